@@ -13,10 +13,6 @@ def nearest_turn(steps, low, high):
     return nearest(steps, low, high, 4096)
 
 
-def lost(steps, low, high):
-    return nearest_turn(steps, low, high) != steps
-
-
 def away(steps, low, high):
     return max(low - steps, steps - high, 0)
 
@@ -33,7 +29,6 @@ def test_inside_the_range_nothing_changes(steps, span):
     low, high = span
     inside = low + steps % (high - low + 1)
     assert nearest_turn(inside, low, high) == inside
-    assert not lost(inside, low, high)
 
 
 def test_by_hand():
@@ -41,5 +36,4 @@ def test_by_hand():
     assert nearest_turn(-6, 100, 1500) == -6
     assert nearest_turn(3200, 1000, 3000) == 3200
     assert nearest_turn(5000, 0, 4095) == 904
-    assert lost(4090, 100, 1500) and lost(5000, 0, 4095)
-    assert not lost(20, 100, 1500)
+    assert nearest_turn(20, 100, 1500) == 20

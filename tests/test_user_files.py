@@ -70,9 +70,7 @@ def test_what_is_no_regular_file_is_refused_at_once(
     refused(lambda: reader(str(binary)))
 
 
-@pytest.mark.parametrize(
-    "reader", [READERS[k] for k in ("rig", "character", "profile", "rules", "walk")]
-)
+@pytest.mark.parametrize("reader", READERS.values(), ids=READERS)
 def test_nothing_of_a_file_that_is_no_configuration_is_shown(
     reader: Callable[[str], object], tmp_path: Path
 ) -> None:

@@ -176,21 +176,6 @@ def test_a_servo_that_does_not_confirm_its_torque_off_is_named(
     assert "torque off on all servos; neck_roll (servo 9): torque-off not confirmed" in done.err
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("jog", "neck_yaw", "10"),
-        ("monitor", "--once"),
-        ("calibrate", "--dry-run", "--joint", "neck_yaw"),
-    ],
-    ids=lambda words: words[0],
-)
-def test_an_absent_port_is_said_with_what_there_is(words: tuple[str, ...]) -> None:
-    done = invoked(*words, "--port", "/dev/ttyNowhere")
-    assert done.code == 2
-    assert "no serial port /dev/ttyNowhere" in done.err
-
-
 def test_nonsense_is_refused_before_the_torque_is_on() -> None:
     for words in (("jog", "nose", "3"), ("jog", "neck_yaw", "nan")):
         done = invoked(*words, "--mock")

@@ -27,19 +27,16 @@ class Looks:
     """Columns of n ticks; degrees, yaw + left, pitch + up, seen from the head.
 
     t_s: (n,); gaze_deg, plan_deg: (n, 2) measured gaze in space; the planned gaze point
-    eyes_deg: (n, 2, 2) left and right eye in the head, measured
     target_deg: (n, 2) of the point to look at; look: (n,) its number
-    flight: (n,) whether a saccade is planned in this tick; saccades: (n,) their number until then
+    flight: (n,) whether a saccade is planned in this tick
     """
 
     t_s: np.ndarray
     gaze_deg: np.ndarray
     plan_deg: np.ndarray
-    eyes_deg: np.ndarray
     target_deg: np.ndarray
     look: np.ndarray
     flight: np.ndarray
-    saccades: np.ndarray
 
 
 def point(yaw_deg: float, pitch_deg: float = 0.0) -> Vec3:
@@ -69,11 +66,11 @@ def commanded(times_s: Sequence[float], points: Sequence[Vec3], seed: int) -> Lo
             last_s = t_s
             if number >= 0:
                 rows.append((t_s, *_angles(tick.pose, tick.gaze.gaze_point_world_m, points[number]),
-                             number, tick.gaze.phase == "saccade", tick.gaze.saccades))  # fmt: skip
+                             number, tick.gaze.phase == "saccade"))  # fmt: skip
     table = np.array(rows, dtype=float)
     return Looks(
-        table[:, 0], table[:, 1:3], table[:, 3:5], table[:, 7:11].reshape(-1, 2, 2),
-        table[:, 5:7], table[:, 11].astype(int), table[:, 12] > 0.0, table[:, 13].astype(int),
+        table[:, 0], table[:, 1:3], table[:, 3:5],
+        table[:, 5:7], table[:, 7].astype(int), table[:, 8] > 0.0,
     )  # fmt: skip
 
 
@@ -92,5 +89,4 @@ def _angles(pose: GazeState, plan: Vec3, target: Vec3) -> list[float]:
     head = pose.p_world_head_m
     sight = add(line_of_sight(pose, left=True), line_of_sight(pose, left=False))
     ways = sight, sub(plan, head), sub(target, head)
-    eyes = (*pose.eye_left_rad, *pose.eye_right_rad)
-    return np.degrees([angle for way in ways for angle in yaw_pitch(way)] + list(eyes)).tolist()
+    return np.degrees([angle for way in ways for angle in yaw_pitch(way)]).tolist()

@@ -55,9 +55,7 @@ def following(run: Runner, hz: float, seconds: float, seed: int) -> Following:
     seen = run(SwingingFace(hz), seed=seed, seconds=lasts_s, overrides=ON_ONE_POINT)
     t, kept = seen.t_s, smooth(seen) & (seen.t_s > _SETTLED_S)
     gaze, face = seen.gaze_deg[:, 0], seen.truth_deg("face 0")[:, 0]
-    response = _phasor(t, np.gradient(gaze, t), hz, kept) / _phasor(
-        t, np.gradient(face, t), hz, kept
-    )
+    response = phasor(t, np.gradient(gaze, t), hz, kept) / phasor(t, np.gradient(face, t), hz, kept)
     step = round(_SPEED_OVER_S / float(np.median(np.diff(t))))
     speed = np.abs(gaze[step:] - gaze[:-step]) / (t[step:] - t[:-step])
     calm = np.convolve(~kept, np.ones(step + 1))[step : len(kept)] < 0.5
@@ -78,7 +76,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     return out
 
 
-def _phasor(t: np.ndarray, x: np.ndarray, hz: float, kept: np.ndarray) -> complex:
+def phasor(t: np.ndarray, x: np.ndarray, hz: float, kept: np.ndarray) -> complex:
     """Return the sine of a frequency in a signal, as a complex amplitude."""
     w = 2.0 * np.pi * hz
     base = np.column_stack([np.sin(w * t), np.cos(w * t), np.ones_like(t)])[kept]

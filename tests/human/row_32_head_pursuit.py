@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from human.measured_run import Runner
+from human.row_01_pursuit import phasor
 from human.swinging_face import SwingingFace
 
 SCENE = SwingingFace(0.08, 25.0)
@@ -34,12 +35,13 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         t, head = one.t_s[kept], one.head_deg[kept, 0]
         step = round(_OVER_S / float(np.median(np.diff(t))))
         speed = np.abs(head[step:] - head[:-step]) / _OVER_S
-        w = 2.0 * np.pi * SCENE.hz
         moved, walked = (
-            complex(*_phasor(t, x, w)) for x in (head, one.truth_deg("face 0")[kept, 0])
+            phasor(one.t_s, x[:, 0], SCENE.hz, kept)
+            for x in (one.head_deg, one.truth_deg("face 0"))
         )
         ratio = moved / walked
-        rows.append((100.0 * (speed < _STILL_DEG_S).mean(), np.angle(ratio) / w, abs(ratio)))
+        behind_s = -np.angle(ratio) / (2.0 * np.pi * SCENE.hz)
+        rows.append((100.0 * (speed < _STILL_DEG_S).mean(), behind_s, abs(ratio)))
         eyes.append(np.abs(one.eyes_deg[kept, :, 0].mean(axis=1)))
     still, lag, gain = np.mean(rows, axis=0)
     off = np.concatenate(eyes)
@@ -50,10 +52,3 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "largest eye angle, deg": float(off.max()),
         "head's motion over the walker's": float(gain),
     }
-
-
-def _phasor(t: np.ndarray, x: np.ndarray, w: float) -> tuple[float, float]:
-    """Return the cosine and the negative sine of a frequency in a signal: positive angles lag."""
-    base = np.column_stack([np.cos(w * t), np.sin(w * t), np.ones_like(t)])
-    c, s, _ = np.linalg.lstsq(base, x, rcond=None)[0]
-    return float(c), float(s)

