@@ -317,6 +317,7 @@ CURVES = {
             lambda: "time" + ",c" * 200_000 + "\n0" + ",1" * 200_000,
             "200,000 columns; at most",
         ),
+        ("empty.csv", lambda: "\n" * 30_000_000, "30,000,000 lines; at most"),
         ("words.csv", lambda: "time,neck_yaw\n" + "a,b\n" * 2_000_000, "and at least 990 more"),
         ("curves.gltf", lambda: json.dumps(CURVES), "300,000 curves; at most"),
     ],
