@@ -151,19 +151,3 @@ def test_nonsense_is_refused_and_changes_nothing(widgets: Widgets, text: str) ->
     assert slider.value == 0.0 and tab.client.seen >= {"steer", "watch"}
     tab.read()
     assert len(tab.notices) == 1 and tab.notices[0][1]
-
-
-def test_what_is_of_one_browser_is_neither_seen_nor_set_by_another(widgets: Widgets) -> None:
-    heard: list[str] = []
-    one, other = Tab(widgets, "browser 1"), Tab(widgets, "browser 2")
-    own = widgets.panel("tune").for_client(one.client.name)
-    field = own.section("parameters").text("find")
-    field.on_change(lambda text, client: heard.append(text))
-    assert one.read() == [1, 2] and other.read() == []
-    other.send({"set": [2, "mine"]})
-    other.read()
-    assert heard == [] and field.value == "" and other.notices == []
-    one.send({"set": [2, "mine"]})
-    assert heard == ["mine"]
-    widgets.leave(one.client)
-    assert Tab(widgets).read() == []  # it is gone with its browser

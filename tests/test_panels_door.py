@@ -59,7 +59,8 @@ def test_what_is_shown_comes_and_what_is_done_is_heard(near: Rig) -> None:
         assert "goes from -10 to 10" in said(there)["say"][0]["text"]
         there.send("no JSON")
         assert said(there)["say"][0]["refused"] is True
-    panel.clear()
+    slider.remove()
+    image.remove()
 
 
 def test_a_flood_of_one_browser_does_not_hold_up_a_stop(near: Rig) -> None:

@@ -110,9 +110,8 @@ def serve(
     browsers, widgets = Browsers(token), Widgets()
 
     def name(client: str) -> str:
-        """Return the name of a client's browser; client: its number, possibly with a suffix."""
-        number = client.partition(":")[0]
-        in_view = browser_of(server, int(number)) if number.isdecimal() else ""
+        """Return the name of a client's browser; client: its name, or its number in the view."""
+        in_view = browser_of(server, int(client)) if client.isdecimal() else ""
         return widgets.browser(client) or in_view
 
     outbox = Outbox(

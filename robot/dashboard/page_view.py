@@ -125,16 +125,14 @@ class PageView:
     def _take(self, kind: bytes, data: object) -> None:
         """Apply messages of the rig other than snapshots and frames."""
         if kind == MESSAGE and isinstance(data, list):
-            who, text = data
-            self._controls.record_answer(who)
+            client, text = data
             if text:
-                client = who.partition(":")[0]
+                refused = text.startswith(_REFUSED)
                 self._widgets.notify(
-                    text.removeprefix(_REFUSED),
-                    client,
-                    self._outbox.name(client),
-                    refused=text.startswith(_REFUSED),
+                    text.removeprefix(_REFUSED), client, self._outbox.name(client), refused=refused
                 )
+                if refused:
+                    self._controls.show_values()
         elif kind == PARAMS and isinstance(data, list):
             self._controls.add_params(data)
         elif kind == TRACKS and isinstance(data, list):

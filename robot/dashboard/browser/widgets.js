@@ -20,7 +20,6 @@
  * @property {string} current
  * @property {boolean} pick
  * @property {boolean} open
- * @property {boolean} whole
  * @property {string} on
  * @property {number} low
  * @property {number} high
@@ -44,7 +43,6 @@ import { drawChart } from "./chart.js";
 
 const AGAIN_MS = 500;
 const DRAG_MS = 50; // shortest time between values of a dragged slider
-const KEYS_MS = 250;
 const NOTICE_MS = 8000, REFUSED_MS = 14000;
 const NUMBER_BYTES = 4;
 const PICK_STEP = 0.04;
@@ -196,14 +194,10 @@ const KINDS = {
       if (field.value !== force || on === "enter") { force = field.value; send(force); }
       field.classList.remove("typed");
     };
-    const byKey = seldom(() => commit(), KEYS_MS);
-    field.addEventListener("input", () => {
-      if (on === "key") byKey(0);
-      else field.classList.add("typed");
-    });
+    field.addEventListener("input", () => { field.classList.add("typed"); });
     field.addEventListener("keydown", (event) => {
       if (event.key === "Enter") commit();
-      if (event.key === "Escape" && on !== "key" && field.value !== force) {
+      if (event.key === "Escape" && field.value !== force) {
         event.stopPropagation(); // it closes no drawer
         shown();
       }
@@ -260,7 +254,6 @@ const KINDS = {
         field.step = String(props.step);
         describe(field, props.hint);
       }
-      number.step = props.whole ? "1" : String(props.step);
       if (changed.value !== undefined) force = props.value;
       if (!held && !number.classList.contains("typed")) shown();
     } };

@@ -31,11 +31,13 @@ from gazerig.robot.model.commands import Command, Tune, Value
 
 _FRAME_S = 0.08
 _STATE_S = 0.3
+_LIVE = "next tick"
+"""Time of effect of the parameters that a running rig applies."""
 _PIECE = 40  # parameters in a message: about 20 kB, a tenth of the limit
 
 
 class ParamFeed:
-    """Sends the parameters to the page, and after that all changes.
+    """Sends the parameters that a running rig applies to the page, and after that all changes.
 
     The constructor writes the first messages. This takes a moment, so construct it before the
     torque is on.
@@ -51,6 +53,7 @@ class ParamFeed:
         self._due: deque[bytes] = deque()
         self._known: dict[str, Value] = {}
         self._version: int | None = None
+        self._live: frozenset[str] = frozenset()
         self._write()
 
     def restart(self) -> None:
@@ -76,10 +79,12 @@ class ParamFeed:
         # Before reading, so that a change in the meantime is sent next.
         self._version = self._tuning.version
         if first:
-            params = self._tuning.parameters()
+            params = [param for param in self._tuning.parameters() if param.live == _LIVE]
+            self._live = frozenset(param.key for param in params)
             for start in range(0, len(params), _PIECE):
                 self._due.append(PARAMS + msgspec.json.encode(params[start : start + _PIECE]))
-        now = dict(self._tuning.values())
+        values = self._tuning.values()
+        now = {key: value for key, value in values.items() if key in self._live}
         gone = object()
         changed = [key for key, value in now.items() if self._known.get(key, gone) != value]
         self._known = now

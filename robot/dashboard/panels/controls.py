@@ -7,7 +7,7 @@ from math import degrees, radians
 import viser
 
 from gazerig.gaze.track.expression import NEUTRAL
-from gazerig.robot.dashboard.panels.param_panel import ParamPanels
+from gazerig.robot.dashboard.panels.param_panel import ParamPanel
 from gazerig.robot.dashboard.panels.play_panel import PlayPanel
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.widgets.html import note
@@ -34,7 +34,7 @@ class Controls:
         self._steer, self._tune = widgets.panel("steer"), widgets.panel("tune")
         self._jog = JogPanel(self._steer.section("joints", order=40), outbox)
         self._lead = GazeTargetPanel(self._steer, scene, outbox, self._jog.forget_jogged)
-        self._tuning = ParamPanels(widgets, self._tune, outbox)
+        self._tuning = ParamPanel(widgets, self._tune, outbox)
         self._face = ExpressionPanel(self._steer, outbox)
         self._play = PlayPanel(widgets.panel("play"), outbox)
         self._talk = TalkPanel(self._steer, outbox)
@@ -76,9 +76,9 @@ class Controls:
         self._play.show(snapshot)
         self._talk.show(snapshot)
 
-    def record_answer(self, who: str) -> None:
-        """Record the rig's answer to a browser's change."""
-        self._tuning.record_answer(who)
+    def show_values(self) -> None:
+        """Show all parameters in force again, after a refused change."""
+        self._tuning.show_values()
 
 
 class TalkPanel:

@@ -20,13 +20,11 @@ class WidgetPlace(NamedTuple):
 
     number: number of the element; parent: name of the panel or number of the section around it
     panel: name of the panel around it, at any depth
-    owner: only client that sees it, "" for all
     """
 
     number: int
     parent: str | int
     panel: str
-    owner: str = ""
 
 
 class WidgetPublisher(Protocol):
@@ -36,7 +34,7 @@ class WidgetPublisher(Protocol):
         """Send changed properties to all viewers of the element, except one client."""
 
     def publish_removal(self, widget: "Widget") -> None:
-        """Remove the element and its children from all browsers."""
+        """Remove an element without children from all browsers."""
 
     def publish_image(self, widget: "Widget") -> None:
         """Send an element's new image."""
@@ -185,7 +183,7 @@ class Checkbox(Field[bool]):
 
 
 class TextField(Field[str]):
-    """Line of text, sent ``on`` "enter" (also if the focus has "left"), or at each "key"."""
+    """Line of text, sent ``on`` "enter", or also if the focus has "left"."""
 
     def check_value(self, value: object) -> str:
         """Return a text without control characters."""
@@ -212,16 +210,12 @@ class Slider(Field[float]):
         self._set(low=ends[0], high=ends[1])
 
     def check_value(self, value: object) -> float:
-        """Return a number between the ends, whole if the slider's step is."""
+        """Return a number between the ends."""
         low, high = self.ends
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise ValueError(f"{self.label} is a number from {low:g} to {high:g}")
         if not low <= value <= high:
             raise ValueError(f"{self.label} goes from {low:g} to {high:g}; {value:g} is outside")
-        if self.props["whole"]:
-            if value != int(value):
-                raise ValueError(f"{self.label} is a whole number")
-            return int(value)
         return float(value)
 
 

@@ -48,29 +48,21 @@ class Container:
         page: page to which elements are added.
         parent: name of the panel, or number of the section.
         panel: name of the panel.
-        owner: only client that sees the added elements, "" for all.
     """
 
-    def __init__(self, page: "Widgets", parent: str | int, panel: str, owner: str = "") -> None:
+    def __init__(self, page: "Widgets", parent: str | int, panel: str) -> None:
         self.page = page
-        self._where = (parent, panel, owner)
-
-    def for_client(self, client: str) -> "Container":
-        """Return this container for elements that only one client sees."""
-        return Container(self.page, *self._where[:2], client)
-
-    def clear(self) -> None:
-        """Remove all elements."""
-        self.page.clear(self._where[0])
+        self._where = (parent, panel)
 
     def html(self, content: str = "", *, order: float = 0.0) -> Html:
         """Add a piece of HTML."""
         return self.page.add(Html, "html", self._where, {"content": content, "order": order})
 
-    def section(self, title: str, *, is_open: bool = True, order: float = 0.0) -> "Section":
+    def section(self, title: str, *, is_open: bool = True, order: float = 0.0) -> "Container":
         """Add a section with a title that can be folded."""
         props: dict[str, object] = {"title": title, "open": is_open, "order": order}
-        return Section(self, self.page.add(Widget, "section", self._where, props))
+        widget = self.page.add(Widget, "section", self._where, props)
+        return Container(self.page, widget.place.number, widget.place.panel)
 
     def image(self, label: str, *, pick: bool = False, order: float = 0.0) -> Image:
         """Add an image, empty at first; label: its description for screen readers.
@@ -107,9 +99,9 @@ class Container:
     def text(
         self, label: str, value: str = "", *, hint: str = "", on: str = "left", order: float = 0.0
     ) -> TextField:
-        """Add a text field that is sent at Enter, when it loses the focus, or at each key.
+        """Add a text field that is sent at Enter, or also when it loses the focus.
 
-        on: "enter", "left" or "key"
+        on: "enter" or "left"
         """
         props: dict[str, object] = {
             "label": label, "value": value, "hint": hint, "on": on, "order": order,
@@ -124,13 +116,12 @@ class Container:
         value: float,
         *,
         hint: str = "",
-        whole: bool = False,
         order: float = 0.0,
     ) -> Slider:
         """Add a slider between two ends, whose number can also be typed."""
         props: dict[str, object] = {
             "label": label, "low": ends[0], "high": ends[1], "step": step, "value": value,
-            "hint": hint, "whole": whole, "order": order,
+            "hint": hint, "order": order,
         }  # fmt: skip
         return self.page.add(Slider, "slider", self._where, props)
 
@@ -163,18 +154,6 @@ class Container:
             "label": label, "options": list(options), "current": "", "hint": hint, "order": order,
         }  # fmt: skip
         return self.page.add(Buttons, "buttons", self._where, props)
-
-
-class Section(Container):
-    """Part of a panel under a title."""
-
-    def __init__(self, parent: Container, widget: Widget) -> None:
-        super().__init__(parent.page, widget.place.number, *widget.place[2:])
-        self.widget = widget
-
-    def remove(self) -> None:
-        """Remove the section with all its elements."""
-        self.widget.remove()
 
 
 class Notice(NamedTuple):
@@ -224,7 +203,6 @@ class Widgets:
         self._numbers = self._client_numbers = 0
         self._held = 0
         self._on_join: list[Callable[[str], object]] = []
-        self._on_leave: list[Callable[[str], object]] = []
 
     # --- elements --------------------------------------------------------------------------
 
@@ -235,9 +213,9 @@ class Widgets:
         return Container(self, name, name)
 
     def add(
-        self, make: Make[W], kind: str, where: tuple[str | int, str, str], props: dict[str, object]
+        self, make: Make[W], kind: str, where: tuple[str | int, str], props: dict[str, object]
     ) -> W:
-        """Add an element; where: its parent, its panel, and the only client that sees it."""
+        """Add an element; where: its parent and its panel."""
         with self._lock:
             self._numbers += 1
             widget = make(self, WidgetPlace(self._numbers, *where), kind, props)
@@ -250,7 +228,7 @@ class Widgets:
         with self._lock:
             if widget.place.number not in self._widgets:
                 return
-            for client in self._viewers(widget):
+            for client in self._clients.values():
                 if client.name != but:
                     waiting = client.changes.setdefault(widget.place.number, {})
                     assert waiting is not None  # numbers are not reused
@@ -258,21 +236,19 @@ class Widgets:
             self._wake()
 
     def publish_removal(self, widget: Widget) -> None:
-        """Remove an element and its children."""
+        """Remove an element without children."""
         with self._lock:
             if self._widgets.pop(widget.place.number, None) is None:
                 return
-            for client in self._viewers(widget):
+            for client in self._clients.values():
                 client.changes[widget.place.number] = None
                 client.images.discard(widget.place.number)
-            for one in [w for w in self._widgets.values() if w.place.parent == widget.place.number]:
-                self.publish_removal(one)
             self._wake()
 
     def publish_image(self, widget: Widget) -> None:
         """Send an element's new image."""
         with self._lock:
-            for client in self._viewers(widget):
+            for client in self._clients.values():
                 client.images.add(widget.place.number)
             self._wake()
 
@@ -287,12 +263,6 @@ class Widgets:
             with self._lock:
                 self._held -= 1
                 self._wake()
-
-    def clear(self, parent: str | int) -> None:
-        """Remove all elements of a panel or section."""
-        with self._lock:
-            for one in [w for w in self._widgets.values() if w.place.parent == parent]:
-                self.publish_removal(one)
 
     def notify(
         self, text: str, client: str = "", browser: str = "", *, refused: bool = False
@@ -314,10 +284,6 @@ class Widgets:
         """Whether any client is connected."""
         return bool(self._clients)
 
-    def _viewers(self, widget: Widget) -> list[Client]:
-        owner = widget.place.owner
-        return [client for client in self._clients.values() if owner in ("", client.name)]
-
     def _wake(self) -> None:
         if self._held:
             return
@@ -331,10 +297,6 @@ class Widgets:
         """Call ``do`` with the name of every client that connects."""
         self._on_join.append(do)
 
-    def on_leave(self, do: Callable[[str], object]) -> None:
-        """Call ``do`` with the name of every client that has disconnected."""
-        self._on_leave.append(do)
-
     def join(self, browser: str, wake: Callable[[], None]) -> Client:
         """Add a client and queue all elements for it; wake: called when data waits."""
         with self._lock:
@@ -342,10 +304,9 @@ class Widgets:
             client = Client(f"panels-{self._client_numbers}", browser, wake)
             self._clients[client.name] = client
             for number, widget in self._widgets.items():
-                if not widget.place.owner:
-                    client.changes[number] = dict(widget.props)
-                    if widget.data:
-                        client.images.add(number)
+                client.changes[number] = dict(widget.props)
+                if widget.data:
+                    client.images.add(number)
         for do in self._on_join:
             do(client.name)
         with self._lock:
@@ -353,14 +314,9 @@ class Widgets:
         return client
 
     def leave(self, client: Client) -> None:
-        """Remove a client and its own elements."""
+        """Remove a client."""
         with self._lock:
             self._clients.pop(client.name, None)
-            for widget in list(self._widgets.values()):
-                if widget.place.owner == client.name:
-                    self._widgets.pop(widget.place.number, None)
-        for do in self._on_leave:
-            do(client.name)
 
     def browser(self, client: str) -> str:
         """Return the name of a client's browser, "" if it is not connected."""
@@ -423,7 +379,7 @@ class Widgets:
                 with self._lock:
                     widget = self._widgets.get(number)
                 # It may just have been removed.
-                if widget is None or widget.place.owner not in ("", client.name):
+                if widget is None:
                     return
                 try:
                     widget.receive_input(value, client.name)
