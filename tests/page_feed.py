@@ -15,9 +15,10 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
-from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState
+from gazerig.robot.dashboard.feed.live_feed import LiveRig
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
+from gazerig.robot.dashboard.feed.snapshot import RunState
 from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
@@ -55,7 +56,7 @@ class PageFeed:
         self._frame = 1000
 
     def _rig(self) -> LiveRig:
-        return LiveRig(200.0, self._made.shown_rig())
+        return LiveRig(self._made.shown_rig())
 
     def turned(self, joints_rad: Mapping[str, float]) -> Tick:
         """Return the tick with other angles of some joints."""

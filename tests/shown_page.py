@@ -35,7 +35,6 @@ SNAPSHOT = Snapshot(
     reasons=(),
     faces=(),
     bodies=(),
-    rate_hz=200.0,
     health="0 lost",
     joints=GAZE_JOINTS,
 )

@@ -24,7 +24,7 @@ def running() -> Iterator[Running]:
 
 
 def shown(tick: Tick) -> Snapshot:
-    return snapshot(tick, 200.0, "", "")
+    return snapshot(tick)
 
 
 def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from msgspec import structs
+from page_feed import IN_TIME
 from shown_page import wait_for
 from world_shapes import SmallWorld
 
@@ -17,19 +18,17 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
-from gazerig.robot.control.tick_text import perception_text
 from gazerig.robot.dashboard.feed.camera_overlay import background, draw_detections
 from gazerig.robot.dashboard.feed.gaze_trail import GAZE_KEPT_S, GazeHistory
 from gazerig.robot.dashboard.feed.live_feed import (
     LiveFeed,
     LiveRig,
-    RunState,
     gaze_pixel,
     read_waiting,
 )
 from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
-from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts
+from gazerig.robot.dashboard.feed.snapshot import RunState, SnapshotBuilder
 from gazerig.robot.model.control_source import TrackState
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.types import Snapshot
@@ -62,7 +61,8 @@ class Page:
         self.page = PageProcess("127.0.0.1", 0)
         self.page.join(ours)
         self.said: list[str] = []
-        self.state = RunState({"lost": 3}, "wait", "talking", "shy", ResidualFigures(None, None, 0))
+        residual = ResidualFigures(None, None, 0)
+        self.state = RunState({"lost": 3}, "wait", "talking", "shy", residual, timing=IN_TIME)
         self.rigs = 0
         self.picture: ScenePicture | None = None
         self.world: SmallWorld | None = None
@@ -76,7 +76,7 @@ class Page:
 
     def _rig(self, made: Assembly) -> LiveRig:
         self.rigs += 1
-        return LiveRig(200.0, made.shown_rig(), False, self.picture, self.world, self.detector)
+        return LiveRig(made.shown_rig(), False, self.picture, self.world, self.detector)
 
     def comes_up(self) -> None:
         before = self.page.started
@@ -100,7 +100,7 @@ def page(ran: Run) -> Iterator[Page]:
 
 def test_a_snapshot_is_that_of_the_ticks_themselves(ran: Run, page: Page) -> None:
     page.comes_up()
-    direct = SnapshotBuilder(200.0, ran.made.shown_rig())
+    direct = SnapshotBuilder(ran.made.shown_rig())
     shots: list[Snapshot] = []
     talk = ConversationState(3, "speaking", 1, 0.5, 6.0, 0.9, "Hello", "agent")
     ticks = [
@@ -116,17 +116,12 @@ def test_a_snapshot_is_that_of_the_ticks_themselves(ran: Run, page: Page) -> Non
     last = shots[-1]
     events = tuple(event for shot in shots for event in shot.events)
     trail = tuple(one for shot in shots for one in shot.trail)
-    tick = ticks[-1]
-    perception = perception_text(
-        tick, ran.made.robot.perception.residual()._replace(speed_deg_s=None)
-    )
-    whole = direct.build(SnapshotTexts("bus: lost 3 times", "wait", perception, "shy", "talking"))
+    whole = direct.build(page.state)
     assert whole is not None and len(whole.events) > 2
     assert events == whole.events and trail == whole.trail
     for field in fields(Snapshot):
-        if field.name not in ("events", "trail", "worst", "timing"):
+        if field.name not in ("events", "trail", "worst"):
             assert getattr(last, field.name) == getattr(whole, field.name), field.name
-    assert last.timing is not None and last.timing.overruns_ever == 0
     assert page.said == ["the page is at http://127.0.0.1:9/?token=x"]
 
 

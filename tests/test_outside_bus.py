@@ -121,7 +121,7 @@ def test_the_guardian_switches_its_torque_off(example):
 
 def test_the_page_draws_it(example):
     made = assemble(load_rig(str(HEAD)), RunOptions(mock=True, fast=True))
-    message = rig_message(LiveRig(40.0, made.shown_rig()))
+    message = rig_message(LiveRig(made.shown_rig()))
     made.close()
     del SERVOS["lx-16a"]  # the page's process loads no package
     feed = LiveFeed()

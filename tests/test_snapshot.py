@@ -8,6 +8,7 @@ import pytest
 from desk import GAZE_JOINTS
 from fakes.runs import play
 from msgspec.structs import replace
+from page_feed import STATE
 from six_joints import SIX
 
 from gazerig.config.schema import Rig, load_rig
@@ -15,13 +16,12 @@ from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts, snapshot
+from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, snapshot
 from gazerig.robot.model.types import SeenBlink, SeenSaccade, Snapshot
 from gazerig.robot.safety.health import HOT_C
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
-RATE_HZ = 200.0
 TICKS_BETWEEN = 8
 
 
@@ -48,19 +48,19 @@ def shown_rig() -> ShownRig:
 
 @cache
 def taken() -> tuple[Snapshot, ...]:
-    snapshots = SnapshotBuilder(RATE_HZ, shown_rig())
+    snapshots = SnapshotBuilder(shown_rig())
     out = []
     for number, tick in enumerate(visit()[2]):
         snapshots.update(tick)
         if number % TICKS_BETWEEN == TICKS_BETWEEN - 1:
-            shot = snapshots.build(SnapshotTexts("bus ok", "wait", "perception", "shy", "listen"))
+            shot = snapshots.build(STATE)
             assert shot is not None
             out.append(shot)
     return tuple(out)
 
 
 def test_nothing_is_shown_before_the_first_tick() -> None:
-    assert SnapshotBuilder(RATE_HZ).build(SnapshotTexts()) is None
+    assert SnapshotBuilder().build(STATE) is None
 
 
 def test_every_eye_movement_is_shown_once() -> None:
@@ -105,11 +105,11 @@ def test_the_camera_sits_on_the_head_and_sees_the_face() -> None:
 
 def test_servos_come_with_their_limits_and_their_silences() -> None:
     rig, _, ticks = visit()
-    snapshots = SnapshotBuilder(RATE_HZ, shown_rig())
+    snapshots = SnapshotBuilder(shown_rig())
     silent = replace(ticks[3].joints, missing=("neck_yaw",))
     for tick in (*ticks[:3], replace(ticks[3], joints=silent)):
         snapshots.update(tick)
-    shot = snapshots.build(SnapshotTexts())
+    shot = snapshots.build(STATE)
     assert shot is not None and shot.servos.limits is not None
     assert shot.servos.unanswered == tuple(int(name == "neck_yaw") for name in GAZE_JOINTS)
     hottest = rig.joints["neck_yaw"].limit().hottest_c
@@ -119,15 +119,15 @@ def test_servos_come_with_their_limits_and_their_silences() -> None:
 
 def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
     ticks = visit()[2]
-    snapshots = SnapshotBuilder(RATE_HZ)
+    snapshots = SnapshotBuilder()
     calm = [tick for tick in ticks if tick.guard_result.level == "ok"][:4]
     short = replace(calm[1], guard_result=replace(calm[1].guard_result, level="hold"))
     for tick in (calm[0], short, calm[2]):
         snapshots.update(tick)
-    shot = snapshots.build(SnapshotTexts())
+    shot = snapshots.build(STATE)
     assert shot is not None and (shot.level, shot.worst) == ("ok", "hold")
     snapshots.update(calm[3])
-    after = snapshots.build(SnapshotTexts())
+    after = snapshots.build(STATE)
     assert after is not None and after.worst == "ok"
 
 
@@ -135,10 +135,10 @@ def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
 def maker_shown() -> tuple[tuple[Tick, ...], Snapshot]:
     """Two seconds of six hobby servos on a Maestro, in one snapshot."""
     _, made, ticks = visit("maker", 2.0)
-    snapshots = SnapshotBuilder(RATE_HZ, made.shown_rig())
+    snapshots = SnapshotBuilder(made.shown_rig())
     for tick in ticks:
         snapshots.update(tick)
-    shot = snapshots.build(SnapshotTexts())
+    shot = snapshots.build(STATE)
     assert shot is not None
     return ticks, shot
 
@@ -151,7 +151,7 @@ def test_joints_of_servos_that_tell_nothing_are_shown_as_estimated() -> None:
     assert shot.servos.unanswered == (0,) * 6
     assert all(len(row.measured_rad) == 6 for row in shot.trail)
     one = replace(ticks[-1].joints, measured=(True, False, True, True, True, False))
-    mixed = snapshot(replace(ticks[-1], joints=one), 200.0, "", "")
+    mixed = snapshot(replace(ticks[-1], joints=one))
     assert mixed.estimated == ("eyes_tilt", "right_lower_lid")
-    measured = snapshot(visit()[2][-1], 200.0, "", "")
+    measured = snapshot(visit()[2][-1])
     assert measured.joints == GAZE_JOINTS and measured.estimated == ()

@@ -31,9 +31,10 @@ from gazerig.robot.control.observers import Observers, failure_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.door.token_file import hide_token
-from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState
+from gazerig.robot.dashboard.feed.live_feed import LiveRig
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import ParamFeed, Publisher
+from gazerig.robot.dashboard.feed.snapshot import RunState
 from gazerig.robot.dashboard.feed.status_line import StatusLine
 from gazerig.robot.dashboard.requests.page_requests import PageRequestHandler
 from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
@@ -186,7 +187,7 @@ class RunObservers:
         picture = ScenePicture(made.scene) if made.scene is not None else None
         shapes = made.room.shapes() if made.room is not None else None
         return LiveRig(
-            made.loop.rate_hz, made.shown_rig(), self._emulated, picture, shapes, self._detector,
+            made.shown_rig(), self._emulated, picture, shapes, self._detector,
             self._choice,
         )  # fmt: skip
 

@@ -287,7 +287,6 @@ class Snapshot:
         lids: Measured left and right opening, 0..1.
         target_name, why: Target, e.g. "face 3: left eye", and the reason for it; while a client
             is in control, the client and its command.
-        rate_hz: Control rate of the last second.
         health: State of the bus as text.
         behaviour: Present behaviour.
         saliences: Saliences of the winner and the next bodies, highest first.
@@ -333,8 +332,7 @@ class Snapshot:
     reasons: tuple[str, ...]
     faces: tuple["Face", ...]
     bodies: tuple[SeenBody, ...]
-    rate_hz: float
-    health: str
+    health: str = ""
     behaviour: str = ""
     saliences: tuple["Salience", ...] = ()
     perception: str = ""

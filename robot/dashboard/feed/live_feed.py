@@ -8,10 +8,9 @@ ticks, and other data (``RunState``) when it has changed.
 import json
 import pickle
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from msgspec import UNSET, structs
@@ -20,18 +19,10 @@ from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.drivers.process.passed_image import PassedImage, receive, take_image
-from gazerig.drivers.types import (
-    BusHealth,
-    DetectedFace,
-    DetectedPerson,
-    Detections,
-    ImageArray,
-    MovingBlob,
-)
+from gazerig.drivers.types import Detections, ImageArray
 from gazerig.gaze.types import Floats, Mat3, Percept, Vec3
 from gazerig.robot.control.tick import Tick, TickRecord
 from gazerig.robot.control.tick_stream import decode, encode
-from gazerig.robot.control.tick_text import health_text, perception_text
 from gazerig.robot.dashboard.feed.gaze_trail import GazeHistory, GazeTrail
 from gazerig.robot.dashboard.feed.page_process import (
     CHOICES,
@@ -40,14 +31,14 @@ from gazerig.robot.dashboard.feed.page_process import (
     TRACKS,
     VALUES,
 )
-from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
+from gazerig.robot.dashboard.feed.snapshot import RunState, ShownRig, SnapshotBuilder
 from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES
 from gazerig.robot.description.build import RigShape
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.model.scene_view import PinholeView, SceneView
-from gazerig.robot.model.types import LoopFigures, Snapshot
+from gazerig.robot.model.types import Snapshot
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 TICKS, RIG, STATE, DETECTED = b"t", b"g", b"a", b"d"
@@ -60,7 +51,7 @@ _NEAREST_M = 0.05
 
 
 class LiveRig(NamedTuple):
-    """Constant properties of a running rig: the rate of its loop, and its geometry.
+    """Constant properties of a running rig, and its geometry.
 
     emulated: whether its servos are emulated and not being calibrated
     picture: draws the image of a simulated camera; None without one, or if it returns images
@@ -69,7 +60,6 @@ class LiveRig(NamedTuple):
     choice: settings chosen for this computer, in one line; "" if nothing was measured
     """
 
-    rate_hz: float
     shown: ShownRig
     emulated: bool = False
     picture: SceneView | None = None
@@ -85,51 +75,19 @@ class ShownWorld(NamedTuple):
     world_s: float
 
 
-class RunState(NamedTuple):
-    """State of a run that ticks do not contain.
+class ShownFrame(NamedTuple):
+    """Detections of a frame, without its images, and the image to draw them into.
 
-    errors: errors of the bus, by kind; behaviour, conversation, character: the present ones
-    scene_start_s: start of a simulated scene or world, None before it and without one
-    timing: the loop's own figures; None: unknown. In the page's own
-        figures, ticks that a busy page did not accept would appear late.
-    expression: the present one, "" without any
-    """
-
-    errors: dict[str, int]
-    behaviour: str
-    conversation: str
-    character: str
-    residual: ResidualFigures
-    scene_start_s: float | None = None
-    timing: LoopFigures | None = None
-    expression: str = ""
-
-
-class FrameHeader(NamedTuple):
-    """Detections of a frame that are drawn, and properties of its image.
-
-    faces: box, landmarks and confidence; blobs: id, kind, position and radius
-    people: box, centre of the head, size of the trunk and confidence
-    conditions: reasons for poor detection
-    lens: the one with which the frame was located, else the one that the camera reports: fx, fy,
-        cx, cy in pixels and five distortion coefficients
-    shape, dtype: those of the array in the attached memory; None, "" without one
+    found: its lens is the one with which the frame was located, else the one that the camera
+        reports
+    image: array in the attached memory, None without one
     depth: whether it is the depth image; wants_depth: whether depth should be shown
     """
 
-    captured_s: float
-    number: int
-    width_px: int
-    height_px: int
-    faces: Sequence[tuple[Any, Any, float]]
-    blobs: Sequence[tuple[int, str, Any, float]]
-    lens: tuple[float, ...] | None
-    shape: tuple[int, ...] | None
-    dtype: str
+    found: Detections
+    image: PassedImage | None
     depth: bool
     wants_depth: bool
-    people: Sequence[tuple[Any, Any, float, float]] = ()
-    conditions: Sequence[str] = ()
 
 
 def rig_message(rig: LiveRig) -> bytes:
@@ -145,24 +103,16 @@ def state_message(state: RunState) -> bytes:
 def frame_message(
     found: Detections, image: PassedImage | None, depth: bool, wants_depth: bool
 ) -> bytes:
-    """Return a message with the detections of a frame; see ``FrameHeader``."""
-    lens = found.located.intrinsics if found.located is not None else found.lens
-    head = FrameHeader(
-        found.captured_s,
-        found.number,
-        found.width_px,
-        found.height_px,
-        [(face.box_px, face.landmarks_px, face.confidence) for face in found.faces],
-        [(blob.id, blob.kind, blob.p_camera_m, blob.radius_m) for blob in found.blobs],
-        (lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, *lens.distortion) if lens else None,
-        image.shape if image is not None else None,
-        image.dtype if image is not None else "",
-        depth,
-        wants_depth,
-        [(one.box_px, one.head_px, one.trunk_px, one.confidence) for one in found.people],
-        found.conditions,
+    """Return a message with the detections of a frame; see ``ShownFrame``."""
+    plain = replace(
+        found,
+        image=None,
+        depth_m=None,
+        located=None,
+        lens=found.located.intrinsics if found.located is not None else found.lens,
+        faces=tuple([replace(face, mesh=None) for face in found.faces]),  # it is not drawn
     )
-    return DETECTED + encode(head)
+    return DETECTED + encode(ShownFrame(plain, image, depth, wants_depth))
 
 
 class LiveFeed:
@@ -210,7 +160,7 @@ class LiveFeed:
             SERVOS.update(models)
             rig = LiveRig(*parts)
             if self._builder is None:
-                self._builder = SnapshotBuilder(rig.rate_hz, rig.shown)
+                self._builder = SnapshotBuilder(rig.shown)
                 self._poses = PoseHistory(rig.shown.kinematics)
             self._builder.rig = rig.shown
             self.emulated, self.choice = rig.emulated, rig.choice
@@ -220,31 +170,17 @@ class LiveFeed:
             if pickle.dumps(rig.world) != pickle.dumps(self._world):
                 self._world = rig.world
         elif kind == DETECTED:
-            self._take_frame(decode(body, FrameHeader), fd)
+            self._take_frame(decode(body, ShownFrame), fd)
         else:
             return False
         return True
 
     def snapshot(self) -> Snapshot | None:
         """Return the rig's state and its events since the last call; None without new ticks."""
-        if not self._new_ticks or self._builder is None or self._newest is None:
+        if not self._new_ticks or self._builder is None:
             return None
         self._new_ticks = False
-        state, tick = self._state, self._newest
-        seen = perception_text(tick, state.residual)
-        perception = " | ".join(filter(None, (seen, self._detector)))
-        health = health_text(BusHealth(0, 0, state.errors))
-        return self._builder.build(
-            SnapshotTexts(
-                health,
-                state.behaviour,
-                perception,
-                state.character,
-                state.conversation,
-                state.timing,
-                state.expression,
-            )
-        )
+        return self._builder.build(self._state, self._detector)
 
     @property
     def shape(self) -> RigShape | None:
@@ -312,26 +248,12 @@ class LiveFeed:
             self._gaze.add(tick.t_s, tick.gaze.gaze_point_world_m)
         self._new_ticks = True
 
-    def _take_frame(self, head: FrameHeader, fd: int) -> None:
-        lens = None
-        if head.lens is not None:
-            fx_px, fy_px, cx_px, cy_px, k1, k2, p1, p2, k3 = head.lens
-            lens = Intrinsics(fx_px, fy_px, cx_px, cy_px, (k1, k2, p1, p2, k3))
-        found = Detections(
-            head.captured_s,
-            head.number,
-            head.width_px,
-            head.height_px,
-            tuple([DetectedFace(box, np.array(marks), sure) for box, marks, sure in head.faces]),
-            tuple([MovingBlob(*blob) for blob in head.blobs]),
-            lens=lens,
-            people=tuple([DetectedPerson(*one) for one in head.people]),
-            conditions=tuple(head.conditions),
-        )
-        if head.shape is not None and fd >= 0:
-            array = take_image(PassedImage(fd, tuple(head.shape), head.dtype))
-            found = replace(found, depth_m=array) if head.depth else replace(found, image=array)
-        self._found, self._wants_depth, self._new_frame = found, head.wants_depth, True
+    def _take_frame(self, frame: ShownFrame, fd: int) -> None:
+        found = frame.found
+        if frame.image is not None and fd >= 0:
+            array = take_image(frame.image._replace(fd=fd))
+            found = replace(found, depth_m=array) if frame.depth else replace(found, image=array)
+        self._found, self._wants_depth, self._new_frame = found, frame.wants_depth, True
 
 
 def _has_no_image(found: Detections) -> bool:

@@ -21,12 +21,12 @@ from gazerig.robot.control.tick_stream import TickBatch
 from gazerig.robot.dashboard.feed.live_feed import (
     TICKS,
     LiveRig,
-    RunState,
     frame_message,
     rig_message,
     state_message,
 )
 from gazerig.robot.dashboard.feed.page_process import PARAMS, VALUES, PageProcess
+from gazerig.robot.dashboard.feed.snapshot import RunState
 from gazerig.robot.model.commands import Command, Tune, Value
 
 _FRAME_S = 0.08

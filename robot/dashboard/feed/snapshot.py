@@ -7,12 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gazerig.drivers.types import BusHealth
 from gazerig.gaze.angles import angle_between
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import GazeState, Vec3
-from gazerig.robot.control.loop_timing import LoopTiming, busy_text
+from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick, cyclopean_direction
-from gazerig.robot.control.tick_text import head_activity, tick_control_source
+from gazerig.robot.control.tick_text import (
+    head_activity,
+    health_text,
+    perception_text,
+    tick_control_source,
+)
 from gazerig.robot.description.build import RigShape
 from gazerig.robot.model.control_source import playing
 from gazerig.robot.model.frames import CameraMount
@@ -33,13 +39,13 @@ from gazerig.robot.model.types import (
     Snapshot,
     Trail,
 )
+from gazerig.robot.perception.egomotion_residual import ResidualFigures
 from gazerig.robot.safety.health import HOT_C, LASTING_LOAD, VOLTAGE_MARGIN_V, WARM_C
 
 _TICKS_KEPT = 600
 """Largest number of waiting ticks: those of three seconds, for a delayed reader."""
 _TRAIL_S = 0.0095
 """Joints are shown 100 times a second; a little less than 10 ms, for rounding's sake."""
-_TIMING_S = 0.5
 _LOWER_LIDS = frozenset(("left_lower_lid", "right_lower_lid"))
 _GRAVITY: dict[Level, int] = {"ok": 0, "limited": 1, "hold": 2, "torque_off": 3}
 
@@ -57,18 +63,22 @@ class ShownRig(NamedTuple):
     shape: RigShape | None = None
 
 
-class SnapshotTexts(NamedTuple):
-    """State that a tick does not contain: bus errors, perception, present choices, as text.
+class RunState(NamedTuple):
+    """State of a run that ticks do not contain.
 
-    timing: the loop's own figures; None: those of the ticks that arrived
+    errors: errors of the bus, by kind; behaviour, conversation, character: the present ones
+    scene_start_s: start of a simulated scene or world, None before it and without one
+    timing: the loop's own figures; None: unknown. In the page's own
+        figures, ticks that a busy page did not accept would appear late.
     expression: the present one, "" without any
     """
 
-    health: str = ""
-    behaviour: str = ""
-    perception: str = ""
-    character: str = ""
-    conversation: str = ""
+    errors: dict[str, int]
+    behaviour: str
+    conversation: str
+    character: str
+    residual: ResidualFigures
+    scene_start_s: float | None = None
     timing: LoopFigures | None = None
     expression: str = ""
 
@@ -107,17 +117,14 @@ class SnapshotBuilder:
     ``update`` only stores the tick; ``build`` does the work.
     """
 
-    def __init__(self, rate_hz: float, rig: ShownRig | None = None) -> None:
+    def __init__(self, rig: ShownRig | None = None) -> None:
         self.rig = rig
-        self._rate_hz = rate_hz
         self._ticks: deque[Tick] = deque(maxlen=_TICKS_KEPT)
         self._newest: Tick | None = None
         self._begin()
 
     def _begin(self) -> None:
-        self._timing = LoopTiming(self._rate_hz)
-        self._figures: LoopFigures | None = None
-        self._figures_s = self._trail_s = -np.inf
+        self._trail_s = -np.inf
         self._movements = EyeMovements()
         self._unanswered: Counter[str] = Counter()
 
@@ -125,8 +132,11 @@ class SnapshotBuilder:
         """Add a tick."""
         self._ticks.append(tick)
 
-    def build(self, said: SnapshotTexts) -> Snapshot | None:
-        """Return a snapshot of the newest tick, None before the first."""
+    def build(self, state: RunState, detector: str = "") -> Snapshot | None:
+        """Return a snapshot of the newest tick, None before the first.
+
+        detector: detector of faces and people, "" if none runs
+        """
         trail: list[Trail] = []
         events: list[SeenEvent] = []
         worst: Level = "ok"
@@ -135,7 +145,6 @@ class SnapshotBuilder:
             if self._newest is not None and tick.t_s < self._newest.t_s:
                 self._begin()
             self._newest = tick
-            self._timing.update(tick.t_s)
             if tick.joints.missing:
                 self._unanswered.update(tick.joints.missing)
             events += self._movements.update(tick)
@@ -146,45 +155,36 @@ class SnapshotBuilder:
                 worst = tick.guard_result.level
         if self._newest is None:
             return None
-        t_s, track = self._newest.t_s, playing(self._newest.tracks)
-        if t_s - self._figures_s >= _TIMING_S:
-            self._figures, self._figures_s = self._timing.figures(), t_s
-        timing = said.timing if said.timing is not None else self._figures
-        busy = busy_text(timing)
-        plain = snapshot(
-            self._newest, timing.rate_hz if timing else 0.0, said.health, said.behaviour,
-            said.perception, self.rig,
-        )  # fmt: skip
+        track = playing(self._newest.tracks)
+        busy = busy_text(state.timing)
+        seen = perception_text(self._newest, state.residual)
+        plain = snapshot(self._newest, self.rig)
         reasons = plain.reasons
         others = tuple([reason for reason in reasons if not reason.endswith(": stale joints")])
         if busy and len(others) < len(reasons):
             reasons = (*others, busy)  # old readings are due to a busy computer
         return replace(
             plain,
-            character=said.character,
-            conversation=said.conversation,
+            health=health_text(BusHealth(0, 0, state.errors)),
+            perception=" | ".join(filter(None, (seen, detector))),
+            behaviour=state.behaviour,
+            character=state.character,
+            conversation=state.conversation,
             servos=plain.servos._replace(
                 unanswered=tuple([self._unanswered[name] for name in plain.joints])
             ),
-            timing=timing,
+            timing=state.timing,
             busy=busy,
             reasons=reasons,
             worst=worst,
             trail=tuple(trail),
             events=tuple(events),
-            expressed=(track.name if track is not None else "", said.expression),
+            expressed=(track.name if track is not None else "", state.expression),
         )
 
 
-def snapshot(
-    tick: Tick,
-    rate_hz: float,
-    health: str,
-    behaviour: str,
-    perception: str = "",
-    rig: ShownRig | None = None,
-) -> Snapshot:
-    """Return the snapshot of a single tick.
+def snapshot(tick: Tick, rig: ShownRig | None = None) -> Snapshot:
+    """Return the snapshot of a single tick, without the state that it does not contain.
 
     rig: geometry of the rig, for the commanded pose, the camera and the servos' limits
     """
@@ -211,12 +211,8 @@ def snapshot(
         reasons=tick.guard_result.reasons,
         faces=percept.faces if percept is not None else (),
         bodies=_bodies(tick),
-        rate_hz=rate_hz,
-        health=health,
-        behaviour=behaviour,
         saliences=() if leads.overrides_gaze else target.saliences,
         plan="" if leads.overrides_gaze else target.plan,
-        perception=perception,
         commanded_rad=tick.guard_result.command_rad,
         target_kind=leads.kind if leads.overrides_gaze else target.kind,
         target_part=None if leads.overrides_gaze else target.part,
