@@ -186,12 +186,12 @@ def test_stretches_join_end_to_end_and_are_forgotten() -> None:
     for k in range(1000):
         t_s = 0.05 * k
         timeline.update(looking(t_s, "face 1: nose" if t_s < 40.0 else "hand <7>", None))
-    (face, hand) = timeline.intervals("target")
-    assert face == (0.0, pytest.approx(39.95), "face 1")
-    assert hand == (pytest.approx(39.95), pytest.approx(49.95), "hand <7>")
+    face, hand = timeline._rows["target"]
+    assert face[:3] == (0.0, pytest.approx(39.95), "face 1")
+    assert hand[:3] == (pytest.approx(39.95), pytest.approx(49.95), "hand <7>")
     for k in range(1000, 1700):
         timeline.update(looking(0.05 * k, "hand <7>", None))
-    assert [what for _, _, what in timeline.intervals("target")] == ["hand <7>"]
+    assert [stretch.what for stretch in timeline._rows["target"]] == ["hand <7>"]
 
 
 def test_strip_shows_targets_saccades_blinks_and_the_guard_and_runs_no_markup() -> None:

@@ -6,6 +6,7 @@ from msgspec import structs
 from shown_page import SNAPSHOT
 from ticked_rig import Outbox
 
+from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.dashboard.panels.play_panel import PlayPanel, SoundWaves, timeline_html
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.commands import EndTrack, Play
@@ -15,10 +16,10 @@ SHOW = TrackState(
     4, "show", 12.0, 60.0, owns=("neck_yaw", "jaw"), who="stage", sound="/a/hello.wav",
     limited="neck_yaw: slower by 1.2", clock="sound",
 )  # fmt: skip
-INFO = {
-    "name": "show", "description": "a <b>song</b>", "duration_s": 60.0, "slowed_by": 1.2,
-    "sound": "/a/hello.wav", "cues": [["verse", 30.0]], "layers": ["head", "jaw"],
-}  # fmt: skip
+INFO = TrackInfo(
+    "show", "a <b>song</b>", 60.0, 1.2,
+    sound="/a/hello.wav", cues=(("verse", 30.0),), layers=("head", "jaw"),
+)  # fmt: skip
 
 
 class NoWaves(SoundWaves):
@@ -34,7 +35,7 @@ class Drawer:
         self.panel = PlayPanel(Widgets().panel("play"), self.outbox)  # type: ignore[arg-type]
         self.panel._waves = NoWaves()
         self.panel.offer(["tilt", "none", "show"])
-        self.panel.add_infos([INFO])
+        self.panel.add_infos([structs.asdict(INFO)])
 
     def show(self, t_s: float, *tracks: TrackState) -> None:
         self.panel.show(replace(SNAPSHOT, t_s=t_s, tracks=tracks))

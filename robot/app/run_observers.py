@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from msgspec import structs
-
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.vision.model_files import detector_status
 from gazerig.robot.app.assemble import Assembly
@@ -280,7 +278,7 @@ class RunObservers:
                 steps = None if self._steer is None else {STEER: self._steer.keys}
                 self._page.offer(steps or self._made.robot.menus())
                 infos = [] if steps else self._made.robot.tracks()
-                self._page.offer_tracks([structs.asdict(info) for info in infos])
+                self._page.offer_tracks(infos)
         with self._report_errors("the doors"):
             self._doors.open()
 

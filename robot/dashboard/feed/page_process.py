@@ -17,10 +17,13 @@ from pathlib import Path
 from typing import BinaryIO
 from urllib.parse import urlsplit
 
+import msgspec
+
 from gazerig.drivers.process import child_process, message_link
 from gazerig.drivers.process.message_link import MessageLink
 from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.drivers.process.passed_image import send
+from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.dashboard.requests.inbox import (
     BEAT,
     MESSAGE_BYTES,
@@ -107,7 +110,7 @@ class PageProcess:
         self._inbox: Inbox | None = None
         self._stops: StopListener | None = None
         self._choices: Mapping[str, tuple[str, ...]] = {}
-        self._tracks: Sequence[Mapping[str, object]] = ()
+        self._tracks: Sequence[TrackInfo] = ()
         self._over = threading.Event()
         self._beginning = threading.Lock()
         self._clock = RealClock()
@@ -184,10 +187,10 @@ class PageProcess:
         self._choices = choices
         self.send(CHOICES + json.dumps(choices).encode())
 
-    def offer_tracks(self, infos: Sequence[Mapping[str, object]]) -> None:
+    def offer_tracks(self, infos: Sequence[TrackInfo]) -> None:
         """Describe the rig's tracks to the page."""
         self._tracks = infos
-        self.send(TRACKS + json.dumps(infos).encode())
+        self.send(TRACKS + msgspec.json.encode(infos))
 
     def say(self, text: str) -> None:
         """Show a message to all users of the page."""

@@ -51,7 +51,7 @@ class Controls:
                 self._lead.offer(name, choices)
                 self._first.offer(name, choices)
 
-    def add_tracks(self, infos: Sequence[Mapping[str, object]]) -> None:
+    def add_tracks(self, infos: Sequence[object]) -> None:
         """Add what the rig reports of its tracks."""
         self._play.add_infos(infos)
 

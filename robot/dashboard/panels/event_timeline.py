@@ -94,10 +94,6 @@ class Timeline(PagePanel):
             return
         stretches.append(_Interval(stretches[-1].end_s if stretches else t_s, t_s, what, kind))
 
-    def intervals(self, row: str) -> tuple[tuple[float, float, str], ...]:
-        """Return start, end and value of each interval of a row, such as target or head."""
-        return tuple(stretch[:3] for stretch in self._rows[row])
-
     def drawing(self) -> str:
         """Return the strip as HTML."""
         now_s = self._now_s

@@ -4,9 +4,11 @@ import threading
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.widgets.html import LINE_PX, box, heading, line, note, svg, text
 from gazerig.robot.dashboard.widgets.widget import Buttons
@@ -29,7 +31,7 @@ class PlayPanel:
 
     def __init__(self, place: Container, outbox: Outbox) -> None:
         self._place, self._outbox = place, outbox
-        self._infos: dict[str, Mapping[str, object]] = {}
+        self._infos: dict[str, TrackInfo] = {}
         self._waves = SoundWaves()
         self._drawn_s = 0.0
         self.tracks: Buttons | None = None
@@ -56,9 +58,9 @@ class PlayPanel:
         self.end.on_press(lambda _, who: self._end(who))
         self._draw_list()
 
-    def add_infos(self, infos: Iterable[Mapping[str, object]]) -> None:
-        """Add what the rig reports of each track: duration, sound, owned joints, cues, layers."""
-        self._infos = {str(info["name"]): info for info in infos}
+    def add_infos(self, infos: Sequence[object]) -> None:
+        """Add what the rig reports of each track, as it was sent."""
+        self._infos = {info.name: info for info in msgspec.convert(infos, list[TrackInfo])}
         self._draw_list()
 
     def show(self, snapshot: Snapshot) -> None:
@@ -88,7 +90,7 @@ class PlayPanel:
 
 def timeline_html(
     tracks: Sequence[TrackState],
-    infos: Mapping[str, Mapping[str, object]],
+    infos: Mapping[str, TrackInfo],
     waves: "SoundWaves",
 ) -> str:
     """Return the tracks as rows of a timeline: sound, cues, position, layers, owners, limits."""
@@ -97,7 +99,7 @@ def timeline_html(
     parts: list[str] = []
     notes: list[str] = []
     for row, track in enumerate(tracks):
-        parts += _row(track, infos.get(track.name, {}), waves, row * _ROW_PX)
+        parts += _row(track, infos.get(track.name), waves, row * _ROW_PX)
         if track.who and track.is_playing:
             notes.append(f"{track.name}: started by {track.who}")
         if track.limited:
@@ -110,7 +112,7 @@ def timeline_html(
 
 
 def _row(
-    track: TrackState, info: Mapping[str, object], waves: "SoundWaves", top: float
+    track: TrackState, info: TrackInfo | None, waves: "SoundWaves", top: float
 ) -> Iterable[str]:
     """Return one track: its name and time, sound, bar with cues, layers and owned joints."""
     lasts_s = max(track.duration_s, 1e-3)
@@ -134,38 +136,23 @@ def _row(
     bar = top + 18.0 + _WAVE_PX
     yield box(0.0, bar, LINE_PX, _BAR_PX, "line-grid", "the track's time")
     yield box(0.0, bar, x, _BAR_PX, "ok")
-    for name, at_s in _cues(info):
+    for name, at_s in info.cues if info is not None else ():
         place = at_s / lasts_s * LINE_PX
         yield line(((place, bar - 4.0), (place, bar + _BAR_PX)), "axis")
         yield text(min(place + 2.0, LINE_PX - 40.0), bar - 3.0, name, size=10.0)
     yield line(((x, top + 16.0), (x, bar + _BAR_PX)), "mean")
-    owns = f"owns {', '.join(track.owns)}" if track.owns else "gaze moves all joints"
-    layers = ", ".join(map(str, _words(info, "layers")))
+    layers = ", ".join(info.layers) if info is not None else ""
     owns = f"owns {', '.join(track.owns)}" if track.owns else "owns no joint"
     yield text(0.0, bar + _BAR_PX + 12.0, f"{layers}; {owns}" if layers else owns, size=11.0)
 
 
-def _info_html(info: Mapping[str, object]) -> str:
+def _info_html(info: TrackInfo) -> str:
     """Return one track of the list: name, duration, description, or why the rig refuses it."""
-    lasts_s, slowed = info.get("duration_s", 0.0), info.get("slowed_by", 1.0)
-    assert isinstance(lasts_s, int | float) and isinstance(slowed, int | float)
-    aside = f"{lasts_s:.1f} s" + (f", {slowed:.2f} times slower" if slowed > 1.0 + 1e-6 else "")
-    refused = str(info.get("refused", ""))
-    sound = Path(str(info["sound"])).name if info.get("sound") else ""
-    lines = [str(info.get("description", "")), refused and f"refused: {refused}", sound]
-    return heading(str(info["name"]), "" if refused else aside) + "".join(
-        map(note, filter(None, lines))
-    )
-
-
-def _words(info: Mapping[str, object], key: str) -> list[object]:
-    value = info.get(key, ())
-    return list(value) if isinstance(value, list | tuple) else []
-
-
-def _cues(info: Mapping[str, object]) -> list[tuple[str, float]]:
-    """Return names and times of a track's cues."""
-    return [(str(cue[0]), float(cue[1])) for cue in _words(info, "cues")]  # type: ignore[index]
+    slower = f", {info.slowed_by:.2f} times slower" if info.slowed_by > 1.0 + 1e-6 else ""
+    aside = "" if info.refused else f"{info.duration_s:.1f} s{slower}"
+    refused = info.refused and f"refused: {info.refused}"
+    lines = [info.description, refused, Path(info.sound).name]
+    return heading(info.name, aside) + "".join(map(note, filter(None, lines)))
 
 
 class SoundWaves:
