@@ -146,6 +146,7 @@ def test_nothing_is_sent_before_the_page_is_there_and_everything_again_to_anothe
 def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: bool) -> None:
     page.comes_up()
     page.publisher.depth = depth
+    page.live.choices.faces = True
     rng = np.random.default_rng(0)
     image = rng.integers(0, 255, (400, 640, 3), np.uint8)
     metres = rng.random((400, 640), np.float32) + 0.5
@@ -160,7 +161,7 @@ def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: b
     assert poses is not None
     R, p_m = ran.made.shown_rig().mount.pose(*poses.head_pose(found.captured_s))
     for gaze_px in (None, gaze_pixel(tick.gaze.gaze_point_world_m, R, p_m, lens)):
-        drawn = draw_detections(background(found, depth), found, gaze_px, lens, faces=False)
+        drawn = draw_detections(background(found, depth), found, gaze_px, lens)
         if np.array_equal(drawn, news.image):
             break
     else:
