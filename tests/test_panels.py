@@ -101,6 +101,10 @@ def test_what_one_does_the_others_see_and_handlers_hear_once(widgets: Widgets) -
     assert one.read() == [] and other.read() == [1]
     slider.value = 3.0  # set by the program: no handler is called
     assert len(heard) == 1 and one.read() == [1]
+    slider.value = 4.0  # older than what the browser sends before it reads
+    one.send({"set": [1, 5.0]})
+    one.read(), other.read()
+    assert (one.seen[1]["value"], other.seen[1]["value"]) == (3.0, 5.0)
 
 
 @pytest.mark.parametrize(

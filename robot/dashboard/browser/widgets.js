@@ -219,7 +219,7 @@ const KINDS = {
     const number = make("input", { type: "number", className: "number" });
     let force = 0, held = false;
     const shown = () => { range.value = String(force); number.value = written(force); };
-    const set = (value) => { force = value; send(value); };
+    const set = (value) => { force = value; shown(); send(value); };
     const drag = seldom((value) => set(value), DRAG_MS);
     range.addEventListener("input", () => { number.value = range.value; drag(Number(range.value)); });
     range.addEventListener("pointerdown", () => { held = true; });

@@ -229,10 +229,12 @@ class Widgets:
             if widget.place.number not in self._widgets:
                 return
             for client in self._clients.values():
-                if client.name != but:
-                    waiting = client.changes.setdefault(widget.place.number, {})
-                    assert waiting is not None  # numbers are not reused
-                    waiting.update(props)
+                if client.name == but:  # what waits for it is older than its own input
+                    (client.changes.get(widget.place.number) or {}).pop("value", None)
+                    continue
+                waiting = client.changes.setdefault(widget.place.number, {})
+                assert waiting is not None  # numbers are not reused
+                waiting.update(props)
             self._wake()
 
     def publish_removal(self, widget: Widget) -> None:
