@@ -20,10 +20,9 @@ from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.snapshot import RunState
 from gazerig.robot.model.types import LoopFigures
-from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 IN_TIME = LoopFigures(200.0, 0.0, 0.0, 0.0, 0, 0, 10.0)
-STATE = RunState({}, "wait", "", "shy", ResidualFigures(None, None, 0), timing=IN_TIME)
+STATE = RunState({}, "wait", "", "shy", timing=IN_TIME)
 GREY = np.full((400, 640, 3), (140, 120, 100), np.uint8)
 """A picture of the size that the scene's camera has."""
 

@@ -260,7 +260,6 @@ SAID = {
         "faults",
         "_obey",
         "camera.latest",
-        "head_turn_residual",
     ),
 }
 """Spans that name nothing which could be looked up."""

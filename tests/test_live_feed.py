@@ -32,7 +32,6 @@ from gazerig.robot.dashboard.feed.snapshot import RunState, SnapshotBuilder
 from gazerig.robot.model.control_source import TrackState
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.types import Snapshot
-from gazerig.robot.perception.egomotion_residual import ResidualFigures
 from gazerig.sim_mock.scenes.scene import ScenePicture
 
 
@@ -61,8 +60,7 @@ class Page:
         self.page = PageProcess("127.0.0.1", 0)
         self.page.join(ours)
         self.said: list[str] = []
-        residual = ResidualFigures(None, None, 0)
-        self.state = RunState({"lost": 3}, "wait", "talking", "shy", residual, timing=IN_TIME)
+        self.state = RunState({"lost": 3}, "wait", "talking", "shy", timing=IN_TIME)
         self.rigs = 0
         self.picture: ScenePicture | None = None
         self.world: SmallWorld | None = None

@@ -168,28 +168,6 @@ def test_what_is_no_number_is_not_taken_in(bad: float) -> None:
         assert np.isfinite(values).all()
 
 
-@pytest.mark.parametrize("late_s", [0.0, 0.03])
-def test_perception_tells_by_how_much_times_are_wrong(late_s: float) -> None:
-    """A head that turns before a still face, with the true times of the pictures or later ones."""
-    mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
-    perception, poses = Perception(mount, 69.0, Tracker()), PoseHistory(Neck())
-    taken: list[Any] = []
-    for tick in range(800):
-        t = tick / 200
-        yaw = 0.25 * np.sin(3.0 * t) ** 3
-        poses.remember(t + late_s, (yaw, 0.0, 0.0))
-        if tick % 7 == 0:
-            c, s = np.cos(-yaw), np.sin(-yaw)
-            face = face_at((-s, 0.0, c))
-            taken.append(Detections(t, len(taken) + 1, WIDTH, HEIGHT, (face,)))
-        if taken and t - taken[-1].captured_s > 0.025:
-            perception.see(taken[-1], poses)
-    figures = perception.residual()
-    assert figures.samples > 10 and figures.late_ms is not None and figures.speed_deg_s is not None
-    assert abs(figures.late_ms) == pytest.approx(1e3 * late_s, abs=4.0)
-    assert (figures.speed_deg_s < 0.5) is (late_s == 0.0)
-
-
 def test_who_walks_out_of_the_picture_is_no_longer_seen_but_remembered() -> None:
     """A body without a visible face is reported for a second after it was found, inside."""
     perception, outside = Perception(STILL, 69.0, Tracker()), 0

@@ -207,7 +207,7 @@ class RunObservers:
         if self._states % _STATES_PER_FIGURES == 1:  # computing them takes half a millisecond
             self._figures = self._timing.figures()
         return RunState(
-            errors, *in_force, robot.perception.residual(), start_s,
+            errors, *in_force, start_s,
             self._figures,
             menus.get("expression", ("",))[0],
         )  # fmt: skip

@@ -75,7 +75,6 @@ def run_figures(
         "overruns": count.overruns,
         "faces_seen": robot.perception.frames_with_face,
         "pictures": robot.perception.frames,
-        "head_turn_residual": robot.perception.residual()._asdict(),
         **ticks,
         "joint_faults": faults.figures(),
         "bus": bus,

@@ -16,14 +16,12 @@ from gazerig.robot.model.control_source import (
 )
 from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.types import GuardResult
-from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 
-def perception_text(tick: Tick, residual: ResidualFigures) -> str:
-    """Return age of the frame, camera conditions, distances of faces and the ego-motion residual.
+def perception_text(tick: Tick) -> str:
+    """Return age of the frame, camera conditions and distances of faces.
 
-    e.g. "frame 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | static objects appear to move 0.3
-    deg/s while the head turns"
+    e.g. "frame 63 ms old | face 1 at 0.98 m by camera, +- 1 cm"
     """
     if tick.percept is None:
         return "no frame yet"
@@ -36,10 +34,6 @@ def perception_text(tick: Tick, residual: ResidualFigures) -> str:
             f"+- {100.0 * face.along_sd_m:.0f} cm"
             + (", looks at the head" if face.looks_at_head else "")
             + (", speaks" if face.speaks else "")
-        )
-    if residual.speed_deg_s is not None:
-        parts.append(
-            f"static objects appear to move {residual.speed_deg_s:.1f} deg/s while the head turns"
         )
     return " | ".join(parts)
 

@@ -117,10 +117,6 @@ class PoseHistory:
         """
         return self._geometry.head_pose(*self.angles(t_s))
 
-    def pose_at(self, angles: NeckAngles) -> tuple[Mat3, Vec3]:
-        """Return R_world_head and p_world_head_m at angles of the neck and the lower neck."""
-        return self._geometry.head_pose(*angles)
-
     def angles(self, t_s: float) -> NeckAngles:
         """Return the angles at a time, interpolated between ticks.
 

@@ -18,13 +18,6 @@ from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.perception.egomotion_residual import (
-    EgomotionResidual,
-    ResidualFigures,
-    TrackedPoint,
-    rotation_rate_rad_s,
-    turn_bound,
-)
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
 from gazerig.robot.perception.hand_ownership import (
     OwnParts,
@@ -45,8 +38,6 @@ from gazerig.robot.perception.track import (
 )
 from gazerig.robot.perception.tracker import Tracker
 
-# The head's rotation rate at a capture is computed over this time before and after it.
-_HALF_TURN_S = 0.015
 # A camera that turned farther than this between two frames shows another part of the same room.
 _COS_SAME_VIEW = cos(radians(5.0))
 
@@ -83,9 +74,7 @@ class Perception:
         self._tracker = tracker
         self._hands = Hands()
         self._tracks: tuple[BodyTrack, ...] = ()
-        self._p_camera: Vec3 = (0.0, 0.0, 0.0)
         self._p_head: Vec3 = (0.0, 0.0, 0.0)
-        self._residual = EgomotionResidual()
         self._percept: Percept | None = None
         self._number = 0
         self._scene: tuple[int, Vec3] | None = None
@@ -144,8 +133,6 @@ class Perception:
                 or _in_picture(rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, size_px)
             ]
         )
-        self._p_camera = p
-        self._note_residual(t_s, poses)
         self._percept = Percept(
             t_s,
             _bodies(tracks),
@@ -153,10 +140,6 @@ class Perception:
             self._cuts,
         )
         return self._percept
-
-    def residual(self) -> ResidualFigures:
-        """Return the apparent speed of stationary things while the head turns, and its cause."""
-        return self._residual.figures()
 
     def _is_cut(self, scene: int, axis: Vec3) -> bool:
         """Return whether a frame shows another scene although the camera was hardly turned.
@@ -172,24 +155,6 @@ class Perception:
             return False
         restarted = scene // SCENES_OF_A_PROCESS != before[0] // SCENES_OF_A_PROCESS
         return restarted or dot(before[1], axis) > _COS_SAME_VIEW
-
-    def _note_residual(self, t_s: float, poses: PoseHistory) -> None:
-        """Record the apparent positions of things; they are evaluated while the head turns."""
-        if not self._mount.on_head:
-            return
-        before, after = poses.angles(t_s - _HALF_TURN_S), poses.angles(t_s + _HALF_TURN_S)
-
-        def turn() -> Vec3:
-            (R_before, _), (R_after, _) = poses.pose_at(before), poses.pose_at(after)
-            return rotation_rate_rad_s(R_before, R_after, 2.0 * _HALF_TURN_S)
-
-        seen = [
-            TrackedPoint(track.id, track.detection.p_world_m, track.v_world_m_s)
-            for track in self._tracks
-            if track.seen_s == t_s
-        ]
-        most_rad_s = turn_bound(before, after) / (2.0 * _HALF_TURN_S)
-        self._residual.step(t_s, turn, self._p_camera, seen, most_rad_s)
 
     def _face(self, track: BodyTrack) -> Face:
         """Return a tracked face with its eight parts."""

@@ -39,7 +39,6 @@ from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.model.scene_view import PinholeView, SceneView
 from gazerig.robot.model.types import Snapshot
-from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 TICKS, RIG, STATE, DETECTED = b"t", b"g", b"a", b"d"
 """First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, and a frame."""
@@ -139,7 +138,7 @@ class LiveFeed:
         self._builder: SnapshotBuilder | None = None
         self._poses: PoseHistory | None = None
         self._percept: Percept | None = None
-        self._state = RunState({}, "", "", "", ResidualFigures(None, None, 0))
+        self._state = RunState({}, "", "", "")
         self._found: Detections | None = None
         self._wants_depth = False
         self._newest: Tick | None = None

@@ -39,7 +39,6 @@ from gazerig.robot.model.types import (
     Snapshot,
     Trail,
 )
-from gazerig.robot.perception.egomotion_residual import ResidualFigures
 from gazerig.robot.safety.health import HOT_C, LASTING_LOAD, VOLTAGE_MARGIN_V, WARM_C
 
 _TICKS_KEPT = 600
@@ -77,7 +76,6 @@ class RunState(NamedTuple):
     behaviour: str
     conversation: str
     character: str
-    residual: ResidualFigures
     scene_start_s: float | None = None
     timing: LoopFigures | None = None
     expression: str = ""
@@ -157,7 +155,7 @@ class SnapshotBuilder:
             return None
         track = playing(self._newest.tracks)
         busy = busy_text(state.timing)
-        seen = perception_text(self._newest, state.residual)
+        seen = perception_text(self._newest)
         plain = snapshot(self._newest, self.rig)
         reasons = plain.reasons
         others = tuple([reason for reason in reasons if not reason.endswith(": stale joints")])
