@@ -6,6 +6,7 @@ with gazerig.open("desk", mock=True) as head:
 The names in ``__all__`` are stable; every change to them is listed in the changelog.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -72,12 +73,8 @@ def __getattr__(name: str) -> Any:
 
         return version("gazerig")
     if name == "aio":  # a module, imported at first use as well
-        from importlib import import_module
-
         return import_module("gazerig.aio")
     if name in _HOME:
-        from importlib import import_module
-
         found = getattr(import_module(_HOME[name]), name)
         globals()[name] = found
         return found

@@ -156,11 +156,10 @@ class AsyncHead:
 
 
 def connect(
-    pid: int | None = None, *, name: str | None = None, rig: str | None = None,
-    who: str = "a program",
-) -> AsyncHead:  # fmt: skip
+    pid: int | None = None, *, name: str | None = None, who: str = "a program"
+) -> AsyncHead:
     """Return a head to connect to in an ``async with`` block; the arguments of ``gazerig.connect``.
 
     The block raises ``NotFound`` if no head runs, or several fit; the message lists them.
     """
-    return AsyncHead(lambda: connect_now(pid, name=name, rig=rig, who=who))
+    return AsyncHead(lambda: connect_now(pid, name=name, who=who))

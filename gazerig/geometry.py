@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import degrees
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
@@ -34,11 +33,6 @@ class JointSolution:
     error_deg: float
     seen_m: Vec3
     limited: tuple[JointReply, ...]
-
-    @property
-    def joints_deg(self) -> dict[str, float]:
-        """Return the angles in degrees."""
-        return {name: degrees(angle) for name, angle in self.joints_rad.items()}
 
 
 @dataclass(frozen=True, slots=True)

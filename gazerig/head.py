@@ -52,11 +52,6 @@ STREAM_AHEAD_S = 1.0
 class Order:
     """An order to a head, as returned by ``look_at`` and similar methods.
 
-    In a ``with`` block, control ends with the block:
-
-        with head.look_at(1.0, 0.2, 0.3) as order:
-            order.wait()
-
     Args:
         host: the head.
         read_reply: returns the reply once the head has accepted the order, None before.
@@ -72,9 +67,7 @@ class Order:
         self._why = ""
 
     def __repr__(self) -> str:
-        reply = self._accepted_reply()
-        said = "not accepted yet" if reply is None else reply.text()
-        return f"<Order: {self._outcome or 'in progress'}; {said}>"
+        return f"<Order: {self._outcome or 'in progress'}>"
 
     @property
     def reply(self) -> CommandReply:
@@ -135,25 +128,11 @@ class Order:
         if self.active:
             self._host.look_freely()
 
-    def __enter__(self) -> Self:
-        """Return the order itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Give up control."""
-        self.end()
-
     def _update_outcome(self, now: Progress) -> bool:
         """Update from the newest owner and tracks; return whether the order has ended."""
         reply = self._accepted_reply()
         if reply is not None and self._outcome is None and (end := command_outcome(reply, now)):
-            outcome, self._why = end
-            self._outcome = outcome
+            self._outcome, self._why = end
         return self._outcome is not None
 
     def _accepted_reply(self) -> CommandReply | None:

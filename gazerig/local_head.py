@@ -5,7 +5,6 @@ import logging
 import os
 import signal
 import threading
-from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
@@ -59,11 +58,10 @@ class LocalHead(Head):
     @property
     def state(self) -> HeadState:
         """Return the newest tick of the control loop."""
-        tick = self._feed.newest
-        if tick is None:
+        if self._feed.newest is None:
             self._active_run()
             self._pause(lambda: self._feed.newest is not None, 10.0)
-            tick = self._feed.newest
+        tick = self._feed.newest
         if tick is None:
             raise HeadEnded("the control loop is not running")
         return head_state(tick)
@@ -145,10 +143,6 @@ class LocalHead(Head):
         self._composed = session.compose(self._options, self._substitutes)
         return self._composed
 
-    @abstractmethod
-    def __enter__(self) -> Self:
-        """Switch the torque on at the present joint angles, and start."""
-
 
 class RunningHead(LocalHead):
     """A head whose loop runs in its own thread, in real time.
@@ -216,10 +210,8 @@ class RunningHead(LocalHead):
             return
         if raised is not None:
             raise raised
-        if self._failure is not None:
-            raise HeadEnded(f"the head has ended: {self._ended}") from self._failure
         if self._ended.startswith("fault"):
-            raise HeadEnded(f"the head has ended: {self._ended}")
+            raise HeadEnded(f"the head has ended: {self._ended}") from self._failure
 
     def end(self, reason: str) -> None:
         """Ask the head to park, from any thread or a signal handler; a second call skips parking.
@@ -256,8 +248,7 @@ class RunningHead(LocalHead):
 
     def _update(self, tick: Tick) -> None:
         self._feed.update(tick)
-        if not self._started.is_set():
-            self._started.set()
+        self._started.set()
 
     def _abandonment_reason(self) -> str | None:
         """Return why the block cannot end the head any more, None if it can."""

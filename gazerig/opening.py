@@ -18,7 +18,7 @@ from gazerig.robot.recording.playback_devices import NoCamera
 @overload
 def open(
     rig: str = "desk", *, fast: Literal[True], mock: bool = True,
-    bus: Literal["emulated", "ideal"] | None = None, page: None = None,
+    bus: Literal["emulated", "ideal"] | None = None,
     scene: str | None = None, world: str | None = None, video: Path | str | None = None,
     camera: Camera | None = None, detector: FaceDetector | None = None,
     attention: Chooser | None = None, character: str | None = None, profile: str | None = None,

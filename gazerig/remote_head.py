@@ -5,12 +5,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from gazerig.errors import HeadEnded, NotFound
+from gazerig.errors import HeadEnded
 from gazerig.head import Head, Order
 from gazerig.robot.control.head_state import HeadEvent, HeadState
 from gazerig.robot.model.commands import Command, Value, as_value
 from gazerig.robot.model.outcome import Progress
-from gazerig.robot.remote.client import RequestRejected, RobotClient, connect_to_all
+from gazerig.robot.remote.client import RequestRejected, RobotClient
 
 
 class RemoteHead(Head):
@@ -95,29 +95,17 @@ class RemoteHead(Head):
 
 
 def connect(
-    pid: int | None = None, *, name: str | None = None, rig: str | None = None,
-    who: str = "a program",
-) -> RemoteHead:  # fmt: skip
+    pid: int | None = None, *, name: str | None = None, who: str = "a program"
+) -> RemoteHead:
     """Connect to a head that runs in another program of the same user.
 
     Args:
         pid: process id of the head, if several heads run.
         name: its name (``gazerig run --name``), if several heads run.
-        rig: its rig, if several heads run.
         who: name of this program in messages and on the page.
 
     Raises:
         NotFound: no head runs, or several run and the arguments do not select one; the message
             lists them.
     """
-    if rig is None:
-        return RemoteHead(RobotClient.connect(pid if name is None else name, who))
-    found = [RemoteHead(client) for client in connect_to_all(pid if name is None else name, who)]
-    fitting = [head for head in found if head.rig == rig]
-    for head in found:
-        if len(fitting) != 1 or head is not fitting[0]:
-            head.__exit__(None, None, None)
-    if len(fitting) == 1:
-        return fitting[0]
-    there = ", ".join(f"{head.pid} ({head.rig})" for head in found) or "start one: gazerig run ..."
-    raise NotFound(f"{len(fitting) or 'no'} heads with the rig {rig} are running: {there}")
+    return RemoteHead(RobotClient.connect(pid if name is None else name, who))

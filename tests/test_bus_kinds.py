@@ -24,5 +24,5 @@ class TestBehindATerminal:
     bus = BusSuite.bus
     recover = BusSuite.recover
     test_goals = BusSuite.test_goals_are_followed_and_told
-    test_release = BusSuite.test_release_takes_the_torque_of_all
+    test_release = BusSuite.test_torque_on_holds_every_servo_where_it_is_until_its_release
     test_unplugged = BusSuite.test_an_unplugged_port_comes_back_and_holds
