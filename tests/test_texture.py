@@ -48,7 +48,12 @@ def _seen(mesh: TexturedMesh, uv: Floats) -> Floats:
 
 def _corners(vertices: Floats, faces: np.ndarray, values: Floats) -> np.ndarray:
     """Return places and values of the corners of all triangles, in an order of their own."""
-    rows = np.concatenate((vertices[faces], values[faces]), axis=-1).reshape(len(faces), -1)
+    around = np.concatenate((vertices[faces], values[faces]), axis=-1)
+    # From the corner with the least numbers, as a triangle may begin at any.
+    keys = np.round(around[..., :6], 6).tolist()
+    first = np.array([key.index(min(key)) for key in keys])
+    turns = (first[:, None] + np.arange(3)) % 3
+    rows = np.take_along_axis(around, turns[..., None], axis=1).reshape(len(faces), -1)
     return rows[np.lexsort(np.round(rows, 6).T[::-1])]
 
 
