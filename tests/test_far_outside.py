@@ -59,7 +59,6 @@ class Bench:
             rig_bus(rig, ports),
             rig.joints,
             park_rad(rig),
-            rig.guard.soft_start_speed_deg_s,
             rig.couplings.values(),
             recover=self.said.append if recover else None,
         )

@@ -88,7 +88,7 @@ def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
         said = json.loads(beside.read_text())
         assert set(said["basis"].values()) == {"estimated" if name == "six" else "measured"}
         expected = list(SIX) if name == "six" else []
-        assert said["estimated_joints"] == said["reckoned_joints"] == expected
+        assert said["estimated_joints"] == expected
 
 
 def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:

@@ -238,10 +238,7 @@ class Bench:
         self.names = rig.names
         for name, angle in (where_rad or {}).items():
             self.turn(name, angle)
-        self.body = Body(
-            rig_bus(rig, ports), rig.joints, park_rad(rig), rig.guard.soft_start_speed_deg_s,
-            sag=sag_compensation(rig),
-        )  # fmt: skip
+        self.body = Body(rig_bus(rig, ports), rig.joints, park_rad(rig), sag=sag_compensation(rig))
         self.guard = Guard(
             rig.guard,
             limits(rig.joints),

@@ -180,12 +180,10 @@ def assemble(
             )  # fmt: skip
         if options.mock and not options.fast:
             seen = make_borrowed_camera(seen, rig, clock, lambda: sight.mount.retune(live.camera))
-        gentle_deg_s = rig.guard.soft_start_speed_deg_s
         body = Body(
             opened.bus,
             rig.joints,
             park_rad(rig),
-            gentle_deg_s,
             rig.couplings.values(),
             None if options.bus == "ideal" else sag_compensation(rig),
             messages.append if options.recover else None,

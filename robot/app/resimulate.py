@@ -32,8 +32,6 @@ from gazerig.robot.recording.read import BadRecording, RunRecording
 
 Joints = Literal["recorded", "emulated"]
 
-_LOWER_LIDS = frozenset(("left_lower_lid", "right_lower_lid"))
-
 
 class Resimulation(NamedTuple):
     """Result of a resimulation.
@@ -241,14 +239,10 @@ class _Decisions(NamedTuple):
 
 
 def _decisions(tick: Tick) -> _Decisions:
-    gaze = structs.replace(tick.gaze, limited=())  # only in recordings of later versions
-    # Commands for absent lids have no effect.
-    if _LOWER_LIDS.isdisjoint(tick.guard_result.joints):
-        gaze = structs.replace(gaze, lower_left=1.0, lower_right=1.0)
     # The wording of the reason may change; its content is in the saliences.
     return _Decisions(
         repr(structs.replace(tick.target, why="")),
-        repr(gaze),
+        repr(tick.gaze),
         repr(tick.desired_rad),
         repr(tick.guard_result.command_rad),
         tick.guard_result.level,

@@ -97,7 +97,6 @@ class Summary:
                 "p95": _percentile_deg(self._errors_mdeg, 95.0),
             },
             "estimated": list(estimated_joints(last)) if last else [],
-            "reckoned": list(estimated_joints(last)) if last else [],  # the key of earlier versions
             "limited": dict(sorted(self._limited.items())),
             "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
         }

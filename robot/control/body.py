@@ -57,7 +57,6 @@ class Body:
         bus: Bus with the configuration from ``servo_setups``.
         joints: The joints by name.
         park_rad: As in ``servo_setups``.
-        gentle_deg_s: As in ``servo_setups``.
         pairs: As in ``servo_setups``.
         sag: Changes of the goals that make up for the weight; None: none.
         recover: Receives a line about each joint that is far outside its range, which then moves
@@ -69,7 +68,6 @@ class Body:
         bus: ServoBus,
         joints: Mapping[str, JointParams],
         park_rad: Mapping[str, float] | None = None,
-        gentle_deg_s: float = ENTRY_DEG_S,
         pairs: Collection[CouplingParams] = (),
         sag: SagCompensation | None = None,
         recover: Callable[[str], object] | None = None,
@@ -82,7 +80,6 @@ class Body:
         self._coupled = CoupledServos(pairs, self.names) if pairs else None
         self._park_rad = dict(park_rad or {})
         self._torque_off = False
-        self._gentle_deg_s = gentle_deg_s
         self._joints = self._set_up = tuple(joints[name] for name in self.names)
         self._limp = LimpJoints([joint.limp_when_idle_s for joint in self._joints])
         linkages = [joint.make_linkage() for joint in self._joints]
@@ -103,7 +100,6 @@ class Body:
 
     def retune(self, joints: Mapping[str, JointParams], gentle_deg_s: float) -> None:
         """Apply new limits of joints; the servos are set up again when torque is switched on."""
-        self._gentle_deg_s = gentle_deg_s
         self._joints = tuple(joints[name] for name in self.names)
         self.bus.retune(servo_setups(joints, self._park_rad, gentle_deg_s, self._pairs))
 

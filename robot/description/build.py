@@ -66,7 +66,6 @@ CAMERA, OPTICAL_FRAME = "camera_link", "camera_optical_frame"
 SIDES = ("left", "right")
 
 UP: Vec3 = (0.0, -1.0, 0.0)
-DOWN: Vec3 = (0.0, 1.0, 0.0)
 _AXES: dict[str, Vec3] = {"yaw": (0.0, 0.0, 1.0), "pitch": UP, "roll": (1.0, 0.0, 0.0)}
 _AXES |= {"pan": _AXES["yaw"], "tilt": UP}
 

@@ -72,7 +72,3 @@ class BoxingEvent(Protocol):
     def due_s(self) -> float | None:
         """Return the time by which a response is due, None: by the end."""
         ...
-
-
-class SceneEvent(ExpectedResponse, BoxingEvent, Protocol):
-    """An event with both interfaces."""

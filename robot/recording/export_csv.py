@@ -106,7 +106,6 @@ def _basis_by_column(trace: GazeAngles) -> dict[str, object]:
     return {
         "joints": list(trace.joints),
         "estimated_joints": list(trace.estimated),
-        "reckoned_joints": list(trace.estimated),  # the former key, for compatibility
         "basis": {key: trace.basis(of) for key, of in (gaze | there).items()},
         "estimated": ESTIMATED,
     }

@@ -22,7 +22,6 @@ from math import degrees, nan
 from typing import NamedTuple
 
 import numpy as np
-from msgspec import structs
 from numpy.typing import NDArray
 
 from gazerig.gaze.angles import add, angle_between, sub, yaw_pitch
@@ -30,8 +29,7 @@ from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3, body_name
 from gazerig.robot.control.feedback_basis import Basis, basis_of, estimated_joints
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.commands import REPEATED, Command, Jog, Stop
-from gazerig.robot.model.conversation import ConversationState
+from gazerig.robot.model.commands import Jog, Stop
 
 Ints = NDArray[np.int64]
 
@@ -69,16 +67,6 @@ class GazeTarget(NamedTuple):
     part: str
 
 
-class RecordedTurn(NamedTuple):
-    """A state of conversation: begin, duration, state, partner's number or None, spoken text."""
-
-    onset_s: float
-    duration_s: float
-    state: str
-    partner: int | None
-    text: str
-
-
 class GazeAngles(NamedTuple):
     """The columns of a run of n ticks.
 
@@ -92,10 +80,8 @@ class GazeAngles(NamedTuple):
         movement: (n,) Planned movement as an index in MOVEMENTS.
         blink: (n,) Whether a blink was planned.
         looked_at: (n,) Planned target as an index in ``names``.
-        messages: Events and commands in order, (time_s, text).
         joints: Names of the rig's joints.
         estimated: Names of the joints whose servos have no feedback.
-        turns: Turns of conversation.
     """
 
     start_s: float
@@ -110,11 +96,9 @@ class GazeAngles(NamedTuple):
     blink: NDArray[np.bool_]
     looked_at: Ints
     names: tuple[GazeTarget, ...]
-    messages: tuple[tuple[float, str], ...]
     lower_lids: Floats
     joints: tuple[str, ...]
     estimated: tuple[str, ...]
-    turns: tuple[RecordedTurn, ...] = ()
 
     @property
     def rate_hz(self) -> float:
@@ -151,7 +135,6 @@ class GazeAnglesBuilder:
         self._angles = array("d")
         self._codes = array("l")
         self._numbers: dict[GazeTarget, int] = {}
-        self._messages: list[tuple[float, str]] = []
         self._start_s: float | None = None
         self._fixated: Target | None = None
         self._saccades = 0
@@ -159,8 +142,6 @@ class GazeAnglesBuilder:
         self._led = ""
         self._joints: tuple[str, ...] = ()
         self._estimated: dict[str, None] = {}
-        self._turns: list[tuple[float, ConversationState]] = []
-        self._end_s = 0.0
 
     def update(self, tick: Tick) -> None:
         """Add a tick."""
@@ -180,16 +161,9 @@ class GazeAnglesBuilder:
             head = (nan, nan, nan) if not _NECK.isdisjoint(missing) else head
             lost_lids = [nan if n in missing else o for n, o in zip(_LIDS, lids, strict=True)]
             lids = (lost_lids[0], lost_lids[1], lost_lids[2], lost_lids[3])
-        self._end_s = time_s = tick.t_s - self._start_s
-        turn = tick.conversation
-        if turn.number != (self._turns[-1][1].number if self._turns else 0):
-            self._turns.append((time_s, turn))
+        time_s = tick.t_s - self._start_s
         self._angles.extend((time_s, *left, *right, *cyclopean, *head, *lids, *planned))
-        self._messages += [(time_s, event) for event in tick.events]
         for command in tick.commands:
-            if isinstance(command, REPEATED):
-                continue
-            self._messages.append((time_s, command_text(command)))
             if isinstance(command, Jog):
                 self._jogged = bool(command.angles_rad)
             elif isinstance(command, Stop):
@@ -217,17 +191,8 @@ class GazeAnglesBuilder:
         return GazeAngles(
             self._start_s, a[:, 0], a[:, 1:3], a[:, 3:5], a[:, 5:7], a[:, 7:10], a[:, 10:12],
             a[:, 14:16], codes[:, 0], codes[:, 1] > 0, codes[:, 2], tuple(self._numbers),
-            tuple(self._messages), a[:, 12:14], self._joints, tuple(self._estimated), self._turn_rows(),
+            a[:, 12:14], self._joints, tuple(self._estimated),
         )  # fmt: skip
-
-    def _turn_rows(self) -> tuple[RecordedTurn, ...]:
-        """Return the turns; the last one ends with the run."""
-        ends = [*(at_s for at_s, _ in self._turns), self._end_s][1:]
-        return tuple(
-            RecordedTurn(at_s, end_s - at_s, turn.state, turn.partner, turn.text)
-            for (at_s, turn), end_s in zip(self._turns, ends, strict=True)
-            if turn.state != "idle"
-        )
 
     def _number(self, tick: Tick) -> int:
         """Return the number of the target that the eyes are on or move to.
@@ -251,16 +216,6 @@ class GazeAnglesBuilder:
 def target_text(target: Target) -> str:
     """Return kind and id of a target, e.g. "face 3"."""
     return body_name(target.kind, target.id)
-
-
-def command_text(command: Command) -> str:
-    """Return a command as text, e.g. "requested: stop why=space bar"."""
-    given = " ".join(
-        f"{field.name}={value}"
-        for field in structs.fields(command)
-        if (value := getattr(command, field.name)) != field.default
-    )
-    return f"requested: {type(command).__name__.lower()} {given}".rstrip()
 
 
 def _degrees(way: Vec3) -> Angles2:

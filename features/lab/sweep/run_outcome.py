@@ -24,7 +24,7 @@ OUTSIDE, DISTANCE = "report.outside", "report.distance"
 VERDICT = "verdict."
 REPORT = "report."
 _HALF = 0.25
-_NOT_REPRODUCED = ("wall_seconds", "reckoned")
+_NOT_REPRODUCED = ("wall_seconds",)
 
 
 class Outcome(NamedTuple):
