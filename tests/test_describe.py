@@ -202,14 +202,14 @@ def test_the_whole_model_is_compiled_with_looks(name: str) -> None:
     import mujoco
 
     description = description_of(shipped(name))
-    text = mjcf(description, "one_")
+    text = mjcf(description)
     model = mujoco.MjSpec.from_string(text.xml, assets=text.assets).compile()
     assert {model.joint(i).name for i in range(model.njnt)} == {
-        f"one_{joint.name}" for joint in description.joints
+        joint.name for joint in description.joints
     }
     assert model.nu == len(shipped(name).joints)
     for joint in description.joints:
-        low, high = model.joint(f"one_{joint.name}").range
+        low, high = model.joint(joint.name).range
         limit = shipped(name).joints[joint.follows.joint if joint.follows else joint.name].limit()
         assert (low, high) == pytest.approx((limit.low_rad, limit.high_rad), abs=1e-12)
     assert model.ncam == 1

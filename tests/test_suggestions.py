@@ -2,11 +2,9 @@
 
 import pytest
 
-from gazerig.robot.cli.terminal import complete_suggestions
+from gazerig.robot.cli.terminal import complete_suggestions, suggest_for_rig
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")
-
-GIVEN = {"rig": "my rig.yaml", "port": "/dev/ttyACM3", "mock": False}
 
 
 @pytest.mark.parametrize(
@@ -22,8 +20,6 @@ GIVEN = {"rig": "my rig.yaml", "port": "/dev/ttyACM3", "mock": False}
     ],
 )  # fmt: skip
 def test_a_suggestion_names_rig_and_port(said: str, wanted: str) -> None:
-    assert complete_suggestions(said, GIVEN) == wanted
-    assert complete_suggestions(complete_suggestions(said, GIVEN), GIVEN).count(
-        "--port"
-    ) == wanted.count("--port")
-    assert complete_suggestions(said, {}) == said
+    with suggest_for_rig("my rig.yaml", "/dev/ttyACM3", mock=False):
+        assert complete_suggestions(said) == wanted == complete_suggestions(wanted)
+    assert complete_suggestions(said) == said

@@ -158,18 +158,11 @@ def suggest_doctor(text: str) -> str:
     return f"{text}; gazerig doctor finds the cause" if reaches and "gazerig " not in text else text
 
 
-def complete_suggestions(text: str, given: Mapping[str, object] | None = None) -> str:
-    """Return a message whose suggested commands use the rig and port of the current command.
-
-    Args:
-        text: The message.
-        given: Parameters of the command: rig, port, mock; None: those of the current one.
-    """
-    if given is None:
-        given = _given[-1]
-    if "gazerig " not in text or not isinstance(given.get("rig"), str):
+def complete_suggestions(text: str) -> str:
+    """Return a message whose suggested commands use the rig and port of the current command."""
+    known = _given[-1]
+    if "gazerig " not in text or not isinstance(known.get("rig"), str):
         return text
-    known = given
 
     def whole(found: re.Match[str]) -> str:
         if text[found.end() :].startswith((f" {shlex.quote(str(known['rig']))}", " --port ")):

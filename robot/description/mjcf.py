@@ -34,7 +34,6 @@ class Mjcf(NamedTuple):
 
 def mjcf(
     description: Description,
-    prefix: str = "",
     folder: str = "",
     *,
     looks: bool = True,
@@ -44,49 +43,46 @@ def mjcf(
 
     Args:
         description: description of the rig.
-        prefix: prefix of all names, so that one world can contain two rigs.
         folder: folder of the meshes and textures, relative to the text.
         looks: include visual shapes; without them, the same mechanism needs no files.
         awake: the lids are open at first; otherwise all joints are at 0.
     """
     if not looks:
         description = description.without_looks()
-    root = ET.Element("mujoco", model=prefix + description.name)
+    root = ET.Element("mujoco", model=description.name)
     compiler = ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     ET.SubElement(root, "option", timestep=numbers((_STEP_S,)), integrator="implicitfast")
     if folder:
         compiler.set("meshdir", folder)
         compiler.set("texturedir", folder)
     assets: dict[str, bytes] = {}
-    _add_assets(ET.SubElement(root, "asset"), description, prefix, assets)
+    _add_assets(ET.SubElement(root, "asset"), description, assets)
     bodies = {"": ET.SubElement(root, "worldbody")}
     for link in description.links:
-        body = ET.SubElement(bodies[link.parent or ""], "body", name=prefix + link.name)
+        body = ET.SubElement(bodies[link.parent or ""], "body", name=link.name)
         bodies[link.name] = body
-        _fill(body, link, prefix, awake)
+        _fill(body, link, awake)
         if link.name == description.camera.optical:
             # MuJoCo's camera looks along -z with y up; the optical frame looks along z with y down.
             camera = description.camera
             share = camera.height_px / camera.width_px
             field_y = 2.0 * atan(tan(0.5 * camera.horizontal_field_rad) * share)
             ET.SubElement(
-                body, "camera", name=f"{prefix}camera", fovy=numbers((degrees(field_y),)),
+                body, "camera", name="camera", fovy=numbers((degrees(field_y),)),
                 xyaxes="1 0 0 0 -1 0", resolution=f"{camera.width_px} {camera.height_px}",
             )  # fmt: skip
     contacts = ET.SubElement(root, "contact")
     for one, other in description.may_touch:
-        ET.SubElement(contacts, "exclude", body1=prefix + one, body2=prefix + other)
-    _add_linkages(ET.SubElement(root, "equality"), description, prefix)
-    _add_servos(root, description, prefix)
+        ET.SubElement(contacts, "exclude", body1=one, body2=other)
+    _add_linkages(ET.SubElement(root, "equality"), description)
+    _add_servos(root, description)
     ET.indent(root)
     return Mjcf(ET.tostring(root, encoding="unicode") + "\n", assets)
 
 
-def _add_assets(
-    parent: ET.Element, description: Description, prefix: str, assets: dict[str, bytes]
-) -> None:
+def _add_assets(parent: ET.Element, description: Description, assets: dict[str, bytes]) -> None:
     for visual in (one for link in description.links for one in link.visuals):
-        name = prefix + visual.name
+        name = visual.name
         files = mesh_files(name, visual.painted)
         assets |= {file: data for file, data in files.items() if not file.endswith(".mtl")}
         ET.SubElement(parent, "texture", name=name, type="2d", file=f"{name}.png")
@@ -96,7 +92,7 @@ def _add_assets(
         ET.SubElement(parent, "mesh", name=name, file=f"{name}.obj", inertia="shell")
 
 
-def _fill(body: ET.Element, link: Link, prefix: str, awake: bool) -> None:
+def _fill(body: ET.Element, link: Link, awake: bool) -> None:
     """Write the contents of a body, its joint first."""
     at_rad, R = 0.0, link.R
     if awake and link.joint is not None and link.joint.awake_rad:
@@ -113,7 +109,7 @@ def _fill(body: ET.Element, link: Link, prefix: str, awake: bool) -> None:
     if link.joint is not None:
         joint = link.joint
         element = ET.SubElement(
-            body, "joint", name=prefix + joint.name, type="hinge", axis=numbers(joint.axis),
+            body, "joint", name=joint.name, type="hinge", axis=numbers(joint.axis),
             range=numbers((joint.low_rad, joint.high_rad)),
         )  # fmt: skip
         if joint.drive is not None:
@@ -129,8 +125,8 @@ def _fill(body: ET.Element, link: Link, prefix: str, awake: bool) -> None:
         _add_shape(body, shape)
     for visual in link.visuals:
         geom = ET.SubElement(
-            body, "geom", name=f"{prefix}{visual.name}", type="mesh", mesh=prefix + visual.name,
-            material=prefix + visual.name, contype="0", conaffinity="0", group=_LOOKS_GROUP,
+            body, "geom", name=visual.name, type="mesh", mesh=visual.name,
+            material=visual.name, contype="0", conaffinity="0", group=_LOOKS_GROUP,
             mass="0",
         )  # fmt: skip
         _place(geom, visual.p_m, visual.R)
@@ -153,13 +149,13 @@ def _add_shape(body: ET.Element, shape: CollisionShape) -> None:
     _place(geom, shape.p_m, shape.R)
 
 
-def _add_linkages(parent: ET.Element, description: Description, prefix: str) -> None:
+def _add_linkages(parent: ET.Element, description: Description) -> None:
     for joint in description.joints:
         if joint.follows is not None:
             # The largest stiffness that is stable with steps of 1 ms.
             ET.SubElement(
-                parent, "joint", joint1=prefix + joint.name,
-                joint2=prefix + joint.follows.joint, solref="0.002 1",
+                parent, "joint", joint1=joint.name,
+                joint2=joint.follows.joint, solref="0.002 1",
                 polycoef=numbers((0.0, joint.follows.ratio, 0.0, 0.0, 0.0)),
             )  # fmt: skip
 
@@ -173,7 +169,7 @@ _TINY = 1e-6
 motor would limit the change of the current, where the servo limits that of the duty."""
 
 
-def _add_servos(root: ET.Element, description: Description, prefix: str) -> None:
+def _add_servos(root: ET.Element, description: Description) -> None:
     """Add a servo to each joint, or a motor if the data of its servo are unknown.
 
     The two gains of a servo act on a tendon that turns with its joint and limits the torque of
@@ -184,7 +180,7 @@ def _add_servos(root: ET.Element, description: Description, prefix: str) -> None
     speeds: list[dict[str, str]] = []
     brakes: list[dict[str, str]] = []
     for joint in description.joints:
-        name, drive = prefix + joint.name, joint.drive
+        name, drive = joint.name, joint.drive
         if joint.follows is not None:
             continue
         if drive is None:
