@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from recorded_run import Recorded
 
     from gazerig.config.schema import Rig
-    from gazerig.gaze.scanpath.scanpath import Walk
 
 # The same examples every time; HYPOTHESIS_PROFILE=search draws others. A busy machine is no fault.
 settings.register_profile("steady", derandomize=True, deadline=None)
@@ -81,14 +80,6 @@ def desk_rig() -> "Rig":
 @pytest.fixture(scope="session")
 def maker_rig() -> "Rig":
     return shipped_rig("maker")
-
-
-@pytest.fixture(scope="session")
-def printed_walk() -> "Walk":
-    """The walk over a face with the numbers that Nakamoto & Tsuruno print."""
-    from gazerig.config.schema import load_walk
-
-    return load_walk("nakamoto_tsuruno")
 
 
 @pytest.fixture(scope="session")

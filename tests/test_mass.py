@@ -34,10 +34,6 @@ def heavy(name: str, mass: MassParams = REAL) -> Rig:
     return replace(shipped(name), mass=mass)
 
 
-def with_joint(rig: Rig, name: str, **changes: Any) -> Rig:
-    return replace(rig, joints={**rig.joints, name: replace(rig.joints[name], **changes)})
-
-
 def mujoco_loads_nm(rig: Rig, angles: Mapping[str, float]) -> dict[str, float]:
     import mujoco
 

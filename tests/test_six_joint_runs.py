@@ -2,13 +2,10 @@
 
 import csv
 import json
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
 from msgspec.structs import replace
 from recorded_rigs import Run, recorded
 from recorded_run import exact
@@ -33,12 +30,6 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return recorded(tmp_path_factory.mktemp("nine") / "desk.mcap", load_rig("desk"), 2.0)
 
 
-def messages(path: Path, *topics: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    with path.open("rb") as file:
-        for _, channel, message in make_reader(file).iter_messages(topics):
-            yield channel.topic, json.loads(message.data)
-
-
 # --- recordings
 
 
@@ -56,9 +47,6 @@ def test_a_run_of_six_joints_is_done_again_to_the_bit(maker: Run) -> None:
     assert found.is_same and found.sent_bytes_same and found.notes == ()
     assert list(map(exact, seen)) == list(map(exact, maker.ticks))
     assert rerun(maker.recording, joints="emulated").is_same
-
-
-# --- messages of the run
 
 
 # --- exports

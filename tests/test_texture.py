@@ -14,22 +14,12 @@ from gazerig.robot.description.mesh import (
 )
 from gazerig.robot.description.texture import TexturedMesh, add_texture
 
-
-def glow() -> Painted:
-    from gazerig.robot.dashboard.view.glb import glow_disc
-
-    return glow_disc((20, 24, 34, 140), 10)
-
-
 SHAPES: dict[str, Callable[[], Painted]] = {
     "eye": head_mesh.eye,
-    "lid": lambda: head_mesh.eyelid(False),
     "other brow": lambda: mirror_mesh(head_mesh.brow()),
     "skin": lambda: head_mesh.skin().head,
-    "jaw": lambda: head_mesh.skin().jaw,
     "person": lambda: person_shape.head(1, 0.6),
     "torso": lambda: person_shape.torso(2, 0.4),
-    "glow": glow,
 }
 
 

@@ -120,7 +120,6 @@ def begin(
     """Make an animatronic head look at people as people look at each other."""
     if context.invoked_subcommand is None:
         from gazerig.drivers.serial.list_ports import serial_ports
-        from gazerig.robot.cli.main import next_steps
         from gazerig.robot.remote.client import connect_to_all
 
         print(next_steps(serial_ports(), rig_files(), bool(connect_to_all())))
@@ -178,13 +177,7 @@ def next_steps(ports: "Iterable[SerialPort]", rigs: Iterable[Path], running: boo
     if usb and own is None:
         lines += _block(
             f"A servo adapter is plugged in ({usb[0].by_id or usb[0].device}):",
-            (
-                (f"gazerig scan --port {usb[0].device}", "which servos answer; changes nothing"),
-                (
-                    "list the servos that answer; changes nothing",
-                    "your own rig file, from four questions",
-                ),
-            ),
+            ((f"gazerig scan --port {usb[0].device}", "which servos answer; changes nothing"),),
         )
     elif own is not None:
         lines += _block(

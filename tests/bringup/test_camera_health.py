@@ -43,11 +43,6 @@ def turned(image: np.ndarray, clockwise_deg: float) -> np.ndarray:
     return cv2.warpAffine(image, turn, (WIDTH, HEIGHT), borderMode=cv2.BORDER_REPLICATE)
 
 
-def blurred(image: np.ndarray, px: float) -> np.ndarray:
-    soft = np.asarray(cv2.GaussianBlur(image, (0, 0), px), np.uint8)
-    return noisy(soft, 2.0, np.random.default_rng(1))
-
-
 def looked(
     images: list[np.ndarray], detector: Any = None, rotation: int = 0
 ) -> tuple[list[str], tuple[str, ...]]:
