@@ -128,6 +128,30 @@ def test_a_process_that_hangs_is_told_of_and_started_again(recording):
     camera.close()
 
 
+class Slow:
+    """A detector that needs a second for its 20th picture."""
+
+    pictures = 0
+
+    def find(self, picture):
+        self.pictures += 1
+        end_s = time.process_time() + 1.0
+        while self.pictures == 20 and time.process_time() < end_s:
+            pass
+        return ()
+
+
+def test_pictures_that_are_not_processed_in_time_are_no_lost_camera(recording):
+    parts = CameraParts(partial(CameraReplay, recording), Slow)
+    camera = CameraProcess(parts, time.monotonic, CameraRecovery(silent_s=0.3, restart_s=0.6))
+    camera.open()
+    wait_for(lambda: camera.frames > 25)
+    busy, again = camera.events()
+    assert busy.startswith("this computer is too busy for the camera: no picture processed")
+    assert again.startswith("pictures are processed again after ")
+    camera.close()
+
+
 def test_a_process_is_busy_that_wants_to_run_for_most_of_its_silence():
     wanted = [5.0, 5.6, 5.6, None]
     demand = ProcessorDemand(lambda: wanted.pop(0))

@@ -1,6 +1,7 @@
 """gazerig new: what it asks, what it writes, and that every rig it writes runs."""
 
 import itertools
+import time
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from gazerig.config.schema import load_rig
 from gazerig.config.shipped_files import SHIPPED
 from gazerig.robot.cli import new as command
 from gazerig.robot.cli.new_rig import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
+from gazerig.robot.cli.terminal import LineWriter
 
 TEMPLATES = {
     "minimal": ("--board", "dynamixel", "--joints", "eyes", "--camera", "webcam"),
@@ -84,6 +86,24 @@ def test_on_a_terminal_it_asks_again_until_an_answer_is_one(
         "gazerig calibrate a.yaml",
         "gazerig run a.yaml --oak",
     ]
+
+
+def test_a_question_is_complete_before_its_prompt(monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[str] = []
+
+    def write_slowly(writer: LineWriter, text: str) -> None:
+        time.sleep(0.02)
+        written.append(text)
+
+    def answer(prompt: str) -> str:
+        assert "the distance between the eyes" in written[-1]
+        return ""
+
+    tty = type("Tty", (), {"isatty": lambda self: True, "fileno": lambda self: 2})()
+    for name, value in (("sys.stderr", tty), ("sys.stdin", tty), ("builtins.input", answer)):
+        monkeypatch.setattr(name, value)
+    monkeypatch.setattr(LineWriter, "_write", write_slowly)
+    assert typed("new", "a.yaml", *TEMPLATES["minimal"]) == 0 and written
 
 
 @pytest.mark.parametrize(

@@ -356,7 +356,7 @@ def test_a_flood_is_refused_and_costs_the_loop_nothing(rig: Rig) -> None:
         heard(flood, "tag", "hello")
         for _ in range(600):
             flood.send('{"do": "look_at", "p_world_m": [1, 0, 0.3]}')
-        assert "too many requests" in heard(flood, "refused")["refused"]
+        assert "too many requests" in heard(flood, "messages")["refused"]
         ask(flood, do="stop", why="in the flood", tag="s")
         with rig.dial() as other:
             ask(other, do="stop", why="another", tag=1)
