@@ -233,12 +233,12 @@ def test_a_stop_holds_two_seconds_whoever_asks(running: Running) -> None:
 
 
 def test_another_resumes_only_who_confirms(running: Running) -> None:
-    running.order(Stop("a hand", who="browser 1"))
+    for who in ("browser 1", "browser 2"):
+        running.order(Stop("a hand", who=who))
     running.go(2.1)
-    assert "stopped by browser 1: another client must confirm" in replied(
-        running, Resume(who="browser 2")
-    )
-    assert "stopped by browser 1: another client must confirm" in replied(running, Resume())
+    by = "stopped by browser 1 and browser 2: another client must confirm"
+    for command in (Resume(who="browser 2"), Resume()):
+        assert by in replied(running, command)
     assert running.made.robot.stopped
     ticket = running.made.robot.command(Resume(who="browser 2", confirmed=True))
     tick = running.go(0.006)[0]
