@@ -6,7 +6,7 @@ import re
 import pytest
 from line_noise import IDS, Noisy
 
-from gazerig.drivers.errors import PortError
+from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.process.host_lateness import (
     AFTERMATH_S,
     BUSY,
@@ -61,6 +61,16 @@ def test_answers_that_come_late_are_the_computer_s_not_a_plug_s(kind):
     blaming = [text for text in outcome.said if re.search(BLAME, text)]
     assert not blaming, blaming
     assert outcome.wrong == 0
+
+
+@pytest.mark.parametrize("kind", (*KINDS, "maestro", "pca9685"))
+def test_a_start_that_fails_while_the_computer_is_late_blames_no_plug(kind):
+    noisy = Noisy(kind)
+    noisy.device.faults.command("delay all 100")
+    noisy.port._sleep_until = lambda until_s: noisy._sleep_until(until_s + 0.03)
+    with pytest.raises(ServoMissing, match="this computer was busy") as caught:
+        noisy.start()
+    assert not re.search(BLAME, str(caught.value))
 
 
 @pytest.mark.parametrize("kind", KINDS)
