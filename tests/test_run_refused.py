@@ -59,13 +59,13 @@ MINIMAL = DESK.with_name("minimal.yaml")
 
 def test_ranges_in_radians_get_a_hint(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path, text = tmp_path / "my.yaml", MINIMAL.read_text(encoding="utf-8")
-    for degrees, radians in (("35", "0.61"), ("30", "0.52")):
+    for degrees, radians in (("35", "1.57"), ("30", "0.52")):
         text = text.replace(f"min_deg: -{degrees}, max_deg: {degrees}",
                             f"min_deg: -{radians}, max_deg: {radians}")  # fmt: skip
     path.write_text(text, encoding="utf-8")
     assert typed("check", str(path)) == 0
     hint = "degrees? these look like radians"
-    assert f"min_deg and max_deg of all joints: no angle is above 0.61: {hint}" in " ".join(
+    assert f"min_deg and max_deg of all joints: no angle is above 1.57: {hint}" in " ".join(
         capfd.readouterr().err.split()
     )
     # One joint with a usual range shows that they are degrees.
