@@ -14,6 +14,7 @@ from rich.console import Console as RichConsole
 
 from gazerig.drivers.process.visible_text import VisibleStream, visible
 from gazerig.robot.cli.console import Console
+from gazerig.robot.cli.terminal import run_app
 
 START = "from gazerig.robot.cli.entry_point import main; main()"
 EVIL = "\x1b]0;owned\x07\x1b[31mred\x1b[2J"
@@ -60,6 +61,12 @@ def test_names_in_errors_are_shown(words, capfd):
     out, err = capfd.readouterr()
     assert r"\x1b" in out + err
     assert not set(out + err) & {"\x1b", "\x07"}, out + err
+
+
+def test_what_a_command_prints_is_shown(capfd):
+    with pytest.raises(SystemExit):
+        run_app(lambda words: print(*words), [EVIL], "")
+    assert capfd.readouterr().out == f"{visible(EVIL)}\n"
 
 
 def test_keys_of_a_yaml_are_shown_on_a_terminal(tmp_path):
