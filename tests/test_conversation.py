@@ -70,6 +70,8 @@ def test_states_follow_each_other_and_are_in_tick_and_state(rig: Running) -> Non
     assert (changed.number, changed.since_s) == (spoken.number, spoken.since_s)
     assert changed.ends_s == pytest.approx(longer.t_s + 2.0, abs=0.01)
     assert changed.confidence < 0.5
+    blank = rig.do(Talk("speaking", text=" ", who="a", stay=True))[1][-1].conversation
+    assert blank.ends_s is None
     words = Talk("speaking", words=(("a", 0.0), ("b", 3.0)), who="a", stay=True)
     timed = rig.do(words)[1][-1].conversation
     assert timed.ends_s == pytest.approx(rig.ticks[-1].t_s + 3.4, abs=0.01)

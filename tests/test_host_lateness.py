@@ -73,6 +73,20 @@ def test_a_start_that_fails_while_the_computer_is_late_blames_no_plug(kind):
     assert not re.search(BLAME, str(caught.value))
 
 
+@pytest.mark.parametrize("kind", (*KINDS, "maestro", "pca9685"))
+def test_an_emulator_that_was_suspended_is_named_in_one_line(kind, monkeypatch):
+    noisy = Noisy(kind)
+    noisy.start()
+    held: list[bytes] = []
+    with monkeypatch.context() as suspended:
+        suspended.setattr(noisy.port, "write", held.append)
+        said = noisy.run("clear", 0.0, 100, 0.0).said
+    for data in held:
+        noisy.port.write(data)
+    (line,) = said + noisy.run("clear", 0.0, 100).said
+    assert "then late but intact ones; plugs and power are not the cause" in line
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_short_pauses_of_the_computer_cost_no_value(kind):
     noisy = Noisy(kind)
