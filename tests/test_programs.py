@@ -582,8 +582,9 @@ def test_states_after_an_answer_are_not_older() -> None:
         program.add_news(programs.HeadNews('"before"', (), Progress()), 5.0)
         program.queue_answer({"do": "look_at"}, {"ok": 1}, 5.02)
         program.add_news(programs.HeadNews('"read before the answer"', (), Progress()), 5.019)
+        sent = [*iter(program.outgoing, "")]
         program.add_news(programs.HeadNews('"after"', (), Progress()), 5.03)
-        return [json.loads(text) for text in iter(program.outgoing, "")]
+        return [json.loads(text) for text in (*sent, *iter(program.outgoing, ""))]
 
     assert asyncio.run(follow()) == ["before", {"ok": 1}, "after"]
 
