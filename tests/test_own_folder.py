@@ -5,11 +5,14 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from gazerig.config.schema import load_rig
 from gazerig.drivers.process import own_folder
 from gazerig.drivers.process.own_folder import PREFIX, OwnFolder, sweep
+from gazerig.robot.app.voice import RunVoice
 
 HOLDS = (
     "import sys, time; from pathlib import Path;"
@@ -36,6 +39,18 @@ def test_what_a_killed_process_left_goes_with_the_next_start_and_no_sooner(tmp_p
     mine.remove()
     mine.remove()
     assert names(tmp_path) == set()
+
+
+def test_a_voice_begins_with_removing_what_a_killed_run_has_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    left = tmp_path / f"{PREFIX}voice-left"
+    left.mkdir()
+    (left / "held").touch()
+    given: Any = (None, lambda: load_rig("desk"), None, tmp_path, tuple, False)
+    RunVoice(*given)
+    assert not left.exists()
 
 
 def test_what_is_not_ours_to_remove_stays(tmp_path: Path) -> None:
