@@ -16,7 +16,7 @@ from gazerig.drivers.process.host_lateness import (
     HostLateness,
 )
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.servo_bus.faults import NOT_SET_UP
+from gazerig.drivers.servo_bus.faults import GARBLES, NOT_SET_UP
 
 SYNC_READ = 0x82
 
@@ -85,6 +85,16 @@ def test_an_emulator_that_was_suspended_is_named_in_one_line(kind, monkeypatch):
         noisy.port.write(data)
     (line,) = said + noisy.run("clear", 0.0, 100).said
     assert "then late but intact ones; plugs and power are not the cause" in line
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_bytes_damaged_while_the_computer_is_late_mean_no_second_id(kind):
+    noisy = Noisy(kind)
+    noisy.start()
+    noisy.device.faults.command("delay 6 18 count 3")
+    said = noisy.run("corrupt 3", 0.0, 300, 0.0).said
+    (text,) = [text for text in said if GARBLES in text]
+    assert "this computer was busy" in text and not re.search(BLAME, text)
 
 
 @pytest.mark.parametrize("kind", KINDS)
