@@ -220,12 +220,6 @@ def test_a_head_of_a_program_has_the_same_rule() -> None:
             pass
 
 
-def test_servos_that_measure_nothing_are_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_bus, "_CROOKED_DEG", {"left_eye_pan": 60.0})
-    monkeypatch.setattr(run_bus, "STOP_BEYOND_DEG", 30.0)
-    Bench(load_rig("six_hobby")).start()
-
-
 def test_the_text_of_one_joint() -> None:
     limit = JointLimit(radians(-45.0), radians(45.0), 1.0, 1.0)
     for inside in (-55.0, 0.0, 54.9):

@@ -66,14 +66,6 @@ def test_what_is_not_ours_to_remove_stays(tmp_path: Path) -> None:
     assert names(tmp_path) == before and (other / "held").exists()
 
 
-@pytest.mark.parametrize("kind", ["page", "voice"])
-def test_a_start_leaves_the_folders_of_every_live_run(kind: str, tmp_path: Path) -> None:
-    first = OwnFolder(kind, tmp_path)
-    with OwnFolder(kind, tmp_path) as second:
-        assert names(tmp_path) == {first.path.name, second.name}
-    first.remove()
-
-
 def test_a_folder_that_is_swept_before_it_is_locked_is_made_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
