@@ -6,13 +6,11 @@ the same texts, and after an error nothing is changed. Pure.
 
 import dataclasses
 from collections.abc import Iterator, Mapping
-from fnmatch import fnmatchcase
-from functools import lru_cache
 from typing import Any
 
 from gazerig.config.load import ConfigError, ConfigFault, validate_rules
 from gazerig.config.rig import GazeConfig, Rig
-from gazerig.config.schema import RULES
+from gazerig.config.schema import RULES, refusal
 from gazerig.config.validation import abbreviate, suggestion_text
 from gazerig.params import Declaration, declarations
 from gazerig.robot.model.commands import Value
@@ -24,39 +22,38 @@ NEXT_START = "next start"
 LIVE_LIMITS = ("min_deg", "max_deg", "max_speed_deg_s", "max_accel_deg_s2")
 """Keys of a joint that a running rig applies."""
 _LIVE = (
-    "character",
-    "ranges.*",
-    "guard.*",
-    "tracker.*",
-    "sound.device",
-    *(f"joints.*.{name}" for name in LIVE_LIMITS),
+    "character.",
+    "ranges.",
+    "guard.",
+    "tracker.",
+    "sound.device.",
+    # A package's rule is created with its section, and so is the chooser.
+    *(f"gaze.{name}." for name in declarations(GazeConfig) if name != "chooser"),
 )
-"""Keys that a running rig applies, besides those of gaze; it reads all others when it starts."""
+"""Starts of other keys that a running rig applies; it reads all others when it starts."""
+_RIG = Declaration("params", params=Rig)
 
 
 def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:
     """Return the parameters of a rig in the order of its file."""
     known = values(defaults)
-    leaves = _leaves(Declaration("params", params=Rig), rig, "")
-    return tuple(_parameter(key, declared, known.get(key)) for key, declared, _ in leaves)
+    return tuple(_parameter(key, declared, known.get(key)) for key, declared, _ in _leaves(rig))
 
 
-def value_of(rig: Rig, key: str) -> Value:
-    """Return the value at a dotted key; a mapping for a group.
+def value_of(rig: Any, key: str) -> Value:
+    """Return the value at a dotted key of a dataclass; a mapping for a group.
 
     Raises:
         gazerig.config.load.ConfigError: the key does not exist; the message lists the existing
             ones.
     """
-    value: Any = to_plain(rig)
-    for done, step in enumerate(steps := key.split(".")):
-        names = tuple(value) if isinstance(value, dict) else ()
-        if step not in names:
+    value = to_plain(rig)
+    for step in key.split("."):
+        if not isinstance(value, dict) or step not in value:
+            names = value if isinstance(value, dict) else ()
             near = suggestion_text(step, names) or ";"
-            there = f"available: {', '.join(names)}"
-            there = there if names else f"{'.'.join(steps[:done])} has no keys"
-            rule = f"unknown key {abbreviate(step)}{near} {there}"
-            raise ConfigError([ConfigFault("", None, key, "", rule)])
+            rule = f"unknown key {abbreviate(step)}{near} available: {', '.join(names) or 'none'}"
+            raise refusal(key, rule)
         value = value[step]
     found: Value = value
     return found
@@ -64,27 +61,28 @@ def value_of(rig: Rig, key: str) -> Value:
 
 def values(rig: Rig) -> dict[str, Value]:
     """Return the values of all parameters by key."""
-    leaves = _leaves(Declaration("params", params=Rig), rig, "")
-    return {key: to_plain(value) for key, _, value in leaves}
+    return {key: to_plain(value) for key, _, value in _leaves(rig)}
 
 
 def apply_changes(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     """Return the rig with other values at dotted keys, after checking every rule.
 
     A mapping is merged over the present one, like a layer of a file. None removes an entry of a
-    mapping that cannot contain null.
+    mapping.
 
     Raises:
         gazerig.config.load.ConfigError: lists every fault, as when a file is loaded.
     """
-    data, faults = to_plain(rig), list[ConfigFault]()
+    data = to_plain(rig)
     for key, value in changes.items():
-        faults += _put(data, key, to_plain(value))
+        data = merge(data, nest({key: to_plain(value)}), _RIG)
     outcome = validate_rules(Rig, data, RULES)
     made, found = outcome
-    faults += [ConfigFault("", None, ".".join(map(str, v.path)), v.value, v.rule) for v in found]
-    if faults or made is None:
-        raise ConfigError(faults)
+    if found or made is None:
+        raise ConfigError(
+            ConfigFault("", None, ".".join(map(str, one.path)), one.value, one.rule)
+            for one in found
+        )
     return made
 
 
@@ -93,40 +91,56 @@ def differences(before: Rig, after: Rig) -> dict[str, Value]:
 
     A removed entry of a mapping has the value None.
     """
-    return {} if before is after else dict(_differences(to_plain(before), to_plain(after), ""))
+    return dict(_differences(to_plain(before), to_plain(after), ""))
 
 
-def flatten_changes(changes: Mapping[str, Value]) -> dict[str, Value]:
+def flatten_changes(changes: Mapping[str, Any]) -> dict[str, Value]:
     """Return changes with mappings expanded to their single keys, as in a file."""
-    out: dict[str, Value] = {}
+    return dict(_differences({}, changes, ""))
+
+
+def nest(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values at dotted keys as nested mappings, as in a file."""
+    nested: dict[str, Any] = {}
     for key, value in changes.items():
-        if isinstance(value, Mapping) and value:
-            out |= flatten_changes({f"{key}.{step}": item for step, item in value.items()})
+        *above, last = key.split(".")
+        held = nested
+        for step in above:
+            held = held.setdefault(step, {})
+        held[last] = value
+    return nested
+
+
+def merge(low: Any, high: Any, declared: Declaration | None = None) -> Any:
+    """Return plain values merged over others.
+
+    declared: declaration of both; its mappings contain no null, which removes an entry
+    """
+    if not isinstance(high, dict):
+        return high
+    merged = dict(low) if isinstance(low, dict) else {}
+    for key, value in high.items():
+        if value is None and declared is not None and declared.form == "mapping":
+            merged.pop(key, None)
         else:
-            out[key] = value
-    return out
+            below = declared.below(key) if declared is not None else None
+            merged[key] = merge(merged.get(key), value, below)
+    return merged
 
 
 def to_plain(value: Any) -> Any:
     """Return frozen values as dicts, tuples and scalars."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {name: to_plain(one) for name, (_, one) in _fields(value).items()}
+    if dataclasses.is_dataclass(value):
+        value = _fields(value)
     if isinstance(value, Mapping):
         return {str(key): to_plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return tuple(to_plain(item) for item in value)
-    return value
+    return tuple(map(to_plain, value)) if isinstance(value, list | tuple) else value
 
 
-@lru_cache(maxsize=1024)
 def effect_time(key: str) -> str:
     """Return when a change of a key takes effect."""
-    first, second, *_ = *key.split("."), ""
-    if first == "gaze":  # a package's rule is created with its section, and so is the chooser
-        live = second in declarations(GazeConfig) and second != "chooser"
-    else:
-        live = any(fnmatchcase(key, pattern) for pattern in _LIVE)
-    return NEXT_TICK if live else NEXT_START
+    limit = key.startswith("joints.") and key.endswith(LIVE_LIMITS)
+    return NEXT_TICK if limit or f"{key}.".startswith(_LIVE) else NEXT_START
 
 
 def start_note(key: str) -> str:
@@ -134,27 +148,24 @@ def start_note(key: str) -> str:
     return " (at the next start)" if effect_time(key) == NEXT_START else ""
 
 
-def _fields(value: Any) -> dict[str, tuple[Declaration, Any]]:
-    """Return the fields of a section with their values, and the sections of plug-ins in it."""
-    shown = {
-        name: (one, getattr(value, name)) for name, one in declarations(value.__class__).items()
-    }
-    for name, section in getattr(value, "plugins", {}).items():
-        shown[name] = Declaration("params", params=type(section)), section
-    return shown
+def _fields(value: Any) -> dict[str, Any]:
+    """Return the fields of a section, and the sections of plug-ins in it."""
+    own = {name: getattr(value, name) for name in declarations(value.__class__)}
+    return own | getattr(value, "plugins", {})
 
 
-def _leaves(declared: Declaration, value: Any, key: str) -> Iterator[tuple[str, Declaration, Any]]:
+def _leaves(
+    value: Any, declared: Declaration = _RIG, key: str = ""
+) -> Iterator[tuple[str, Declaration, Any]]:
     """Yield key, declaration and value of every leaf below a position."""
-    start = f"{key}." if key else ""
     if dataclasses.is_dataclass(value):
-        for name, (field, inner) in _fields(value).items():
-            yield from _leaves(field, inner, f"{start}{name}")
-    elif declared.form == "mapping" and declared.inner is not None:
-        for step, item in value.items():
-            yield from _leaves(declared.inner, item, f"{start}{step}")
-    else:
+        value = _fields(value)
+    elif declared.form != "mapping":
         yield key, declared, value
+        return
+    for step, item in value.items():
+        below = declared.below(step) or Declaration("params", params=type(item))
+        yield from _leaves(item, below, f"{key}.{step}" if key else step)
 
 
 def _parameter(key: str, declared: Declaration, default: Value) -> Parameter:
@@ -177,41 +188,10 @@ def _parameter(key: str, declared: Declaration, default: Value) -> Parameter:
 
 
 def _differences(before: Any, after: Any, key: str) -> Iterator[tuple[str, Value]]:
-    if not (isinstance(before, dict) and isinstance(after, dict)):
-        if before != after or type(before) is not type(after):
-            yield key, after
-        return
-    start = f"{key}." if key else ""
-    for step in {**before, **after}:
-        if step in before and step in after:
-            yield from _differences(before[step], after[step], f"{start}{step}")
-        else:
-            yield f"{start}{step}", after.get(step)
-
-
-def _put(data: dict[str, Any], key: str, value: Value) -> list[ConfigFault]:
-    """Set a value in plain data at a dotted key; return the faults."""
-    *over, last = key.split(".")
-    held: Any = data
-    declared: Declaration | None = Declaration("params", params=Rig)
-    for step in over:
-        declared = declared.below(step) if declared is not None else None
-        below = held.get(step) if isinstance(held, dict) else ()
-        if below is None or (declared is not None and below in declared.choices):
-            held[step] = {}
-        held = held[step] if isinstance(held, dict) else None
-    if not isinstance(held, dict):
-        rule = f"unknown key {abbreviate(last)}; {'.'.join(over)} is a single value"
-        return [ConfigFault("", None, key, abbreviate(value), rule)]
-    items = declared.inner if declared is not None else None
-    if value is None and items is not None and not items.optional:
-        held.pop(last, None)
-    else:
-        held[last] = _overlay(held.get(last), value)
-    return []
-
-
-def _overlay(low: Any, high: Any) -> Any:
-    if not (isinstance(low, dict) and isinstance(high, dict)):
-        return high
-    return {**low, **{key: _overlay(low.get(key), value) for key, value in high.items()}}
+    old = before if isinstance(before, Mapping) else {}
+    if isinstance(after, Mapping) and (old or after):
+        for step in {**old, **after}:
+            below = f"{key}.{step}" if key else step
+            yield from _differences(old.get(step, ...), after.get(step), below)
+    elif before != after:
+        yield key, after

@@ -58,18 +58,24 @@ class Ranges:
     ]
 
 
+@dataclass(frozen=True, kw_only=True)
+class PluginSections:
+    """Sections of other packages' parts by their names; no file contains this key."""
+
+    plugins: Annotated[Mapping[str, Any], Unlisted()] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
-class BusConfig:
+class BusConfig(PluginSections):
     """Connection to the servos on one port."""
 
     # fmt: off
     port: Annotated[str, "serial port or I2C bus, e.g. /dev/ttyUSB0"]
     kind: Annotated[BusKind, Choices(*BUS_KINDS), "type of the servos or board on this bus"] = "dynamixel"
-    dynamixel: Annotated[DynamixelParams, "Protocol 2.0 settings, for kind dynamixel"] = field(default_factory=DynamixelParams)
-    feetech: Annotated[FeetechParams, "Feetech STS settings, for kind feetech"] = field(default_factory=FeetechParams)
-    maestro: Annotated[MaestroParams, "Pololu Maestro settings, for kind maestro"] = field(default_factory=MaestroParams)
-    pca9685: Annotated[Pca9685Params, "PCA9685 settings, for kind pca9685"] = field(default_factory=Pca9685Params)
-    plugins: Annotated[Mapping[str, Any], Unlisted()] = field(default_factory=dict, kw_only=True)
+    dynamixel: Annotated[DynamixelParams, "Protocol 2.0 settings, for kind dynamixel"] = DynamixelParams()
+    feetech: Annotated[FeetechParams, "Feetech STS settings, for kind feetech"] = FeetechParams()
+    maestro: Annotated[MaestroParams, "Pololu Maestro settings, for kind maestro"] = MaestroParams()
+    pca9685: Annotated[Pca9685Params, "PCA9685 settings, for kind pca9685"] = Pca9685Params()
     # fmt: on
 
     @property
@@ -105,10 +111,8 @@ class LidJoints:
         Raises:
             ValueError: shut and open are the same angle.
         """
-        for name in LIDS:
-            ends = self.ends_deg(name)
-            if ends is not None and ends[0] == ends[1]:
-                raise ValueError("a lid's shut and open angles must differ")
+        if any(ends and ends[0] == ends[1] for ends in map(self.ends_deg, LIDS)):
+            raise ValueError("a lid's shut and open angles must differ")
 
     def ends_deg(self, name: str) -> tuple[float, float] | None:
         """Return the angles of a joint's lid, shut and open; None if they are not given."""
@@ -122,69 +126,68 @@ class LidJoints:
 
 
 @dataclass(frozen=True)
-class GazeConfig:
+class GazeConfig(PluginSections):
     """The gaze models."""
 
     # fmt: off
-    bottom_up: Annotated[BottomUpParams, "bottom-up attention by motion"] = field(default_factory=BottomUpParams)
-    top_down: Annotated[TopDownParams, "gaze target of each behaviour"] = field(default_factory=TopDownParams)
+    bottom_up: Annotated[BottomUpParams, "bottom-up attention by motion"] = BottomUpParams()
+    top_down: Annotated[TopDownParams, "gaze target of each behaviour"] = TopDownParams()
     chooser: Annotated[str, Choices("attention"), "selection of the gaze target: attention, or the rule of a package"] = "attention"
-    attention: Annotated[AttentionParams, "who wins"] = field(default_factory=AttentionParams)
-    idle: Annotated[IdleParams, "idle gaze without a target"] = field(default_factory=IdleParams)
+    attention: Annotated[AttentionParams, "who wins"] = AttentionParams()
+    idle: Annotated[IdleParams, "idle gaze without a target"] = IdleParams()
     looks_away: Annotated[LooksAway,
         "looks away from a face; people: as measured in remote talk, mostly aside; eyes_alive: in reported turns as while talking, "
         "listening and thinking, which looks up; none: never"] = "people"
-    aversion: Annotated[AversionParams, "looks away in reported turns"] = field(default_factory=AversionParams)
-    conversation: Annotated[ConversationParams, "signs of listening"] = field(default_factory=ConversationParams)
-    scanpath: Annotated[ScanpathParams, "scanpath over a face"] = field(default_factory=ScanpathParams)
-    saccade: Annotated[SaccadeParams, "saccades of the eyes"] = field(default_factory=SaccadeParams)
-    pursuit: Annotated[PursuitParams, "smooth pursuit of the eyes"] = field(default_factory=PursuitParams)
-    head: Annotated[HeadParams, "head movements in gaze shifts"] = field(default_factory=HeadParams)
+    aversion: Annotated[AversionParams, "looks away in reported turns"] = AversionParams()
+    conversation: Annotated[ConversationParams, "signs of listening"] = ConversationParams()
+    scanpath: Annotated[ScanpathParams, "scanpath over a face"] = ScanpathParams()
+    saccade: Annotated[SaccadeParams, "saccades of the eyes"] = SaccadeParams()
+    pursuit: Annotated[PursuitParams, "smooth pursuit of the eyes"] = PursuitParams()
+    head: Annotated[HeadParams, "head movements in gaze shifts"] = HeadParams()
     drift: Annotated[DriftLaw, "breathing, and small random sway of a head at rest"] = "people"
-    lids: Annotated[LidParams, "blinks"] = field(default_factory=LidParams)
-    mouth: Annotated[MouthParams, "motion while the head speaks"] = field(default_factory=MouthParams)
-    oculomotor: Annotated[OculomotorParams, "coordination of saccades, pursuit and head"] = field(default_factory=OculomotorParams)
-    plugins: Annotated[Mapping[str, Any], Unlisted()] = field(default_factory=dict, kw_only=True)
+    lids: Annotated[LidParams, "blinks"] = LidParams()
+    mouth: Annotated[MouthParams, "motion while the head speaks"] = MouthParams()
+    oculomotor: Annotated[OculomotorParams, "coordination of saccades, pursuit and head"] = OculomotorParams()
     # fmt: on
 
 
-@dataclass(frozen=True)
-class Rig:
+@dataclass(frozen=True, kw_only=True)
+class Rig(PluginSections):
     """One head: buses, geometry, joints, limits and gaze."""
 
     # fmt: off
     name: Annotated[str, "name of the rig"]
     profile: Annotated[str, "name of a shipped profile or path of a YAML file"]
     character: Annotated[str | None,
-        "name of a shipped character or path of a YAML file, applied over rig and profile; null: none"] = field(default=None, kw_only=True)
+        "name of a shipped character or path of a YAML file, applied over rig and profile; null: none"] = None
     ranges: Annotated[Ranges, "ranges of eyes and head; null: those of the profile"]
     bus: Annotated[BusConfig, "servo bus"]
     buses: Annotated[Mapping[str, BusConfig],
-        "further servo buses by name; a joint selects its bus by this name"] = field(default_factory=dict, kw_only=True)
+        "further servo buses by name; a joint selects its bus by this name"] = field(default_factory=dict)
     geometry: Annotated[GeometryParams, "dimensions of the head"]
     joints: Annotated[Mapping[str, JointParams], "one entry per joint"]
-    lid_joints: Annotated[LidJoints, "lid angles of a rig with lids"] = field(default_factory=LidJoints)
+    lid_joints: Annotated[LidJoints, "lid angles of a rig with lids"] = LidJoints()
     couplings: Annotated[Mapping[str, CouplingParams],
-        "pairs of joints that two servos move together, each pair under any name"] = field(default_factory=dict, kw_only=True)
+        "pairs of joints that two servos move together, each pair under any name"] = field(default_factory=dict)
     meshes: Annotated[Mapping[str, MeshParams],
-        "mesh files that replace the generated shapes, by the name of the link"] = field(default_factory=dict, kw_only=True)
-    mass: Annotated[MassParams, "masses and their balance"] = field(default_factory=MassParams, kw_only=True)
+        "mesh files that replace the generated shapes, by the name of the link"] = field(default_factory=dict)
+    mass: Annotated[MassParams, "masses and their balance"] = MassParams()
     park_deg: Annotated[Mapping[str, _Degrees],
         "pose to which the joints move before torque is switched off; omitted joints go to 0"] = field(default_factory=dict)
-    camera: Annotated[CameraParams, "mount of the camera"] = field(default_factory=CameraParams)
-    webcam: Annotated[WebcamParams, "settings requested from a webcam"] = field(default_factory=WebcamParams)
-    oak: Annotated[OakParams, "settings requested from an OAK-D"] = field(default_factory=OakParams)
-    motion: Annotated[MotionParams, "detection of moving things"] = field(default_factory=MotionParams)
-    detector: Annotated[FaceDetectorParams, "detection of faces"] = field(default_factory=FaceDetectorParams)
+    camera: Annotated[CameraParams, "mount of the camera"] = CameraParams()
+    webcam: Annotated[WebcamParams, "settings requested from a webcam"] = WebcamParams()
+    oak: Annotated[OakParams, "settings requested from an OAK-D"] = OakParams()
+    motion: Annotated[MotionParams, "detection of moving things"] = MotionParams()
+    detector: Annotated[FaceDetectorParams, "detection of faces"] = FaceDetectorParams()
     face_parts_mm: Annotated[Mapping[str, tuple[_Millimetres, _Millimetres, _Millimetres]],
         "measured positions of one person's face parts (DN FL LE M N FR RE UP) relative to the nose tip: "
         "out of the face, to that person's left, up; omitted parts have an average adult's position"] = field(default_factory=dict)
-    tracker: Annotated[TrackerParams, "tracking of identities"] = field(default_factory=TrackerParams)
-    loop: Annotated[LoopParams, "control loop"] = field(default_factory=LoopParams)
-    guard: Annotated[GuardParams, "safety"] = field(default_factory=GuardParams)
-    gaze: Annotated[GazeConfig, "gaze models"] = field(default_factory=GazeConfig)
+    tracker: Annotated[TrackerParams, "tracking of identities"] = TrackerParams()
+    loop: Annotated[LoopParams, "control loop"] = LoopParams()
+    guard: Annotated[GuardParams, "safety"] = GuardParams()
+    gaze: Annotated[GazeConfig, "gaze models"] = GazeConfig()
     track_files: Annotated[tuple[str, ...], "YAML files with further tracks, relative to this file; file names are track names"] = ()
-    sound: Annotated[SoundParams, "loudspeaker and voice"] = field(default_factory=SoundParams, kw_only=True)
+    sound: Annotated[SoundParams, "loudspeaker and voice"] = SoundParams()
     expressions: Annotated[Mapping[str, Mapping[str, _Degrees]], Unit("deg"),
         "facial expressions: name -> joint -> angle added to it; for a lid, to the open lid"] = field(default_factory=dict)
     expression_blend_s: Annotated[float, Bounds(0.05, 10), "time from one expression to another"] = 0.5
@@ -192,7 +195,6 @@ class Rig:
         "values 0..1 that a program sets many times per second, such as a jaw's opening from loudness"] = field(default_factory=dict)
     doors: Annotated[tuple[str, ...],
         "voice stacks that take part, each in a process of its own: NAME [ADDRESS] [--bind HOST:PORT], as for gazerig door"] = ()
-    plugins: Annotated[Mapping[str, Any], Unlisted()] = field(default_factory=dict, kw_only=True)
     # fmt: on
 
     @property

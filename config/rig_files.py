@@ -1,24 +1,39 @@
-"""Files of a running rig: read together, and written only if they can be loaded again.
+"""Files of a running rig, and which of them a browser may name.
 
-A file is written from its last text without a fault. A rig's file that a user has made invalid
-meanwhile is kept as a backup, and is never the base of a new file.
+A page that controls a running rig names characters, walks, profiles and files to save in. The
+program reads and writes them with its user's permissions, so only files in one folder may be named.
 """
 
 import os
+import re
 from collections.abc import Mapping
 from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.config.load import ConfigError, ConfigFault
+from gazerig.config.load import shipped_path
+from gazerig.config.parameters import flatten_changes
 from gazerig.config.rig import Rig
-from gazerig.config.save import rig_file, save
-from gazerig.config.schema import layers_of, load_rig
-from gazerig.drivers.files.file_input import kind_of, read_limited
+from gazerig.config.save import save
+from gazerig.config.schema import layers_of, load_rig, refusal, rig_path
+from gazerig.config.shipped_files import file_in_folders
 from gazerig.robot.model.parameter import SavedFile
 
-_LARGEST = 1_000_000  # bytes, as gazerig.config.entries reads
+_KIND_OF_KEY = {
+    "gaze.scanpath.transition_matrix": "scanpaths",
+    "profile": "profiles",
+    "character": "characters",
+}
+"""Keys of a rig that contain a shipped name or a file, and the kind of the names."""
+_FILE_KEYS = re.compile(r"track_files|sound\.folders|detector\.model_file|meshes\..+\.file")
+"""Other keys that contain files."""
+_LOCAL_KEYS = re.compile(r"(doors|bus\.port|buses\..+\.port|sound\.voice)(\..+)?")
+"""Keys that start programs or open devices of this computer."""
+_LOCAL = (
+    "starts a program or opens a device of the head's computer, so it cannot be set over the network: "
+    "set it in the rig's file or with gazerig ctl set on that computer"
+)
 
 
 class RigLayers(NamedTuple):
@@ -29,64 +44,23 @@ class RigLayers(NamedTuple):
     profile: str | None
 
 
-class RigFiles(NamedTuple):
-    """Files of a rig, its own first, and their contents when they were read."""
-
-    paths: tuple[Path, ...]
-    texts: tuple[bytes, ...]
-
-    @property
-    def own_text(self) -> bytes:
-        """Text of the rig's own file."""
-        return self.texts[0] if self.texts else b""
-
-    def has_changed(self) -> bool:
-        """Whether the content of any of them has changed, or cannot be read."""
-        try:
-            return tuple(read_limited(path, _LARGEST) for path in self.paths) != self.texts
-        except OSError:
-            return True
-
-
-def read_all(layers: RigLayers) -> tuple[Rig, RigFiles]:
-    """Return a rig and its files.
+def read_all(layers: RigLayers) -> tuple[Rig, tuple[Path, ...]]:
+    """Return a rig and its files, its own first.
 
     Raises:
         gazerig.config.load.ConfigError: see gazerig.config.schema.load_rig.
     """
-    paths = tuple(layers_of(*layers))
-    texts = _texts(paths)
-    return load_rig(*layers), RigFiles(paths, texts)
-
-
-def refuse_copy(to: str) -> None:
-    """Check that a rig can be copied to a path, without opening anything.
-
-    Raises:
-        gazerig.config.load.ConfigError: the path exists, or is not that of a YAML file.
-    """
-    rule = ""
-    if os.path.isdir(to):
-        rule = "is a directory; name a new .yaml file in it"
-    elif os.path.exists(to) and not os.path.isfile(to):
-        rule = f"is {kind_of(os.stat(to))}; name a new .yaml file"
-    elif not to.endswith((".yaml", ".yml")):
-        rule = "a rig's file ends in .yaml; rename it"
-    elif os.path.lexists(to):
-        rule = "already exists and is not overwritten; choose another name"
-    if rule:
-        raise ConfigError([ConfigFault(to, None, "", "", rule)])
+    return load_rig(*layers), tuple(layers_of(*layers))
 
 
 def save_layers(
-    layers: RigLayers, good: bytes, to: str | None, wanted: Mapping[str, Any], now: datetime
-) -> tuple[SavedFile, RigFiles]:
+    layers: RigLayers, to: str | None, wanted: Mapping[str, Any], now: datetime
+) -> tuple[SavedFile, tuple[Path, ...]]:
     """Write values into a rig's file; character and profile must not override any of them.
 
     Args:
         layers: The rig's file, and the files merged over it.
-        good: Last text of the file without a fault; it replaces a text that has faults now.
-        to: A new file for this text and the values; None: the rig's own.
+        to: A new file for a copy with the values; None: the rig's own.
         wanted: Values by dotted key.
         now: Time for the backup's name.
 
@@ -97,23 +71,58 @@ def save_layers(
         gazerig.config.load.ConfigError: see gazerig.config.save.save; or ``to`` exists or is not a
             YAML file.
     """
-    base = None
+    own, source = rig_path(layers.name), None
     if to is not None:
-        refuse_copy(to)
-        base, layers = good, layers._replace(name=to)
-    else:
-        try:
-            load_rig(*layers)
-        except ConfigError:
-            base = good
+        if not to.endswith((".yaml", ".yml")):
+            raise refusal("", "a rig's file ends in .yaml; rename it", to)
+        if os.path.lexists(to):
+            raise refusal("", "already exists and is not overwritten; choose another name", to)
+        layers, own, source = layers._replace(name=to), Path(to), own
     check = partial(load_rig, character=layers.character, profile=layers.profile)
-    saved = save(rig_file(layers.name), wanted, now, check, Rig, base)
-    paths = tuple(layers_of(*layers))
-    return saved, RigFiles(paths, _texts(paths))
+    saved = save(own, wanted, now, check, source)
+    return saved, tuple(layers_of(*layers))
 
 
-def _texts(paths: tuple[Path, ...]) -> tuple[bytes, ...]:
-    try:
-        return tuple(read_limited(path, _LARGEST) for path in paths)
-    except OSError:
-        return ()  # its faults are reported when it is loaded
+class AllowedFolder:
+    """A folder; files in it and below it may be named."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder.resolve()
+
+    def check_file(
+        self, given: str, kind: str = "", key: str = "", start: Path | None = None
+    ) -> str:
+        """Return a shipped name unchanged, or the full path of a file in the folder.
+
+        Args:
+            given: Name or path.
+            kind: Kind of the accepted shipped names, e.g. "characters"; "" for none.
+            key: Key for the message of a fault.
+            start: Base of relative paths; None: the folder.
+
+        Raises:
+            gazerig.config.load.ConfigError: the file, after resolving links, is outside the folder.
+        """
+        if kind and "/" not in given and not given.endswith((".yaml", ".yml")):
+            shipped_path(kind, given)
+            return given
+        try:
+            return file_in_folders([self.folder], given, start)
+        except ValueError as error:
+            raise refusal(key, str(error)) from None
+
+    def check_changes(self, changes: Mapping[str, object]) -> None:
+        """Check new values of a rig's keys: the files they name, and keys that stay with its owner.
+
+        Relative paths start at the working folder, as when the files are opened.
+
+        Raises:
+            gazerig.config.load.ConfigError: a key may not be set, or a file may not be named.
+        """
+        for key, value in flatten_changes(changes).items():
+            if _LOCAL_KEYS.fullmatch(key):
+                raise refusal(key, _LOCAL)
+            if key in _KIND_OF_KEY or _FILE_KEYS.fullmatch(key):
+                for file in value if isinstance(value, list | tuple) else (value,):
+                    if isinstance(file, str) and file:
+                        self.check_file(file, _KIND_OF_KEY.get(key, ""), key, Path.cwd())

@@ -1,54 +1,30 @@
 """Values and whole configurations as YAML text."""
 
 import json
-import operator
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from gazerig.config.load import load
-from gazerig.config.parameters import to_plain
-from gazerig.config.schema import load_walk
+from gazerig.config.parameters import nest, to_plain
 from gazerig.config.tracks import TrackSet, load_track, track_name, track_path
 
-Value = str | int | float | bool | None | tuple["Value", ...] | list["Value"]
-
-_PLAIN_TEXT = re.compile(r"[A-Za-z/][\w./-]*")
-_NO_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
+_PLAIN_TEXT = re.compile(r"(?!(?i:null|true|false|yes|no|on|off|y|n)$)[A-Za-z/][\w./-]*")
 
 
-class EditRefused(ValueError):
-    """A value cannot be written; the message contains key, reason and remedy."""
-
-
-def format_value(value: Value) -> str:
-    """Return a value as YAML on one line.
-
-    Raises:
-        EditRefused: it is not finite, or neither a scalar nor a list.
-    """
-    if value is None:
-        return "null"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        to_plain = _PLAIN_TEXT.fullmatch(value) and value.lower() not in _NO_TEXT
-        return value if to_plain else json.dumps(value, ensure_ascii=False)
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(format_value, value))}]"
-    if isinstance(value, float):
-        if not isfinite(value):
-            raise EditRefused(f"{value} is not a finite number and is never written")
-        return repr(float(value))
-    try:
-        return str(operator.index(value))
-    except TypeError:
-        raise EditRefused(
-            f"{value!r} is not a number, text, truth value or list of those"
-        ) from None
+def format_value(value: Any) -> str:
+    """Return a value as YAML on one line: JSON, and simple words without quotes."""
+    match value:
+        case Mapping():
+            pairs = [f"{format_value(key)}: {format_value(one)}" for key, one in value.items()]
+            return f"{{{', '.join(pairs)}}}"
+        case list() | tuple():
+            return f"[{', '.join(map(format_value, value))}]"
+        case str() if _PLAIN_TEXT.fullmatch(value):
+            return value
+    return json.dumps(value, ensure_ascii=False, default=int)  # a number of numpy
 
 
 def params_text(params: Any) -> str:
@@ -57,15 +33,6 @@ def params_text(params: Any) -> str:
     ``gazerig.config.load.load`` reads exactly the same values.
     """
     return "".join(_lines(to_plain(params)))
-
-
-def walk_text(name_or_path: str) -> str:
-    """Return the face walk of a rig as YAML.
-
-    Raises:
-        gazerig.config.load.ConfigError: the walk has a fault.
-    """
-    return "".join(_lines(to_plain(load_walk(name_or_path))))
 
 
 def tracks_text(files: Sequence[str]) -> str:
@@ -77,7 +44,7 @@ def tracks_text(files: Sequence[str]) -> str:
     found = {track_name(file): load_track(track_path(file)) for file in files}
     # A rerun plays no sound, and its track is another file.
     found = {name: replace(one, sound=Path(one.sound).name) for name, one in found.items()}
-    return "".join(_lines(to_plain(TrackSet(found)))) if found else ""
+    return params_text(TrackSet(found)) if found else ""
 
 
 def track_files(text: Path, folder: Path) -> tuple[str, ...]:
@@ -89,21 +56,14 @@ def track_files(text: Path, folder: Path) -> tuple[str, ...]:
     files = []
     for name, track in load(text, TrackSet).tracks.items():
         file = folder / f"{name}.yaml"
-        file.write_text("".join(_lines(to_plain(track))), encoding="utf-8")
+        file.write_text(params_text(track), encoding="utf-8")
         files.append(str(file))
     return tuple(files)
 
 
 def changes_text(changes: Mapping[str, Any]) -> str:
     """Return values at dotted keys as the YAML of a layer, for example a character."""
-    nested: dict[str, Any] = {}
-    for key, value in changes.items():
-        *over, last = key.split(".")
-        held = nested
-        for step in over:
-            held = held.setdefault(step, {})
-        held[last] = value
-    return "".join(_lines(nested))
+    return "".join(_lines(nest(changes)))
 
 
 def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:
@@ -114,13 +74,4 @@ def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:
             yield f"{start}\n"
             yield from _lines(value, depth + 1)
         else:
-            yield f"{start} {_flow(value)}\n"
-
-
-def _flow(value: Any) -> str:
-    """Return a value as YAML on one line."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{format_value(k)}: {_flow(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_flow, value)) + "]"
-    return format_value(value)
+            yield f"{start} {format_value(value)}\n"

@@ -6,7 +6,6 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Annotated
 
-from gazerig.config.allowed_folder import file_in_folders
 from gazerig.config.load import (
     Check,
     ConfigError,
@@ -18,6 +17,7 @@ from gazerig.config.load import (
     validate_entries,
 )
 from gazerig.config.long_track import read_long
+from gazerig.config.shipped_files import file_in_folders
 from gazerig.gaze.track.track import MAX_DURATION_S, Track, frame_faults, loop_fault
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 

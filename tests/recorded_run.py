@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from msgspec.structs import replace
 
-from gazerig.config.save_text import params_text, walk_text
-from gazerig.config.schema import load_rig
+from gazerig.config.save_text import params_text
+from gazerig.config.schema import load_rig, load_walk
 from gazerig.drivers.types import Detections
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
@@ -33,7 +33,7 @@ def info_for(pictures_hz: float = 4.0) -> RunInfo:
         rig="desk",
         profile=rig.profile,
         config_yaml=params_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix),
+        walk_yaml=params_text(load_walk(rig.gaze.scanpath.transition_matrix)),
         seed=7,
         rate_hz=rig.loop.rate_hz,
         started_utc=STARTED,

@@ -15,8 +15,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 
-from gazerig.config.save_text import params_text, walk_text
-from gazerig.config.schema import load_rig
+from gazerig.config.save_text import params_text
+from gazerig.config.schema import load_rig, load_walk
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
@@ -35,7 +35,7 @@ def recorded(path: Path, seconds: float = 0.5) -> bytes:
     options, rig = RunOptions(mock=True, fast=True, seed=5, scene="visitor"), load_rig("desk")
     info = RunInfo(
         rig="desk", profile=rig.profile, config_yaml=params_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), seed=5, rate_hz=rig.loop.rate_hz,
+        walk_yaml=params_text(load_walk(rig.gaze.scanpath.transition_matrix)), seed=5, rate_hz=rig.loop.rate_hz,
         started_utc=datetime(2026, 1, 31, 23, 59, 59, tzinfo=UTC), scene="visitor", mock=True, fast=True,
     )  # fmt: skip
     recorder = Recorder(path, info, patient=True)

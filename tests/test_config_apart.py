@@ -1,6 +1,7 @@
 """Rig files read and written in another process are as if read and written here."""
 
 import os
+import shutil
 import signal
 import sys
 from datetime import datetime
@@ -8,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from gazerig.config.load import ConfigError
-from gazerig.config.save import copy_shipped, save_rig
+from gazerig.config.load import ConfigError, shipped_path
+from gazerig.config.save import save
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.subprocess_call import in_subprocess
 
 
 def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    copy_shipped("desk", tmp_path / "my.yaml")
+    shutil.copy(shipped_path("rigs", "desk"), tmp_path / "my.yaml")
     monkeypatch.chdir(tmp_path)  # a relative path means the same there
     assert in_subprocess(load_rig, "my.yaml", "shy", profile="robot") == load_rig(
         "my.yaml", "shy", profile="robot"
@@ -23,7 +24,7 @@ def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
 
 
 def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
-    file = copy_shipped("desk", tmp_path / "my.yaml")
+    file = Path(shutil.copy(shipped_path("rigs", "desk"), tmp_path / "my.yaml"))
     text = file.read_text(encoding="utf-8")
     file.write_text(f"nonsense: 1\n{text}\nmore: 2\n", encoding="utf-8")
     with pytest.raises(ConfigError) as here:
@@ -35,9 +36,9 @@ def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
 
 
 def test_saving_works_there(tmp_path: Path) -> None:
-    file = copy_shipped("desk", tmp_path / "my.yaml")
+    file = Path(shutil.copy(shipped_path("rigs", "desk"), tmp_path / "my.yaml"))
     now = datetime(2026, 1, 31, 23, 59, 59)
-    saved = in_subprocess(save_rig, file, {"loop.rate_hz": 100.0}, now)
+    saved = in_subprocess(save, file, {"loop.rate_hz": 100.0}, now)
     assert saved.path == file and saved.backup is not None and saved.backup.exists()
     assert [str(change) for change in saved.changes] == ["loop.rate_hz: 200.0 -> 100.0"]
     assert load_rig(str(file)).loop.rate_hz == 100.0

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import ConfigError
+from gazerig.config.rig_files import AllowedFolder
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
@@ -45,7 +45,7 @@ def test_files_beside_the_rig_and_shipped_names(home: Path) -> None:
     ],
 )  # fmt: skip
 def test_files_elsewhere_are_refused(home: Path, given: str) -> None:
-    with pytest.raises(ConfigError, match="only files in|no such name"):
+    with pytest.raises(ConfigError, match="only files in|nothing named"):
         AllowedFolder(home).check_file(given, "characters" if given else "")
     if given not in ("", ".", ".."):
         with pytest.raises(ConfigError):

@@ -69,7 +69,7 @@ def test_servos_get_the_limits_that_the_whole_range_needs() -> None:
     [
         (replace(COUPLING, first_ratio=5.0),
          "the servo of neck_pitch would be at -284 steps, outside its 0..4095"),
-        (replace(COUPLING, first="nek_pitch"), "no joint 'nek_pitch'; available: left_eye_pan"),
+        (replace(COUPLING, first="nek_pitch"), "no joint 'nek_pitch'; did you mean 'neck_pitch'? available: left"),
     ],
 )  # fmt: skip
 def test_a_range_that_the_servos_cannot_do_is_refused_with_its_corner(

@@ -111,11 +111,10 @@ def test_a_rig_with_a_face_keeps_all_rules() -> None:
     ("face", "blend_s", "said"),
     [
         ({"left_eye_pan": 5.0}, 0.5, "only gaze turns the eyes"),
-        ({"javv": 5.0}, 0.5, "no joint 'javv'; available: left_upper_lid"),
-        ({"jaw": 26.0}, 0.5, "26 deg is outside the joint's range -2..25"),
-        ({"left_upper_lid": -60.0}, 0.5, "more than the lid's whole range of 45 deg"),
-        ({"neck_roll": 20.0}, 0.1, "375 deg/s, its limit is max_speed_deg_s 200; expression_blend_s"),
-        ({"neck_roll": 5.0}, 0.1, "2887 deg/s2, its limit is max_accel_deg_s2 2000"),
+        ({"javv": 5.0}, 0.5, "no joint 'javv'; available: "),
+        ({"jaw": 26.0}, 0.5, "26.0 is outside the joint's range -2.0..25.0"),
+        ({"neck_roll": 20.0}, 0.1, "cannot move 20 deg within 0.1 s"),
+        ({"neck_roll": 5.0}, 0.1, "must be at least 0.12 s"),
     ],
 )  # fmt: skip
 def test_an_expression_that_no_joint_can_do_is_refused(
@@ -129,9 +128,9 @@ def test_an_expression_that_no_joint_can_do_is_refused(
 @pytest.mark.parametrize(
     ("level", "said"),
     [
-        (LevelParams("left_eye_tilt", 0.0, 5.0), "mouth.joint: only gaze turns the eyes"),
-        (LevelParams("jaw", 0.0, 40.0), "mouth.high_deg: 40 deg is outside"),
-        (LevelParams("jaw", 0.0, 20.0, 20.0), "mouth.smoothing_ms: jaw would move 20 deg"),
+        (LevelParams("left_eye_tilt", 0.0, 5.0), "mouth: only gaze turns the eyes"),
+        (LevelParams("jaw", 0.0, 40.0), "mouth: 40.0 is outside"),
+        (LevelParams("jaw", 0.0, 20.0, 20.0), "mouth: jaw cannot move 20 deg within 0.02 s"),
     ],
 )
 def test_a_level_that_no_joint_can_follow_is_refused(level: LevelParams, said: str) -> None:
@@ -141,5 +140,5 @@ def test_a_level_that_no_joint_can_follow_is_refused(level: LevelParams, said: s
 
 def test_the_range_of_a_neck_at_full_strength_counts() -> None:
     rig = replace(expressive_rig(), expressions={"shy": {"neck_pitch": -36.0}})
-    assert any("outside the joint's range -35..35" in fault for fault in faults(rig))
+    assert any("outside the joint's range -35.0..35.0" in fault for fault in faults(rig))
     assert pose_offset(rig, {"neck_pitch": -20.0}).head_rad == (0.0, radians(-20.0), 0.0)

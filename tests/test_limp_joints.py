@@ -184,20 +184,16 @@ def test_the_policy() -> None:
     assert not joints.limp
 
 
-@pytest.mark.parametrize(
-    ("joint", "rule"),
-    [
-        ("neck_pitch", "a joint of the neck is never limp"),
-        ("left_eye_pan", "gaze moves this joint all the time"),
-    ],
-)
-def test_other_joints_are_refused(joint: str, rule: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("joint", ["neck_pitch", "left_eye_pan"])
+def test_other_joints_are_refused(joint: str, tmp_path: Path) -> None:
     text = shipped_path("rigs", "nine_xl330").read_text()
     begin = text.index(f"  {joint}:")
     at = text.index("{", begin) + 1
     path = tmp_path / "rig.yaml"
     path.write_text(f"{text[:at]}limp_when_idle_s: 1.0, {text[at:]}")
-    with pytest.raises(ConfigError, match=rule):
+    with pytest.raises(
+        ConfigError, match=rf"{joint}.limp_when_idle_s: remove it: only a further joint"
+    ):
         load_rig(str(path))
 
 

@@ -111,7 +111,7 @@ def test_a_question_is_complete_before_its_prompt(monkeypatch: pytest.MonkeyPatc
     [
         (("a.yaml", "--board", "arduino"), "--board arduino: expected dynamixel, feetech"),
         (("a.txt",), "a.txt: a rig's file ends in .yaml: gazerig new a.yaml"),
-        (("a.yaml", "--joints", "eyes_pan"), "nothing turns the eyes in tilt"),
+        (("a.yaml", "--joints", "eyes_pan"), "or eyes_tilt alone if one servo turns both"),
         (("a.yaml", "--joints", "eyes_pan,eyes_tilt,Jaw"), "not a valid joint name"),
         (("there.yaml",), "there.yaml already exists"),
     ],

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from command_line import invoked
 
-from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import ConfigError
+from gazerig.config.rig_files import AllowedFolder
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.rig_description import description_of, shape_of

@@ -10,7 +10,6 @@ from gazerig.config.parameters import (
     NEXT_START,
     apply_changes,
     differences,
-    flatten_changes,
     parameters,
     value_of,
 )
@@ -54,14 +53,14 @@ def test_all_have_words_and_structure_waits_for_the_next_start(
     [
         ({"loop.rate_hz": 5000.0}, "loop.rate_hz: 5000.0 is above 1000 (unit Hz)"),
         ({"gaze.lid.x": 1}, "gaze.lid: unknown key 'lid'; did you mean 'lids'?"),
-        ({"loop.rate_hz.x": 1}, "loop.rate_hz is a single value"),
+        ({"loop.rate_hz.x": 1}, "loop.rate_hz: is a mapping, wanted a number"),
         ({"loop.rate_hz": float("nan")}, "is not a finite number"),
         ({"joints.neck_yaw.max_deg": -80.0}, "min_deg -70.0 must be below max_deg -80.0"),
-        ({"joints.neck_yaw.id": 1}, "id 1 is already used by left_eye_pan"),
+        ({"joints.neck_yaw.id": 1}, "id 1 on bus is already used by joints.left_eye_pan.id"),
         ({"park_deg.neck_pitch": -50.0}, "-50.0 is outside the joint's range -35.0..35.0"),
         ({"joints.left_upper_lid.min_deg": -5.0}, "lid_joints.left_deg"),
         ({"gaze.top_down.rules.wait": None}, "behaviour 'wait' has no rule"),
-        ({"face_parts_mm.XX": (1.0, 2.0, 3.0)}, "unknown face part"),
+        ({"face_parts_mm.XX": (1.0, 2.0, 3.0)}, "no face part 'XX'; available: DN"),
     ],
 )
 def test_what_is_wrong_is_refused_in_the_words_of_a_file(
@@ -104,7 +103,7 @@ def test_entries_and_groups_come_and_go(desk_rig: Rig) -> None:
     assert value_of(other, "gaze.top_down.rules.point.salience") == 1.0
     assert apply_changes(desk_rig, differences(desk_rig, other)) == other
     assert apply_changes(other, differences(other, desk_rig)) == desk_rig
-    flat = flatten_changes(differences(desk_rig, other))
+    flat = differences(desk_rig, other)
     assert flat["gaze.top_down.rules.point.look_at"] == "hand"
     assert flat["camera.lens.focal_px"] == (500.0, 500.0)
 

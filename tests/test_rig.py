@@ -79,8 +79,8 @@ def test_a_rig_names_its_profile_and_character(
 @pytest.mark.parametrize(
     ("old", "new", "place", "rule"),
     [
-        (r"^    id: 9$", "    id: 1", "joints.neck_roll.id", "id 1 is already used by"),
-        (r"model: xc330-m288", "model: xc330", "joints.neck_yaw.model", "unknown servo model"),
+        (r"^    id: 9$", "    id: 1", "joints.neck_roll.id", "id 1 on bus is already used by"),
+        (r"model: xc330-m288", "model: xc330", "joints.neck_yaw.model", "no servo model 'xc330'"),
         (r"model: xc330-m288", "model: XC330-M288", "joints.neck_yaw.model", "mean 'xc330-m288'?"),
         (r"^  neck_roll:", "  neck_rol:", "joints", "neck_roll"),
         (r"left_deg: \[-25.0", "left_deg: [-80.0", "lid_joints.left_deg", "outside"),
@@ -138,23 +138,35 @@ def test_joints_stand_in_their_order_whatever_bus_they_are_on(mixed: Rig) -> Non
         (
             "bus: neck",
             "bus: nack",
-            "joints.neck_yaw.bus: no bus 'nack' under buses; available: neck",
+            "joints.neck_yaw.bus: no bus 'nack'; did you mean 'neck'? available: neck",
         ),
         (
             "model: sts3215",
             "model: xl330-m077",
             "needs a bus of kind dynamixel, its bus is of kind feetech",
         ),
-        ("/dev/ttyUSB0", "/dev/ttyACM0", "buses.neck.port: /dev/ttyACM0 is already used by bus"),
+        (
+            "/dev/ttyUSB0",
+            "/dev/ttyACM0",
+            "buses.neck.port: /dev/ttyACM0 is already used by bus.port",
+        ),
         ("id: 5", "id: 12", "joints.right_lower_lid.id: the board has channels 0 to 11"),
         (", bus: tilt", "", "joints.neck_pitch.model: a sts3215 needs a bus of kind feetech"),
-        ("id: 4\n", "id: 3\n", "joints.left_lower_lid.id: id 3 is already used by right_upper_lid"),
+        (
+            "id: 4\n",
+            "id: 3\n",
+            "joints.left_lower_lid.id: id 3 on bus is already used by joints.right_upper_lid.id",
+        ),
         (
             "left_lower_deg: [-8.0, 22.0]",
             "left_lower_deg: [22.0, 22.0]",
             "a lid's shut and open angles must differ",
         ),
-        ("eyes_tilt:", "left_eye_tilt:", "nothing turns an eye in tilt"),
+        (
+            "eyes_tilt:",
+            "left_eye_tilt:",
+            "use either left_eye_tilt and right_eye_tilt, or eyes_tilt alone",
+        ),
         ("kind: maestro", "kind: maestra", "bus.kind"),
     ],
 )
@@ -172,7 +184,7 @@ def test_an_eye_has_one_master(tmp_path: Path) -> None:
         "\nlid_joints:", own[0].replace("eyes_pan", "left_eye_pan").join(("\n", "\nlid_joints:"))
     )
     said = faults(tmp_path, text.replace("id: 0", "id: 9", 1))
-    assert "joints.eyes_pan: turns both eyes, so it conflicts with left_eye_pan" in said
+    assert "joints.eyes_pan: use either left_eye_pan and right_eye_pan, or eyes_pan alone" in said
 
 
 def test_a_lid_needs_its_ends(tmp_path: Path) -> None:

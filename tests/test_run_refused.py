@@ -109,7 +109,12 @@ def test_check(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     rig.write_text(text, encoding="utf-8")
     assert typed("check", str(rig)) == 2
     said = capfd.readouterr().err
-    for part in ("max_speed_deg_s", "id 8 is already used by neck_pitch", "nmae", "name"):
+    for part in (
+        "max_speed_deg_s",
+        "id 8 on bus is already used by joints.neck_pitch.id",
+        "nmae",
+        "name",
+    ):
         assert part in said
     lines = [line for line in said.splitlines() if line.startswith(f"{rig}:")]
     assert len(lines) >= 4 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)

@@ -19,8 +19,7 @@ from typing import Any, NamedTuple
 from branch import Branch
 from ideal_bus import ideal_buses
 
-from gazerig.config.load import ConfigError
-from gazerig.config.save import copy_shipped
+from gazerig.config.load import ConfigError, shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
@@ -95,7 +94,7 @@ class Running(NamedTuple):
 @contextlib.contextmanager
 def a_rig() -> Iterator[Running]:
     folder = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
-    path, log = copy_shipped("desk", folder / "my.yaml"), folder / "log"
+    path, log = Path(shutil.copy(shipped_path("rigs", "desk"), folder / "my.yaml")), folder / "log"
     with log.open("w") as said:
         process = Branch(
             lambda: serve(path),

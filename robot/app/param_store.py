@@ -8,7 +8,6 @@ All methods may be called from any thread. Changes are checked together, and the
 parts as one command.
 """
 
-import contextlib
 import os
 import threading
 from collections.abc import Callable, Mapping
@@ -16,28 +15,19 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.config.allowed_folder import AllowedFolder
-from gazerig.config.load import ConfigError, ConfigFault, shipped_names
+from gazerig.config.load import shipped_names
 from gazerig.config.parameters import (
     apply_changes,
     differences,
-    flatten_changes,
     start_note,
     value_of,
     values,
 )
 from gazerig.config.parameters import parameters as described
 from gazerig.config.rig import Rig
-from gazerig.config.rig_files import (
-    RigFiles,
-    RigLayers,
-    read_all,
-    refuse_copy,
-    save_layers,
-)
-from gazerig.config.save import rig_file
-from gazerig.config.save_text import EditRefused, format_value
-from gazerig.config.schema import NO_CHARACTER, load_rig
+from gazerig.config.rig_files import AllowedFolder, RigLayers, read_all, save_layers
+from gazerig.config.save_text import format_value
+from gazerig.config.schema import NO_CHARACTER, load_rig, rig_path
 from gazerig.robot.app.live_params import LiveParams, rig_in_effect
 from gazerig.robot.app.subprocess_call import in_subprocess
 from gazerig.robot.model.commands import Value
@@ -54,7 +44,7 @@ class _RigState(NamedTuple):
     in_effect: the one that the running parts have
     name: the given name or path of the rig
     character: the command line's character; None: the rig's
-    files: present files, with their contents at the last valid read
+    files: present files
     file_values, values: values of ``saved`` and of ``rig``, by key
     """
 
@@ -63,7 +53,7 @@ class _RigState(NamedTuple):
     in_effect: Rig
     name: str
     character: str | None
-    files: RigFiles
+    files: tuple[Path, ...]
     file_values: Mapping[str, Value]
     values: Mapping[str, Value]
     version: int
@@ -126,7 +116,7 @@ class ParamStore:
     @property
     def path(self) -> Path:
         """Return the rig's file."""
-        return rig_file(self._state.name)
+        return rig_path(self._state.name)
 
     @property
     def character_name(self) -> str:
@@ -135,7 +125,7 @@ class ParamStore:
 
     def files(self) -> tuple[Path, ...]:
         """Return the files in use: the rig's, and those that override it."""
-        return self._state.files.paths
+        return self._state.files
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters in the order of the file."""
@@ -199,40 +189,21 @@ class ParamStore:
     def save(self, path: Path | str | None = None) -> SavedFile:
         """Write the present values into the rig's file, or into a copy of it at a new path.
 
-        From then on the copy is this rig's file. A file that a user has made invalid meanwhile is
-        kept as a backup.
+        From then on the copy is this rig's file. Edits of the file that are not applied yet are
+        included.
 
         Raises:
             gazerig.config.load.ConfigError: the rig is a shipped one and no path is given, the path
-                exists or cannot be written, or another layer overrides a value.
+                exists or cannot be written, the file has faults now, or another layer overrides a
+                value.
         """
         with self._changing:
             copied = path is not None and os.path.realpath(path) != os.path.realpath(self.path)
-            if copied:
-                refuse_copy(str(path))  # checked before another process is started
-            if self._state.files.has_changed():
-                # A valid edit that is not applied yet is included; an invalid one is not.
-                with contextlib.suppress(ConfigError):
-                    self._reload()
+            self._reload()
             state = self._state
-            wanted = flatten_changes(differences(state.saved, state.rig))
-            # These do not fit in a single line.
-            faults = [
-                ConfigFault(
-                    "",
-                    None,
-                    key,
-                    "",
-                    "contains mappings: change it in the file, which is read again",
-                )
-                for key, value in wanted.items()
-                if isinstance(value, tuple) and any(isinstance(item, Mapping) for item in value)
-            ]
-            if faults:
-                raise ConfigError(faults)
-            layers, good = self._layers(state), state.files.own_text
+            wanted = differences(state.saved, state.rig)
             to = str(path) if copied else None
-            done = self._elsewhere(save_layers, layers, good, to, wanted, self._now())
+            done = self._elsewhere(save_layers, self._layers(state), to, wanted, self._now())
             state = state._replace(name=to or state.name)
             saved: SavedFile
             saved, files = done
@@ -313,7 +284,7 @@ class ParamStore:
             values=values(rig) if found else before.values,
             version=before.version + 1,
         )
-        return tuple(f"{k} = {_text(v)}{start_note(k)}" for k, v in found.items())
+        return tuple(f"{k} = {format_value(v)}{start_note(k)}" for k, v in found.items())
 
 
 def _defaults(rig: Rig) -> Rig:
@@ -323,20 +294,7 @@ def _defaults(rig: Rig) -> Rig:
 
 def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[ParamChange, ...]:
     """Return each value that differs, as YAML; was: former values."""
-    found = flatten_changes(differences(before, after))
     return tuple(
-        ParamChange(key, _text(was[key]) if key in was else None, _text(value))
-        for key, value in found.items()
+        ParamChange(key, format_value(was[key]) if key in was else None, format_value(value))
+        for key, value in differences(before, after).items()
     )
-
-
-def _text(value: Value) -> str:
-    """Write a value as YAML on one line."""
-    if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{key}: {_text(item)}' for key, item in value.items())}}}"
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_text, value))}]"
-    try:
-        return format_value(value)
-    except EditRefused:
-        return str(value)

@@ -5,8 +5,8 @@ from datetime import UTC, datetime
 from typing import TypeVar
 
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import params_text, tracks_text, walk_text
-from gazerig.config.schema import load_rig, load_rules
+from gazerig.config.save_text import params_text, tracks_text
+from gazerig.config.schema import load_rig, load_rules, load_walk
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
@@ -123,7 +123,7 @@ def run_info(rig: Rig, options: RunOptions) -> RunInfo:
         profile=rig.profile,
         character=options.character or rig.character,
         config_yaml=params_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix),
+        walk_yaml=params_text(load_walk(rig.gaze.scanpath.transition_matrix)),
         tracks_yaml=tracks_text(rig.track_files),
         seed=options.seed,
         rate_hz=rig.loop.rate_hz,

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from msgspec import structs
 
-from gazerig.config.allowed_folder import file_in_folders
 from gazerig.config.rig import Rig
+from gazerig.config.shipped_files import file_in_folders
 from gazerig.drivers.process.own_folder import OwnFolder, sweep
 from gazerig.drivers.sound.params import KINDS, SILENT_DEVICE
 from gazerig.drivers.sound.playback import SoundEvent

@@ -160,9 +160,6 @@ def save(
     with clear_errors(), RobotClient.connect(pid) as rig:
         saved = rig.save(path)
     _print_notes(map(str, saved.changes))
-    if not saved.changes and saved.backup is not None:
-        say(f"{saved.path} had faults: it now contains the present values; backup: {saved.backup}")
-        return
     if not saved.changes:
         say(f"{saved.path} already contains all values: nothing to save")
         return

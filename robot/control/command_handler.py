@@ -86,7 +86,7 @@ class ParamAccess(Protocol):
 
 
 class PathGuard(Protocol):
-    """Rules for the files that a client may name (``config.allowed_folder.AllowedFolder``)."""
+    """Rules for the files that a client may name (``config.rig_files.AllowedFolder``)."""
 
     def check_file(self, given: str, kind: str = "") -> str:
         """Return a shipped name or an absolute path; raise if it is not allowed."""

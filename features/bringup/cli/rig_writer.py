@@ -9,7 +9,8 @@ import typer
 from rich.table import Table
 
 from gazerig.config.rig import Rig
-from gazerig.config.save import copy_shipped, rig_file, save_rig
+from gazerig.config.save import save
+from gazerig.config.schema import rig_path
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.cli.prompts import TerminalPerson
 from gazerig.robot.cli.console import Console
@@ -31,7 +32,7 @@ def refuse_unwritable(rig: str, out: Path | None) -> None:
         gazerig.config.load.ConfigError, SetupError: with the reason and the remedy.
     """
     if out is None:
-        save_rig(rig, {}, datetime.now())
+        save(rig_path(rig), {}, datetime.now())
     elif out.exists():
         raise SetupError(f"--out {out}: there is such a file: give it as RIG instead")
     elif "/" in rig or rig.endswith((".yaml", ".yml")):
@@ -52,19 +53,18 @@ def write_values(
     if not values:
         say("everything is as the rig file says: nothing to write")
         return
-    where = rig_file(rig) if out is None else out
+    where = rig_path(rig) if out is None else out
     if not person.agrees(f"write these {len(values)} values into {where}?"):
         say("nothing written")
         return
-    if out is not None:
-        copy_shipped(rig, out)
-    saved = save_rig(where, dict(values), datetime.now())
+    source = None if out is None else rig_path(rig)
+    saved = save(where, values, datetime.now(), source=source)
     for change in saved.changes:
         say(str(change))
-    if saved.backup is None:
+    if not saved.changes:
         say(f"everything is as {saved.path} says: nothing to write")
     else:
-        say(f"written into {saved.path}; as it was: {saved.backup}")
+        say(f"written into {saved.path}; as it was: {saved.backup or rig}")
 
 
 def show_and_write(

@@ -16,7 +16,8 @@ from typing import BinaryIO
 import gazerig
 from gazerig.config.parameters import to_plain
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import params_text, tracks_text, walk_text
+from gazerig.config.save_text import params_text, tracks_text
+from gazerig.config.schema import load_walk
 from gazerig.config.validation import abbreviate
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, write_file
@@ -158,7 +159,7 @@ class SweepSpec:
             "seeds": list(self.seeds),
             "search": dict(self.search),
             "rig": to_plain(self.rig),
-            "walk": walk_text(scanpath.transition_matrix),
+            "walk": params_text(load_walk(scanpath.transition_matrix)),
             "tracks": tracks_text(self.rig.track_files),
         }
 

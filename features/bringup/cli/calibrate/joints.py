@@ -9,8 +9,8 @@ from typing import Annotated, NamedTuple
 import typer
 
 from gazerig.config.rig import Rig
-from gazerig.config.save import propose, rig_file
-from gazerig.config.schema import load_rig
+from gazerig.config.save import propose
+from gazerig.config.schema import load_rig, rig_path
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.serial.port import port_at_path
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
@@ -320,7 +320,7 @@ def calibrate_joints(
                     or not loaded.joints[one].model_facts.measures_position
                 ]
                 propose(
-                    rig_file(rig),
+                    rig_path(rig),
                     {f"joints.{one}.transmission_points": ((0, 0),) for one in behind_rods},
                 )
         refuse_impossible(loaded, names, how)
