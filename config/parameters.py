@@ -10,8 +10,7 @@ from typing import Any
 
 from gazerig.config.load import ConfigError, ConfigFault, validate_rules
 from gazerig.config.rig import GazeConfig, Rig
-from gazerig.config.schema import RULES, refusal
-from gazerig.config.validation import abbreviate, suggestion_text
+from gazerig.config.schema import RULES, refusal, unknown_text
 from gazerig.params import Declaration, declarations
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import Parameter
@@ -36,8 +35,27 @@ _RIG = Declaration("params", params=Rig)
 
 def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:
     """Return the parameters of a rig in the order of its file."""
-    known = values(defaults)
-    return tuple(_parameter(key, declared, known.get(key)) for key, declared, _ in _leaves(rig))
+    known, found = values(defaults), list[Parameter]()
+    for key, declared, _ in _leaves(rig):
+        inner = declared.innermost
+        found.append(
+            Parameter(
+                key,
+                key.rpartition(".")[0],
+                declared.unit,
+                declared.description,
+                inner.low,
+                inner.high,
+                inner.choices,
+                "mapping" if declared.form == "params" else declared.form,
+                known.get(key),
+                effect_time(key),
+                declared.optional,
+                declared.length,
+                declared.inner.form if declared.inner is not None else None,
+            )
+        )
+    return tuple(found)
 
 
 def value_of(rig: Any, key: str) -> Value:
@@ -49,12 +67,10 @@ def value_of(rig: Any, key: str) -> Value:
     """
     value = to_plain(rig)
     for step in key.split("."):
-        if not isinstance(value, dict) or step not in value:
-            names = value if isinstance(value, dict) else ()
-            near = suggestion_text(step, names) or ";"
-            rule = f"unknown key {abbreviate(step)}{near} available: {', '.join(names) or 'none'}"
-            raise refusal(key, rule)
-        value = value[step]
+        names = value if isinstance(value, dict) else {}
+        if step not in names:
+            raise refusal(key, unknown_text("key", step, names))
+        value = names[step]
     found: Value = value
     return found
 
@@ -103,11 +119,9 @@ def nest(changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return values at dotted keys as nested mappings, as in a file."""
     nested: dict[str, Any] = {}
     for key, value in changes.items():
-        *above, last = key.split(".")
-        held = nested
-        for step in above:
-            held = held.setdefault(step, {})
-        held[last] = value
+        for step in reversed(key.split(".")):
+            value = {step: value}
+        nested = merge(nested, value)
     return nested
 
 
@@ -120,11 +134,10 @@ def merge(low: Any, high: Any, declared: Declaration | None = None) -> Any:
         return high
     merged = dict(low) if isinstance(low, dict) else {}
     for key, value in high.items():
-        if value is None and declared is not None and declared.form == "mapping":
+        if value is None and declared and declared.form == "mapping":
             merged.pop(key, None)
         else:
-            below = declared.below(key) if declared is not None else None
-            merged[key] = merge(merged.get(key), value, below)
+            merged[key] = merge(merged.get(key), value, declared and declared.below(key))
     return merged
 
 
@@ -166,25 +179,6 @@ def _leaves(
     for step, item in value.items():
         below = declared.below(step) or Declaration("params", params=type(item))
         yield from _leaves(item, below, f"{key}.{step}" if key else step)
-
-
-def _parameter(key: str, declared: Declaration, default: Value) -> Parameter:
-    inner = declared.innermost
-    return Parameter(
-        key,
-        key.rpartition(".")[0],
-        declared.unit,
-        declared.description,
-        inner.low,
-        inner.high,
-        inner.choices,
-        "mapping" if declared.form == "params" else declared.form,
-        default,
-        effect_time(key),
-        declared.optional,
-        declared.length,
-        declared.inner.form if declared.inner is not None else None,
-    )
 
 
 def _differences(before: Any, after: Any, key: str) -> Iterator[tuple[str, Value]]:

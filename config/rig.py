@@ -38,7 +38,7 @@ from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.kinematics import LIDS, GeometryParams
+from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.tracker_params import TrackerParams
@@ -83,11 +83,6 @@ class BusConfig(PluginSections):
         """Return the parameters of its kind."""
         return self.plugins.get(self.kind) or getattr(self, self.kind)
 
-    @property
-    def baud(self) -> int:
-        """Return the baud rate of its line, bit/s."""
-        return int(self.section.baud)
-
 
 _Degrees = Annotated[float, Bounds(-180, 180)]
 _Millimetres = Annotated[float, Bounds(-300, 300)]
@@ -104,15 +99,6 @@ class LidJoints:
     left_lower_deg: Annotated[_LidPair | None, "left lower lid: [meets the upper one, open]; null: no lower lid"] = None
     right_lower_deg: Annotated[_LidPair | None, "right lower lid: [meets the upper one, open]; null: no lower lid"] = None
     # fmt: on
-
-    def __post_init__(self) -> None:
-        """Check that the lids can move.
-
-        Raises:
-            ValueError: shut and open are the same angle.
-        """
-        if any(ends and ends[0] == ends[1] for ends in map(self.ends_deg, LIDS)):
-            raise ValueError("a lid's shut and open angles must differ")
 
     def ends_deg(self, name: str) -> tuple[float, float] | None:
         """Return the angles of a joint's lid, shut and open; None if they are not given."""
@@ -209,11 +195,3 @@ class Rig(PluginSections):
             KeyError: the bus does not exist.
         """
         return self.buses[name] if name else self.bus
-
-    def bus_of(self, joint: str) -> BusConfig:
-        """Return the bus of a joint's servo.
-
-        Raises:
-            KeyError: the joint or the bus does not exist.
-        """
-        return self.bus_named(self.joints[joint].bus)

@@ -26,15 +26,12 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import output_file
 from gazerig.robot.model.parameter import ParamChange, SavedFile
 
-Check = Callable[[str], Any]
-"""Loads a file by its path and returns its value; raises gazerig.config.load.ConfigError."""
-
 
 def save(
     path: Path | str,
     changes: Mapping[str, Any],
     now: datetime,
-    check: Check = load_rig,
+    check: Callable[[str], Any] = load_rig,
     source: Path | None = None,
 ) -> SavedFile:
     """Write values at dotted keys into a YAML file, and keep the old file as a backup.
@@ -56,11 +53,13 @@ def save(
         rule = "is part of the program and is never changed: copy it"
         raise refusal("", f"{rule} (cp {target} my{target.name}) and use the copy", target)
     before, text, found = propose(source or target, changes)
-    if source is None and not found:
-        return SavedFile(target, None, ())
-    if source is None and not os.access(target, os.W_OK):
-        raise refusal("", "is read-only; allow writing with chmod u+w", target)
-    backup = None if source else Path(f"{target}.bak-{now:%Y%m%d-%H%M%S}")
+    backup = None
+    if source is None:
+        if not found:
+            return SavedFile(target, None, ())
+        if not os.access(target, os.W_OK):
+            raise refusal("", "is read-only; allow writing with chmod u+w", target)
+        backup = Path(f"{target}.bak-{now:%Y%m%d-%H%M%S}")
     try:
         with output_file(target, force=source is None) as fresh:
             fresh.write(text.encode())

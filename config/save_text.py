@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gazerig.config.load import load
-from gazerig.config.parameters import nest, to_plain
+from gazerig.config.parameters import to_plain
 from gazerig.config.tracks import TrackSet, load_track, track_name, track_path
 
 _PLAIN_TEXT = re.compile(r"(?!(?i:null|true|false|yes|no|on|off|y|n)$)[A-Za-z/][\w./-]*")
@@ -28,7 +28,7 @@ def format_value(value: Any) -> str:
 
 
 def params_text(params: Any) -> str:
-    """Return a dataclass of parameters as YAML: a world's script, or those of a rig.
+    """Return a dataclass of parameters, or nested mappings, as YAML.
 
     ``gazerig.config.load.load`` reads exactly the same values.
     """
@@ -59,11 +59,6 @@ def track_files(text: Path, folder: Path) -> tuple[str, ...]:
         file.write_text(params_text(track), encoding="utf-8")
         files.append(str(file))
     return tuple(files)
-
-
-def changes_text(changes: Mapping[str, Any]) -> str:
-    """Return values at dotted keys as the YAML of a layer, for example a character."""
-    return "".join(_lines(nest(changes)))
 
 
 def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:

@@ -1,7 +1,6 @@
 """Rigs, rule sets and face walks by name or path, and rules between the sections of a rig."""
 
 from collections.abc import Collection, Iterable, Sequence
-from contextlib import suppress
 from difflib import get_close_matches
 from math import inf, sqrt
 from pathlib import Path
@@ -124,7 +123,8 @@ Faults = Iterable[tuple[str, str]]
 """Dotted key and broken rule of each fault."""
 
 
-def _unknown(kind: str, name: str, names: Collection[str]) -> str:
+def unknown_text(kind: str, name: str, names: Collection[str]) -> str:
+    """Return that nothing of a kind has a name, with a similar name and all names."""
     near = suggestion_text(name.lower(), names) or ";"
     return f"no {kind} {name!r}{near} available: {', '.join(names) or 'none'}"
 
@@ -177,9 +177,9 @@ def _servos(rig: Rig) -> Faults:
         facts, bus = SERVOS.get(joint.model), {**rig.buses, "": rig.bus}.get(joint.bus)
         key = f"joints.{name}.model"
         if bus is None:
-            yield f"joints.{name}.bus", _unknown("bus", joint.bus, rig.buses)
+            yield f"joints.{name}.bus", unknown_text("bus", joint.bus, rig.buses)
         elif facts is None:
-            yield key, _unknown("servo model", joint.model, sorted(SERVOS))
+            yield key, unknown_text("servo model", joint.model, sorted(SERVOS))
         elif not facts.fits_bus(bus.kind):
             yield (
                 key,
@@ -222,6 +222,8 @@ def _angles(rig: Rig) -> Faults:
         key, lid = f"lid_joints.{rig.lid_joints.key(name)}", rig.lid_joints.ends_deg(name)
         if lid is None:
             yield key, f"missing; the joint {name} needs it: [shut, open]"
+        elif lid[0] == lid[1]:
+            yield key, "a lid's shut and open angles must differ"
         else:
             poses.append((key, name, lid, inf))
     for face, angles in rig.expressions.items():
@@ -233,7 +235,7 @@ def _angles(rig: Rig) -> Faults:
         poses.append((f"levels.{name}", level.joint, turn, level.smoothing_ms / 1e3))
     for key, name, ends, time_s in poses:
         if name not in rig.joints:
-            yield key, _unknown("joint", name, rig.names)
+            yield key, unknown_text("joint", name, rig.names)
             continue
         joint, span = rig.joints[name], max(ends) - min(ends)
         outside = [end for end in ends if not joint.min_deg <= end <= joint.max_deg]
@@ -253,52 +255,39 @@ def _angles(rig: Rig) -> Faults:
             )
 
 
-def _collisions(rig: Rig) -> Faults:
-    """Check whether the forbidden ranges allow any pose."""
+def _mechanism(rig: Rig) -> Faults:
+    """Find collisions, couplings and masses that no such head can have."""
+    if any(joint.model not in SERVOS for joint in rig.joints.values()):
+        return
     try:
-        with suppress(KeyError):  # an unknown model is a fault of another rule
-            limits = tuple(rig.joints[name].limit() for name in rig.names)
-            forbidden_pairs(rig.guard.collisions, limits, rig.names)
+        limits = tuple(rig.joints[name].limit() for name in rig.names)
+        forbidden_pairs(rig.guard.collisions, limits, rig.names)
     except ValueError as error:
         yield "guard.collisions", str(error)
+    for name, pair in rig.couplings.items():
+        absent = [joint for joint in pair.joints if joint not in rig.joints]
+        fault = unknown_text("joint", absent[0], rig.names) if absent else None
+        if fault := fault or unreachable_text(pair, rig.joints):
+            yield f"couplings.{name}", fault
+    if rig.mass != MassParams():
+        from gazerig.robot.description.build import RigShape, rig_mass_faults  # few rigs need it
 
-
-def _masses(rig: Rig) -> Faults:
-    """Find masses that no such head can have."""
-    if rig.mass == MassParams():
-        return
-    from gazerig.robot.description.build import RigShape, rig_mass_faults  # few rigs need it
-
-    lids = dict.fromkeys(LIDS, (-0.4, 0.4))  # their angles hardly matter to the masses
-    with suppress(KeyError):
+        lids = dict.fromkeys(LIDS, (-0.4, 0.4))  # their angles hardly matter to the masses
         yield from rig_mass_faults(
             RigShape(rig.name, rig.geometry, rig.joints, lids, rig.couplings, rig.camera, rig.mass)
         )
 
 
-def _couplings(rig: Rig) -> Faults:
-    """Find couplings whose servos cannot move their joints over the whole range."""
-    for name, coupling in rig.couplings.items():
-        for joint in coupling.joints:
-            if joint not in rig.joints:
-                yield f"couplings.{name}", _unknown("joint", joint, rig.names)
-        with suppress(KeyError):
-            if fault := unreachable_text(coupling, rig.joints):
-                yield f"couplings.{name}", fault
-
-
-def _part_names(rig: Rig) -> Faults:
+def _names(rig: Rig) -> Faults:
+    """Find names of face parts and gestures that do not exist, which would have no effect."""
     for code in rig.face_parts_mm:
         if code not in PARTS:
-            yield f"face_parts_mm.{code}", _unknown("face part", code, PARTS)
-
-
-def _gestures(rig: Rig) -> Faults:
+            yield f"face_parts_mm.{code}", unknown_text("face part", code, PARTS)
     known = [*shipped_names("tracks"), *(Path(file).stem for file in rig.track_files)]
     for behaviour, rule in rig.gaze.top_down.rules.items():
         if rule.gesture not in ("", *known):
             key = f"gaze.top_down.rules.{behaviour}.gesture"
-            yield key, _unknown("gesture", rule.gesture, known)
+            yield key, unknown_text("gesture", rule.gesture, known)
 
 
 RULES = (
@@ -307,10 +296,7 @@ RULES = (
     _servos,
     _limp_joints,
     _angles,
-    _part_names,
-    _collisions,
-    _masses,
-    _couplings,
-    _gestures,
+    _mechanism,
+    _names,
 )
 """Rules between several sections of a rig."""

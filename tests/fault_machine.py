@@ -136,7 +136,7 @@ class Machine:
         self.setups = servo_configs(rig)
         self.linkages = [rig.joints[name].make_linkage() for name in self.names]
         self.places = [(rig.joints[name].bus, servo_index(rig, name)) for name in self.names]
-        self._kinds = [rig.bus_of(name).kind for name in self.names]
+        self._kinds = [rig.bus_named(rig.joints[name].bus).kind for name in self.names]
         self.heard: tuple[bool, ...] = ()
         self.said: list[str] = []
         self.longest_s = 0.0
@@ -343,5 +343,7 @@ class Machine:
 
 def pair_of(rig: Rig, kind: str) -> tuple[str, int, int]:
     """Return the bus of a kind, and the indices of two of its joints."""
-    places = [i for i, name in enumerate(rig.names) if rig.bus_of(name).kind == kind]
+    places = [
+        i for i, name in enumerate(rig.names) if rig.bus_named(rig.joints[name].bus).kind == kind
+    ]
     return rig.joints[rig.names[places[0]]].bus, places[1 % len(places)], places[-1]

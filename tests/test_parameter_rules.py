@@ -109,7 +109,7 @@ def test_entries_and_groups_come_and_go(desk_rig: Rig) -> None:
 
 
 def test_an_unknown_key_has_no_value(desk_rig: Rig) -> None:
-    with pytest.raises(ConfigError, match="did you mean 'lids'"):
+    with pytest.raises(ConfigError, match="no key 'lid'; did you mean 'lids'"):
         value_of(desk_rig, "gaze.lid")
 
 

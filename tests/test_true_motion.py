@@ -64,7 +64,7 @@ def judged(judge: Judge) -> None:
         i = judge.rig.names.index(name)
         assert worst.stops == 0, f"{name} touched its stop"
         assert worst.beyond_deg <= BEYOND_DEG, f"{name} {worst.beyond_deg:.2f} deg beyond its range"
-        if judge.rig.bus_of(name).kind in HOBBY_KINDS:
+        if judge.rig.bus_named(judge.rig.joints[name].bus).kind in HOBBY_KINDS:
             continue  # a hobby servo leaps from pulse to pulse as it likes
         assert worst.speed_deg_s <= SPEED * judge.top[i], f"{name} {worst.speed_deg_s:.0f} deg/s"
         assert worst.accel_deg_s2 <= ACCEL * judge.most[i], f"{name} {worst.accel_deg_s2:.0f}"

@@ -113,7 +113,9 @@ class Judge:
         self.rig = rig
         joint_limits = np.array([limit[:4] for limit in limits(rig.joints)])
         self.low, self.high, self.top, self.most = np.degrees(joint_limits.T)
-        self.pulsed = np.array([rig.bus_of(name).kind in HOBBY_KINDS for name in rig.names])
+        self.pulsed = np.array(
+            [rig.bus_named(rig.joints[name].bus).kind in HOBBY_KINDS for name in rig.names]
+        )
         self.worst = {name: Worst(-180.0, 0.0, 0.0, 0) for name in rig.names}
 
     def take(self, shafts: Shafts) -> None:

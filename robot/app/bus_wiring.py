@@ -117,7 +117,7 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
     return ReleasePlan(
         config.kind,
         path,
-        config.baud,
+        config.section.baud,
         ids,
         board.crc,
         board.channels,

@@ -147,7 +147,7 @@ def servo_index(rig: Rig, joint: str) -> int:
     """Return the index of a joint's servo in the true positions of its emulated device."""
     bus, servo_id = rig.joints[joint].bus, rig.joints[joint].id
     # A board lists all its channels, a chain only its servos.
-    return servo_id if rig.bus_of(joint).kind in HOBBY_KINDS else joints_on(rig, bus).index(joint)
+    return servo_id if rig.bus_named(bus).kind in HOBBY_KINDS else joints_on(rig, bus).index(joint)
 
 
 def _emulated_line(rig: Rig, name: str) -> Emulated:
@@ -162,7 +162,7 @@ def _emulated_line(rig: Rig, name: str) -> Emulated:
         if whole:
             bodies = moving_bodies(description, rig.joints)
             weight = HeadWeight(bodies, tuple(_turned_joints(rig, one) for one in joints))
-        return CHAINS[config.kind](specs, config.baud, weight)
+        return CHAINS[config.kind](specs, config.section.baud, weight)
     if config.kind in BOARDS:
         return BOARDS[config.kind](config, tuple(_hobby_spec(rig, one) for one in joints))
     servos = tuple(

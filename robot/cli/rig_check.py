@@ -11,9 +11,8 @@ app = typer.Typer()
 def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and list all faults at once; no servo is contacted."""
     with clear_errors(rig):
-        say(check_line(rig))
-        hints = (*unit_lines(rig), *weight_lines(rig), *track_lines(rig))
-        for line in hints:
+        lines = (check_line(rig), *unit_lines(rig), *weight_lines(rig), *track_lines(rig))
+        for line in lines:
             say(line)
 
 

@@ -109,7 +109,11 @@ class Watch:
             servos, linkage = device.servos, machine.linkages[i]
             own = servos[place]
             others = [one for one in servos if one.id == setup.id and one is not own]
-            if others and machine.rig.bus_of(machine.names[i]).kind == "feetech":
+            if (
+                others
+                and machine.rig.bus_named(machine.rig.joints[machine.names[i]].bus).kind
+                == "feetech"
+            ):
                 self._shared.add(i)
             true[i] += [linkage.angle_rad(one.position_steps) for one in others]
             around.append([(float(one.warmth_c), 0.1 * one.voltage_01v) for one in (own, *others)])

@@ -71,7 +71,7 @@ class Bench(EmulatedRig):
         readers = {}
         for name in bus_names(rig):
             config, port = rig.bus_named(name), self.ports[name]
-            port.setBaudRate(config.baud)
+            port.setBaudRate(config.section.baud)
             board = BOARDS.get(config.kind)
             readers[name] = (
                 board(port, config) if board else SmartServoTelemetry(port, KINDS[config.kind])
@@ -186,7 +186,7 @@ class HandBench:
         balanced = MassParams(head=LinkMassParams(com_mm=(0.0, 0.0, 0.0)))
         self.rig = EmulatedRig(replace(rig, mass=balanced))
         self.port = self.rig.ports[""]
-        self.port.setBaudRate(rig.bus.baud)
+        self.port.setBaudRate(rig.bus.section.baud)
         reader = SmartServoTelemetry(self.port, KINDS["dynamixel"])
         self.monitor = Monitor({"": reader}, rig.joints, self.rig.clock.now_s)
         self._at: dict[str, float] = {}

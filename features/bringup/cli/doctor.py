@@ -125,7 +125,9 @@ def _examine_buses(
         else:
             kind = servo_kind(setups[0].model)
             far = partial(find_far_outside, rig.joints, rig.couplings.values())
-            examine = partial(checkup.examine_bus, line, kind, setups, config.baud, progress, far)
+            examine = partial(
+                checkup.examine_bus, line, kind, setups, config.section.baud, progress, far
+            )
         findings[bus] = checkup.examine_ports(line, bench.host, examine)
         if can_be_released(rig, bus):
             findings[bus].append(checkup.examine_guardian(release_plan(rig, bus, line.port_name)))
@@ -165,7 +167,7 @@ def _apply_fixes(
         done += checkup.fix_latency(line.port_name, bench.host)
         if any(finding.fixes for finding in findings[bus]):
             config = rig.bus_named(bus)
-            line.setBaudRate(config.baud)
+            line.setBaudRate(config.section.baud)
 
             def write_fix(
                 one: Fix, bus: str = bus, line: BusPort = line, config: BusConfig = config

@@ -148,7 +148,7 @@ def open_port(
     Raises:
         PortError: it is absent, busy, not permitted, or does not support the speed.
     """
-    baud = rig.bus_named(bus).baud
+    baud = rig.bus_named(bus).section.baud
     with unopened_port(ports.paths[bus], guardian.beat if guardian is not None else None) as port:
         if not port.setBaudRate(baud):
             raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose another")

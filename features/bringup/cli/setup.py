@@ -83,7 +83,7 @@ def _set_up_chain(task: SetupTask) -> list[str]:
     """Set the servos of one bus up; return the joints that were skipped."""
     count = len(task.setups)
     say(
-        f"{task.title}: {count} of {len(task.rig.names)} servos to set up for {task.config.baud} "
+        f"{task.title}: {count} of {len(task.rig.names)} servos to set up for {task.config.section.baud} "
         "bit/s. Switch the servo supply off before you plug or unplug one."
     )
     left = []
@@ -109,7 +109,7 @@ def _set_up_joint(task: SetupTask, one: ServoConfig) -> bool:
                 rig_ports(task.rig, task.mock, task.port, fresh) as wired,
                 unopened_port(wired.paths[task.bus]) as line,
             ):
-                return _set_up(line, kind, one, task.config.baud, task.yes)
+                return _set_up(line, kind, one, task.config.section.baud, task.yes)
         except DriverError as error:
             if task.yes:
                 raise

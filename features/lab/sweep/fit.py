@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.config.parameters import differences
-from gazerig.config.save_text import changes_text
+from gazerig.config.parameters import differences, nest
+from gazerig.config.save_text import params_text
 from gazerig.config.schema import NO_CHARACTER, load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.analysis.human_norms import BANDS, BY_KEY
@@ -165,4 +165,4 @@ def yaml_snippet(options: RunOptions, point: Point) -> str:
     """
     plain = load_rig(options.rig, NO_CHARACTER, options.profile)
     whole = load_rig(options.rig, options.character, options.profile)
-    return changes_text(differences(plain, whole) | dict(point))
+    return params_text(nest(differences(plain, whole) | dict(point)))
