@@ -164,15 +164,6 @@ def test_a_later_layer_that_has_the_last_word_is_named(small):
     assert small.read_text() == SMALL
 
 
-def test_rights_and_links_stay(small, tmp_path):
-    small.chmod(0o640)
-    link = tmp_path / "current.yaml"
-    link.symlink_to(small)
-    save(link, {"name": "b"}, NOW, check)
-    assert link.is_symlink() and "name: b" in small.read_text()
-    assert small.stat().st_mode & 0o777 == 0o640
-
-
 def test_files_that_cannot_be_written(small, tmp_path):
     small.chmod(0o444)
     if os.geteuid():  # root may write any file

@@ -95,7 +95,8 @@ def test_all_ports_are_guarded(tmp_path):
     plans = release_plans(rig, bus_ports(rig, None))
     kinds = {name: plan.kind for name, plan in plans.items()}
     assert kinds == {"": "maestro", "neck": "dynamixel", "tilt": "feetech"}
-    assert plans["tilt"].ids == (1,) and plans["tilt"].section.baud == rig.bus_named("tilt").baud
+    assert plans["tilt"].ids == (1,)
+    assert plans["tilt"].baud == rig.bus_named("tilt").section.baud
 
 
 def test_plans_go_through_a_command_line():

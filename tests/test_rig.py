@@ -177,22 +177,6 @@ def test_what_cannot_be_is_said(tmp_path: Path, old: str, new: str, says: str) -
     assert says in said, said
 
 
-def test_an_eye_has_one_master(tmp_path: Path) -> None:
-    own = re.search(r"  eyes_pan:.*?(?=\n  eyes_tilt:)", mixed_text(), re.S)
-    assert own is not None
-    text = mixed_text().replace(
-        "\nlid_joints:", own[0].replace("eyes_pan", "left_eye_pan").join(("\n", "\nlid_joints:"))
-    )
-    said = faults(tmp_path, text.replace("id: 0", "id: 9", 1))
-    assert "joints.eyes_pan: use either left_eye_pan and right_eye_pan, or eyes_pan alone" in said
-
-
-def test_a_lid_needs_its_ends(tmp_path: Path) -> None:
-    text = re.sub(r"  left_lower_deg.*\n", "", mixed_text())
-    rule = "lid_joints.left_lower_deg: missing; the joint left_lower_lid needs it"
-    assert rule in faults(tmp_path, text)
-
-
 def test_ports_are_named_by_their_bus(mixed: Rig) -> None:
     assert bus_ports(mixed, None)["tilt"] == "/dev/ttyACM1"
     given = bus_ports(mixed, "/dev/x,neck=/dev/y")

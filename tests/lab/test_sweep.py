@@ -265,7 +265,7 @@ def test_steps_lists_and_ranges_are_read() -> None:
         (
             "gaze.head.eye_only_rnge_deg=4:16:7",
             ConfigError,
-            "unknown key 'eye_only_rnge_deg'; did you mean",
+            "no key 'eye_only_rnge_deg'; did you mean",
         ),
         (f"{EYES_ALONE}=4:200", ConfigError, "200.0 is above 180 (unit deg)"),
         (f"{EYES_ALONE}", SetupError, "not KEY=VALUES; values are LOW:HIGH:STEPS"),
