@@ -35,30 +35,28 @@ _RIG = Declaration("params", params=Rig)
 
 def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:
     """Return the parameters of a rig in the order of its file."""
-    known, found = values(defaults), list[Parameter]()
-    for key, declared, _ in _leaves(rig):
-        inner = declared.innermost
-        found.append(
-            Parameter(
-                key,
-                key.rpartition(".")[0],
-                declared.unit,
-                declared.description,
-                inner.low,
-                inner.high,
-                inner.choices,
-                "mapping" if declared.form == "params" else declared.form,
-                known.get(key),
-                effect_time(key),
-                declared.optional,
-                declared.length,
-                declared.inner.form if declared.inner is not None else None,
-            )
+    known = values(defaults)
+    return tuple(
+        Parameter(
+            key,
+            key.rpartition(".")[0],
+            declared.unit,
+            declared.description,
+            declared.innermost.low,
+            declared.innermost.high,
+            declared.innermost.choices,
+            "mapping" if declared.form == "params" else declared.form,
+            known.get(key),
+            effect_time(key),
+            declared.optional,
+            declared.length,
+            declared.inner.form if declared.inner is not None else None,
         )
-    return tuple(found)
+        for key, declared, _ in _leaves(rig)
+    )
 
 
-def value_of(rig: Any, key: str) -> Value:
+def value_of(rig: Any, key: str) -> Any:
     """Return the value at a dotted key of a dataclass; a mapping for a group.
 
     Raises:
@@ -71,8 +69,7 @@ def value_of(rig: Any, key: str) -> Value:
         if step not in names:
             raise refusal(key, unknown_text("key", step, names))
         value = names[step]
-    found: Value = value
-    return found
+    return value
 
 
 def values(rig: Rig) -> dict[str, Value]:

@@ -73,10 +73,9 @@ def save_layers(
     """
     own, source = rig_path(layers.name), None
     if to is not None:
-        if not to.endswith((".yaml", ".yml")):
-            raise refusal("", "a rig's file ends in .yaml; rename it", to)
-        if os.path.lexists(to):
-            raise refusal("", "already exists and is not overwritten; choose another name", to)
+        if os.path.lexists(to) or not to.endswith((".yaml", ".yml")):
+            rule = "already exists, or its name does not end in .yaml; choose another name"
+            raise refusal("", rule, to)
         layers, own, source = layers._replace(name=to), Path(to), own
     check = partial(load_rig, character=layers.character, profile=layers.profile)
     saved = save(own, wanted, now, check, source)

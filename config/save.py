@@ -50,8 +50,8 @@ def save(
     target = Path(os.path.realpath(path))
     if target.is_relative_to(SHIPPED.resolve()):
         # An update of the package would overwrite it.
-        rule = "is part of the program and is never changed: copy it"
-        raise refusal("", f"{rule} (cp {target} my{target.name}) and use the copy", target)
+        copy = f"copy it (cp {target} my{target.name}) and use the copy"
+        raise refusal("", f"is part of the program and is never changed: {copy}", target)
     before, text, found = propose(source or target, changes)
     backup = None
     if source is None:

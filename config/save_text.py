@@ -41,9 +41,11 @@ def tracks_text(files: Sequence[str]) -> str:
     Raises:
         gazerig.config.load.ConfigError: one has a fault.
     """
-    found = {track_name(file): load_track(track_path(file)) for file in files}
-    # A rerun plays no sound, and its track is another file.
-    found = {name: replace(one, sound=Path(one.sound).name) for name, one in found.items()}
+    found = {}
+    for file in files:
+        track = load_track(track_path(file))
+        # A rerun plays no sound, and its track is another file.
+        found[track_name(file)] = replace(track, sound=Path(track.sound).name)
     return params_text(TrackSet(found)) if found else ""
 
 

@@ -215,9 +215,7 @@ def _limp_joints(rig: Rig) -> Faults:
 
 def _angles(rig: Rig) -> Faults:
     """Find poses and moves that a joint cannot do; a move has a time."""
-    poses: list[tuple[str, str, tuple[float, ...], float]] = [
-        (f"park_deg.{name}", name, (angle,), inf) for name, angle in rig.park_deg.items()
-    ]
+    poses = [(f"park_deg.{name}", name, [angle], inf) for name, angle in rig.park_deg.items()]
     for name in (name for name in LIDS if name in rig.joints):
         key, lid = f"lid_joints.{rig.lid_joints.key(name)}", rig.lid_joints.ends_deg(name)
         if lid is None:
@@ -225,14 +223,16 @@ def _angles(rig: Rig) -> Faults:
         elif lid[0] == lid[1]:
             yield key, "a lid's shut and open angles must differ"
         else:
-            poses.append((key, name, lid, inf))
-    for face, angles in rig.expressions.items():
-        for name, angle in angles.items():
-            key = f"expressions.{face}.{name}"
-            poses.append((key, name, (0.0, angle), rig.expression_blend_s))
-    for name, level in rig.levels.items():
-        turn = level.low_deg, level.high_deg
-        poses.append((f"levels.{name}", level.joint, turn, level.smoothing_ms / 1e3))
+            poses.append((key, name, list(lid), inf))
+    poses += [
+        (f"expressions.{face}.{name}", name, [0.0, angle], rig.expression_blend_s)
+        for face, angles in rig.expressions.items()
+        for name, angle in angles.items()
+    ]
+    poses += [
+        (f"levels.{name}", one.joint, [one.low_deg, one.high_deg], one.smoothing_ms / 1e3)
+        for name, one in rig.levels.items()
+    ]
     for key, name, ends, time_s in poses:
         if name not in rig.joints:
             yield key, unknown_text("joint", name, rig.names)
@@ -266,8 +266,9 @@ def _mechanism(rig: Rig) -> Faults:
         yield "guard.collisions", str(error)
     for name, pair in rig.couplings.items():
         absent = [joint for joint in pair.joints if joint not in rig.joints]
-        fault = unknown_text("joint", absent[0], rig.names) if absent else None
-        if fault := fault or unreachable_text(pair, rig.joints):
+        if absent:
+            yield f"couplings.{name}", unknown_text("joint", absent[0], rig.names)
+        elif fault := unreachable_text(pair, rig.joints):
             yield f"couplings.{name}", fault
     if rig.mass != MassParams():
         from gazerig.robot.description.build import RigShape, rig_mass_faults  # few rigs need it

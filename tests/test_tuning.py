@@ -128,7 +128,7 @@ def test_a_shipped_rig_asks_for_a_path_and_goes_on_from_it(tmp_path: Path) -> No
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
     with pytest.raises(ConfigError, match="is part of the program"):
         bench.tuning.save()
-    with pytest.raises(ConfigError, match=r"ends in \.yaml"):
+    with pytest.raises(ConfigError, match=r"not end in \.yaml"):
         bench.tuning.save(tmp_path / "my")
     copy = tmp_path / "my.yaml"
     bench.tuning.save(copy)
