@@ -17,8 +17,6 @@ from slow_rigs import at_rate
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
 import gazerig
-from gazerig.config.faults import ConfigError
-from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.door_processes import DoorEntry
 
@@ -118,11 +116,3 @@ def test_an_entry_has_a_name_an_address_and_a_place_to_listen(
             DoorEntry.parse(text)
     else:
         assert DoorEntry.parse(text) == entry
-
-
-def test_an_unknown_door_is_found_when_the_rig_is_read(tmp_path: Path) -> None:
-    rig = at_rate(tmp_path, "desk", 80.0)
-    with open(rig, "a") as file:
-        file.write("doors: [wyomin]\n")
-    with pytest.raises(ConfigError, match=r"doors.*did you mean 'wyoming'\? there is voice-ass"):
-        load_rig(rig)
