@@ -10,7 +10,7 @@ from gazerig.errors import Error
 class ConfigFault:
     """One fault of a file.
 
-    line, column: counted from 1, None if the file could not be read
+    line: counted from 1, None if the file could not be read
     key: dotted key path, list items counted from 0; value: the text at that position, shortened
     rule: the broken rule and the remedy
     """
@@ -20,13 +20,11 @@ class ConfigFault:
     key: str
     value: str
     rule: str
-    column: int | None = None
 
     def __str__(self) -> str:
         """Return ``file:line: key: rule`` on one line, for any content of the key."""
-        place = [self.file, *(str(n) for n in (self.line, self.column) if n is not None)]
-        words = ": ".join(part for part in (":".join(place), self.key, self.rule) if part)
-        return " ".join(words.splitlines())
+        place = self.file if self.line is None else f"{self.file}:{self.line}"
+        return " ".join(": ".join(filter(None, (place, self.key, self.rule))).splitlines())
 
 
 class ConfigError(Error):

@@ -8,7 +8,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from gazerig.config.load import ConfigError, ConfigFault, validate_rules
+from gazerig.config.load import ConfigError, validate_rules
 from gazerig.config.rig import GazeConfig, Rig
 from gazerig.config.schema import RULES, refusal, unknown_text
 from gazerig.params import Declaration, declarations
@@ -92,10 +92,7 @@ def apply_changes(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     outcome = validate_rules(Rig, data, RULES)
     made, found = outcome
     if found or made is None:
-        raise ConfigError(
-            ConfigFault("", None, ".".join(map(str, one.path)), one.value, one.rule)
-            for one in found
-        )
+        raise ConfigError(found)
     return made
 
 

@@ -6,10 +6,11 @@ in ``plugins`` of the section around it.
 
 import dataclasses
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from typing import Any, NamedTuple, TypeVar, cast
 
-from gazerig.config.rig import Rig
-from gazerig.config.validation import Path, Violation, abbreviate, validate
+from gazerig.config.faults import ConfigFault
+from gazerig.config.validation import Path, fault_at, validate
 from gazerig.drivers.bus.servo_models import add_models
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import (
@@ -39,88 +40,71 @@ _PARTS: dict[str, Any] = {
 
 
 class PluginSection(NamedTuple):
-    """A checked section, which was taken from a rig's data.
+    """A checked section: the path of the section around it, and the fields to set there."""
 
-    key: path of the key that names the part; above: path of the section around it
-    """
-
-    key: Path
     above: Path
-    name: str
-    params: object
+    fields: dict[str, Any]
 
 
 def take_plugins(
     data: dict[str, Any],
-) -> tuple[dict[str, Any], list[PluginSection], list[Violation]]:
+) -> tuple[dict[str, Any], list[PluginSection], list[ConfigFault]]:
     """Take the sections of plug-ins out of a rig's plain values.
 
     Returns:
-        The other values, the sections, and the violations of those that cannot be used.
+        The other values, the sections, and the faults of those that cannot be used.
     """
-    taken, found = list[PluginSection](), list[Violation]()
-    for group, above, key, name in list(_named_plugins(data)):
-        path = (*above, key)
-        data, given = _without(data, above, key, name)
+    data = deepcopy(data)
+    taken, faults = list[PluginSection](), list[ConfigFault]()
+    for group, above, key, name, given in list(_pop_sections(data)):
         try:
             params = _section_type(group, name)
         except PluginError as error:
-            found.append(Violation(path, abbreviate(name), str(error)))
+            faults.append(fault_at((*above, key), str(error)))
             continue
-        value, wrong = validate(params, given)
-        found += [one._replace(path=(*above, name, *one.path)) for one in wrong]
-        taken.append(PluginSection(path, above, name, value))
-    return data, taken, found
-
-
-def _without(data: dict[str, Any], above: Path, *keys: str) -> tuple[dict[str, Any], Any]:
-    """Return the values without keys of a section, and the value of the last of these keys."""
-    if above:
-        step = str(above[0])
-        inner, taken = _without(data[step], above[1:], *keys)
-        return {**data, step: inner}, taken
-    return {k: one for k, one in data.items() if k not in keys}, data.get(keys[-1], {})
+        value, wrong = validate(params, given, (*above, name))
+        faults += wrong
+        fields = {"plugins": {name: value}} | ({} if key == name else {key: name})
+        taken.append(PluginSection(above, fields))
+    return data, taken, faults
 
 
 def put_plugins(value: T, taken: list[PluginSection]) -> T:
     """Return the rig with the sections of its plug-ins."""
     for one in taken:
-        value = _put(value, one.above, one)
+        value = _put(value, *one)
     return value
 
 
-def _put(value: Any, above: Path, section: PluginSection) -> Any:
-    if above and isinstance(value, Mapping):
-        return {**value, above[0]: _put(value[above[0]], above[1:], section)}
+def _put(value: Any, above: Path, fields: dict[str, Any]) -> Any:
+    """Return a frozen value with other fields in the section at a path."""
     if above:
         step = str(above[0])
-        return dataclasses.replace(value, **{step: _put(getattr(value, step), above[1:], section)})
-    key = str(section.key[-1])
-    named = {} if key == section.name else {key: section.name}
-    return dataclasses.replace(
-        value, plugins={**value.plugins, section.name: section.params}, **named
-    )
+        mapping = isinstance(value, Mapping)
+        inner = {step: _put(value[step] if mapping else getattr(value, step), above[1:], fields)}
+        return {**value, **inner} if mapping else dataclasses.replace(value, **inner)
+    fields = {**fields, "plugins": {**value.plugins, **fields["plugins"]}}
+    return dataclasses.replace(value, **fields)
 
 
-def _named_plugins(data: Any) -> Iterator[tuple[str, Path, str, str]]:
-    """Yield the group of each plug-in, the path of the section around its own, its key and name."""
+def _pop_sections(data: dict[str, Any]) -> Iterator[tuple[str, Path, str, str, Any]]:
+    """Remove and yield each plug-in's group, the path above, its key, its name and its section."""
     buses = data.get("buses")
-    places: list[tuple[str, Path, str]] = [
-        (BUS, ("bus",), "kind"),
-        *((BUS, ("buses", name), "kind") for name in (buses if isinstance(buses, dict) else ())),
-        (DETECTOR, ("detector",), "kind"),
-        (ATTENTION, ("gaze",), "chooser"),
+    places: list[tuple[str, Path, str, Any]] = [
+        (BUS, ("bus",), "kind", data.get("bus")),
+        (DETECTOR, ("detector",), "kind", data.get("detector")),
+        (ATTENTION, ("gaze",), "chooser", data.get("gaze")),
     ]
-    for group, above, key in places:
-        holder = data
-        for step in above:
-            holder = holder.get(step) if isinstance(holder, dict) else None
+    for name, bus in buses.items() if isinstance(buses, dict) else ():
+        places.append((BUS, ("buses", name), "kind", bus))
+    for group, above, key, holder in places:
         name = holder.get(key) if isinstance(holder, dict) else None
         if isinstance(name, str) and not is_ours(group, name):
-            yield group, above, key, name
-    for name in data.keys() - declarations(Rig).keys():
-        if any(one.name == name for one in registrations(CAMERA)):
-            yield CAMERA, (), name, name
+            del holder[key]
+            yield group, above, key, name, holder.pop(name, {})
+    for one in registrations(CAMERA):
+        if one.name in data and not one.is_ours:
+            yield CAMERA, (), one.name, one.name, data.pop(one.name)
 
 
 def _section_type(group: str, name: str) -> type:

@@ -13,8 +13,8 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.nodes import MappingNode, ScalarNode
+import yaml
+from yaml.nodes import MappingNode, ScalarNode
 
 from gazerig.config.entries import parse
 from gazerig.config.load import ConfigError, Document, read_yaml
@@ -101,14 +101,14 @@ def propose(
         if (new := format_value(value)) != olds.get(key)
     )
     tree, text = to_plain(nest({change.key: changes[change.key] for change in found})), before.text
-    edits = _edits(YAML(typ="safe", pure=True).compose(text), tree, text)
+    edits = _edits(yaml.compose(text, Loader=yaml.CSafeLoader), tree, text)
     for start, end, new in reversed(sorted(edits, key=itemgetter(0))):
         text = f"{text[:start]}{new}{text[end:]}"
     after = parse(str(path), text, [])
-    if after is None or after.to_plain() != merge(before.data, tree):
+    if after is None or after.data != merge(before.data, tree):
         rule = (
-            "cannot be written: it is a mapping, a list with comments between its lines, or "
-            "connected with another value by an anchor (&); change the file by hand"
+            "cannot be written: it is a mapping, or a list with comments between its lines; change "
+            "the file by hand"
         )
         raise refusal(", ".join(changes), rule, path)
     return before, text, found

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from math import degrees
 from pathlib import Path
 from typing import Annotated
 
@@ -11,21 +12,18 @@ from gazerig.config.load import (
     ConfigError,
     ConfigFault,
     load,
-    package_file_path,
     shipped_names,
     shipped_path,
-    validate_entries,
 )
-from gazerig.config.long_track import read_long
 from gazerig.config.shipped_files import file_in_folders
-from gazerig.gaze.track.track import MAX_DURATION_S, Track, frame_faults, loop_fault
+from gazerig.gaze.track.track import LID_CHANNELS, MAX_DURATION_S, Track, frame_faults, loop_fault
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
-_HEAD_KEYS = {
-    "neck_yaw": "head_yaw_deg",
-    "neck_pitch": "head_pitch_deg",
-    "neck_roll": "head_roll_deg",
-}
+_GAZE_JOINT = (
+    "is a joint of gaze: write head_yaw_deg, head_pitch_deg, head_roll_deg, eyes_yaw_deg, "
+    "eyes_pitch_deg or lids of the frame instead"
+)
+_LARGEST = 20_000_000  # bytes, for MAX_FRAMES
 
 
 def load_track(path: Path) -> Track:
@@ -35,14 +33,7 @@ def load_track(path: Path) -> Track:
         gazerig.config.load.ConfigError: lists every fault.
     """
     checks: list[Check[Track]] = [*CHECKS, partial(_sound_file, path)]
-    if (long := read_long(path)) is None:
-        track = load(path, Track, checks=checks)
-    else:
-        outcome = validate_entries(Track, long, checks)
-        found, faults = outcome
-        if faults or found is None:
-            raise ConfigError(faults)
-        track = found
+    track = load(path, Track, checks=checks, largest=_LARGEST)
     return replace(track, sound=str(path.parent / track.sound)) if track.sound else track
 
 
@@ -72,24 +63,14 @@ def radians_hint(angles_deg: Iterable[float], below: float = 1.0) -> str:
 def track_angles_deg(track: Track) -> Iterator[float]:
     """Yield the angles of a track's frames."""
     for frame in (*track.frames, *track.frames_without_neck):
-        angles = (
-            frame.head_yaw_deg,
-            frame.head_pitch_deg,
-            frame.head_roll_deg,
-            frame.eyes_yaw_deg,
-            frame.eyes_pitch_deg,
-            *frame.joints_deg.values(),
-        )
-        yield from [angle for angle in angles if angle is not None]
-
-
-def shipped_tracks() -> Mapping[str, Track]:
-    """Return the tracks of this package by name."""
-    return _shipped()
+        for channel, value in frame.values().items():
+            if channel not in LID_CHANNELS:
+                yield degrees(value)
 
 
 @cache
-def _shipped() -> Mapping[str, Track]:
+def shipped_tracks() -> Mapping[str, Track]:
+    """Return the tracks of this package by name."""
     return {name: load_track(shipped_path("tracks", name)) for name in shipped_names("tracks")}
 
 
@@ -129,7 +110,7 @@ def track_path(file: str) -> Path:
     """
     if "/" in file or file.endswith((".yaml", ".yml")):
         return Path(file).expanduser()
-    return package_file_path("tracks", file)
+    return shipped_path("tracks", file)
 
 
 def track_name(file: str) -> str:
@@ -167,8 +148,7 @@ def _joint_names(track: Track) -> Iterable[tuple[str, str]]:
         for i, frame in enumerate(getattr(track, key)):
             for joint in frame.joints_deg:
                 if joint in GAZE_JOINTS:
-                    instead = _HEAD_KEYS.get(joint, "lids" if joint.endswith("lid") else "eyes_yaw_deg and eyes_pitch_deg")  # fmt: skip
-                    yield f"{key}.{i}.joints_deg.{joint}", f"is moved by {instead}; use that"
+                    yield f"{key}.{i}.joints_deg.{joint}", _GAZE_JOINT
                 elif not JOINT_NAME.fullmatch(joint):
                     yield f"{key}.{i}.joints_deg.{joint}", "not the name of a joint"
 

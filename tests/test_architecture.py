@@ -29,7 +29,7 @@ OWNERS = {
     "pyarrow": ("features.lab.sweep.run_outcome",),
     "jinja2": ("features.lab.report.", "features.study.report"),
     "aiohttp": ("robot.dashboard.", "features.study.server", "doors."),
-    "ruamel": ("config.entries", "config.save"),
+    "yaml": ("config.entries", "config.save"),
     "pydantic": ("config.",),
     "pydantic_core": ("config.",),
     "typer": (

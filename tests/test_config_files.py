@@ -34,52 +34,43 @@ def faults_of(folder: Path, text: str | bytes) -> list[str]:
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("", "rig.yaml:1: is empty; write 'key: value' lines"),
-        ("# only words\n", "rig.yaml:1: is empty; write 'key: value' lines"),
-        ("\n- a\n", "rig.yaml:2: the top level is not a mapping; write 'key: value' lines"),
-        ("null\n", "rig.yaml:1: the top level is not a mapping; write 'key: value' lines"),
-        (b"a: 1\nb: \xff\n", "rig.yaml:2: is not UTF-8 text (byte 0xff); save it as UTF-8"),
+        ("# only words\n", "rig.yaml:1: is not a mapping; write 'key: value' lines"),
+        ("\n- a\n", "rig.yaml:2: is not a mapping; write 'key: value' lines"),
+        (b"a: 1\nb: \xff\n", "rig.yaml:2: is not UTF-8 text; save it as UTF-8"),
         (
-            "a: 1\nb: 2\x07\n",
-            "rig.yaml:2:5: not valid YAML: character U+0007 is not allowed; remove it",
+            "ä: 1\nb: 2\x07\n",
+            "rig.yaml:2: not valid YAML: control characters are not allowed; remove it",
         ),
         (
             "a:\n\tb: 1\n",
-            "rig.yaml:2:1: not valid YAML: while scanning for the next token, "
-            "found character '\\t' that cannot start any token; indent with spaces",
+            "rig.yaml:2: not valid YAML: while scanning for the next token from line 2, found "
+            "character that cannot start any token; "
+            "indent with spaces, and put text with %, @ or ` in quotes",
         ),
         (
-            "a: 1\nb: [1, 2\n",
-            "rig.yaml:3:1: not valid YAML: while parsing a flow sequence, expected ',' or ']', "
-            "but got '<stream end>'; check this line and the one above",
+            "a: 'x\nb: 2\n",
+            "rig.yaml:3: not valid YAML: while scanning a quoted scalar from line 1, "
+            "found unexpected end of stream; check this line and the one above",
         ),
         (
             "a: 1\n  b: 2\n",
-            "rig.yaml:2:4: not valid YAML: mapping values are not allowed here; "
+            "rig.yaml:2: not valid YAML: mapping values are not allowed in this context; "
             "check this line and the one above",
         ),
         (
-            "a: *nobody\n",
-            "rig.yaml:1:4: not valid YAML: found undefined alias; "
-            "check this line and the one above",
+            "a: &a 1\nb: *a\n",
+            "rig.yaml:2: not valid YAML: an alias (*) or tag (!), which is not supported; "
+            "write the value; check this line and the one above",
         ),
         (
-            "%YAML 9.9\n---\na: 1\n",
-            "rig.yaml:1:1: not valid YAML: found incompatible YAML document "
-            "(version 1.* is required); check this line and the one above",
-        ),
-        (
-            "name: &a [*a]\n",
-            "rig.yaml:1: nested deeper than 40 levels, or recursive; reduce the nesting",
+            "a:\n  - !force 1\n",
+            "rig.yaml:2: not valid YAML: an alias (*) or tag (!), which is not supported; "
+            "write the value; check this line and the one above",
         ),
         (
             "[" * 200,
-            "rig.yaml:1:41: nested deeper than 40 levels, or recursive; reduce the nesting",
-        ),
-        (
-            "name: &a0 [1]\n"
-            + "".join(f"a{n + 1}: &a{n + 1} [{f'*a{n},' * 9}]\n" for n in range(9)),
-            "rig.yaml:1: contains more than 20000 values; shorten it",
+            "rig.yaml:1: not valid YAML: more than 40 levels or 2000000 values; shorten it; "
+            "check this line and the one above",
         ),
     ],
 )
@@ -91,7 +82,7 @@ def test_a_file_that_cannot_be_used(tmp_path: Path, text: str | bytes, fault: st
 
 def test_two_documents_in_one_file_are_refused(tmp_path: Path) -> None:
     (fault,) = faults_of(tmp_path, GOOD + "---\nname: b\n")
-    assert fault.startswith("rig.yaml:10:1: not valid YAML: expected a single document")
+    assert fault.startswith("rig.yaml:10: not valid YAML: a second document; write one")
 
 
 def test_an_absent_file_is_named_with_a_near_one(tmp_path: Path) -> None:
@@ -99,7 +90,8 @@ def test_an_absent_file_is_named_with_a_near_one(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as caught:
         load(tmp_path / "nodd.yaml", Rig)
     assert str(caught.value) == (
-        f"{tmp_path / 'nodd.yaml'}: no such file; did you mean 'nod.yaml'? check the name"
+        f"{tmp_path / 'nodd.yaml'}: No such file or directory; did you mean 'nod.yaml'? "
+        "name a YAML file that you may read"
     )
 
 
@@ -108,7 +100,7 @@ def test_a_file_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyP
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr("gazerig.config.entries.read_limited", refuse)  # the tests may run as root
-    with pytest.raises(ConfigError, match=r"rig\.yaml: cannot be read: permission denied"):
+    with pytest.raises(ConfigError, match=r"rig\.yaml: Permission denied"):
         read_yaml(write(tmp_path, GOOD))
 
 
@@ -136,7 +128,7 @@ def test_a_document_knows_its_lines_and_keeps_its_text(tmp_path: Path) -> None:
 def test_shipped_files_are_found_by_name() -> None:
     with pytest.raises(ConfigError, match=r"^config/rigs: nothing named '\.\./x' is shipped"):
         shipped_path("rigs", "../x")
-    with pytest.raises(ConfigError, match="there are none of this kind"):
+    with pytest.raises(ConfigError, match="available: none"):
         shipped_path("hats", "top")
     for kind in ("rigs", "profiles", "scanpaths"):
         for name in shipped_names(kind):

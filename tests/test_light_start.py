@@ -11,7 +11,7 @@ from light_python import LightPython
 ALLOWED = {
     *("gazerig", "numpy", "serial", "fastcrc", "msgspec", "smbus2", "dynamixel_sdk"),
     # for the rig's file, which is read and written while running
-    *("ruamel", "pydantic", "pydantic_core", "annotated_types", "typing_inspection"),
+    *("yaml", "pydantic", "pydantic_core", "annotated_types", "typing_inspection"),
     *("typing_extensions", "cython_runtime"),
     *("sitecustomize", "usercustomize"),  # the machine's own, with every Python: Debian has one
 }

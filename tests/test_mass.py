@@ -82,7 +82,7 @@ def test_a_head_rests_where_its_weight_has_no_lever_or_on_its_stop() -> None:
 @pytest.mark.parametrize(
     ("lines", "key", "rule"),
     [
-        ("head: {mass_kg: -1}", "mass.head.mass_kg", "below"),
+        ("head: {mass_kg: -1}", "mass.head.mass_kg", "to 50 kg"),
         ("head: {mass_kg: 0.02}", "mass.head.mass_kg", "weigh 0.029"),
         ("head: {com_mm: [200, 0, 30]}", "mass.head.com_mm", "outside the head"),
         ("links: {lefteye: {mass_kg: 1}}", "mass.links.lefteye", "did you mean left_eye"),

@@ -91,7 +91,7 @@ def test_a_joint_far_outside_moves_inside_slowly_on_request(example, monkeypatch
 def test_its_section_is_checked(example, tmp_path):
     text = HEAD.read_text(encoding="utf-8")
     for old, new, told in (
-        ("reply_timeout_ms: 5.0", "reply_timeout_ms: 900.0", "900.0 is above 500 (unit ms)"),
+        ("reply_timeout_ms: 5.0", "reply_timeout_ms: 900.0", "is 900.0, wanted a number"),
         ("kind: lx16a", "kind: lx61a", "did you mean 'lx16a'?"),
         (
             "model: lx-16a",

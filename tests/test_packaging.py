@@ -6,10 +6,8 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
 
 from command_line import parse
-from ruamel.yaml import YAML
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -38,10 +36,6 @@ def test_every_file_that_is_not_python_is_named_as_data() -> None:
                 assert path in named, f"{path.relative_to(ROOT)} would not be installed"
     data = [path for top in TOPS for path in top.rglob("*.yaml")]
     assert len(data) > 10 and named.issuperset(data)
-
-
-def yaml(name: str) -> Any:
-    return YAML(typ="safe").load((ROOT / name).read_text(encoding="utf-8"))
 
 
 def test_the_container_holds_all_sources_and_starts_a_command_that_is_one() -> None:

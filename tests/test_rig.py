@@ -88,11 +88,11 @@ def test_a_rig_names_its_profile_and_character(
         (r"min_deg: -35.0", "min_deg: 40.0", "joints.left_eye_pan", "below max_deg"),
         (r"rate_hz: 200.0", "rate_hz: .nan", "loop.rate_hz", "number"),
         (r"rate_hz: 200.0", 'rate_hz: "200"', "loop.rate_hz", "number"),
-        (r"rate_hz: 200.0", "rate_hz: 2000.0", "loop.rate_hz", "above 1000"),
+        (r"rate_hz: 200.0", "rate_hz: 2000.0", "loop.rate_hz", "20 to 1000 Hz"),
         (r"interocular_mm", "interocular", "geometry", "interocular_mm"),
         (r"^    zero_step: 2048", "    zero_step: 20", "joints.left_eye_pan", "0..4095"),
         (r"^lid_joints:(.*\n  .*)*", "", "lid_joints.left_deg", "left_upper_lid needs it"),
-        (r"left_deg: .*", "left_deg: [-25.0]", "lid_joints.left_deg", "length 1, wanted 2"),
+        (r"left_deg: .*", "left_deg: [-25.0]", "lid_joints.left_deg", "a list of 2"),
     ],
 )
 def test_rules_between_sections(old: str, new: str, place: str, rule: str, tmp_path: Path) -> None:

@@ -51,7 +51,7 @@ def test_an_unknown_key_of_a_joint_is_the_only_error(
     path.write_text(text.replace("    zero_step:", "    zero_stepp:", 1), encoding="utf-8")
     assert typed("check", str(path)) == 2
     (line,) = capfd.readouterr().err.splitlines()
-    assert "left_eye_pan.zero_stepp: unknown key 'zero_stepp'; did you mean 'zero_step'" in line
+    assert "left_eye_pan.zero_stepp: unknown key; did you mean 'zero_step'" in line
 
 
 MINIMAL = DESK.with_name("minimal.yaml")
@@ -105,19 +105,14 @@ def test_check(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     rig = tmp_path / "bad.yaml"
     text = DESK.read_text(encoding="utf-8")
     text = text.replace("max_speed_deg_s: 200.0", "max_speed_deg_s: 9000.0", 1)
-    text = text.replace("id: 9\n", "id: 8\n").replace("name: desk", "nmae: desk")
+    text = text.replace("name: desk", "nmae: desk")
     rig.write_text(text, encoding="utf-8")
     assert typed("check", str(rig)) == 2
     said = capfd.readouterr().err
-    for part in (
-        "max_speed_deg_s",
-        "id 8 on bus is already used by joints.neck_pitch.id",
-        "nmae",
-        "name",
-    ):
+    for part in ("max_speed_deg_s", "nmae", "name"):
         assert part in said
     lines = [line for line in said.splitlines() if line.startswith(f"{rig}:")]
-    assert len(lines) >= 4 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)
+    assert len(lines) == 3 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)
 
 
 def test_a_track_in_radians_gets_a_hint(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -77,7 +77,7 @@ def test_one_wrong_value_refuses_all_with_every_rule() -> None:
         )
     assert len(refused.value.faults) == 2 and not bench.orders
     assert bench.tuning.values()["gaze.lids.open_ms"] == 175.0
-    with pytest.raises(ConfigError, match="no such file"):
+    with pytest.raises(ConfigError, match="No such file"):
         bench.tuning.set({"gaze.scanpath.transition_matrix": "absent.yaml"})
     assert not bench.orders and bench.tuning.version == 0
 

@@ -93,13 +93,7 @@ def test_nothing_of_a_file_that_is_no_configuration_is_shown(
         assert not any(word in said for word in ("hunter2", "root:", "daemon", "$6$")), said
 
 
-def test_a_configuration_with_a_typo_is_still_told_what_was_meant(tmp_path: Path) -> None:
-    file = tmp_path / "rig.yaml"
-    file.write_text("nome: x\n")
-    assert "did you mean 'name'" in str(pytest.raises(ConfigError, load_rig, str(file)).value)
-
-
-def test_yaml_is_bounded_in_size_and_in_what_it_stands_for(tmp_path: Path) -> None:
+def test_yaml_is_bounded_in_size_and_stands_for_nothing_larger(tmp_path: Path) -> None:
     file = tmp_path / "big.yaml"
     with file.open("wb") as big:
         big.truncate(100_000_000)
@@ -108,13 +102,13 @@ def test_yaml_is_bounded_in_size_and_in_what_it_stands_for(tmp_path: Path) -> No
         f"a{n + 1}: &a{n + 1} [{f'*a{n},' * 9}]\n" for n in range(12)
     )
     file.write_text(bomb)
-    assert "more than 20000 values" in str(pytest.raises(ConfigError, load_rig, str(file)).value)
+    assert "not supported" in str(pytest.raises(ConfigError, load_rig, str(file)).value)
 
 
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        (r'"\ud800"', "U+D800"),
+        (r'"\ud800"', "invalid Unicode"),
         (r'"\u202Egpj.exe"', "U+202E"),
         (f'"{"n" * 401}"', "longer than 400"),
     ],

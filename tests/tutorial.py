@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import yaml
 from papers import ROOT
-from ruamel.yaml import YAML
 
 TUTORIAL = ROOT / "docs/tutorial.md"
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -55,7 +55,6 @@ def commands(step: int) -> list[str]:
 
 def write_files(folder: Path, step: int) -> None:
     """Write the files as they are after a step."""
-    yaml = YAML()
     for block in blocks():
         path = folder / block.file
         if block.step > step:
@@ -63,10 +62,10 @@ def write_files(folder: Path, step: int) -> None:
         if block.language == "python":
             path.write_text(block.text, encoding="utf-8")
         elif block.language == "yaml":
-            here = yaml.load(path.read_text(encoding="utf-8")) if path.exists() else {}
-            _merge(here, yaml.load(block.text), path.name)
+            here = yaml.safe_load(path.read_text(encoding="utf-8")) if path.exists() else {}
+            _merge(here, yaml.safe_load(block.text), path.name)
             with path.open("w", encoding="utf-8") as file:
-                yaml.dump(here, file)
+                yaml.safe_dump(here, file, sort_keys=False)
 
 
 def _merge(into: Any, more: Any, place: str) -> None:

@@ -1,7 +1,7 @@
 """Requests of another program to a running rig, and the answers, as plain JSON values.
 
 {"do": "set", "changes": {"loop.rate_hz": 100.0}}  ->  {"ok": {"notes": []}}
-{"do": "set", "changes": {"loop.rate_hz": 1e9}}    ->  {"refused": "... is above 1000 ..."}
+{"do": "set", "changes": {"loop.rate_hz": 1e9}}    ->  {"refused": "... wanted 20 to 1000 ..."}
 """
 
 import threading

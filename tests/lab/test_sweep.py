@@ -267,7 +267,7 @@ def test_steps_lists_and_ranges_are_read() -> None:
             ConfigError,
             "no key 'eye_only_rnge_deg'; did you mean",
         ),
-        (f"{EYES_ALONE}=4:200", ConfigError, "200.0 is above 180 (unit deg)"),
+        (f"{EYES_ALONE}=4:200", ConfigError, "is 200.0, wanted a number, 0 to 180 deg"),
         (f"{EYES_ALONE}", SetupError, "not KEY=VALUES; values are LOW:HIGH:STEPS"),
         (f"{EYES_ALONE}=9:4:3", SetupError, "9 is not below 4"),
         (f"{EYES_ALONE}=4:9:1", SetupError, "1 steps; wanted 2 to"),
