@@ -60,7 +60,7 @@ def read(
         beside = [one.name for one in path.parent.glob("*.yaml")] if absent else ()
         near = suggestion_text(path.name, beside) or ";"
         rule = f"{error.strerror}{near} name a YAML file that you may read"
-    faults.append(ConfigFault(str(path), line, "", "", rule))
+    faults.append(ConfigFault(str(path), line, "", rule))
     return None
 
 
@@ -84,7 +84,7 @@ def parse(
     elif known and root.keys().isdisjoint(known):
         rule = f"is not such a configuration: it has none of the keys {', '.join(known)}"
     if rule:
-        faults.append(ConfigFault(file, reader.lines.get("", 1), "", "", rule))
+        faults.append(ConfigFault(file, reader.lines.get("", 1), "", rule))
         return None
     faults += reader.faults
     return Document(file, text, root, reader.lines)
@@ -94,14 +94,14 @@ def _syntax_fault(file: str, text: str, error: yaml.YAMLError) -> ConfigFault:
     """Return the fault of a text that is not YAML, with its line."""
     if isinstance(error, ReaderError):
         line = text.encode(errors="surrogatepass").count(b"\n", 0, error.position) + 1
-        return ConfigFault(file, line, "", "", f"not valid YAML: {error.reason}; remove it")
+        return ConfigFault(file, line, "", f"not valid YAML: {error.reason}; remove it")
     line, words = error.problem_mark.line + 1, error.problem
     cure = "check this line and the one above"
     if error.context:
         words = f"{error.context} from line {error.context_mark.line + 1}, {words}"
     if "start any token" in words:
         cure = "indent with spaces, and put text with %, @ or ` in quotes"
-    return ConfigFault(file, line, "", "", f"not valid YAML: {words}; {cure}")
+    return ConfigFault(file, line, "", f"not valid YAML: {words}; {cure}")
 
 
 def _line(event: Any) -> int:
@@ -162,7 +162,7 @@ class _Reader:
             name, key = event.value, f"{start}{event.value}"
             if name in values:
                 rule = f"duplicate key, first in line {self.lines[key]}"
-                self.faults.append(ConfigFault(self._file, _line(event), key, "", rule))
+                self.faults.append(ConfigFault(self._file, _line(event), key, rule))
             values[name] = self._value(next(self._events), _line(event), key, depth)
         return values
 

@@ -11,14 +11,13 @@ class ConfigFault:
     """One fault of a file.
 
     line: counted from 1, None if the file could not be read
-    key: dotted key path, list items counted from 0; value: the text at that position, shortened
+    key: dotted key path, list items counted from 0
     rule: the broken rule and the remedy
     """
 
     file: str
     line: int | None
     key: str
-    value: str
     rule: str
 
     def __str__(self) -> str:

@@ -5,6 +5,7 @@ that a fault found after merging the layers, or by a rule between two sections, 
 to change.
 """
 
+import contextlib
 import re
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import MISSING, asdict, replace
@@ -17,10 +18,9 @@ from gazerig.config.faults import ConfigError as ConfigError
 from gazerig.config.faults import ConfigFault as ConfigFault
 from gazerig.config.plugin_sections import put_plugins, take_plugins
 from gazerig.config.rig import Rig
-from gazerig.config.shipped_files import SHIPPED
+from gazerig.config.shipped_files import SHIPPED, is_path
 from gazerig.config.shipped_files import shipped_names as shipped_names
-from gazerig.config.validation import fault_at, suggestion_text, validate
-from gazerig.drivers.errors import PluginError
+from gazerig.config.validation import fault_at, fill, suggestion_text, validate
 from gazerig.drivers.plugins import RIGS, TRACKS, yaml_files
 from gazerig.params import Declaration, declarations
 
@@ -51,7 +51,8 @@ def load(
 ) -> T:
     """Return the frozen dataclass of ``path`` merged over ``defaults`` (the first is the lowest).
 
-    Checks receive the whole value, once all of its fields are valid.
+    Checks receive the whole value. If fields are faulty, a finding is listed only if it is true for
+    any correct values of these fields.
 
     Raises:
         ConfigError: lists every fault of every file.
@@ -79,15 +80,24 @@ def validate_rules(
 ) -> tuple[T | None, list[ConfigFault]]:
     """Return the frozen dataclass of plain values, None if impossible, and every fault.
 
-    The checks are made once all fields are valid; a valid dataclass may have faults of them.
+    If fields are faulty, each check finds what it can before it reads one of them. A valid
+    dataclass may have faults of checks.
     """
     data, plugins, found = take_plugins(data) if issubclass(into, Rig) else (data, [], [])
     value, wrong = validate(into, data)
-    if value is None or found:
-        return None, [*found, *wrong]
-    value = put_plugins(value, plugins)
-    rules = [one for check in checks for one in check(value)]
-    return value, [fault_at((key,), rule) for key, rule in rules]
+    found += wrong
+    if value is not None and not found:
+        value = put_plugins(value, plugins)
+        rules = [one for check in checks for one in check(value)]
+        return value, [fault_at((key,), rule) for key, rule in rules]
+    faulty = {one.key for one in found}
+    faulty |= {".".join(map(str, (*one.above, key))) for one in plugins for key in one.fields}
+    partial = fill(Declaration("params", params=cast(Any, into)), data, faulty)
+    for check in checks:
+        with contextlib.suppress(ArithmeticError, AttributeError, LookupError, TypeError):
+            for key, rule in check(partial):
+                found.append(fault_at((key,), rule))
+    return None, found
 
 
 def read_yaml(path: Path, known: Collection[str] = ()) -> Document:
@@ -120,17 +130,24 @@ def shipped_path(kind: str, name: str, home: Path | None = None) -> Path:
     names = shipped_names(kind, home)
     if name in names:
         return (home or SHIPPED) / kind / f"{name}.yaml"
-    try:
-        files = yaml_files(_GROUPS[kind]) if kind in _GROUPS else {}
-    except PluginError as error:
-        rule = str(error)
-    else:
-        if name in files:
-            return files[name][0]
-        known = ", ".join((*names, *files)) or "none"
-        hint = suggestion_text(name, (*names, *files)) or ";"
-        rule = f"nothing named {name!r} is shipped{hint} available: {known}"
-    raise ConfigError([ConfigFault(f"config/{kind}", None, "", repr(name), rule)])
+    files = yaml_files(_GROUPS[kind]) if kind in _GROUPS else {}
+    if name in files:
+        return files[name][0]
+    known = ", ".join((*names, *files)) or "none"
+    hint = suggestion_text(name, (*names, *files)) or ";"
+    rule = f"nothing named {name!r} is shipped{hint} available: {known}"
+    raise ConfigError([ConfigFault(f"config/{kind}", None, "", rule)])
+
+
+def find_file(kind: str, name_or_path: str, home: Path | None = None) -> Path:
+    """Return a file by its path, which need not exist, or by name as ``shipped_path`` does.
+
+    Raises:
+        ConfigError: no file has this name.
+    """
+    if is_path(name_or_path):
+        return Path(name_or_path).expanduser()
+    return shipped_path(kind, name_or_path, home)
 
 
 def _resolve(value: Any, folder: Path, key: str = "") -> Any:

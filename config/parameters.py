@@ -89,8 +89,7 @@ def apply_changes(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     data = to_plain(rig)
     for key, value in changes.items():
         data = merge(data, nest({key: to_plain(value)}), _RIG)
-    outcome = validate_rules(Rig, data, RULES)
-    made, found = outcome
+    made, found = validate_rules(Rig, data, RULES)
     if found or made is None:
         raise ConfigError(found)
     return made

@@ -12,12 +12,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.config.load import shipped_path
+from gazerig.config.load import find_file, shipped_path
 from gazerig.config.parameters import flatten_changes
 from gazerig.config.rig import Rig
 from gazerig.config.save import save
-from gazerig.config.schema import layers_of, load_rig, refusal, rig_path
-from gazerig.config.shipped_files import file_in_folders
+from gazerig.config.schema import layers_of, load_rig, refusal
+from gazerig.config.shipped_files import file_in_folders, is_path
 from gazerig.robot.model.parameter import SavedFile
 
 _KIND_OF_KEY = {
@@ -71,7 +71,7 @@ def save_layers(
         gazerig.config.load.ConfigError: see gazerig.config.save.save; or ``to`` exists or is not a
             YAML file.
     """
-    own, source = rig_path(layers.name), None
+    own, source = find_file("rigs", layers.name), None
     if to is not None:
         if os.path.lexists(to) or not to.endswith((".yaml", ".yml")):
             rule = "already exists, or its name does not end in .yaml; choose another name"
@@ -102,7 +102,7 @@ class AllowedFolder:
         Raises:
             gazerig.config.load.ConfigError: the file, after resolving links, is outside the folder.
         """
-        if kind and "/" not in given and not given.endswith((".yaml", ".yml")):
+        if kind and not is_path(given):
             shipped_path(kind, given)
             return given
         try:

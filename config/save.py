@@ -1,20 +1,20 @@
 """Writing values into a user's YAML file, atomically and with a backup.
 
-Only the text of these values changes: comments, order and form of the file stay. The new text is
-checked as a separate file before it replaces the old one, which stays in the folder; its name then
-contains the time.
+Comments and the order of keys stay (ruamel's round trip). The new text is checked as a separate
+file before it replaces the old one, which stays in the folder; its name then contains the time.
 """
 
+import io
 import os
-from collections.abc import Callable, Iterator, Mapping
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import datetime
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-import yaml
-from yaml.nodes import MappingNode, ScalarNode
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from gazerig.config.entries import parse
 from gazerig.config.load import ConfigError, Document, read_yaml
@@ -101,9 +101,7 @@ def propose(
         if (new := format_value(value)) != olds.get(key)
     )
     tree, text = to_plain(nest({change.key: changes[change.key] for change in found})), before.text
-    edits = _edits(yaml.compose(text, Loader=yaml.CSafeLoader), tree, text)
-    for start, end, new in reversed(sorted(edits, key=itemgetter(0))):
-        text = f"{text[:start]}{new}{text[end:]}"
+    text = _rewrite(text, tree) if tree else text
     after = parse(str(path), text, [])
     if after is None or after.data != merge(before.data, tree):
         rule = (
@@ -114,35 +112,33 @@ def propose(
     return before, text, found
 
 
-def _edits(holder: Any, wanted: Mapping[str, Any], text: str) -> Iterator[tuple[int, int, str]]:
-    """Yield start, end and new text for the values in a mapping of a file; new keys come last.
-
-    Nothing is yielded for a value that cannot be replaced.
-    """
-    missing = dict(wanted)
-    for key, node in holder.value:
-        if key.value not in wanted:
-            continue
-        value = missing.pop(key.value)
-        start, end = node.start_mark.index, _end(node)
-        if isinstance(node, MappingNode) and isinstance(value, dict):
-            yield from _edits(node, value, text)
-        elif isinstance(node, ScalarNode):
-            yield start, end, format_value(value)
-        elif "#" not in text[key.end_mark.index : end]:
-            yield key.end_mark.index, end, f": {format_value(value)}"
-    if missing:
-        at, gap = holder.end_mark.index - 1, ", "
-        if not holder.flow_style:
-            at = f"{text}\n".index("\n", _end(holder))
-            gap = f"\n{' ' * holder.value[0][0].start_mark.column}"
-        lines = [f"{format_value(key)}: {format_value(value)}" for key, value in missing.items()]
-        yield at, at, f"{gap if holder.value else ''}{gap.join(lines)}"
+def _rewrite(text: str, wanted: Mapping[str, Any]) -> str:
+    """Return a file's text with other values; its comments and the order of its keys stay."""
+    yaml = YAML()  # the round trip
+    yaml.preserve_quotes = True
+    yaml.width = 10_000  # lines of the file are not wrapped
+    yaml.representer.add_representer(
+        type(None), lambda to, _: to.represent_scalar("tag:yaml.org,2002:null", "null")
+    )
+    step = re.search(r"^( +)[^\s#-]", text, re.MULTILINE)
+    yaml.indent(mapping=len(step[1]) if step else 2)
+    root, out = yaml.load(text), io.StringIO()
+    _put(root, yaml.load(format_value(wanted)), len(root))
+    yaml.dump(root, out)
+    return out.getvalue()
 
 
-def _end(node: Any) -> int:
-    """Return the end of a value's text, without the comments behind it."""
-    while isinstance(node.value, list) and node.value and not node.flow_style:
-        last = node.value[-1]
-        node = last[1] if isinstance(last, tuple) else last
-    return int(node.end_mark.index)
+def _put(holder: Any, wanted: Mapping[str, Any], at: int = 0) -> None:
+    """Put values into a mapping of a file, new keys at a place; leave what cannot be replaced."""
+    for key, value in wanted.items():
+        held = holder.get(key)
+        if key not in holder:
+            holder.insert(at, key, value)
+        elif isinstance(held, CommentedMap) and isinstance(value, CommentedMap):
+            # In a block first: the comments below its last key are those of the next section.
+            _put(held, value, len(held) if held.fa.flow_style() else 0)
+        elif isinstance(held, CommentedSeq) and isinstance(value, list) and len(held) == len(value):
+            for i, item in enumerate(value):
+                held[i] = item
+        elif not (isinstance(held, CommentedMap | CommentedSeq) and held.ca.items):
+            holder[key] = value

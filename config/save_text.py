@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from gazerig.config.load import load
+from gazerig.config.load import find_file, load
 from gazerig.config.parameters import to_plain
-from gazerig.config.tracks import TrackSet, load_track, track_name, track_path
+from gazerig.config.tracks import TrackSet, load_track, track_name
 
 _PLAIN_TEXT = re.compile(r"(?!(?i:null|true|false|yes|no|on|off|y|n)$)[A-Za-z/][\w./-]*")
 
@@ -43,7 +43,7 @@ def tracks_text(files: Sequence[str]) -> str:
     """
     found = {}
     for file in files:
-        track = load_track(track_path(file))
+        track = load_track(find_file("tracks", file))
         # A rerun plays no sound, and its track is another file.
         found[track_name(file)] = replace(track, sound=Path(track.sound).name)
     return params_text(TrackSet(found)) if found else ""

@@ -9,10 +9,10 @@ from gazerig.config.load import (
     Check,
     ConfigError,
     ConfigFault,
+    find_file,
     load,
     read_yaml,
     shipped_names,
-    shipped_path,
 )
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
@@ -36,7 +36,7 @@ NO_CHARACTER = "none"
 
 def refusal(key: str, rule: str, file: Path | str = "", line: int | None = None) -> ConfigError:
     """Return the error of one key or file."""
-    return ConfigError([ConfigFault(str(file), line, key, "", rule)])
+    return ConfigError([ConfigFault(str(file), line, key, rule)])
 
 
 def load_rig(
@@ -61,15 +61,6 @@ def load_rig(
     return load(layers[-1], Rig, defaults=layers[:-1], checks=(*RULES, *further))
 
 
-def rig_path(name_or_path: str) -> Path:
-    """Return the file of a rig by shipped name or path; a path need not exist.
-
-    Raises:
-        gazerig.config.load.ConfigError: no shipped rig has this name.
-    """
-    return _find("rigs", name_or_path)
-
-
 def layers_of(
     name_or_path: str, character: str | None = None, profile: str | None = None
 ) -> list[Path]:
@@ -79,13 +70,13 @@ def layers_of(
         gazerig.config.load.ConfigError: no shipped rig, profile or character has this name, or the
             rig cannot be read.
     """
-    layers = [rig_path(name_or_path)]
+    layers = [find_file("rigs", name_or_path)]
     rig = read_yaml(layers[0], tuple(declarations(Rig)))
     for key, given in (("profile", profile), ("character", character)):
         named = given or rig.data.get(key)
         try:
             if isinstance(named, str) and named != NO_CHARACTER:
-                layers.append(_find(f"{key}s", named))
+                layers.append(find_file(f"{key}s", named))
         except ConfigError as error:
             if given:
                 raise
@@ -99,7 +90,7 @@ def load_rules(name_or_path: str) -> TopDownParams:
     Raises:
         gazerig.config.load.ConfigError: lists every fault.
     """
-    return load(_find("rules", name_or_path), TopDownParams)
+    return load(find_file("rules", name_or_path), TopDownParams)
 
 
 def load_walk(name_or_path: str) -> Walk:
@@ -108,14 +99,7 @@ def load_walk(name_or_path: str) -> Walk:
     Raises:
         gazerig.config.load.ConfigError: lists every fault.
     """
-    return load(_find("scanpaths", name_or_path), Walk)
-
-
-def _find(kind: str, name_or_path: str) -> Path:
-    """Return the path of a file given by path (a slash or a YAML ending) or by shipped name."""
-    if "/" in name_or_path or name_or_path.endswith((".yaml", ".yml")):
-        return Path(name_or_path)
-    return shipped_path(kind, name_or_path)
+    return load(find_file("scanpaths", name_or_path), Walk)
 
 
 _EYES = {*GAZE_JOINTS} - {*LIDS, *NECK}

@@ -18,6 +18,11 @@ def shipped_names(kind: str, home: Path | None = None) -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in ((home or SHIPPED) / kind).glob("*.yaml")))
 
 
+def is_path(name_or_path: str) -> bool:
+    """Return whether a file is given by its path: a slash or a YAML ending."""
+    return "/" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
+
+
 def file_in_folders(folders: Sequence[Path], given: str, start: Path | None = None) -> str:
     """Return the full path of a file in folders or below, with links resolved.
 

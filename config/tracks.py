@@ -11,6 +11,7 @@ from gazerig.config.load import (
     Check,
     ConfigError,
     ConfigFault,
+    find_file,
     load,
     shipped_names,
     shipped_path,
@@ -81,18 +82,10 @@ def tracks_of(files: Sequence[str]) -> dict[str, Track]:
         files: Paths of its own tracks; they replace shipped tracks of the same name.
 
     Raises:
-        gazerig.config.load.ConfigError: lists every fault of all files.
+        gazerig.config.load.ConfigError: lists every fault of the first file that has one.
     """
-    found = dict(shipped_tracks())
-    faults: list[ConfigFault] = []
-    for file in files:
-        try:
-            found[track_name(file)] = load_track(track_path(file))
-        except ConfigError as error:
-            faults += error.faults
-    if faults:
-        raise ConfigError(faults)
-    return found
+    own = {track_name(file): load_track(find_file("tracks", file)) for file in files}
+    return {**shipped_tracks(), **own}
 
 
 @dataclass(frozen=True)
@@ -100,17 +93,6 @@ class TrackSet:
     """Tracks as stored in a recording."""
 
     tracks: Annotated[Mapping[str, Track], "tracks of the rig by name"]
-
-
-def track_path(file: str) -> Path:
-    """Return the path of a track file; a name alone selects a track of a package.
-
-    Raises:
-        gazerig.config.load.ConfigError: no package has a track of this name.
-    """
-    if "/" in file or file.endswith((".yaml", ".yml")):
-        return Path(file).expanduser()
-    return shipped_path("tracks", file)
 
 
 def track_name(file: str) -> str:
@@ -123,7 +105,7 @@ def track_name(file: str) -> str:
     if JOINT_NAME.fullmatch(name):
         return name
     rule = "the file name is the track's name: lower-case letters, digits and _, beginning with a letter, at most 40 characters"
-    raise ConfigError([ConfigFault(file, None, "", repr(name), rule)])
+    raise ConfigError([ConfigFault(file, None, "", rule)])
 
 
 def _frame_times(track: Track) -> Iterable[tuple[str, str]]:

@@ -3,9 +3,10 @@
 ``__post_init__`` may raise ValueError if two fields contradict each other.
 """
 
+import dataclasses
 import json
-import re
-from collections.abc import Iterable, Iterator
+import reprlib
+from collections.abc import Container, Iterable, Iterator
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from functools import cache
@@ -34,10 +35,7 @@ _WORDS = {
     "mapping": "a mapping",
     "params": "a mapping",
 }
-_LONGEST_TEXT = 400  # characters; names and paths
 _MOST_ERRORS = 200  # of one value; more would take minutes to describe
-_UNSHOWN = re.compile("[\0-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
-"""Control characters, line ends, changes of direction, and surrogates."""
 
 
 def validate(into: type[T], data: object, above: Path = ()) -> tuple[T | None, list[ConfigFault]]:
@@ -46,8 +44,6 @@ def validate(into: type[T], data: object, above: Path = ()) -> tuple[T | None, l
     data: dicts, tuples, str, int, float, bool and None
     above: path of the data
     """
-    if strange := list(_strange_texts(data, above)):
-        return None, strange
     try:
         # Only values from JSON become dataclasses and tuples in pydantic's strict mode.
         value = _adapter(cast(Any, into)).validate_json(json.dumps([data], default=repr))
@@ -65,22 +61,47 @@ def _adapter(params: type) -> TypeAdapter[Any]:
     return TypeAdapter(whole, config=config)
 
 
+class _Unknown:
+    """Stands for a faulty value; a rule that reads it ends with an AttributeError or TypeError."""
+
+    def _end(self, *_: object) -> Any:
+        raise AttributeError
+
+    __bool__ = __eq__ = __hash__ = __str__ = _end
+
+
+_UNKNOWN: Any = _Unknown()
+
+
+def fill(declared: Declaration, data: Any, faulty: Container[str], key: str = "") -> Any:
+    """Return a value of which some parts are faulty; these end the rule that reads them."""
+    if key in faulty:
+        return _UNKNOWN
+    start = f"{key}." if key else ""
+    if declared.params is not None and isinstance(data, dict):
+        known: dict[str, Any] = declarations(declared.params)
+        meant = {near for name in data.keys() - known for near in get_close_matches(name, known, 1)}
+        made: Any = object.__new__(declared.params)
+        for field in dataclasses.fields(declared.params):
+            name, value = field.name, _UNKNOWN
+            if name in data:
+                value = fill(known[name], data[name], faulty, start + name)
+            elif start + name not in faulty and name not in meant:
+                create: Any = field.default_factory
+                value = field.default if create is dataclasses.MISSING else create()
+            object.__setattr__(made, name, value)
+        return made
+    below = declared.inner or declared
+    if isinstance(data, dict):
+        return {step: fill(below, one, faulty, f"{start}{step}") for step, one in data.items()}
+    if isinstance(data, tuple):
+        return tuple(fill(below, one, faulty, f"{start}{i}") for i, one in enumerate(data))
+    return data
+
+
 def fault_at(path: Path, rule: str) -> ConfigFault:
     """Return a fault of a value, without its file."""
-    return ConfigFault("", None, ".".join(map(str, path)), "", rule)
-
-
-def _strange_texts(value: Any, path: Path) -> Iterator[ConfigFault]:
-    """Find texts that cannot be displayed, written to a file or distinguished from others."""
-    for text in (value, *path[-1:]):
-        if isinstance(text, str) and len(text) > _LONGEST_TEXT:
-            yield fault_at(path, f"is longer than {_LONGEST_TEXT} characters; shorten it")
-        elif isinstance(text, str) and (found := _UNSHOWN.search(text)):
-            rule = f"contains U+{ord(found[0]):04X}, which cannot be shown; remove it"
-            yield fault_at(path, rule)
-    if isinstance(value, dict | tuple):
-        for step, inner in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from _strange_texts(inner, (*path, step))
+    return ConfigFault("", None, ".".join(map(str, path)), rule)
 
 
 def expected_text(declared: Declaration) -> str:
@@ -108,12 +129,6 @@ def suggestion_text(word: str, words: Iterable[str]) -> str:
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
-def abbreviate(value: object) -> str:
-    """Return a value for a message, cut if it is long."""
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:60]}..."
-
-
 def _faults(into: type, path: Path, details: ErrorDetails) -> list[ConfigFault]:
     """Return one pydantic error as faults: several if a section has several removed keys."""
     holder = declared = Declaration("params", params=into)
@@ -137,7 +152,7 @@ def _faults(into: type, path: Path, details: ErrorDetails) -> list[ConfigFault]:
     elif kind == "value_error":
         rule = " ".join(str(details["ctx"]["error"]).split())
     else:
-        found = "empty" if value is None else abbreviate(value)
+        found = "empty" if value is None else reprlib.repr(value)
         hint = suggestion_text(value, map(str, declared.choices)) if isinstance(value, str) else ""
         rule = f"is {found}, wanted {expected_text(declared)}{hint}"
     return list(_removed_keys(path, value)) or [fault_at(path, rule)]

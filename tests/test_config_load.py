@@ -153,9 +153,40 @@ def test_faults_come_in_the_order_of_their_lines(tmp_path: Path) -> None:
     assert lines == sorted(lines)
 
 
-def test_rules_between_fields_wait_until_all_fields_are_right(tmp_path: Path) -> None:
-    broken = GOOD.replace("nod", "5").replace("id: 2", "id: 1")
-    assert [one.split(": ")[1] for one in faults_of(tmp_path, broken)] == ["name"]
+def is_nod(rig: Rig) -> Iterator[tuple[str, str]]:
+    if rig.name != "nod":
+        yield "name", "is not ours"
+
+
+def gains_name_joints(rig: Rig) -> Iterator[tuple[str, str]]:
+    for name, gain in rig.gains.items():
+        if name not in rig.joints:
+            yield f"gains.{name}", "no such joint"
+        elif gain / rig.joints[name].low_deg > 0:
+            yield f"gains.{name}", "has the wrong sign"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "keys"),
+    [
+        ("name: nod", "name: 5", ["name"]),
+        ("neck: {id: 1}", "neck: {id: 999}", ["joints.neck.id"]),
+        ("neck: {id: 1}", "neck: {idd: 2}", ["joints.neck.idd", "joints.neck.id"]),
+        ("neck: {id: 1}", "neck:", ["joints.neck"]),
+        ("neck: {id: 1}", "neck: {id: 1, low_deg: x}", ["joints.neck.low_deg"]),
+        ("joints:", "joints: 5\nspare:", ["joints", "spare.neck", "spare.pan"]),
+        ("camera:", "camera:\n  fsp: 5", ["camera.fsp"]),
+        ("camera:", "camera:\n  fps: -1", ["camera.fps"]),
+        ("gains:", "gains: {nekc: 1}\nspare:", ["gains.nekc", "spare.neck"]),
+    ],
+)
+def test_a_check_finds_nothing_that_a_right_value_could_mend(
+    tmp_path: Path, old: str, new: str, keys: list[str]
+) -> None:
+    file = write(tmp_path, f"{GOOD}gains:\n  neck: 1\n".replace(old, new))
+    with pytest.raises(ConfigError) as caught:
+        load(file, Rig, checks=(*CHECKS, is_nod, gains_name_joints))
+    assert sorted(fault.key for fault in caught.value.faults) == sorted(keys)
 
 
 def test_a_slip_in_a_check_is_not_taken_for_a_fault_of_the_file(tmp_path: Path) -> None:
@@ -192,6 +223,7 @@ def test_a_fault_names_the_layer_its_value_comes_from(tmp_path: Path) -> None:
         load(top, Rig, defaults=[base], checks=CHECKS)
     assert [(Path(f.file).name, f.line, f.key) for f in caught.value.faults] == [
         ("base.yaml", 7, "joints.pan.max_speed_deg_s"),
+        ("top.yaml", 5, "joints.pan.id"),
         ("top.yaml", 6, "joints.tilt.id"),
         ("top.yaml", 8, "fps"),
     ]

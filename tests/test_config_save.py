@@ -87,17 +87,23 @@ def test_a_value_changes_and_every_other_line_stays(small):
     assert present(saved.backup).read_text() == SMALL
 
 
-def test_a_list_on_several_lines_is_replaced_unless_comments_would_be_lost(small):
-    with pytest.raises(ConfigError, match="joints.tilt.gains: .*comments"):
-        save(small, {"joints.tilt.gains": (800, 1, 10)}, NOW, check)
-    assert small.read_text() == SMALL
-    small.write_text(SMALL.replace("   # P", "").replace("    # D", ""))
+def test_flow_mappings_and_block_lists_keep_their_style(small):
     save(small, {"joints.pan.id": 7, "joints.tilt.gains": (800, 1, 10)}, NOW, check)
-    assert "    pan: {id: 7, zero_step: 2000}    # flow\n" in small.read_text()
-    assert check(small).joints["tilt"].gains == (800, 1, 10)
+    text = small.read_text()
+    assert "    pan: {id: 7, zero_step: 2000}    # flow\n" in text
+    assert "        - 800   # P\n        - 1\n        - 10    # D\n" in text
 
 
-def test_missing_keys_are_added_before_the_comments_of_what_follows(small):
+def test_a_list_is_replaced_unless_comments_would_be_lost(small):
+    with pytest.raises(ConfigError, match="joints.tilt.gains: .*comments"):
+        save(small, {"joints.tilt.gains": None}, NOW, check)
+    assert small.read_text() == SMALL
+    small.write_text(SMALL.replace("   # P", "").replace("    # D\n# the end", ""))
+    save(small, {"joints.tilt.gains": None}, NOW, check)
+    assert check(small).joints["tilt"].gains is None
+
+
+def test_missing_keys_are_added_apart_from_the_comments_of_what_follows(small):
     saved = save(
         small,
         {"joints.pan.min_deg": -20.0, "spare.id": 9, "spare.note": "x", "joints.tilt.note": "y"},
@@ -105,10 +111,9 @@ def test_missing_keys_are_added_before_the_comments_of_what_follows(small):
         check,
     )
     text = small.read_text()
-    assert "    pan: {id: 1, zero_step: 2000, min_deg: -20.0}    # flow\n" in text
-    assert text.endswith(
-        '        - 10    # D\n        note: "y"\nspare: {id: 9, note: x}\n# the end\n'
-    )
+    assert "    pan: {id: 1, zero_step: 2000, min_deg: -20.0} # flow\n" in text
+    assert '    tilt:\n        note: "y"\n        id: 2\n' in text
+    assert text.endswith("        - 10    # D\n# the end\nspare: {id: 9, note: x}\n")
     assert saved.changes[1] == ParamChange("spare.id", None, "9")
     assert str(saved.changes[1]) == "spare.id: (not in the file) -> 9"
     assert check(small).spare.id == 9

@@ -36,14 +36,14 @@ class FileOnly:
 
     def files(self) -> Sequence[Path]:
         if self.lost:
-            raise ConfigError([ConfigFault(str(self.path), None, "", "", "not now")])
+            raise ConfigError([ConfigFault(str(self.path), None, "", "not now")])
         return (self.path,)
 
     def reload(self, path: Path) -> tuple[str, ...]:
         text = path.read_text(encoding="utf-8")
         if "wrong" in text:
             rules = ("a is above 1", "b: unknown key")
-            raise ConfigError(ConfigFault(str(path), 1, "", "", rule) for rule in rules)
+            raise ConfigError(ConfigFault(str(path), 1, "", rule) for rule in rules)
         before, self.text = self.text, text
         self.version += text != before
         return (f"text = {text.strip()}",) if text != before else ()

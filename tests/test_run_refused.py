@@ -105,14 +105,19 @@ def test_check(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     rig = tmp_path / "bad.yaml"
     text = DESK.read_text(encoding="utf-8")
     text = text.replace("max_speed_deg_s: 200.0", "max_speed_deg_s: 9000.0", 1)
-    text = text.replace("name: desk", "nmae: desk")
+    text = text.replace("id: 9\n", "id: 8\n").replace("name: desk", "nmae: desk")
     rig.write_text(text, encoding="utf-8")
     assert typed("check", str(rig)) == 2
     said = capfd.readouterr().err
-    for part in ("max_speed_deg_s", "nmae", "name"):
+    for part in (
+        "max_speed_deg_s",
+        "id 8 on bus is already used by joints.neck_pitch.id",
+        "nmae",
+        "name",
+    ):
         assert part in said
     lines = [line for line in said.splitlines() if line.startswith(f"{rig}:")]
-    assert len(lines) == 3 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)
+    assert len(lines) >= 4 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)
 
 
 def test_a_track_in_radians_gets_a_hint(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,7 @@ LARGEST = {
     "gaze": 59_000,
     "drivers": 128_100,
     "sim_mock": 79_300,
-    "config": 19_100,
+    "config": 12_000,
     "robot": 194_500,
     "robot/dashboard": 54_700,
     "gazerig": 14_000,

@@ -105,19 +105,12 @@ def test_yaml_is_bounded_in_size_and_stands_for_nothing_larger(tmp_path: Path) -
     assert "not supported" in str(pytest.raises(ConfigError, load_rig, str(file)).value)
 
 
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        (r'"\ud800"', "invalid Unicode"),
-        (r'"\u202Egpj.exe"', "U+202E"),
-        (f'"{"n" * 401}"', "longer than 400"),
-    ],
-)
-def test_names_can_be_shown_and_recorded(tmp_path: Path, name: str, said: str) -> None:
+def test_names_can_be_recorded(tmp_path: Path) -> None:
     desk = (Path(__file__).parents[1] / "config/rigs/desk.yaml").read_text()
     file = tmp_path / "rig.yaml"
-    file.write_text(desk.replace("name: desk", f"name: {name}", 1))
-    assert said in str(pytest.raises(ConfigError, load_rig, str(file)).value)
+    file.write_text(desk.replace("name: desk", r'name: "\ud800"', 1))
+    with pytest.raises(ConfigError, match="invalid Unicode"):
+        load_rig(str(file))
     file.write_text(desk.replace("name: desk", 'name: "Kopf 頭 👩‍🚀"', 1))
     assert load_rig(str(file)).name.startswith("Kopf")
 

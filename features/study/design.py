@@ -17,9 +17,9 @@ from gazerig.config.load import ConfigError, load, shipped_path
 from gazerig.config.parameters import NEXT_START, apply_changes, differences, effect_time
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
+from gazerig.config.shipped_files import is_path
 from gazerig.drivers.errors import SetupError
 from gazerig.params import Bounds
-from gazerig.robot.app.scene_files import is_path
 from gazerig.robot.model.commands import Value
 
 HOME = Path(__file__).parent

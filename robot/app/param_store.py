@@ -15,7 +15,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.config.load import shipped_names
+from gazerig.config.load import find_file, shipped_names
 from gazerig.config.parameters import (
     apply_changes,
     differences,
@@ -27,7 +27,7 @@ from gazerig.config.parameters import parameters as described
 from gazerig.config.rig import Rig
 from gazerig.config.rig_files import AllowedFolder, RigLayers, read_all, save_layers
 from gazerig.config.save_text import format_value
-from gazerig.config.schema import NO_CHARACTER, load_rig, rig_path
+from gazerig.config.schema import NO_CHARACTER, load_rig
 from gazerig.robot.app.live_params import LiveParams, rig_in_effect
 from gazerig.robot.app.subprocess_call import in_subprocess
 from gazerig.robot.model.commands import Value
@@ -116,7 +116,7 @@ class ParamStore:
     @property
     def path(self) -> Path:
         """Return the rig's file."""
-        return rig_path(self._state.name)
+        return find_file("rigs", self._state.name)
 
     @property
     def character_name(self) -> str:

@@ -3,8 +3,8 @@
 from functools import lru_cache
 from pathlib import Path
 
-from gazerig.config.load import load, shipped_path
-from gazerig.config.shipped_files import shipped_names
+from gazerig.config.load import find_file, load
+from gazerig.config.shipped_files import is_path, shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.sim_mock.scenes.faces_scene import FacesScene, faults
 from gazerig.sim_mock.scenes.script import SceneScript
@@ -38,11 +38,6 @@ def load_scene(name_or_path: str, seed: int = 0) -> FacesScene:
     return FacesScene(Path(name_or_path).stem, script, seed)
 
 
-def is_path(name_or_path: str) -> bool:
-    """Return whether a script is given by its path."""
-    return "/" in name_or_path or Path(name_or_path).suffix in (".yaml", ".yml")
-
-
 def script_file(
     kind: str, name_or_path: str, home: Path | None = None
 ) -> tuple[Path, tuple[int, int, int] | None]:
@@ -51,7 +46,7 @@ def script_file(
     Raises:
         gazerig.config.load.ConfigError: no shipped script has this name.
     """
-    path = Path(name_or_path) if is_path(name_or_path) else shipped_path(kind, name_or_path, home)
+    path = find_file(kind, name_or_path, home)
     try:
         facts = path.stat()
     except OSError:

@@ -68,7 +68,7 @@ def _outcome(
 
 
 def _failed(work: Callable[..., Any], rule: str) -> ConfigError:
-    return ConfigError([ConfigFault(f"process for {work.__name__}", None, "", "", rule)])
+    return ConfigError([ConfigFault(f"process for {work.__name__}", None, "", rule)])
 
 
 if __name__ == "__main__":

@@ -40,14 +40,15 @@ def unit_lines(rig: str) -> list[str]:
     Raises:
         ConfigError: the rig is invalid.
     """
+    from gazerig.config.load import find_file
     from gazerig.config.schema import load_rig
-    from gazerig.config.tracks import load_track, radians_hint, track_angles_deg, track_path
+    from gazerig.config.tracks import load_track, radians_hint, track_angles_deg
 
     loaded = load_rig(rig)
     ends = [end for one in loaded.joints.values() for end in (one.min_deg, one.max_deg)]
     hints = {f"{rig}: min_deg and max_deg of all joints": radians_hint(ends, _SMALLEST_DEG)}
     for file in loaded.track_files:
-        hints[file] = radians_hint(track_angles_deg(load_track(track_path(file))))
+        hints[file] = radians_hint(track_angles_deg(load_track(find_file("tracks", file))))
     return [f"{where}: {hint}" for where, hint in hints.items() if hint]
 
 
@@ -69,13 +70,14 @@ def track_lines(rig: str) -> list[str]:
     Raises:
         ConfigError: the rig is not good.
     """
+    from gazerig.config.load import find_file
     from gazerig.config.schema import load_rig
-    from gazerig.config.tracks import load_track, track_path
+    from gazerig.config.tracks import load_track
     from gazerig.robot.app.track_file import fit_to_rig
     from gazerig.robot.cli.tracks import fit_text
 
     loaded = load_rig(rig)
     return [
-        fit_text(loaded.name, file, fit_to_rig(loaded, load_track(track_path(file))))
+        fit_text(loaded.name, file, fit_to_rig(loaded, load_track(find_file("tracks", file))))
         for file in loaded.track_files
     ]

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from gazerig.config.load import find_file
 from gazerig.config.rig import Rig
 from gazerig.config.save import save
-from gazerig.config.schema import rig_path
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.cli.prompts import TerminalPerson
 from gazerig.robot.cli.console import Console
@@ -32,7 +32,7 @@ def refuse_unwritable(rig: str, out: Path | None) -> None:
         gazerig.config.load.ConfigError, SetupError: with the reason and the remedy.
     """
     if out is None:
-        save(rig_path(rig), {}, datetime.now())
+        save(find_file("rigs", rig), {}, datetime.now())
     elif out.exists():
         raise SetupError(f"--out {out}: there is such a file: give it as RIG instead")
     elif "/" in rig or rig.endswith((".yaml", ".yml")):
@@ -53,11 +53,11 @@ def write_values(
     if not values:
         say("everything is as the rig file says: nothing to write")
         return
-    where = rig_path(rig) if out is None else out
+    where = find_file("rigs", rig) if out is None else out
     if not person.agrees(f"write these {len(values)} values into {where}?"):
         say("nothing written")
         return
-    source = None if out is None else rig_path(rig)
+    source = None if out is None else find_file("rigs", rig)
     saved = save(where, values, datetime.now(), source=source)
     for change in saved.changes:
         say(str(change))

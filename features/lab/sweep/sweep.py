@@ -8,6 +8,7 @@ interrupted one.
 import contextlib
 import fcntl
 import json
+import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,7 +19,6 @@ from gazerig.config.parameters import to_plain
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import params_text, tracks_text
 from gazerig.config.schema import load_walk
-from gazerig.config.validation import abbreviate
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.lab.sweep.axes import Axis, Point
@@ -117,7 +117,7 @@ def _differences(then: object, now: object, key: str = "") -> Iterator[str]:
             below = f"{key}.{name}" if key else str(name)
             yield from _differences(then.get(name), now.get(name), below)
     elif then != now:
-        yield f"{key} was {abbreviate(then)}, is now {abbreviate(now)}"
+        yield f"{key} was {reprlib.repr(then)}, is now {reprlib.repr(now)}"
 
 
 def _key(point: Point, seed: int) -> str:

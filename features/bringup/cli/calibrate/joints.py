@@ -8,9 +8,10 @@ from typing import Annotated, NamedTuple
 
 import typer
 
+from gazerig.config.load import find_file
 from gazerig.config.rig import Rig
 from gazerig.config.save import propose
-from gazerig.config.schema import load_rig, rig_path
+from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.serial.port import port_at_path
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
@@ -320,7 +321,7 @@ def calibrate_joints(
                     or not loaded.joints[one].model_facts.measures_position
                 ]
                 propose(
-                    rig_path(rig),
+                    find_file("rigs", rig),
                     {f"joints.{one}.transmission_points": ((0, 0),) for one in behind_rods},
                 )
         refuse_impossible(loaded, names, how)
