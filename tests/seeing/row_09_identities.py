@@ -2,12 +2,14 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
 from math import radians
-from typing import NamedTuple
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from present import present
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
@@ -15,7 +17,7 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.drivers.vision.clothing import ClothingReader
 from gazerig.drivers.vision.cut_detector import CutDetector
-from gazerig.gaze.types import Vec3
+from gazerig.gaze.types import Percept
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
@@ -27,14 +29,15 @@ FIELD_DEG = 69.0
 LENS = intrinsics_of_view(radians(FIELD_DEG), *SIZE)
 RATE_HZ = 30.0
 Image = NDArray[np.uint8]
+Place = NDArray[np.float64]
 Way = Callable[[float], tuple[float, float, float]]
 """Where a face is at a time: to the right of the camera's axis, below it and before it, m."""
 
 _FRONTAL = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
 _HIDDEN_M = 0.16  # a face nearer than this to the view of a nearer one is not found
 _MISSED, _MARKS_PX = 0.05, 0.8
-_FALSE_PER_MIN = 2.0
 _SAME_DEG = 3.0
+_FALSE = 2.0 / 60.0 / RATE_HZ  # false faces in a picture
 
 # Clothes above and below the hips as the street shows them, blue, green, red: most are dark.
 _CLOTHES = [
@@ -87,25 +90,20 @@ def to_and_fro(rng: np.random.Generator, away_m: float) -> Way:
 def crossings(rng: np.random.Generator) -> dict[str, tuple[list[Way], float]]:
     """Return who walks how, and for how many seconds; every call other speeds and distances."""
     v, w, far = rng.uniform(0.5, 1.2), rng.uniform(0.5, 1.2), rng.uniform(1.6, 2.2)
+    near = walk(-1.0, v, far)
+    six = [(-1) ** k * 0.5 * (1.2 + 0.4 * k) for k in range(6)]
     return {
-        "two cross": ([walk(-1.0, v, far), walk(1.0, -w, far + 0.6)], 2.0),
-        "two cross at one distance": ([walk(-1.0, v, far), walk(1.0, -w, far)], 2.0),
+        "two cross": ([near, walk(1.0, -w, far + 0.6)], 2.0),
+        "two cross at one distance": ([near, walk(1.0, -w, far)], 2.0),
         "two meet and turn back": (
             [walk(-0.9, 0.5, far, 1.4), walk(0.9, -0.5, far + 0.2, 1.4)],
             2.8,
         ),
-        "three cross": (
-            [walk(-1.0, v, far), walk(1.0, -w, far + 0.5), walk(0.3, 0.2, far + 1.0)],
-            2.0,
-        ),
+        "three cross": ([near, walk(1.0, -w, far + 0.5), walk(0.3, 0.2, far + 1.0)], 2.0),
         "six cross": (
             [
-                walk(
-                    (-1) ** k * 0.5 * (1.2 + 0.4 * k),
-                    -((-1) ** k) * rng.uniform(0.5, 1.2),
-                    1.2 + 0.4 * k,
-                )
-                for k in range(6)
+                walk(x, -np.sign(x) * rng.uniform(0.5, 1.2), 1.2 + 0.4 * k)
+                for k, x in enumerate(six)
             ],
             2.5,
         ),
@@ -120,12 +118,11 @@ def crossings(rng: np.random.Generator) -> dict[str, tuple[list[Way], float]]:
     }
 
 
-def pictures(ways: list[Way], seconds: float, rng: np.random.Generator) -> Iterator[
-    tuple[Detections, dict[int, NDArray[np.float64]], set[int]]
-]:  # fmt: skip
+def pictures(
+    ways: list[Way], seconds: float, rng: np.random.Generator
+) -> Iterator[tuple[Detections, dict[int, Place], set[int]]]:
     """Yield what a detector finds, where people are by number, and who of them can be found."""
-    crowd = Crowd(len(ways), rng.spawn(1)[0])
-    reader = ClothingReader()
+    crowd, reader = Crowd(len(ways), rng.spawn(1)[0]), ClothingReader()
     for k in range(1, int(seconds * RATE_HZ) + 1):
         places = {i: np.array(way(k / RATE_HZ)) for i, way in enumerate(ways)}
         seen = {i: p for i, p in places.items() if _in_view(p) and not _hidden(p, places.values())}
@@ -135,30 +132,21 @@ def pictures(ways: list[Way], seconds: float, rng: np.random.Generator) -> Itera
         yield Detections(k / RATE_HZ, k, *SIZE, faces=found), places, set(seen)
 
 
-def visits(rng: np.random.Generator, people: int, seconds: float) -> Iterator[
-    tuple[int, float, float, Way]
-]:  # fmt: skip
-    """Yield who comes, from when, until when and how: from one side, for a while, to one side."""
-    below, start = rng.normal(0.0, 0.08, people), 2.0
-    while start < seconds:
-        who, far, pace = int(rng.integers(people)), rng.uniform(0.8, 2.0), rng.uniform(0.6, 1.2)
-        side, other = rng.choice((-1.0, 1.0), 2)
-        end, wide, height = start + rng.uniform(15, 70), 0.75 * far, rng.normal(below[who], 0.03)
+def visit(rng: np.random.Generator, below_m: float, start_s: float) -> tuple[float, Way]:
+    """Return the end and the way of a visit: from one side, for a while, to one side."""
+    far, pace, (side, other) = rng.uniform(0.8, 2.0), rng.uniform(0.6, 1.2), rng.choice((-1, 1), 2)
+    end_s, wide, height = start_s + rng.uniform(15, 70), 0.75 * far, rng.normal(below_m, 0.03)
 
-        def way(
-            t: float, start: float = start, end: float = end, far: float = far, pace: float = pace,
-            side: float = side, other: float = other, wide: float = wide, height: float = height,
-        ) -> tuple[float, float, float]:  # fmt: skip
-            come, go = wide - pace * (t - start), wide - pace * (end - t)
-            aside = side * max(come, 0.0) + other * max(go, 0.0) + 0.05 * np.sin(0.7 * t)
-            return float(aside), height + 0.02 * np.sin(0.4 * t), far + 0.05 * np.sin(0.3 * t)
+    def way(t: float) -> tuple[float, float, float]:
+        come, go = wide - pace * (t - start_s), wide - pace * (end_s - t)
+        aside = side * max(come, 0.0) + other * max(go, 0.0) + 0.05 * np.sin(0.7 * t)
+        return float(aside), height + 0.02 * np.sin(0.4 * t), far + 0.05 * np.sin(0.3 * t)
 
-        yield who, start, end, way
-        start = end + rng.uniform(4, 120)
+    return end_s, way
 
 
-def come_and_go(people: int, seconds: float, rng: np.random.Generator) -> tuple[int, int, int, int]:
-    """Return visits, returns within 5 minutes, kept numbers, numbers of others.
+def come_and_go(people: int, seconds: float, rng: np.random.Generator) -> Counter[str]:
+    """Count visits, returns within 5 minutes, kept numbers and numbers of others.
 
     The number of a visit is the one that it had in most pictures.
     """
@@ -166,28 +154,32 @@ def come_and_go(people: int, seconds: float, rng: np.random.Generator) -> tuple[
     crowd, reader = Crowd(people, rng.spawn(1)[0]), ClothingReader()
     last: dict[int, tuple[float, int]] = {}
     owner: dict[int, int] = {}
-    returns = kept = wrong = shown = 0
-    for who, start, end, way in visits(rng, people, seconds):
+    count: Counter[str] = Counter()
+    below_m, start_s = rng.normal(0.0, 0.08, people), 2.0
+    while start_s < seconds:
+        who = int(rng.integers(people))
+        end_s, way = visit(rng, below_m[who], start_s)
         numbers: Counter[int] = Counter()
-        for k in range(round(start * RATE_HZ), round((end + 2.0) * RATE_HZ)):
+        for k in range(round(start_s * RATE_HZ), round((end_s + 2.0) * RATE_HZ)):
             t, faces, places = k / RATE_HZ, [], {}
-            if t < end:
+            if t < end_s:
                 places[who] = p = np.array(way(t))
                 if _in_view(p) and rng.random() >= _MISSED:
                     faces.append(detected(p, rng))
-            if rng.random() < _FALSE_PER_MIN / 60.0 / RATE_HZ:
+            if rng.random() < _FALSE:
                 faces.append(detected(rng.uniform((-0.7, -0.2, 1.0), (0.7, 0.4, 2.0)), rng))
             found, _ = reader.add_clothing(crowd.image(places, k), t, tuple(faces))
-            percept = see.see(Detections(t, k, *SIZE, faces=found), poses)
-            assert percept is not None
-            pairs = _matched(places, [(face.id, face.p_world_m) for face in percept.faces])
-            numbers.update(number for i, number in pairs if i is not None)
+            percept = present(see.see(Detections(t, k, *SIZE, faces=found), poses))
+            numbers.update(number for i, number in _matched(places, percept) if i is not None)
         ((number, _),) = numbers.most_common(1)
-        if who in last and start - last[who][0] < 300.0:
-            returns, kept = returns + 1, kept + (number == last[who][1])
-        wrong += owner.setdefault(number, who) != who
-        last[who], shown = (end, number), shown + 1
-    return shown, returns, kept, wrong
+        if who in last and start_s - last[who][0] < 300.0:
+            count["returns"] += 1
+            count["kept"] += number == last[who][1]
+        count["visits"] += 1
+        count["wrong"] += owner.setdefault(number, who) != who
+        last[who] = end_s, number
+        start_s = end_s + rng.uniform(4, 120)
+    return count
 
 
 class Crowd:
@@ -208,7 +200,7 @@ class Crowd:
         ]
         self._light = 1.0 + 0.25 * np.sin(np.linspace(0.0, 5.0, SIZE[0]) + rng.uniform(0.0, 6.28))
 
-    def image(self, places: dict[int, NDArray[np.float64]], number: int) -> Image:
+    def image(self, places: dict[int, Place], number: int) -> Image:
         """Return a picture of people at places."""
         drawn = self._room.copy()
         for i, p in sorted(places.items(), key=lambda one: (-one[1][2], -one[1][0])):
@@ -232,21 +224,20 @@ def _box(
     cv2.rectangle(image, low, (round(x + half * px_m), round(y + bottom * px_m)), colour, -1)
 
 
-def _in_view(p: NDArray[np.float64]) -> bool:
+def _in_view(p: Place) -> bool:
     x, y = project(p[None], LENS)[0]
     return bool(20.0 < x < SIZE[0] - 20.0)
 
 
-def _hidden(p: NDArray[np.float64], others: Iterable[NDArray[np.float64]]) -> bool:
+def _hidden(p: Place, others: Iterable[Place]) -> bool:
     """Return whether a nearer face covers this one; of two as near, the left one does."""
-    for q in others:
-        nearer = q[2] < p[2] or (q[2] == p[2] and q[0] < p[0])
-        if nearer and np.hypot(*(p[:2] / p[2] - q[:2] / q[2])) < _HIDDEN_M / q[2]:
-            return True
-    return False
+    return any(
+        (q[2], q[0]) < (p[2], p[0]) and np.hypot(*(p[:2] / p[2] - q[:2] / q[2])) < _HIDDEN_M / q[2]
+        for q in others
+    )
 
 
-def detected(p: NDArray[np.float64], rng: np.random.Generator) -> DetectedFace:
+def detected(p: Place, rng: np.random.Generator) -> DetectedFace:
     """Return a face at a place in the camera's axes, turned to it, as a detector finds it."""
     points = project(LANDMARKS_FACE_M @ _FRONTAL.T + p, LENS) + rng.normal(0.0, _MARKS_PX, (5, 2))
     (x, y), (right, bottom) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
@@ -261,6 +252,13 @@ def perception() -> tuple[Perception, PoseHistory]:
     return Perception(mount, FIELD_DEG, Tracker()), poses
 
 
+def _best_pairs(costs: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    from scipy.optimize import linear_sum_assignment
+
+    rows, columns = linear_sum_assignment(costs)
+    return rows, columns
+
+
 def idf1(ways: list[Way], seconds: float, rng: np.random.Generator) -> float:
     """Return IDF1: pairs of truth and track that agree in the best pairing of whole identities.
 
@@ -273,30 +271,22 @@ def idf1(ways: list[Way], seconds: float, rng: np.random.Generator) -> float:
     true: Counter[int] = Counter()
     believed: Counter[int] = Counter()
     for found, there, seen in pictures(ways, seconds, rng):
-        percept = see.see(found, poses)
-        assert percept is not None
-        for i, number in _matched(there, [(face.id, face.p_world_m) for face in percept.faces]):
+        for i, number in _matched(there, present(see.see(found, poses))):
             if i in seen:
                 hits[i, number] += 1
             if i is None or i in seen:
                 believed[number] += 1
-        true.update(list(seen))
-    people, numbers = sorted(true), sorted(believed)
-    table = np.array([[hits[i, n] for n in numbers] for i in people])
-    from scipy.optimize import linear_sum_assignment
-
-    rows, columns = linear_sum_assignment(-table)
-    return float(2.0 * table[rows, columns].sum() / (true.total() + believed.total()))
+        true.update(seen)
+    table = np.array([[hits[i, n] for n in sorted(believed)] for i in sorted(true)])
+    best = table[_best_pairs(-table)].sum()
+    return float(2.0 * best / (true.total() + believed.total()))
 
 
-def _matched(
-    people: dict[int, NDArray[np.float64]], tracks: list[tuple[int, Vec3]]
-) -> Iterator[tuple[int | None, int]]:
-    """Yield the person of each track in one picture, None for no one, and its number."""
-    from scipy.optimize import linear_sum_assignment
-
+def _matched(people: dict[int, Place], percept: Percept) -> Iterator[tuple[int | None, int]]:
+    """Yield the person of each face in a percept, None for no one, and its number."""
     p = np.array(list(people.values())).reshape(-1, 3)
-    q = np.array([(-y, -z, x) for _, (x, y, z) in tracks]).reshape(-1, 3)
+    at = [face.p_world_m for face in percept.faces]
+    q = np.array([(-y, -z, x) for x, y, z in at]).reshape(-1, 3)
     far, believed = np.linalg.norm(p, axis=1), np.linalg.norm(q, axis=1)
     cos = np.clip((p / far[:, None]) @ (q / believed[:, None]).T, -1.0, 1.0)
     apart_deg = np.degrees(np.arccos(cos))
@@ -304,18 +294,9 @@ def _matched(
     cost = apart_deg + _SAME_DEG * np.abs(np.log(far[:, None] / believed))
     cost[apart_deg > _SAME_DEG] = 1e6
     names = list(people)
-    who = {
-        j: names[i] for i, j in zip(*linear_sum_assignment(cost), strict=True) if cost[i, j] < 1e6
-    }
-    for j, (number, _) in enumerate(tracks):
-        yield who.get(j), number
-
-
-class Film(NamedTuple):
-    """Drawn pictures, and the numbers of those before which there is a cut."""
-
-    images: list[Image]
-    cuts: list[int]
+    who = {j: names[i] for i, j in zip(*_best_pairs(cost), strict=True) if cost[i, j] < 1e6}
+    for j, face in enumerate(percept.faces):
+        yield who.get(j), face.id
 
 
 def room(rng: np.random.Generator, width: int = 1000, height: int = 600) -> Image:
@@ -330,17 +311,15 @@ def room(rng: np.random.Generator, width: int = 1000, height: int = 600) -> Imag
     return np.repeat(np.clip(image, 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
 
 
-def cut_film(rng: np.random.Generator) -> Film:
-    """Return rooms one after the other, with the trouble that is no cut in each.
+def cut_film(rng: np.random.Generator) -> tuple[list[Image], list[int]]:
+    """Return pictures of rooms one after the other, and the numbers of those after a cut.
 
-    A pan of 11 deg a picture, light that is switched, noise, and a hand before the lens.
+    In each room is trouble that is no cut: a pan of 11 deg a picture, light that is switched,
+    noise, and a hand before the lens.
     """
     images: list[Image] = []
-    cuts: list[int] = []
     noise = [rng.normal(0.0, 3.0, (*SIZE[::-1], 1)) for _ in range(4)]
-    for scene in range(4):
-        if scene:
-            cuts.append(len(images))
+    for _ in range(4):
         view = room(rng)
         for k in range(24):
             x = 100 + 100 * (0, 1, 2, 1)[k % 4] if k < 9 else 100  # 100 px are 11 deg
@@ -352,38 +331,30 @@ def cut_film(rng: np.random.Generator) -> Film:
             if 18 <= k < 21:
                 image[60 * (k - 18) :, 200:380] = 170.0
             images.append(np.clip(image + noise[k % 4], 0, 255).astype(np.uint8))
-    return Film(images, cuts)
+    return images, list(range(24, len(images), 24))
+
+
+def _changes(numbers: Iterable[int]) -> list[int]:
+    return [k for k, (one, other) in enumerate(pairwise(numbers), start=1) if one != other]
 
 
 def cuts_in(images: Iterable[Image]) -> list[int]:
     """Return the numbers of the pictures before which a cut is found."""
-    cuts = CutDetector()
-    scenes = [cuts.scene(image) for image in images]
-    return [k for k in range(1, len(scenes)) if scenes[k] != scenes[k - 1]]
+    return _changes(map(CutDetector().scene, images))
 
 
-class _Found:
-    """A detector of a drawn face that is in every picture at about the same place."""
-
-    def __init__(self, rng: np.random.Generator) -> None:
-        self._rng = rng
-
-    def find(self, image: Image) -> tuple[DetectedFace, ...]:
-        """Return the face."""
-        return (detected(np.array([0.1, 0.0, 1.5]), self._rng),)
-
-
-def went_on(film: Film, rng: np.random.Generator) -> tuple[int, int]:
-    """Return how many identities continued after a cut, and how many ended without a cut."""
+def ends_in(images: Iterable[Image], rng: np.random.Generator) -> list[int]:
+    """Return the numbers of the pictures before which the identity of a steady face ends."""
     see, poses = perception()
-    frames, ids = FrameAnalyzer(_Found(rng)), []
-    for k, image in enumerate(film.images):
-        percept = see.see(frames.analyze(Shot(k / RATE_HZ, k + 1, image)), poses)
-        assert percept is not None
-        (face,) = percept.faces
+    # So low that its clothes are below the picture: those would be the room, which pans.
+    place = np.array([0.1, 0.5, 1.5])
+    frames = FrameAnalyzer(SimpleNamespace(find=lambda _: (detected(place, rng),)))
+    ids = []
+    for k, image in enumerate(images, start=1):
+        found = frames.analyze(Shot(k / RATE_HZ, k, image))
+        ((face),) = present(see.see(found, poses)).faces
         ids.append(face.id)
-    ended = [k for k in range(1, len(ids)) if ids[k] != ids[k - 1]]
-    return sum(k not in ended for k in film.cuts), sum(k not in film.cuts for k in ended)
+    return _changes(ids)
 
 
 def measure(full: bool) -> dict[str, float]:
@@ -393,24 +364,29 @@ def measure(full: bool) -> dict[str, float]:
         rng = np.random.default_rng(seed)
         for name, (ways, seconds) in crossings(rng).items():
             figures.setdefault(f"{name}: IDF1", []).append(idf1(ways, seconds, rng))
-    rng, on, found, false, cuts, images = np.random.default_rng(0), 0, 0, 0, 0, 0
-    for _ in range(10 if full else 2):
-        film = cut_film(rng)
-        on += went_on(film, rng)[0]
-        there = cuts_in(film.images)
-        found += len(set(there) & set(film.cuts))
-        false += len(set(there) - set(film.cuts))
-        cuts, images = cuts + len(film.cuts), images + len(film.images)
-    alone = [come_and_go(1, 1200.0 if full else 400.0, np.random.default_rng(k)) for k in range(3)]
-    six = [come_and_go(6, 1200.0 if full else 400.0, np.random.default_rng(k)) for k in range(3)]
     out = {name: float(np.mean(values)) for name, values in figures.items()}
-    out["identities that go on after a cut, %"] = 100.0 * on / cuts
+    rng, films = np.random.default_rng(0), Counter[str]()
+    for _ in range(10 if full else 2):
+        images, cuts = cut_film(rng)
+        found, ended = {*cuts_in(images)}, {*ends_in(images, rng)}
+        films.update(
+            images=len(images), cuts=len(cuts), found=len(found.intersection(cuts)),
+            false=len(found.difference(cuts)), went_on=len({*cuts} - ended),
+        )  # fmt: skip
+    out["identities that go on after a cut, %"] = 100.0 * films["went_on"] / films["cuts"]
+    out["cuts found, %"] = 100.0 * films["found"] / films["cuts"]
+    out["cuts where there is none, of 1000 pictures"] = 1e3 * films["false"] / films["images"]
+    alone, six = (
+        sum(
+            (come_and_go(n, 1200.0 if full else 400.0, np.random.default_rng(k)) for k in range(3)),
+            Counter(),
+        )
+        for n in (1, 6)
+    )
     out["one comes and goes: returns with the same number, %"] = (
-        100.0 * sum(one[2] for one in alone) / sum(one[1] for one in alone)
+        100.0 * alone["kept"] / alone["returns"]
     )
     out["six come and go: visits with another person's number, %"] = (
-        100.0 * sum(one[3] for one in six) / sum(one[0] for one in six)
+        100.0 * six["wrong"] / six["visits"]
     )
-    out["cuts found, %"] = 100.0 * found / cuts
-    out["cuts where there is none, of 1000 pictures"] = 1e3 * false / images
     return out
