@@ -143,17 +143,18 @@ def test_engaging_such_a_servo_names_it_and_leaves_all_without_torque(spoil, err
     assert not any(servo.torque for servo in rig.chain.servos)
 
 
-def test_a_position_that_wraps_as_the_torque_comes_on_is_found():
+@pytest.mark.parametrize("turn", [4096, -4096])
+def test_a_position_that_wraps_as_the_torque_comes_on_is_found(turn):
     rig = Rig().open()
     servo = rig.chain[2]
 
     def wrap(code, raw):
-        if servo.torque and servo.shaft.x < 4000:
-            servo.shaft.x += 4096
+        if servo.torque and 0 < servo.shaft.x < 4000:
+            servo.shaft.x += turn
         return raw
 
     rig.port.spoil = wrap
-    with pytest.raises(ServoFault, match="servo 2: position jumped from 2002 to 6098"):
+    with pytest.raises(ServoFault, match=f"servo 2: position jumped from 2002 to {2002 + turn}"):
         rig.bus.enable_torque()
     assert not any(s.torque for s in rig.chain.servos)
 
