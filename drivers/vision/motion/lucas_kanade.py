@@ -261,10 +261,12 @@ def _fit_robustly(rows: Floats, flow: Floats) -> tuple[Floats | None, Floats, fl
     for _ in range(_STEPS):
         weighted = rows * weights[:, None]
         normal = rows.T @ weighted
-        # Points on a line have moments without an area.
-        xx, xy, yy = normal[0, 0], normal[0, 1], normal[1, 1]
-        flat = xx * yy - xy * xy <= 1e-6 * max(xx, yy) ** 2 + 1e-12
-        if np.count_nonzero(weights) < _LEAST_FLOW_POINTS or flat:
+        if np.count_nonzero(weights) < _LEAST_FLOW_POINTS:
+            return None, weights, scale
+        # Points on a line have moments about their mean without an area.
+        x, y, total = normal[2].tolist()
+        (xx, xy), (_, yy) = (normal[:2, :2] - np.outer((x, y), (x, y)) / total).tolist()
+        if xx * yy - xy * xy <= 1e-6 * max(xx, yy) ** 2 + 1e-12:
             return None, weights, scale
         numbers = np.asarray(np.linalg.solve(normal, weighted.T @ flow))
         errors = np.hypot(*(flow - rows @ numbers).T)
