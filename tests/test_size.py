@@ -21,7 +21,7 @@ LARGEST = {
     "features/lab": 53_400,
     "features/study": 10_200,
     "features/world": 49_200,
-    "tests": 556_300,
+    "tests": 555_600,
 }
 TOKEN = re.compile(
     r"""(?P<comment>\#[^\n]*)

@@ -53,12 +53,12 @@ def write_values(
     if not values:
         say("everything is as the rig file says: nothing to write")
         return
-    where = find_file("rigs", rig) if out is None else out
+    file = find_file("rigs", rig)
+    where = out or file
     if not person.agrees(f"write these {len(values)} values into {where}?"):
         say("nothing written")
         return
-    source = None if out is None else find_file("rigs", rig)
-    saved = save(where, values, datetime.now(), source=source)
+    saved = save(where, values, datetime.now(), source=out and file)
     for change in saved.changes:
         say(str(change))
     if not saved.changes:
