@@ -13,9 +13,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-
 from gazerig.config.entries import parse
 from gazerig.config.load import ConfigError, Document, read_yaml
 from gazerig.config.parameters import flatten_changes, merge, nest, to_plain, value_of
@@ -114,6 +111,8 @@ def propose(
 
 def _rewrite(text: str, wanted: Mapping[str, Any]) -> str:
     """Return a file's text with other values; its comments and the order of its keys stay."""
+    from ruamel.yaml import YAML  # few runs save anything
+
     yaml = YAML()  # the round trip
     yaml.preserve_quotes = True
     yaml.width = 10_000  # lines of the file are not wrapped
@@ -134,11 +133,11 @@ def _put(holder: Any, wanted: Mapping[str, Any], at: int = 0) -> None:
         held = holder.get(key)
         if key not in holder:
             holder.insert(at, key, value)
-        elif isinstance(held, CommentedMap) and isinstance(value, CommentedMap):
+        elif isinstance(held, dict) and isinstance(value, dict):
             # In a block first: the comments below its last key are those of the next section.
-            _put(held, value, len(held) if held.fa.flow_style() else 0)
-        elif isinstance(held, CommentedSeq) and isinstance(value, list) and len(held) == len(value):
+            _put(held, value, len(held) if holder[key].fa.flow_style() else 0)
+        elif isinstance(held, list) and isinstance(value, list) and len(held) == len(value):
             for i, item in enumerate(value):
                 held[i] = item
-        elif not (isinstance(held, CommentedMap | CommentedSeq) and held.ca.items):
+        elif not (isinstance(held, dict | list) and holder[key].ca.items):
             holder[key] = value

@@ -75,7 +75,7 @@ def layers_of(
     for key, given in (("profile", profile), ("character", character)):
         named = given or rig.data.get(key)
         try:
-            if isinstance(named, str) and named != NO_CHARACTER:
+            if isinstance(named, str) and (key, named) != ("character", NO_CHARACTER):
                 layers.append(find_file(f"{key}s", named))
         except ConfigError as error:
             if given:

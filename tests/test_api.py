@@ -116,7 +116,7 @@ def test_a_stopped_head_refuses_orders_until_it_resumes(head: gazerig.SimulatedH
         (lambda head: head.express("smug"), "no expression 'smug'"),
         (lambda head: head.move_opponent(0.7, 0.0, 0.0), "no opponent to move"),
         (lambda head: head.set({"gaze.head.eye_only_range_deg": 1e9}), "0 to 180 deg"),
-        (lambda head: head.get("gaze.hed"), "unknown key"),
+        (lambda head: head.get("gaze.hed"), "no key .hed."),
         (lambda head: head.save(), "is part of the program and is never changed"),
         (lambda head: next(head.states(0.0)), "above 0"),
     ],
