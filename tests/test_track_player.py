@@ -10,11 +10,12 @@ import pytest
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.track.track import KeyFrame, Track
-from gazerig.gaze.track.track_player import TrackPlayer
+from gazerig.gaze.track.track_player import OffsetState, TrackPlayer
 from gazerig.robot.app.rig_limits import lid_spans, limits
 from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.commands import EndTrack, Play, SyncTrack
 from gazerig.robot.model.joint import JointLimit
+from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.model.types import further_joints
 
 
@@ -118,6 +119,12 @@ def test_other_channels_run_together_and_the_same_replace() -> None:
     it.player.step(0.7)
     assert not [one for one in it.choices.states(0.7) if one.is_playing]
     assert it.end(0.8, "talk") == "talk is not playing; playing: none"
+
+
+def test_a_jaw_that_is_interrupted_in_a_syllable_comes_to_rest_at_once() -> None:
+    state = OffsetState(*np.zeros((3, 12)))
+    state.value[9], state.speed[9], state.acceleration[9] = 0.152, -3.22, -140.0
+    assert TrackFit(rig().names, lid_spans(rig())).fade_s(state, limits(rig().joints), 0.25) < 1.0
 
 
 def test_an_owned_jaw_goes_from_the_present_angle_to_the_track_and_back() -> None:

@@ -383,12 +383,17 @@ class TrackFit:
         return found
 
     def fade_s(self, state: OffsetState, limits: Sequence[JointLimit], least_s: float) -> float:
-        """Return the time in which a moving offset can return to rest within limits."""
+        """Return the time in which a moving offset can return to rest within limits.
+
+        If none keeps them, the one that exceeds them least: a long return from a high acceleration
+        swings far. The guard limits the rest.
+        """
         most = self._transition_limits(state, limits)
-        for factor in _LONGER:
-            if self._keeps_limits(_fade_samples(state, factor * least_s), most):
-                return factor * least_s
-        return _LONGER[-1] * least_s
+        fades = {factor * least_s: _fade_samples(state, factor * least_s) for factor in _LONGER}
+        for fade_s, samples in fades.items():
+            if self._keeps_limits(samples, most):
+                return fade_s
+        return min(fades, key=lambda fade_s: self._excess(fades[fade_s], most))
 
     def wait_s(
         self,
@@ -419,6 +424,13 @@ class TrackFit:
             np.maximum(most, np.abs(now)) + _ROUNDING
             for most, now in zip(_track_limits(limits), begins, strict=True)
         ]
+
+    def _excess(self, samples: MotionSamples, most: Sequence[Floats]) -> float:
+        """Return the largest ratio of a speed or an acceleration to a given one."""
+        return max(
+            float((np.abs(column @ self._matrix) / limit).max())
+            for column, limit in zip(samples[2:], most, strict=True)
+        )
 
     def _keeps_limits(self, samples: MotionSamples, most: Sequence[Floats]) -> bool:
         """Return whether speeds and accelerations stay below given ones."""
