@@ -172,11 +172,8 @@ def gains_name_joints(rig: Rig) -> Iterator[tuple[str, str]]:
         ("name: nod", "name: 5", ["name"]),
         ("neck: {id: 1}", "neck: {id: 999}", ["joints.neck.id"]),
         ("neck: {id: 1}", "neck: {idd: 2}", ["joints.neck.idd", "joints.neck.id"]),
-        ("neck: {id: 1}", "neck:", ["joints.neck"]),
         ("neck: {id: 1}", "neck: {id: 1, low_deg: x}", ["joints.neck.low_deg"]),
         ("joints:", "joints: 5\nspare:", ["joints", "spare.neck", "spare.pan"]),
-        ("camera:", "camera:\n  fsp: 5", ["camera.fsp"]),
-        ("camera:", "camera:\n  fps: -1", ["camera.fps"]),
         ("gains:", "gains: {nekc: 1}\nspare:", ["gains.nekc", "spare.neck"]),
     ],
 )

@@ -13,6 +13,7 @@ from shown_page import wait_for
 from world_shapes import SmallWorld
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.shared_frames import SharedDetections, SlotReader, SlotWriter
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run
@@ -151,8 +152,14 @@ def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: b
     tick = ran.ticks[-1]
     assert tick.detections is not None
     found = replace(tick.detections, image=image, depth_m=metres)
-    page.stream.update(structs.replace(tick, detections=found))
+    writer, reader = SlotWriter(), SlotReader()
+    slot = writer.put(metres if depth else image)
+    readers = reader, reader
+    shared = SharedDetections(found, None if depth else slot, slot if depth else None, readers)
+    page.stream.update(structs.replace(tick, detections=shared))
     news = read_waiting(page.feed, page.live)
+    reader.close()
+    writer.close()
     assert news.image is not None
     assert found.located is not None
     lens, poses = found.located.intrinsics, page.live._poses

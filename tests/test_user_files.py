@@ -111,8 +111,6 @@ def test_names_can_be_recorded(tmp_path: Path) -> None:
     file.write_text(desk.replace("name: desk", r'name: "\ud800"', 1))
     with pytest.raises(ConfigError, match="invalid Unicode"):
         load_rig(str(file))
-    file.write_text(desk.replace("name: desk", 'name: "Kopf 頭 👩‍🚀"', 1))
-    assert load_rig(str(file)).name.startswith("Kopf")
 
 
 # -- writing ---------------------------------------------------------------------------

@@ -103,13 +103,17 @@ def frame_message(
     found: Detections, image: PassedImage | None, depth: bool, wants_depth: bool
 ) -> bytes:
     """Return a message with the detections of a frame; see ``ShownFrame``."""
-    plain = replace(
-        found,
-        image=None,
-        depth_m=None,
-        located=None,
+    # Not by replace: a frame of the camera's process reads its image when it is asked for.
+    plain = Detections(
+        found.captured_s,
+        found.number,
+        found.width_px,
+        found.height_px,
+        tuple([replace(face, mesh=None) for face in found.faces]),  # it is not drawn
+        found.blobs,
         lens=found.located.intrinsics if found.located is not None else found.lens,
-        faces=tuple([replace(face, mesh=None) for face in found.faces]),  # it is not drawn
+        people=found.people,
+        conditions=found.conditions,
     )
     return DETECTED + encode(ShownFrame(plain, image, depth, wants_depth))
 
