@@ -298,13 +298,10 @@ def bus_of(**methods: Any) -> MultiBus:
 
 @pytest.mark.parametrize("value", [nan, inf])
 @pytest.mark.parametrize("column", ["position_steps", "velocity_steps_s", "load", "at_s"])
-def test_a_servo_without_a_finite_reading_counts_as_missing(column: str, value: float) -> None:
+def test_a_reading_that_is_not_finite_is_a_lost_bus(column: str, value: float) -> None:
     bus = bus_of(read=lambda now_s: GOOD._replace(**{column: (1.0, value)}))
-    for k in range(5):
-        reported = bus.read(1.0 + 0.01 * k)
-        assert reported.missing == (1,) and not reported.torque[1]
-    (line,) = bus.events()
-    assert line.endswith("time of jaw (servo 2): taken as missing")
+    with pytest.raises(BusLost, match=r"bus 'b' of b 1: no finite .* of jaw \(servo 2\)"):
+        bus.read(1.0)
 
 
 @pytest.mark.parametrize("answer", [None, (1, 2), Feedback.create_missing(1)])

@@ -5,11 +5,9 @@ from collections.abc import Collection, Sequence
 from contextlib import ExitStack, suppress
 from itertools import chain
 from math import inf, isfinite
-from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from gazerig.drivers.errors import BusLost, DriverError
-from gazerig.drivers.event_log import EventLog, RateLimitedLog
 from gazerig.drivers.plugins import describe_error
 from gazerig.drivers.types import BusHealth, Feedback, LimpableBus, ServoBus, ServoConfig
 
@@ -36,32 +34,11 @@ class BusShare(NamedTuple):
     setups: tuple[ServoConfig, ...] = ()
 
 
-class _PollTimer:
-    """Schedule of the reads of a bus: every tick, but rarely while no servo on it answers."""
-
-    def __init__(self) -> None:
-        self._in_vain, self._due_s = 0, -inf
-
-    def is_due(self, now_s: float) -> bool:
-        """Return whether it must be read now."""
-        return now_s >= self._due_s
-
-    def update(self, feedback: Feedback, now_s: float) -> None:
-        """Record the feedback of a read."""
-        if len(feedback.missing) < len(feedback.at_s):
-            self._in_vain = 0
-            return
-        self._in_vain += 1
-        if self._in_vain >= IN_A_ROW:
-            self._due_s = now_s + AGAIN_S
-
-
 class MultiBus:
     """Buses that are opened, read, written and released together; implements ServoBus.
 
-    Events and faults of one bus do not affect the others: while one port is lost, the servos of the
-    others are read and moved as usual. A bus that gives up ends the run for all buses, as a head
-    must not continue to move when part of it no longer responds.
+    While one port is lost, the servos of the others are read and moved as usual. A bus that gives
+    up ends the run for all buses.
 
     Args:
         shares: Together they contain every index from 0 on exactly once.
@@ -72,20 +49,19 @@ class MultiBus:
 
     def __init__(self, shares: Sequence[BusShare]) -> None:
         self._shares = list(shares)
-        self._log = EventLog()
-        self._seldom = RateLimitedLog(self._log)
-        self._timers = [_PollTimer() for _ in self._shares]
-        places = sorted(place for share in shares for place in share.servo_indices)
-        if places != list(range(len(places))):
-            raise ValueError(
-                f"buses cover the indices {places}: each index from 0 on must occur once"
-            )
-        self._count = len(places)
         given = [place for share in shares for place in share.servo_indices]
-        order = sorted(range(len(given)), key=given.__getitem__)
-        # None if the buses' servos are already in the order of the rig.
-        self._pick: Any = itemgetter(*order) if order != sorted(order) else None
-        self._nothing = [Feedback.create_missing(len(share.servo_indices)) for share in shares]
+        self._count = len(given)
+        # Position of each of the rig's servos among those of the buses, one after the other.
+        self._order = sorted(range(self._count), key=given.__getitem__)
+        if sorted(given) != list(range(self._count)):
+            raise ValueError(
+                f"buses cover the indices {sorted(given)}: each index from 0 on must occur once"
+            )
+        self._forget_silence()
+
+    def _forget_silence(self) -> None:
+        self._in_vain = [0] * len(self._shares)
+        self._due_s = [-inf] * len(self._shares)
 
     def open(self) -> None:
         """Open every bus; if one cannot be opened, close those opened before it.
@@ -94,16 +70,12 @@ class MultiBus:
             PortError: a port cannot be opened.
             ServoMissing: servos are absent or of another model.
         """
-        self._timers = [_PollTimer() for _ in self._shares]
-        opened: list[BusShare] = []
-        try:
+        self._forget_silence()
+        with ExitStack() as opened:
             for share in self._shares:
                 share.bus.open()
-                opened.append(share)
-        except BaseException:
-            for share in opened:
-                share.bus.close()
-            raise
+                opened.callback(share.bus.close)
+            opened.pop_all()
 
     def read(self, now_s: float) -> Feedback:
         """Read all servos of all buses.
@@ -112,30 +84,34 @@ class MultiBus:
         servos of the other buses do not wait for it.
 
         Raises:
-            BusLost: no servo of a bus has answered for longer than its ``give_up_s``, or a bus
-                returned no feedback.
+            BusLost: no servo of a bus has answered for longer than its ``give_up_s``, or another
+                package's bus returned no feedback.
         """
-        feedbacks = list(self._nothing)
-        lost: list[BusLost] = []
-        for i, (share, timer) in enumerate(zip(self._shares, self._timers, strict=True)):
-            if not timer.is_due(now_s):
-                continue
-            try:
-                feedbacks[i] = share.bus.read(now_s)
-                if share.label:
-                    feedbacks[i] = self._require_finite(feedbacks[i], share, now_s)
-            except BusLost as error:  # the others are still read, so that they may reconnect
-                lost.append(error)
-                continue
-            timer.update(feedbacks[i], now_s)
+        feedbacks, lost = [], list[BusLost]()
+        for i, share in enumerate(self._shares):
+            feedback = Feedback.create_missing(len(share.servo_indices))
+            if now_s >= self._due_s[i]:
+                try:
+                    answer = share.bus.read(now_s)
+                    if share.label:
+                        _check_feedback(answer, share)
+                    feedback = answer
+                except BusLost as error:  # the others are still read, so that they may reconnect
+                    lost.append(error)
+                silent = len(feedback.missing) == len(share.servo_indices)
+                self._in_vain[i] = self._in_vain[i] + 1 if silent else 0
+                if self._in_vain[i] >= IN_A_ROW:
+                    self._due_s[i] = now_s + AGAIN_S
+            feedbacks.append(feedback)
         if lost:
             raise lost[0]
         columns = [tuple(chain.from_iterable(parts)) for parts in zip(*feedbacks, strict=True)]
-        missing = list[int]()
-        if columns.pop():
-            for share, feedback in zip(self._shares, feedbacks, strict=True):
-                missing += [share.servo_indices[i] for i in feedback.missing]
-        ordered = columns if self._pick is None else map(self._pick, columns)
+        missing = (
+            share.servo_indices[i]
+            for share, feedback in zip(self._shares, feedbacks, strict=True)
+            for i in feedback.missing
+        )
+        ordered = [tuple([column[i] for i in self._order]) for column in columns[:-1]]
         return Feedback._make((*ordered, tuple(sorted(missing))))
 
     def enable_torque(self) -> tuple[int, ...]:
@@ -147,17 +123,13 @@ class MultiBus:
         Raises:
             DriverError: raised by the bus at fault.
         """
-        goals = [0] * self._count
         try:
-            for share in self._shares:
-                places = share.servo_indices
-                for place, goal in zip(places, share.bus.enable_torque(), strict=True):
-                    goals[place] = goal
+            goals = [goal for share in self._shares for goal in share.bus.enable_torque()]
         except BaseException:
             with suppress(BusLost):
                 self.disable_torque()
             raise
-        return tuple(goals)
+        return tuple([goals[i] for i in self._order])
 
     def set_limp(self, servos: Collection[int]) -> None:
         """Switch torque off on these servos; all others that were limp get it again."""
@@ -174,11 +146,8 @@ class MultiBus:
         """
         if len(goals_steps) != self._count:
             raise ValueError(f"{len(goals_steps)} goals for {self._count} servos")
-        for goal in goals_steps:
-            if goal != goal:  # checked before any bus sends its goals
-                raise ValueError(
-                    "a goal is not a number: every goal must be a whole number of steps"
-                )
+        if any(goal != goal for goal in goals_steps):  # before any bus sends its goals
+            raise ValueError("a goal is not a number: every goal must be a whole number of steps")
         for share in self._shares:
             goals = [goals_steps[place] for place in share.servo_indices]
             if share.label:
@@ -189,13 +158,12 @@ class MultiBus:
             share.bus.write(goals)
 
     def faults(self) -> tuple[str, ...]:
-        """Return the latched servo faults, one line each."""
+        """Return the present servo faults, one line each."""
         return tuple(fault for share in self._shares for fault in share.bus.faults())
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
-        events = [event for share in self._shares for event in share.bus.events()]
-        return (*self._log.drain(), *events)
+        return tuple(event for share in self._shares for event in share.bus.events())
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Store setups for the next time torque is switched on.
@@ -242,30 +210,19 @@ class MultiBus:
             for share in reversed(self._shares):
                 stack.callback(share.bus.close)
 
-    def _require_finite(self, feedback: Feedback, share: BusShare, now_s: float) -> Feedback:
-        """Return the feedback of another package's bus; servos without finite values are missing.
 
-        Raises:
-            BusLost: it is not the feedback of the bus's servos.
-        """
-        count = len(share.servo_indices)
-        if not isinstance(feedback, Feedback) or {*map(len, feedback[:-1])} != {count}:
-            raise BusLost(f"{share.label}: read returned no feedback of {count} servos")
-        numbers = feedback[:4]
-        if all(map(isfinite, chain.from_iterable(numbers))):
-            return feedback
-        wrong = {
-            i
-            for i in range(count)
-            if i not in feedback.missing and not all([isfinite(column[i]) for column in numbers])
-        }
-        if not wrong:
-            return feedback
-        names = ", ".join(share.setups[i].label() for i in sorted(wrong))
-        text = f"{share.label}: no finite position, speed, load or time of {names}"
-        self._seldom.add(f"{text}: taken as missing", now_s, share.name)
-        columns = [
-            tuple([none[i] if i in wrong else column[i] for i in range(count)])
-            for column, none in zip(feedback[:-1], Feedback.create_missing(count)[:-1], strict=True)
-        ]
-        return Feedback._make((*columns, tuple(sorted(wrong.union(feedback.missing)))))
+def _check_feedback(feedback: Feedback, share: BusShare) -> None:
+    """Check the feedback of another package's bus.
+
+    Raises:
+        BusLost: it is not that of its servos, or a servo that is not missing has no finite values.
+    """
+    count = len(share.servo_indices)
+    if not isinstance(feedback, Feedback) or {*map(len, feedback[:-1])} != {count}:
+        raise BusLost(f"{share.label}: read returned no feedback of {count} servos")
+    for i in set(range(count)).difference(feedback.missing):
+        if not all(isfinite(column[i]) for column in feedback[:4]):
+            raise BusLost(
+                f"{share.label}: no finite position, speed, load or time of "
+                f"{share.setups[i].label()}, which is not missing"
+            )
