@@ -1,10 +1,13 @@
-"""Every kind of servo bus of ours, with the same few servos."""
+"""Every kind of servo bus of ours, with the same four servos; the only place that makes buses."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from math import inf, sin
+
+import pytest
 
 from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.timing import TIMING, BusTiming
@@ -15,7 +18,7 @@ from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Bus, Pca9685Param
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.types import ServoBus, ServoConfig
+from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
     DynamixelLine,
@@ -26,11 +29,13 @@ from gazerig.sim_mock.devices import (
     build,
 )
 from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.bus_suite import START, BusBench, BusUnderTest, create_bench
+from gazerig.testing.bus_suite import START, BusBench, BusUnderTest
 
 PATIENT_S = 0.2
+TICK_S = 0.01
 
 
 def _timing(patient: bool, give_up_s: float) -> BusTiming:
@@ -90,8 +95,10 @@ def _line(name: str, starts: Mapping[int, float]) -> Emulated:
         # The board's own ranges are as wide as such servos go.
         hobby = [HobbySpec(c, x, min_steps=2000, max_steps=10_000) for c, x in starts.items()]
         return MaestroLine(12, servos=tuple(hobby))
-    specs = tuple(ServoSpec(i, _SMART[name][0], round(x)) for i, x in starts.items())
-    return DynamixelLine(specs) if name == "dynamixel" else FeetechLine(specs)
+    firmware = OLD_FIRMWARE if name == "old dynamixel" else ServoSpec(1, "").firmware
+    model = _SMART[name][0]
+    specs = tuple(ServoSpec(i, model, round(x), firmware) for i, x in starts.items())
+    return FeetechLine(specs) if name in FEETECH else DynamixelLine(specs)
 
 
 def _device(name: str) -> Callable[[Mapping[int, float], Callable[[], float]], Device]:
@@ -107,19 +114,154 @@ def _kind(name: str, patient: bool = False) -> BusUnderTest:
     return BusUnderTest("hobby", 4400, 7600, 12_000.0, make, device, True, pulses_on)
 
 
+OLD_FIRMWARE = 45
+"""Without fast sync reads and with another place of the indirect block."""
 _SMART = {
     "dynamixel": ("xl330-m077", 1000, 3000, 4000.0),
+    "old dynamixel": ("xl330-m077", 1000, 3000, 4000.0),
     "feetech": ("sts3215", 1000, 3000, 3000.0),
     "scs": ("scs0009", 200, 900, 1500.0),
 }
 """Model, range and speed of smart servos."""
 _BOARDS = {"maestro": (_maestro, _maestro_pulses_on), "pca9685": (_pca9685, _pca9685_pulses_on)}
-KINDS = (*_SMART, *_BOARDS)
+SMART, FEETECH, BOARDS = tuple(_SMART), ("feetech", "scs"), tuple(_BOARDS)
+KINDS = (*SMART, *BOARDS)
 
 
-def in_process(name: str) -> BusBench:
-    """Make a kind's bench in this process, on a clock that waiting moves."""
-    return create_bench(_kind(name))
+@dataclass(frozen=True)
+class Bench(BusBench):
+    """The servos of a kind in this process, on a clock that waiting moves, and their truth.
+
+    seen: true positions at each request of a read: a right answer has one of these
+    plan: goals that move to and fro without a jump
+    """
+
+    name: str
+    device: Device
+    seen: list[list[float]]
+    plan: list[float]
+
+    def places(self) -> list[float]:
+        """Return the true positions, as ``true_steps`` but quicker."""
+        places = self.device.positions_steps()
+        return [places[s.id if self.kind.board else i] for i, s in enumerate(self.setups)]
+
+    def tick(self, bus: ServoBus, goals: Sequence[int] = (), follows: bool = True) -> Feedback:
+        """Read and write once, servos in motion; every fresh value must be true in its read.
+
+        follows: whether servos follow their pulses; without feedback a position is an estimate
+        """
+        self.seen[:] = [self.places()]
+        began_s = self.now_s()
+        feedback = bus.read(began_s)
+        self.seen.append(self.places())
+        board_room = 0.2 if follows else inf
+        room = (board_room if self.kind.board else 0.003) * (self.kind.high - self.kind.low)
+        for i, true in enumerate(zip(*self.seen, strict=True)):
+            at = feedback.position_steps[i]
+            if i not in feedback.missing and not min(true) - room <= at <= max(true) + room:
+                raise AssertionError(f"{began_s:.3f} s: servo {i} at {at}, truly {true}")
+        bus.write(goals or self._planned(feedback))
+        self.wait(TICK_S)
+        return feedback
+
+    def _planned(self, feedback: Feedback) -> list[int]:
+        """Return goals that follow a sine below the speed limit, from where servos are rearmed."""
+        kind = self.kind
+        most = 0.8 * kind.speed_steps_s * TICK_S
+        sweep = self.steps([0.5 + 0.3 * sin(3.5 * self.now_s() + i) for i in range(len(START))])
+        for i, goal in enumerate(sweep):
+            if feedback.rearmed[i]:
+                self.plan[i] = min(max(feedback.position_steps[i], kind.low), kind.high)
+            else:
+                self.plan[i] += min(max(goal - self.plan[i], -most), most)
+        return [round(goal) for goal in self.plan]
+
+    def ticks(self, bus: ServoBus, seconds: float) -> list[Feedback]:
+        """Tick for a while."""
+        return [self.tick(bus) for _ in range(round(seconds / TICK_S))]
+
+    def recovered(self, bus: ServoBus) -> Feedback:
+        """Tick until all servos answer under torque again."""
+        for _ in range(300):
+            feedback = self.tick(bus)
+            if not feedback.missing and all(feedback.torque):
+                return feedback
+        raise AssertionError(f"not in 3 s: {feedback}, {bus.faults()}, {bus.events()}")
+
+
+def in_process(name: str, wire_time: bool = False) -> Bench:
+    """Make a kind's bench in this process; ``wire_time``: bytes take their time at 1 Mbit/s."""
+    kind, now = _kind(name), [50.0]
+
+    def sleep_until(t_s: float) -> None:
+        now[0] = max(now[0], t_s)
+
+    device = kind.device(kind.starts_steps, lambda: now[0])
+
+    def note(data: bytes) -> None:
+        bench.seen.append(bench.places())
+
+    port = InProcessPort(device, note, "the port under test", sleep_until, wire_time)
+    wait: Callable[[float], None] = lambda s: sleep_until(now[0] + s)  # noqa: E731
+    bench = Bench(kind, port, lambda: now[0], wait, device.faults.command, name, device, [], [])
+    bench.plan[:] = bench.steps(START)
+    return bench
+
+
+class Struck:
+    """A bus in motion, struck by faults; each tick checks goals, speeds and ranges.
+
+    longest_s: the longest read
+    """
+
+    def __init__(self, bench: Bench, victim: int) -> None:
+        self.bench, self.victim = bench, victim
+        self.bus = bench.hold()
+        self.longest_s = 0.0
+        bench.ticks(self.bus, 0.5)
+        self.bus.events()
+
+    def tick(self, own_speed: bool) -> bool:
+        """Tick and check the rules; return whether all servos follow their goals.
+
+        own_speed: nothing restrains a servo that was jammed or without supply
+        """
+        bench, kind = self.bench, self.bench.kind
+        before_s, before = bench.now_s(), bench.places()
+        feedback = bench.tick(self.bus, follows=not own_speed)
+        self.longest_s = max(self.longest_s, bench.now_s() - before_s - TICK_S)
+        passed_s, span = bench.now_s() - before_s, kind.high - kind.low
+        most = 1.3 * kind.speed_steps_s * passed_s + 0.01 * span
+        places = bench.places()
+        for i, (was, now, goal) in enumerate(
+            zip(before, places, bench.true_goals_steps(), strict=True)
+        ):
+            assert goal is None or kind.low <= goal <= kind.high
+            assert kind.low - 0.03 * span <= now <= kind.high + 0.03 * span
+            assert own_speed or abs(now - was) <= most, f"servo {i}: {was} -> {now}"
+        return (
+            not feedback.missing
+            and all(feedback.torque)
+            and all(abs(a - b) < 0.1 * span for a, b in zip(places, bench.plan, strict=True))
+        )
+
+    def strike(self, begin: str, end: str, seconds: float) -> bool:
+        """Let a fault last for a while; return whether all came back, or else check its name."""
+        setup = self.bench.setups[self.victim]
+        own_speed = "stick" in begin or "power" in begin or "static" in begin
+        self.bench.command(begin.format(i=setup.id))
+        for _ in range(round(seconds / TICK_S)):
+            self.tick(own_speed)
+        self.bench.command(end.format(i=setup.id))
+        well = 0
+        for _ in range(400):
+            well = well + 1 if self.tick(own_speed) else 0
+            if well >= 10:
+                return True
+        lines = (*self.bus.events(), *self.bus.faults())
+        assert any(f"{setup.name} (" in line for line in lines), lines
+        return False
 
 
 @contextmanager
@@ -134,3 +276,10 @@ def behind_a_terminal(name: str) -> Iterator[BusBench]:
             yield BusBench(kind, port, time.monotonic, time.sleep, command)
         finally:
             port.closePort()
+
+
+def every_kind(*without: str, why: str = "") -> pytest.MarkDecorator:
+    """Run a test with the name of every kind, except of those without this promise."""
+    skip = pytest.mark.skip(reason=why)
+    names = [pytest.param(name, marks=skip) if name in without else name for name in KINDS]
+    return pytest.mark.parametrize("name", names)
