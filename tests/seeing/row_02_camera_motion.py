@@ -43,25 +43,15 @@ from gazerig.robot.perception.motion_source import MotionSource
 _BAND = {"false things a picture": (0.0, 0.1), "precision": (0.9, 1.0)}
 FILMS: dict[str, tuple[Motion, tuple[Board, ...], tuple[Board, ...], Motion | None, float]] = {
     "still": (still, PEOPLE, ROOM, None, 0.95),
-    "still, somebody close": (still, CLOSE, ROOM, None, 0.95),
     "still, a plain wall": (still, BEFORE_PLAIN, PLAIN, None, 0.95),
-    "shake": (shake, PEOPLE, ROOM, None, 0.9),
-    "bump": (bump, PEOPLE, ROOM, None, 0.9),
     "shake, somebody close": (shake, CLOSE, ROOM, None, 0.9),
     "bump, somebody close": (bump, CLOSE, ROOM, None, 0.9),
     "pan": (pan, PEOPLE, ROOM, None, 0.9),
-    "pan, somebody close": (pan, CLOSE, ROOM, None, 0.9),
     "knock in a turn, somebody close": (knocked_turn, CLOSE, ROOM, turn, 0.9),
-    "knock": (bump, PEOPLE, ROOM, still, 0.9),
-    "knock, somebody close": (bump, CLOSE, ROOM, still, 0.9),
-    "turn": (turn, PEOPLE, ROOM, turn, 0.9),
-    "knock in a turn": (knocked_turn, PEOPLE, ROOM, turn, 0.9),
     "knock in a turn, nobody": (knocked_turn, (), ROOM, turn, 0.0),
     "fast pan, something near": (fast_pan, PEOPLE, NEAR, None, 0.9),
     "shake, something near": (shake, PEOPLE, NEAR, None, 0.9),
-    "shake, nobody": (shake, (), ROOM, None, 0.0),
     "bump, nobody": (bump, (), ROOM, None, 0.0),
-    "pan, nobody": (pan, (), ROOM, None, 0.0),
 }
 """Motion of the camera, people, room, what the joints say of it, and least recall."""
 WANTED = {

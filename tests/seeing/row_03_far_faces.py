@@ -1,8 +1,5 @@
 """Range of face detection with the default settings, 640 x 400 at 69 deg."""
 
-import time
-
-import cv2
 import numpy as np
 from seeing.material import background, eyes_at, noisy, paste, portrait
 
@@ -16,7 +13,6 @@ WANTED = {
     "found of 12 at 7 m": (10, 12),
     "found in a crowd at 3 to 6 m, of 105": (100, 105),
     "faces that are none, a frame": (0, 0.05),
-    "processor time over that of MTCNN": (0, 1),
 }
 
 _WIDTH_PX, _HEIGHT_PX, _FIELD_DEG = 640, 400, 69.0
@@ -47,8 +43,6 @@ def measure(full: bool) -> dict[str, float]:
         hits, every, wrong = hits + found, every + len(truth), [*wrong, extra]
     figures["found in a crowd at 3 to 6 m, of 105"] = 105.0 * hits / every
     figures["faces that are none, a frame"] = float(np.mean(wrong))
-    if full:
-        figures["processor time over that of MTCNN"] = relative_cost(_WIDTH_PX, _HEIGHT_PX)
     return figures
 
 
@@ -90,30 +84,3 @@ def judged(
         for own in truth
     ]
     return sum(map(any, near)), sum(not any(row[i] for row in near) for i in range(len(landmarks)))
-
-
-def relative_cost(width_px: int, height_px: int) -> float:
-    """Return the mean processor time a frame of the default detector, over that of MTCNN."""
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    rng = np.random.default_rng(0)
-    still = background(width_px, height_px).copy()
-    at = width_px / 2.0, height_px / 2.0
-    paste(still, portrait(_WHO[0]), at, eyes_at(1.5, width_px, _FIELD_DEG))
-    frames = [noisy(still, 2.0, rng) for _ in range(49)]
-    spent = {
-        kind: min(_frame_ms(FaceDetectorParams(kind=kind), frames) for _ in range(2))
-        for kind in (FaceDetectorParams().kind, "mtcnn")
-    }
-    cv2.setNumThreads(threads)
-    return spent[FaceDetectorParams().kind] / spent["mtcnn"]
-
-
-def _frame_ms(params: FaceDetectorParams, frames: list[ImageArray]) -> float:
-    """Return the mean processor time of a frame after the first."""
-    detector = face_detector(params)
-    detector.find(frames[0])
-    began_ns = time.thread_time_ns()
-    for frame in frames[1:]:
-        detector.find(frame)
-    return (time.thread_time_ns() - began_ns) / 1e6 / (len(frames) - 1)

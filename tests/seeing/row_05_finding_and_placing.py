@@ -5,46 +5,35 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from seeing.material import MODELS, at_hand, background, carphone, eyes_at, noisy, paste, portrait
+from seeing.material import background, carphone, eyes_at, noisy, paste, portrait
 
 from gazerig.drivers.types import FaceDetector, ImageArray
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
-YUNET = "face_detection_yunet_2026may.onnx"
 WANTED = {
     "found of hard faces, share": (80 / 117, 1),
-    "found of hard faces with YuNet's file, share": (110 / 117, 1),
     "landmark error, eye distances": (0, 0.05),
     "frames of the car film with one face": (0.99, 1),
-    "frames of the cartoon film with a face": (0.98, 1),
-    "faces a frame in a square without near faces": (0, 0.01),
 }
 # Frames of a still after which what is found is counted.
 _FRAMES = 9
 
 
 def measure(full: bool) -> dict[str, float]:
-    """Return the figures; those of YuNet and of the other films where they are at hand."""
-    figures = {
-        "found of hard faces, share": hard_faces(FaceDetectorParams()),
+    """Return the figures; full: of more frames."""
+    return {
+        "found of hard faces, share": hard_faces(),
         "landmark error, eye distances": placing_error(24 if full else 10),
-        "frames of the car film with one face": shown(carphone(), 1 if full else 4, 1),
+        "frames of the car film with one face": shown(carphone(), 1 if full else 4),
     }
-    yunet = at_hand(YUNET, MODELS)
-    if full and yunet is not None:
-        params = FaceDetectorParams(model_file=str(yunet))
-        figures["found of hard faces with YuNet's file, share"] = hard_faces(params)
-    if full and (film := at_hand("Megamind.avi")) is not None:
-        figures["frames of the cartoon film with a face"] = shown(film, 1)
-    if full and (film := at_hand("vtest.avi")) is not None:
-        figures["faces a frame in a square without near faces"] = shown(film, 4)
-    return figures
 
 
-def hard_faces(params: FaceDetectorParams) -> float:
+def hard_faces() -> float:
     """Return the share of portraits found that are dark, blurred, tilted, narrow or small."""
-    found = [bool(after_frames(face_detector(params), hard)) for hard in hard_portraits()]
+    found = [
+        bool(after_frames(face_detector(FaceDetectorParams()), hard)) for hard in hard_portraits()
+    ]
     return float(np.mean(found))
 
 
@@ -107,8 +96,8 @@ def placing_error(frames: int) -> float:
     return float(np.mean(errors))
 
 
-def shown(film: Path, step: int, count: int | None = None) -> float:
-    """Return the share of a film's frames with n faces; None: with any."""
+def shown(film: Path, step: int) -> float:
+    """Return the share of a film's frames with one face."""
     video, detector = cv2.VideoCapture(str(film)), face_detector(FaceDetectorParams())
     found: list[bool] = []
     for number in range(10**6):
@@ -116,8 +105,7 @@ def shown(film: Path, step: int, count: int | None = None) -> float:
         if not read:
             return float(np.mean(found))
         if number % step == 0:
-            faces = len(detector.find(np.asarray(frame, np.uint8)))
-            found.append(faces > 0 if count is None else faces == count)
+            found.append(len(detector.find(np.asarray(frame, np.uint8))) == 1)
     raise AssertionError("a film without an end")
 
 

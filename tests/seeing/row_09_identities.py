@@ -50,11 +50,8 @@ _SENSOR_SD = 4.0
 
 WANTED = {
     "two cross: IDF1": (0.95, 1.0),
-    "two cross at one distance: IDF1": (0.95, 1.0),
     "two meet and turn back: IDF1": (0.95, 1.0),
-    "three cross: IDF1": (0.95, 1.0),
     "six cross: IDF1": (0.95, 1.0),
-    "six walk to and fro, turning behind others: IDF1": (0.95, 1.0),
     "six stroll, for seconds behind others: IDF1": (0.95, 1.0),
     "one comes and goes: returns with the same number, %": (60.0, 100.0),
     "six come and go: visits with another person's number, %": (0.0, 15.0),
@@ -80,36 +77,22 @@ def stroll(rng: np.random.Generator, away_m: float) -> Way:
     )
 
 
-def to_and_fro(rng: np.random.Generator, away_m: float) -> Way:
-    """Return a path from one side of the view to the other and back, of a person of any height."""
-    wide, speed = 0.45 * away_m, rng.uniform(0.5, 1.2)
-    begun, below = rng.uniform(0.0, 4.0 * wide), rng.normal(0.0, 0.08)
-    return lambda t: (abs((begun + speed * t) % (4.0 * wide) - 2.0 * wide) - wide, below, away_m)
-
-
 def crossings(rng: np.random.Generator) -> dict[str, tuple[list[Way], float]]:
     """Return who walks how, and for how many seconds; every call other speeds and distances."""
     v, w, far = rng.uniform(0.5, 1.2), rng.uniform(0.5, 1.2), rng.uniform(1.6, 2.2)
-    near = walk(-1.0, v, far)
     six = [(-1) ** k * 0.5 * (1.2 + 0.4 * k) for k in range(6)]
     return {
-        "two cross": ([near, walk(1.0, -w, far + 0.6)], 2.0),
-        "two cross at one distance": ([near, walk(1.0, -w, far)], 2.0),
+        "two cross": ([walk(-1.0, v, far), walk(1.0, -w, far + 0.6)], 2.0),
         "two meet and turn back": (
             [walk(-0.9, 0.5, far, 1.4), walk(0.9, -0.5, far + 0.2, 1.4)],
             2.8,
         ),
-        "three cross": ([near, walk(1.0, -w, far + 0.5), walk(0.3, 0.2, far + 1.0)], 2.0),
         "six cross": (
             [
                 walk(x, -np.sign(x) * rng.uniform(0.5, 1.2), 1.2 + 0.4 * k)
                 for k, x in enumerate(six)
             ],
             2.5,
-        ),
-        "six walk to and fro, turning behind others": (
-            [to_and_fro(rng, 1.2 + 0.5 * k) for k in range(6)],
-            10.0,
         ),
         "six stroll, for seconds behind others": (
             [stroll(rng, 1.2 + 0.5 * k) for k in range(6)],

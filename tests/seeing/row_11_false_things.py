@@ -2,7 +2,7 @@
 
 Figures: share of the pictures with a thing although nothing moves (false), and of what moves, the
 share on which a thing is reported (recall). Rendered people walk through a rendered room that is
-then compressed, lit or shaded; the films at hand are of webcams on a tripod.
+then compressed, lit or shaded.
 """
 
 import tempfile
@@ -12,35 +12,22 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from seeing.material import at_hand, noisy
+from seeing.material import noisy
 from seeing.moving_room import (
-    FIELD_RAD,
     HEIGHT,
     PEOPLE,
     PLAIN,
     RATE_HZ,
     WIDTH,
     Image,
-    Mask,
     Seen,
     frames,
     still,
 )
-from seeing.row_02_camera_motion import _on, judged
-
-from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.robot.perception.motion_source import MotionSource
+from seeing.row_02_camera_motion import judged
 
 _NOISE_LEVELS, _TREMBLE_PX = 1.0, 0.08
 Change = Callable[[Iterator[Seen]], Iterator[Seen]]
-# Outlines of the person in films of 640x480, and what else moves there.
-_SIGNER: tuple[tuple[int, int], ...] = (
-    (144, 480), (144, 160), (200, 80), (260, 48), (390, 48), (420, 160), (492, 300), (492, 480),
-)  # fmt: skip
-_SLEEVE: tuple[tuple[int, int], ...] = ((524, 250), (640, 250), (640, 480), (524, 480))
-TRIPOD = {"webcam_sign_1.mkv": True, "webcam_sign_2.mkv": False, "webcam_sign_3.mkv": True}
-"""Films of one person who signs, and whether the sleeve of another is in view."""
 
 
 def jpeg(quality: int, seen: Iterator[Seen]) -> Iterator[Seen]:
@@ -102,7 +89,7 @@ WANTED = {
     for name in (*ROOMS, *(f"{name}, nobody" for name in ROOMS))
     for figure, band in {"false": (0.0, 0.02), "recall": (0.95, 1.0)}.items()
     if figure == "false" or "nobody" not in name
-} | {f"{film}: false": (0.0, 0.02) for film in TRIPOD}
+}
 
 
 def plain_room(seconds: float, people: bool) -> Iterator[Seen]:
@@ -133,33 +120,13 @@ def changed(change: Change, people: bool, seconds: float) -> tuple[float, float]
     return score.false / score.pictures, recall
 
 
-def tripod(film: Path, sleeve: bool) -> tuple[float, float]:
-    """Return the shares of pictures with a false thing, and with one on the person who signs."""
-    source, video = MotionSource(MotionParams(), None, FIELD_RAD, None), cv2.VideoCapture(str(film))
-    false: list[bool] = []
-    noticed: list[bool] = []
-    while (got := video.read())[0]:
-        image = np.asarray(got[1], np.uint8)
-        person, moving = _filled(image, _SIGNER), _filled(image, _SIGNER)
-        if sleeve:
-            moving |= _filled(image, _SLEEVE)
-        number = len(false)
-        blobs = source(Shot(number / RATE_HZ, number + 1, image))
-        false.append(any(not _on(blob, moving) for blob in blobs))
-        noticed.append(any(_on(blob, person) for blob in blobs))
-    return float(np.mean(false)), float(np.mean(noticed))
-
-
 def measure(full: bool) -> dict[str, float]:
-    """Return the figures; full: longer, and of the films at hand."""
+    """Return the figures; full: longer."""
     out: dict[str, float] = {}
     for name, change in ROOMS.items():
         seconds = 4.0 if full else 0.8
         out[f"{name}: false"], out[f"{name}: recall"] = changed(change, True, seconds)
         out[f"{name}, nobody: false"], _ = changed(change, False, seconds)
-    for name, sleeve in TRIPOD.items():
-        if full and (film := at_hand(name)) is not None:
-            out[f"{name}: false"], out[f"{name}: with a thing on the person"] = tripod(film, sleeve)
     return out
 
 
@@ -169,9 +136,3 @@ def _lit(one: Seen, factor: float | np.ndarray) -> Seen:
 
 def _decoded(image: object) -> Image:
     return np.asarray(image, np.uint8)
-
-
-def _filled(image: Image, outline: tuple[tuple[int, int], ...]) -> Mask:
-    mask = np.zeros(image.shape[:2], np.uint8)
-    cv2.fillPoly(mask, [np.array(outline, np.int32)], (1,))
-    return mask > 0
