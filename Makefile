@@ -41,7 +41,7 @@ judge: $(VENV)/.installed-dev
 package: $(VENV)/.installed-dev
 	.ci/package $(BIN)/python
 
-# Eight costs, each beside a peer in the same run.
+# Four costs, each beside a peer in the same run.
 bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench.py
 

@@ -1,6 +1,6 @@
 """Costs beside a peer, measured in one run: python tests/bench/bench.py [CASE ...]
 
-Eight cases: tick, bus, start, camera, page, recording, world, sweep. Each prints what something
+Four cases: tick, bus, start, camera. Each prints what something
 costs and the ratio to a peer that ran in turns with it, so that other load strikes both alike.
 Compare figures of one run with each other, on a machine that has nothing else to do. Nothing here
 passes or fails.
@@ -12,11 +12,9 @@ import os
 import resource
 import subprocess
 import sys
-import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -30,22 +28,6 @@ MAIN = "from gazerig.robot.cli.entry_point import main; main()"
 RUN = ("run", "desk", "--mock", "--scene", "visitor", "--seed", "0", "--summary", "-")
 FAST = (*RUN, "--fast", "--no-page")
 ROUNDS = 5
-
-
-PLANE = """
-import os, time
-os.environ.setdefault("MUJOCO_GL", "egl")
-import mujoco
-geom = '<light pos="0 0 3"/><geom type="plane" size="5 5 .1"/>'
-model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geom}</worldbody></mujoco>")
-data, renderer = mujoco.MjData(model), mujoco.Renderer(model, 400, 640)
-mujoco.mj_forward(model, data)
-began_s = time.process_time()
-for _ in range(50):
-    renderer.update_scene(data)
-    renderer.render()
-print(1e3 * (time.process_time() - began_s) / 50)
-"""
 
 
 class Done(NamedTuple):
@@ -239,113 +221,6 @@ def bench_camera() -> None:
     whole_us = timed(lambda: play(made, 20.0)) / 4000
     rows = {name: 1e6 * sum(times) / 4000 for name, times in spent.items()}
     show({**rows, "whole tick": whole_us}, "us of processor a tick", "whole tick")
-
-
-def bench_page() -> None:
-    """Processor time of a running rig with the page and its clients, beside the rig alone."""
-    from page_visitor import LOOKING, Visitor
-    from websockets.exceptions import ConnectionClosed
-
-    def watch(url: str, over: threading.Event) -> None:
-        visitor = Visitor(url)
-        panels, view = visitor.open("/rig/panels"), visitor.open()
-        view.send(LOOKING)
-        with suppress(ConnectionClosed):
-            while not over.is_set():
-                for end in (panels, view):
-                    with suppress(TimeoutError):
-                        while end.recv(timeout=0.01):
-                            pass
-
-    def address(pid: int) -> tuple[str, float]:
-        """Return the page's address, and the processor time that looking for it took."""
-        cpu_s = 0.0
-        while True:
-            done = gazerig("ctl", "rigs", "--json")
-            cpu_s += done.cpu_s
-            for rig in json.loads(done.out):
-                if rig["pid"] == pid and rig["page"]:
-                    return str(rig["page"]), cpu_s
-
-    def spent(page: bool, clients: int) -> float:
-        words = ("--page", "127.0.0.1:8794") if page else ("--no-page",)
-        over, threads, other_s = threading.Event(), [], 0.0
-        began = resource.getrusage(resource.RUSAGE_CHILDREN)
-        process = subprocess.Popen([sys.executable, "-c", MAIN, *RUN, *words, "--seconds", "12"],
-                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
-        if clients:
-            url, other_s = address(process.pid)
-            threads = [threading.Thread(target=watch, args=(url, over)) for _ in range(clients)]
-            for thread in threads:
-                thread.start()
-        process.wait()
-        over.set()
-        for thread in threads:
-            thread.join()
-        ended = resource.getrusage(resource.RUSAGE_CHILDREN)
-        cpu_s = ended.ru_utime + ended.ru_stime - began.ru_utime - began.ru_stime
-        return 1e3 * (cpu_s - other_s)
-
-    works = {"without a page": partial(spent, False, 0), "page": partial(spent, True, 0),
-             "page, 1 client": partial(spent, True, 1), "page, 5 clients": partial(spent, True, 5)}  # fmt: skip
-    show(in_turns(works, 1), "ms of processor in 12 s, all processes", "without a page")
-
-
-def bench_recording() -> None:
-    """A simulated minute with a recording and run again from it, beside one without."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "run.mcap"
-        minute = (*FAST, "--seconds", "60")
-        works = {
-            "without": lambda: gazerig(*minute).cpu_s,
-            "recorded": lambda: gazerig(*minute, "--record", str(file)).cpu_s,
-            "run again": lambda: gazerig("replay", str(file), "--rerun").cpu_s,
-        }
-
-        def fresh(work: Callable[[], float], name: str) -> float:
-            if name == "recorded":
-                file.unlink(missing_ok=True)
-            return work()
-
-        figures = in_turns({name: partial(fresh, work, name) for name, work in works.items()}, 2)
-        show(figures, "s of processor a minute", "without")
-        print(f"  {file.stat().st_size / 1e6:.2f} MB a minute")
-
-
-def bench_world() -> None:
-    """A picture of the living room, beside one that MuJoCo renders of an empty plane."""
-    from rendering import why_not
-
-    if reason := why_not():
-        print(f"  {reason}")
-        return
-    room = (*FAST[:3], *FAST[5:], "--world", "living-room", "--seconds", "10")
-
-    def picture() -> float:
-        seen, blind = gazerig(*room), gazerig(*room, "--no-pictures")
-        return 1e3 * (seen.cpu_s - blind.cpu_s) / max(1, seen.summary["pictures"])
-
-    peer = "MuJoCo's renderer, an empty plane"
-    figures = in_turns({"living room, found faces included": picture,
-                        peer: lambda: float(python(PLANE).out)}, 2)  # fmt: skip
-    show(figures, "ms of processor a picture", peer)
-
-
-def bench_sweep() -> None:
-    """Sixteen runs on one process and on all processors."""
-    key = "gaze.head.eye_only_range_deg=16,24,32,40"
-    jobs = os.cpu_count() or 1
-
-    def swept(count: int) -> float:
-        with tempfile.TemporaryDirectory() as folder:
-            done = gazerig("sweep", "--set", key, "--seeds", "4", "--seconds", "10", "--bus", "ideal",
-                           "--jobs", str(count), "--out", str(Path(folder) / "out"))  # fmt: skip
-        return done.wall_s
-
-    figures = in_turns(
-        {"one process": partial(swept, 1), f"{jobs} processes": partial(swept, jobs)}, 1
-    )
-    show(figures, "s for 16 runs of 10 s", "one process")
 
 
 def cases() -> Iterator[tuple[str, Callable[[], None]]]:

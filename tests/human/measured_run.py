@@ -4,7 +4,7 @@ The rig ``desk`` with byte-true emulated servos goes through the whole loop; wha
 columns, in memory, once for each process. ``tests/human/row_*.py`` measure on it.
 """
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -126,22 +126,6 @@ def half_rate_run(scene: str, profile: str, seconds: float) -> MeasuredRun:
     return measured_run(
         scene, profile, seconds=seconds, overrides={"loop.rate_hz": 100.0}, bus="ideal"
     )
-
-
-def world_targets(world: str, seed: int, seconds: float) -> Counter[str]:
-    """Return the ticks on each kind of target while a face is seen, in an unrendered world."""
-    kinds: Counter[str] = Counter()
-    options = RunOptions(
-        True, True, seed, world=world, no_pictures=True, seconds=seconds, bus="ideal"
-    ).check_and_complete()
-    rig = with_options(load_rig(options.rig, options.character, options.profile), options)
-
-    def update(tick: Tick) -> None:
-        if tick.percept is not None and tick.percept.faces:
-            kinds.update((tick.target.kind,))
-
-    simulate(rig, options, watch=update)
-    return kinds
 
 
 @contextmanager

@@ -4,11 +4,10 @@ The visitor waves 1.5 times a second by +-9.4 deg, for 3.5 s in each round of 44
 what begins to move, and back at the face: repeated motion is soon known (Neo & Chua 2006).
 """
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from human.measured_run import MeasuredRun, Runner, world_targets
+from human.measured_run import MeasuredRun, Runner
 
 WANTED = {
     "waves that get a glance, %": (70.0, 100.0),
@@ -16,7 +15,6 @@ WANTED = {
     "wave after 1.5 s on the hand, %": (0.0, 10.0),
     "targets that are a sinking hand, %": (0.0, 5.0),
     "visitor, hands with a face in view, %": (0.0, 8.0),
-    "living room, hands with a face in view, %": (0.0, 8.0),
 }
 
 WAVE_S = (17.5, 21.0)
@@ -37,17 +35,12 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
             sinking.append(_share(seen, on, end_s - 0.5 * _SINKS_S, end_s + 0.3))
         hands += int(on.sum())
         faces += int((seen.part != "").sum())
-    rooms = [world_targets("living-room", seed, min(seconds, 120.0)) for seed in seeds]
-    every: Counter[str] = sum(rooms, Counter())
     return {
         "waves that get a glance, %": 100.0 * float((np.array(looks) > 0.1).mean()),
         "longest look at a waving hand, s": max(looks),
         "wave after 1.5 s on the hand, %": 100.0 * float(np.mean(late)),
         "targets that are a sinking hand, %": 100.0 * float(np.mean(sinking)),
         "visitor, hands with a face in view, %": 100.0 * hands / max(1, hands + faces),
-        "living room, hands with a face in view, %": 100.0
-        * every["hand"]
-        / max(1, every["hand"] + every["face"]),
     }
 
 

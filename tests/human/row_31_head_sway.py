@@ -1,4 +1,4 @@
-"""A head in front of a person never rests: small, slow, 1/f, and the gaze keeps its place.
+"""A head in front of a person never rests: its motion is small, and the gaze keeps its place.
 
 A person who sits still. People sway by 0.2 to 1.5 deg; servos sway quietly if the goal moves by no
 more than a step of the encoder in a tick.
@@ -12,16 +12,12 @@ from human.row_13_small_motion import ONE_POINT, SCENE
 
 _RESTS_S, _WINDOW_S = 2.0, 10.0
 _STEP_DEG = 360.0 / 4096.0
-_BAND_HZ = (0.02, 0.2)
-"""Below the breath."""
 _AXES = ("yaw", "pitch", "roll")
 
 WANTED = {
     "yaw or roll without a step for 2 s or longer, % of time": (0.0, 25.0),
     "longest time without a step of yaw or roll, s": (0.0, 8.0),
     **{f"{axis}: standard deviation, deg": (0.15, 1.5) for axis in _AXES},
-    **{f"{axis}: slope of the spectrum, log/log": (-2.0, -0.7) for axis in _AXES},
-    "one frequency's largest share of the power of pitch": (0.0, 0.5),
     "largest step of a goal in a tick, encoder steps": (0.0, 2.0),
     "gaze off the plan, 95th percentile, deg": (0.0, 0.6),
 }
@@ -34,8 +30,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     lasted_s = sum(float(np.ptp(one.t_s)) for one in runs)
     goals = np.concatenate([np.abs(np.diff(one.head_goal_deg, axis=0)) for one in runs])
     off = np.concatenate([_off(one) for one in runs])
-    spectra = [np.mean([spectrum(one, i)[1] for one in runs], axis=0) for i in range(3)]
-    hz = spectrum(runs[0], 0)[0]
     deviations = np.median([window for one in runs for window in _deviations(one)], axis=0)
     return {
         "yaw or roll without a step for 2 s or longer, % of time": 50.0
@@ -45,13 +39,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         **{
             f"{axis}: standard deviation, deg": s for axis, s in zip(_AXES, deviations, strict=True)
         },
-        **{
-            f"{axis}: slope of the spectrum, log/log": _slope(hz, power)
-            for axis, power in zip(_AXES, spectra, strict=True)
-        },
-        "one frequency's largest share of the power of pitch": float(
-            spectra[1].max() / spectra[1].sum()
-        ),
         "largest step of a goal in a tick, encoder steps": float(goals.max() / _STEP_DEG),
         "gaze off the plan, 95th percentile, deg": float(np.percentile(off, 95)),
     }
@@ -69,27 +56,6 @@ def unmoved_s(one: MeasuredRun, axis: int) -> np.ndarray:
     moved = np.diff(one.head_deg[:, axis]) != 0.0
     at_s = np.concatenate(([one.t_s[0]], one.t_s[1:][moved], [one.t_s[-1]]))
     return np.diff(at_s)
-
-
-def spectrum(one: MeasuredRun, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return frequencies, and the power of one angle of the neck at them."""
-    x = one.head_deg[:, axis] - one.head_deg[:, axis].mean()
-    hz = np.fft.rfftfreq(len(x), float(np.median(np.diff(one.t_s))))
-    kept = (hz >= _BAND_HZ[0]) & (hz <= _BAND_HZ[1])
-    return hz[kept], np.abs(np.fft.rfft(x * np.hanning(len(x))))[kept] ** 2
-
-
-def _slope(hz: np.ndarray, power: np.ndarray) -> float:
-    if power.max() <= 0.0:
-        return float("nan")
-    edges = np.geomspace(*_BAND_HZ, 9)
-    rows = [
-        (np.log(np.sqrt(a * b)), np.log(power[(hz >= a) & (hz < b)].mean()))
-        for a, b in zip(edges, edges[1:], strict=False)
-        if ((hz >= a) & (hz < b)).any()
-    ]
-    log_hz, log_power = np.array(rows).T
-    return float(np.polyfit(log_hz, log_power, 1)[0])
 
 
 def _off(one: MeasuredRun) -> np.ndarray:

@@ -9,28 +9,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from fakes.scenes import EmptyScene
 from human.measured_run import MeasuredRun, Runner
 
 from gazerig.robot.app.scene_files import load_scene
-from gazerig.sim_mock.scenes.scene import ScenePerson
 
 SCENE = "three-people"
 _HALF_FIELD_DEG = 31.0
-
-
-class Silent(EmptyScene):
-    """The same people, who only look at each other and at the robot."""
-
-    name = "three silent people"
-
-    def __init__(self) -> None:
-        self._scene = load_scene(SCENE)
-        self.round_s, self.behaviours = self._scene.round_s, self._scene.behaviours
-
-    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return the people."""
-        return tuple(person._replace(speaks=False) for person in self._scene.people(t_s))
 
 
 WANTED = {
@@ -39,7 +23,6 @@ WANTED = {
     "stays, SD over mean": (0.7, 2.0),
     "stays above 4 s, %": (5.0, 35.0),
     "longest stay, s": (5.0, 20.0),
-    "nobody speaks: looks at the head, time over others": (1.2, 4.0),
     "least looked at, % of the time on faces": (5.0, 34.0),
 }
 _SEEN_S = 1.0
@@ -51,7 +34,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     runs = [run(SCENE, seed=seed, seconds=seconds) for seed in seeds]
     seen, delays, lengths, counts = [], list[float](), list[float](), np.zeros(3)
     for one in runs:
-        who, speaker, _ = _columns(one)
+        who, speaker = _columns(one)
         in_view = _in_view(one, speaker)
         here = (who >= 0) & _lasts(one, speaker) & in_view & _lasts(one, in_view)
         seen.append((who == speaker)[here])
@@ -59,50 +42,29 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         delays += _delays(one, who, speaker)
         lengths += _stays(one, who)
     stays = np.array(lengths)
-    silent = [run(Silent(), seed=seed, seconds=seconds) for seed in seeds]
     return {
         "on a speaker in view, % of the time on faces": 100.0 * float(np.concatenate(seen).mean()),
         "from the beginning of a turn to its speaker, median s": float(np.median(delays)),
         "stays, SD over mean": float(stays.std() / stays.mean()),
         "stays above 4 s, %": 100.0 * float((stays > 4.0).mean()),
         "longest stay, s": float(stays.max()),
-        "nobody speaks: looks at the head, time over others": _preference(silent),
         "least looked at, % of the time on faces": 100.0 * float(counts.min() / counts.sum()),
     }
 
 
-def _preference(runs: Sequence[MeasuredRun]) -> float:
-    """Return the share of the time on those who look at the head, over that of the others.
-
-    Both shares are of the time for which such a person was in view.
-    """
-    on, there = np.zeros(2), np.zeros(2)
-    for one in runs:
-        who, _, looks = _columns(one)
-        for number in range(3):
-            in_view = (who >= 0) & _in_view(one, np.full(len(who), number))
-            for column, mine in enumerate((looks[:, number], ~looks[:, number])):
-                on[column] += (in_view & mine & (who == number)).sum()
-                there[column] += (in_view & mine).sum()
-    return float((on[0] / there[0]) / (on[1] / there[1]))
-
-
-def _columns(one: MeasuredRun) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (n,) who is looked at and who speaks, -1 for none; (n, 3) who looks at the head."""
+def _columns(one: MeasuredRun) -> tuple[np.ndarray, np.ndarray]:
+    """Return (n,) who is looked at and who speaks, -1 for none."""
     scene = load_scene(SCENE)
     faces = np.stack([one.truth[f"face {number}"] for number in range(3)])
     off = np.linalg.norm(faces - one.target_m, axis=2)
     on = (one.part != "") & (off.min(axis=0) < 0.2)
     who = np.where(on, off.argmin(axis=0), -1)
-    speaker, looks = np.full(len(who), -1), np.zeros((len(who), 3), dtype=bool)
+    speaker = np.full(len(who), -1)
     for tick in range(0, len(who), 10):
         for number, person in enumerate(scene.people(float(one.t_s[tick]))):
             if person.speaks:
                 speaker[tick : tick + 10] = number
-            x, y = person.p_world_face_m[:2]
-            turn = person.face_yaw_pitch_rad[0] - np.arctan2(-y, 0.04 - x)
-            looks[tick : tick + 10, number] = np.cos(turn) > np.cos(np.radians(10.0))
-    return who, speaker, looks
+    return who, speaker
 
 
 def _in_view(one: MeasuredRun, number: np.ndarray) -> np.ndarray:

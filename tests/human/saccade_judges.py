@@ -136,13 +136,12 @@ def remodnav_saccades(run: Exported) -> np.ndarray:
 JUDGES: dict[str, Judge] = {"pymovements": pymovements_saccades, "remodnav": remodnav_saccades}
 
 
-def marks(run: Exported, seen: np.ndarray, with_fast: bool = False) -> Marks:
+def marks(run: Exported, seen: np.ndarray) -> Marks:
     """Compare a judge's saccades with ours.
 
     Args:
         run: what was judged.
         seen: (k, 2) onset and end of the judge's saccades.
-        with_fast: also those during fast following.
     """
     seen = seen[(seen[:, 0] >= run.time_s[0] + _EDGE_S) & (seen[:, 1] <= run.time_s[-1] - _EDGE_S)]
     over, blink = (
@@ -150,14 +149,14 @@ def marks(run: Exported, seen: np.ndarray, with_fast: bool = False) -> Marks:
         for spans in (run.commanded, run.blinks)
     )
     known = np.asarray(over.any(axis=0) | blink.any(axis=0))
-    ours, theirs = _judged(run, run.commanded, with_fast), _judged(run, seen, with_fast)
+    ours, theirs = _judged(run, run.commanded), _judged(run, seen)
     return Marks(np.asarray(over.any(axis=1))[ours], known[theirs])
 
 
-def _judged(run: Exported, spans: np.ndarray, with_fast: bool) -> np.ndarray:
+def _judged(run: Exported, spans: np.ndarray) -> np.ndarray:
     """Return (k,) whether each of these spans counts."""
     at = np.searchsorted(run.time_s, 0.5 * (spans[:, 0] + spans[:, 1]))
-    return np.full(len(spans), True) if with_fast else ~run.fast[np.minimum(at, len(run.fast) - 1)]
+    return ~run.fast[np.minimum(at, len(run.fast) - 1)]
 
 
 def _rate_hz(run: Exported) -> float:

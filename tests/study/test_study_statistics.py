@@ -1,4 +1,4 @@
-"""Tests of statistics: pingouin's values, enumeration, and known results."""
+"""Tests of statistics: values of pingouin 0.7.0, enumeration, and known results."""
 
 import itertools
 import json
