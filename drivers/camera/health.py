@@ -204,11 +204,10 @@ class CameraHealth:
 
     Args:
         rotation_deg: Present camera.rotation.
-        probe_s: Time between searches of a turned frame, seconds.
     """
 
-    def __init__(self, rotation_deg: int = 0, probe_s: float = PROBE_S) -> None:
-        self._model, self._every_s = HealthModel(rotation_deg), probe_s
+    def __init__(self, rotation_deg: int = 0) -> None:
+        self._model = HealthModel(rotation_deg)
         self._probe = TurnedFaceSearch()
         self._events: list[str] = []
         self._due_s, self._probe_s, self._last_s = -inf, -inf, -inf
@@ -268,7 +267,7 @@ class CameraHealth:
             return None
         found = self._probe.find(image, tilted)
         fruitless = tilted and found == 0.0
-        self._probe_s = t_s + self._every_s * (_FRUITLESS if fruitless else 1)
+        self._probe_s = t_s + PROBE_S * (_FRUITLESS if fruitless else 1)
         return found
 
 

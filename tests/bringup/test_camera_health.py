@@ -16,12 +16,8 @@ from gazerig.drivers.camera.health import (
     TurnedFaceSearch,
 )
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.errors import CameraError
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.features.bringup.doctor.camera import examine_camera
-from gazerig.features.bringup.doctor.diagnostics import Diagnostic
-from gazerig.robot.model.frames import CameraParams
 
 WIDTH, HEIGHT = 640, 480
 FAST = {"faces": 0.01}
@@ -136,44 +132,3 @@ def test_frames_that_come_too_fast_are_told_with_the_stage():
         health.assess(Shot(k / 8.0, 391 + k, np.asarray(room())), (), FAST)
         told += health.events()
     assert told[1:] == ["camera: frames are analysed in time again"]
-
-
-class Frames:
-    """A webcam that shows one picture."""
-
-    has_unknown_lens = True
-
-    def __init__(self, image: np.ndarray, absent: bool = False) -> None:
-        self.image, self.absent, self.number = image, absent, 0
-        self.closed = False
-
-    def open(self) -> None:
-        if self.absent:
-            raise CameraError("no camera at /dev/video3: plug it in")
-
-    def take(self, now_s: Any, stop: Any) -> Shot:
-        self.number += 1
-        return Shot(0.5 * self.number, self.number, self.image)
-
-    def events(self) -> tuple[str, ...]:
-        return ("does not take webcam.gain: 3",) if self.number == 1 else ()
-
-    def close(self) -> None:
-        self.closed = True
-
-
-def examined(source: Frames, camera: CameraParams) -> list[Diagnostic]:
-    return examine_camera(source, camera, FaceDetectorParams(), lambda: 0.0)
-
-
-def test_the_doctor_looks_through_a_camera():
-    known = CameraParams(horizontal_field_deg=70.0)
-    good = Frames(np.asarray(room()))
-    found = examined(good, known)
-    assert [one.level for one in found] == ["ok", "note"] and good.closed
-    assert "2 frames a second, faces in 25 of 25" in found[0].what
-    down = Frames(np.ascontiguousarray(room()[::-1, ::-1]) // 16)
-    remedies = {one.remedy for one in examined(down, CameraParams()) if one.level == "warn"}
-    assert len(remedies) == 2 and "set camera.rotation: 180" in remedies
-    (gone,) = examined(Frames(np.asarray(room()), absent=True), known)
-    assert (gone.level, "plug it in" in gone.what) == ("error", True)

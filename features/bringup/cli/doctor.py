@@ -28,7 +28,6 @@ from gazerig.features.bringup.cli.ports import (
 )
 from gazerig.features.bringup.doctor import examination as checkup
 from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685, stop_script
-from gazerig.features.bringup.doctor.camera import LOOK_S, examine_camera
 from gazerig.features.bringup.doctor.diagnostics import (
     BOARD,
     Diagnostic,
@@ -44,7 +43,6 @@ from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.app.bus_wiring import can_be_released, release_plan
 from gazerig.robot.app.rig_weight import weight_findings
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
-from gazerig.robot.model.clock import RealClock
 from gazerig.robot.safety.start_range import find_far_outside
 
 app = typer.Typer()
@@ -59,10 +57,6 @@ def doctor(
     rig: RigArgument = "desk",
     port: PortOption = None,
     mock: MockOption = False,
-    camera: Annotated[
-        int | None,
-        typer.Option(min=0, metavar="N", help="Also check webcam N for some seconds."),
-    ] = None,
     fix: Annotated[
         bool,
         typer.Option("--fix", help="Apply the safe fixes; the torque stays off, nothing moves."),
@@ -82,12 +76,6 @@ def doctor(
                 tell("after that:")
                 findings = _examine_buses(model, lines, tell)
         eyes = [examine_detector(model.detector)]
-        if camera is not None:
-            from gazerig.drivers.camera.webcam import Webcam
-
-            progress(f"looking through webcam {camera} for {LOOK_S:g} s")
-            source = Webcam(camera, model.webcam)
-            eyes += examine_camera(source, model.camera, model.detector, RealClock().now_s)
         eyes += [Diagnostic(*one) for one in _weight_rows(model)]
         show_findings(eyes, tell)
         if as_json:
