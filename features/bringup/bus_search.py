@@ -43,7 +43,6 @@ class SearchRound:
 
     is_supported: whether the adaptor supports the rate; unknown_bytes: bytes that are not valid
     shared_ids: ids that two servos seem to have
-    protocol_1_ids: ids that answer to the old protocol
     board: a Maestro; channels: number of its channels, None if unknown
     """
 
@@ -53,7 +52,6 @@ class SearchRound:
     found: tuple[FoundServo, ...] = ()
     unknown_bytes: int = 0
     shared_ids: tuple[int, ...] = ()
-    protocol_1_ids: tuple[int, ...] = ()
     board: DetectedMaestro | None = None
     channels: int | None = None
 
@@ -114,7 +112,6 @@ def search_bus(
                 one.found,
                 one.junk_bytes,
                 one.shared_ids,
-                one.protocol_1_ids,
             )
         elif port.setBaudRate(baud):
             # Every board has the first six channels; others might cause an error.

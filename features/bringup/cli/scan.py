@@ -308,14 +308,7 @@ def _unusual_lines(one: SearchRound, heard: Container[int]) -> Iterator[str]:
         )
     if one.found or one.baud in heard:
         return
-    if one.protocol_1_ids:
-        ids = ", ".join(map(str, one.protocol_1_ids))
-        yield (
-            f"at {one.baud} bit/s something answers in Protocol 1 as id {ids}: another maker's "
-            "servo (gazerig scan --kind feetech), or one whose Protocol Type must be set to 2 with "
-            "Dynamixel Wizard 2.0"
-        )
-    elif one.unknown_bytes:
+    if one.unknown_bytes:
         yield (
             f"at {one.baud} bit/s only pieces came: a wrong rate, a loose plug, or two servos "
             "with one id"
