@@ -7,7 +7,7 @@ from stand_in import StandIn
 from sts_rig import Rig
 
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES
-from gazerig.drivers.dynamixel.family import DYNAMIXEL, protocol_1_ids
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.feetech.family import FEETECH, set_middle
 from gazerig.drivers.servo_bus.discovery import FoundServo, count_corrupt, ping, scan, scan_ids
@@ -174,16 +174,6 @@ class ScriptedPort(StandIn):
         taken, self.waiting = self.waiting[:length], self.waiting[length:]
         self.time_s = deadline_s if len(taken) < length else self.time_s + 0.0002
         return taken
-
-
-def test_the_old_protocol_is_noticed():
-    assert protocol_1_ids(b"\xff\xff\x05\x02\x00\xf8") == (5,)
-    assert protocol_1_ids(b"\x00\xff\xff\xff\x05\x02\x00\xf8\xff\xff\x06\x02\x20\xd7") == (5, 6)
-    assert protocol_1_ids(b"\xff\xff\x05\x02\x00\xf9") == ()  # checksum
-    assert protocol_1_ids(b"\xff\xff\xfe\x02\x01\xfe") == ()  # the question, echoed
-    assert protocol_1_ids(b"\xff\xff\x05\x02") == ()
-    (one,) = scan(ScriptedPort(b"", b"\xff\xff\x05\x02\x00\xf8"), DYNAMIXEL, (57_600,))
-    assert one.found == () and one.protocol_1_ids == (5,)
 
 
 def test_listening_ends_on_a_line_that_never_falls_silent():

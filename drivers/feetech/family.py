@@ -151,7 +151,6 @@ FEETECH = Family(
     quiet_s=0.004,
     thorough_s=0.004,
     duplicate_id_registers=("present_position", "present_current"),
-    find_protocol_1_ids=None,
     arming=Arming("acceleration", limits_speed=False),
     most_goals=MOST_GOALS,
     recommended_bauds="115200 or 1000000",

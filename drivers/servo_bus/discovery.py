@@ -53,7 +53,6 @@ class BaudScan(NamedTuple):
     is_supported: whether the adaptor supports the rate; junk_bytes: number of bytes outside any
         packet
     shared_ids: ids that two servos seem to share, as their longer answers are incomplete
-    protocol_1_ids: ids that answer only to Protocol 1.0
     """
 
     baud: int
@@ -61,7 +60,6 @@ class BaudScan(NamedTuple):
     found: tuple[FoundServo, ...] = ()
     junk_bytes: int = 0
     shared_ids: tuple[int, ...] = ()
-    protocol_1_ids: tuple[int, ...] = ()
 
 
 def scan(
@@ -97,10 +95,9 @@ def scan(
             continue
         quiet_s = family.thorough_s if thorough else family.quiet_s
         found, junk = scan_ids(port, family, baud, quiet_s, progress, ids)
-        old = family.find_protocol_1_ids(port) if family.find_protocol_1_ids and not found else ()
         each = {one.id: (family_of or {}).get(one.model, family) for one in found}
         shared = tuple(i for i, its in each.items() if count_corrupt(port, its, i) >= SHARED)
-        yield BaudScan(baud, True, found, junk, shared, old)
+        yield BaudScan(baud, True, found, junk, shared)
 
 
 def scan_ids(

@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from gazerig.drivers.serial.port import BusPort
-
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.servo_bus.read_plan import ReadPlan
     from gazerig.drivers.types import ServoConfig
@@ -228,7 +226,6 @@ class Family:
         quiet_s, thorough_s: time-outs of a search: silence after a broadcast ping, or for each id
         duplicate_id_registers: first and last of the registers in which two servos with the same id
             differ
-        find_protocol_1_ids: returns ids that answer only to Protocol 1.0, if the family has it
         arming: register written before torque is switched on
         most_goals: largest number of goals in one packet
         recommended_bauds: bit/s to recommend if an adaptor does not support another rate
@@ -273,7 +270,6 @@ class Family:
     quiet_s: float
     thorough_s: float
     duplicate_id_registers: tuple[str, str]
-    find_protocol_1_ids: Callable[[BusPort], tuple[int, ...]] | None
     arming: Arming
     most_goals: int
     recommended_bauds: str
