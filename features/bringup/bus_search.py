@@ -85,14 +85,12 @@ def search_bus(
     usb: str,
     asked: Sequence[tuple[BusKind, int]],
     thorough: bool = False,
-    to_the_end: bool = False,
 ) -> Iterator[SearchRound]:
     """Search for one kind after the other; end after the first kind that replies.
 
     asked: result of ``plan_search``
     thorough: wait longer for Dynamixel servos, and ping each STS id even if no servo answers a
         broadcast ping
-    to_the_end: continue after servos of a kind, as a line can have two kinds; a board ends it
 
     Raises:
         PortError: the port cannot be opened.
@@ -101,7 +99,7 @@ def search_bus(
     """
     met: BusKind | None = None
     for kind, baud in asked:
-        if met == "maestro" or (met not in (None, kind) and not to_the_end):
+        if met not in (None, kind):
             return
         if kind != "maestro":
             (one,) = scan(port, KINDS[kind].family, (baud,), thorough, family_of=FAMILY_OF)
@@ -128,17 +126,15 @@ def found_servos(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServ
     return [(one.kind, servo) for one in rounds for servo in one.found]
 
 
-def parse_kinds(text: str) -> tuple[BusKind, ...]:
-    """Parse the name of a kind, or "all".
+def parse_kind(text: str) -> BusKind:
+    """Parse the name of a kind.
 
     Raises:
         ValueError: the kind does not exist.
     """
     for kind in ORDER:
         if text == kind:
-            return (kind,)
+            return kind
     if text in BUS_KINDS:
         raise ValueError(f"{text}: hangs on no serial port: gazerig doctor RIG asks it")
-    if text != "all":
-        raise ValueError(f"{text}: not all or one of {', '.join(sorted(ORDER))}")
-    return ORDER
+    raise ValueError(f"{text}: not one of {', '.join(sorted(ORDER))}")

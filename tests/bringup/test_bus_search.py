@@ -3,8 +3,8 @@
 import pytest
 
 from gazerig.features.bringup.bus_search import (
+    ORDER,
     found_servos,
-    parse_kinds,
     plan_search,
     search_bus,
 )
@@ -14,7 +14,6 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-ALL = parse_kinds("all")
 FEW = (1_000_000, 57_600)
 MICRO, MINI = "1ffb:0089", "1ffb:008a"
 
@@ -29,8 +28,8 @@ class Line:
     def tap(self, data):
         self.sent += data
 
-    def search(self, rates=FEW, usb="", to_the_end=False, thorough=False):
-        return list(search_bus(self.port, usb, plan_search(usb, ALL, rates), thorough, to_the_end))
+    def search(self, rates=FEW, usb="", kinds=ORDER, thorough=False):
+        return list(search_bus(self.port, usb, plan_search(usb, kinds, rates), thorough))
 
 
 def maestro(channels=12, crc=False, **chosen):
@@ -50,13 +49,12 @@ BOARDS = {
 
 
 @pytest.mark.parametrize("board", BOARDS.values(), ids=list(BOARDS))
-@pytest.mark.parametrize("to_the_end", [False, True])
-def test_a_board_is_recognised_before_anything_could_move_it(board, to_the_end):
+def test_a_board_is_recognised_before_anything_could_move_it(board):
     board.choose_behaviour("on-error", "ignore")
     board.exchange(bytes.fromhex("8403102F"))
     before = [one["target"] for one in board.faults.reports()]
     line = Line(board)
-    rounds = line.search(rates=None, to_the_end=to_the_end)
+    rounds = line.search(rates=None)
     assert rounds[-1].board is not None and {one.kind for one in rounds} == {"maestro"}
     assert b"\xff" not in line.sent
     assert [one["target"] for one in board.faults.reports()] == before
@@ -65,11 +63,11 @@ def test_a_board_is_recognised_before_anything_could_move_it(board, to_the_end):
 def test_a_port_of_pololu_is_never_sent_servo_packets_even_where_nobody_answers():
     board = maestro(mode="mute")
     line = Line(board)
-    (only,) = line.search(usb=MINI, rates=None, to_the_end=True)
+    (only,) = line.search(usb=MINI, rates=None)
     assert only.board is None and line.sent and b"\xff" not in line.sent
     for kind in ("dynamixel", "feetech"):
-        assert plan_search(MINI, parse_kinds(kind), None) == ()
-    assert plan_search(MICRO, ALL, (1_000_000,)) == (("maestro", 115_200),)
+        assert plan_search(MINI, (kind,), None) == ()
+    assert plan_search(MICRO, ORDER, (1_000_000,)) == (("maestro", 115_200),)
 
 
 # --- servos of each kind hear the other's packets and are left as they are
@@ -94,8 +92,8 @@ def test_no_packet_changes_dynamixel_servos():
     before = [memory(servo) for servo in chain.servos]
     places = chain.positions_steps()
     line = Line(chain)
-    rounds = line.search(to_the_end=True, thorough=True)
-    assert {one.kind for one in rounds} == set(ALL)
+    rounds = line.search(kinds=("feetech",), thorough=True) + line.search(thorough=True)
+    assert {one.kind for one in rounds} == set(ORDER)
     assert bytes.fromhex("FFFF0104020009") in line.sent  # an STS packet went over the line
     assert [memory(servo) for servo in chain.servos] == before
     assert chain.positions_steps() == places
@@ -106,7 +104,7 @@ def test_no_packet_changes_sts_servos():
     chain = build_feetech([ServoSpec(i, "sts3215", 1900 + i) for i in (1, 49, 253)], lambda: 0.0)
     before = [chain[i].read(0, 56) for i in (1, 49, 253)]
     places = chain.positions_steps()
-    rounds = Line(chain).search(to_the_end=True, thorough=True)
+    rounds = Line(chain).search(thorough=True)
     assert {(kind, servo.id) for kind, servo in found_servos(rounds)} == {
         ("feetech", 1), ("feetech", 49), ("feetech", 253),
     }  # fmt: skip

@@ -20,10 +20,11 @@ from gazerig.drivers.pca9685.probe import probe
 from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.features.bringup.bus_search import (
+    ORDER,
     RATES,
     SearchRound,
     found_servos,
-    parse_kinds,
+    parse_kind,
     plan_search,
     search_bus,
 )
@@ -58,7 +59,7 @@ def scan(
     kind: Annotated[
         str | None,
         typer.Option(
-            help="dynamixel, feetech, maestro, pca9685 or all; default: one after the other until "
+            help="dynamixel, feetech, maestro or pca9685; default: one after the other until "
             "one answers, on an I2C bus pca9685. Required for a Maestro that cannot answer."
         ),
     ] = None,
@@ -77,7 +78,7 @@ def scan(
     with clear_errors(rig or DEFAULT_RIG, port, mock):
         rates = parse_bauds(bauds)
         try:
-            kinds = parse_kinds(kind or "all")
+            kinds = ORDER if kind is None else (parse_kind(kind),)
         except ValueError as error:
             raise SetupError(f"--kind {error}") from None
         found_ports = bench.list_ports()
@@ -92,7 +93,7 @@ def scan(
             answered = [
                 _boards(path, as_json)
                 if i2c or kind == "pca9685"
-                else _search_port(path, kinds, rates, thorough, kind, as_json)
+                else _search_port(path, kinds, rates, thorough, as_json)
                 for path, i2c in paths
             ]
     if not any(answered):
@@ -176,7 +177,6 @@ def _search_port(
     kinds: Sequence[BusKind],
     rates: Sequence[int] | None,
     thorough: bool,
-    named: str | None,
     as_json: bool,
 ) -> bool:
     """Search one port and show the results; return whether a servo answered."""
@@ -191,36 +191,33 @@ def _search_port(
         raise SetupError(f"--bauds: none of them is a rate of {' or '.join(kinds)}")
     line = port_at_path(path)
     try:
-        rounds = _search(line, usb, asked, thorough, named == "all")
+        rounds = _search(line, usb, asked, thorough)
         if not thorough and not any(one.has_answer for one in rounds):
             # Ids that are far apart answer after a long silence; some do not answer a broadcast
             # ping.
             servos = [row for row in asked if row[0] != "maestro"]
             boards = [one for one in rounds if one.kind == "maestro"]
-            rounds = [*boards, *_search(line, usb, servos, True, named == "all")]
+            rounds = [*boards, *_search(line, usb, servos, True)]
     finally:
         line.closePort()
-    requested = tuple(dict.fromkeys(row[0] for row in asked))
-    _show(rounds, path, requested, as_json)
+    _show(rounds, path, as_json)
     return any(one.has_answer for one in rounds)
 
 
 def _search(
-    line: BusPort, usb: str, asked: Sequence[tuple[BusKind, int]], thorough: bool, to_the_end: bool
+    line: BusPort, usb: str, asked: Sequence[tuple[BusKind, int]], thorough: bool
 ) -> list[SearchRound]:
     rounds = []
     errors = Console(stderr=True)
     with Progress(console=errors, transient=True, disable=not errors.is_terminal) as bar:
         task = bar.add_task("asking", total=len(asked))
-        for one in search_bus(line, usb, asked, thorough, to_the_end):
+        for one in search_bus(line, usb, asked, thorough):
             rounds.append(one)
             bar.update(task, advance=1, description=f"searched {one.kind} at {one.baud} bit/s")
     return rounds
 
 
-def _show(
-    rounds: Sequence[SearchRound], where: str, requested: Sequence[BusKind], as_json: bool
-) -> None:
+def _show(rounds: Sequence[SearchRound], where: str, as_json: bool) -> None:
     boards = [(one, one.board) for one in rounds if one.board is not None]
     found = found_servos(rounds)
     if as_json:
@@ -261,17 +258,12 @@ def _show(
             script.get(board.is_script_running, "its script: no answer"),
         ):
             out.print(f"{where}: {line}", markup=False)
-    for line in scan_remarks(rounds, where, requested):
+    for line in scan_remarks(rounds, where):
         out.print(complete_suggestions(line), markup=False)
 
 
-def scan_remarks(
-    rounds: Sequence[SearchRound], where: str, requested: Sequence[BusKind] = ()
-) -> Iterator[str]:
-    """Return remarks on a scan beyond its tables of servos and boards.
-
-    requested: kinds to search unless an earlier one answered
-    """
+def scan_remarks(rounds: Sequence[SearchRound], where: str) -> Iterator[str]:
+    """Return remarks on a scan beyond its tables of servos and boards."""
     found = found_servos(rounds)
     boards = sum(1 for one in rounds if one.board is not None)
     if not boards or found:
@@ -282,11 +274,8 @@ def scan_remarks(
                 rates.setdefault(one.kind, []).append(str(one.baud))
         named = (f"searched {kind} at {', '.join(some)} bit/s" for kind, some in rates.items())
         yield f"{count} on {where}; {'; '.join(named)}"
-    unasked = [kind for kind in requested if kind not in {one.kind for one in rounds}]
-    if unasked and boards:
+    if boards:
         yield "nothing else was sent: packets for servos would move what hangs on the board"
-    elif unasked and found:
-        yield f"{' and '.join(unasked)} was not searched, as others answered: --kind all searches it too"
     for one in rounds:
         yield from _unusual_lines(one, {rate.baud for rate in rounds if rate.has_answer})
     if not found and not boards:
