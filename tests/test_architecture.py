@@ -2,16 +2,12 @@
 
 import ast
 import os
-import re
-import shutil
 import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("config", "doors", "drivers", "features", "gaze", "robot", "sim_mock")
@@ -104,64 +100,9 @@ def linted(folder: Path) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-def package(folder: Path) -> Path:
-    """Lay out the package ``gazerig`` in a folder, by links."""
-    top = folder / "gazerig"
-    top.mkdir()
-    for link in (ROOT / "gazerig").iterdir():
-        (top / link.name).symlink_to(link.resolve())
-    return top
-
-
 def test_storeys() -> None:
     found = linted(ROOT)
     assert found.returncode == 0, found.stdout + found.stderr
-
-
-WRONG = (
-    ("gaze", "gazerig.robot.control.loop"),
-    ("robot/app", "gazerig.features.lab.simulated_run"),
-    ("robot/cli", "gazerig.features.study.design"),
-    ("features/lab", "gazerig.features.study.design"),
-    ("drivers/camera", "gazerig.gaze.types"),
-    ("drivers/servo_bus", "gazerig.drivers.dynamixel.family"),
-    ("config", "gazerig.robot.control.loop"),
-    ("sim_mock/scenes", "gazerig.robot.safety.guard"),
-    ("robot/app", "gazerig.features.world.room"),
-    ("sim_mock/pty", "gazerig.features.world.room"),
-    ("features/lab", "gazerig.features.world.room"),
-    ("features/study", "gazerig.features.world.room"),
-    ("robot/control", "gazerig.config.schema"),
-    ("robot/control", "gazerig.robot.dashboard.feed.snapshot"),
-    ("robot/dashboard", "gazerig.robot.recording.read"),
-)
-
-
-@pytest.fixture(scope="module")
-def found_wrong(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Report on a package with all wrong imports, each in a module of its own."""
-    folder = tmp_path_factory.mktemp("wrong")
-    top = package(folder)
-    for room in ROOMS:
-        (top / room).unlink()
-        shutil.copytree(ROOT / room, top / room, ignore=shutil.ignore_patterns("__pycache__"))
-    for number, (room, wrong) in enumerate(WRONG):
-        if not (ROOT / room).is_dir():
-            continue
-        (top / room / f"stray_{number}.py").write_text(f"import {wrong}\n", encoding="utf-8")
-    found = linted(folder)
-    assert found.returncode == 1 and "BROKEN" in found.stdout, found.stdout + found.stderr
-    return found.stdout
-
-
-@pytest.mark.parametrize("number", range(len(WRONG)), ids=[" ".join(one) for one in WRONG])
-def test_a_wrong_arrow_is_found(found_wrong: str, number: int) -> None:
-    room, wrong = WRONG[number]
-    for one in (room, wrong):
-        if feature := re.match(r"(?:gazerig\.)?features[./](\w+)", one):
-            pytest.importorskip(f"gazerig.features.{feature[1]}")
-    arrow = f"gazerig.{room.replace('/', '.')}.stray_{number} -> {wrong} (l.1)"
-    assert arrow in found_wrong, found_wrong
 
 
 def test_every_room_of_the_robot_has_its_storey() -> None:

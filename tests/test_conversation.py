@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from math import inf, nan, radians
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,15 +22,11 @@ from gazerig.gaze.attention.conversation import (
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.app.session import compose
-from gazerig.robot.app.session import run as run_session
 from gazerig.robot.control.head_state import HeadState, head_state
 from gazerig.robot.dashboard.door.programs import ProgramSocket
 from gazerig.robot.model.commands import LookAt, Renew, Talk
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.requests import read_request
-from gazerig.robot.recording.read import RunRecording
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -123,47 +118,6 @@ def test_the_newer_of_two_agents_has_the_conversation(rig: Running) -> None:
     rig.go(0.9)
     rig.do(Renew(who="b"))
     assert rig.go(0.5)[-1].conversation.who == "b"
-
-
-def test_reports_are_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:
-    file = tmp_path / "talk.mcap"
-    composed = compose(
-        RunOptions(
-            mock=True,
-            fast=True,
-            seed=5,
-            scene="face-to-face",
-            seconds=9.0,
-            record=file,
-            bus="emulated",
-        )  # fmt: skip
-    )
-    asked = {
-        300: Talk("listening", 1, stay=True),
-        500: Talk("thinking", stay=True),
-        700: Talk("speaking", seconds=6.0, text="Good morning.", stay=True),
-        1200: Talk("interrupt", stay=True),
-        1400: Talk("speaking", text="Yes.", who="a"),  # lost after a second
-    }
-    count = iter(range(10_000))
-    see = composed.assembly.robot.perception.see
-
-    def see_and_ask(found: Any, poses: Any) -> Any:
-        if (command := asked.get(next(count))) is not None:
-            composed.assembly.robot.command(command)
-        return see(found, poses)
-
-    watched: Any = see_and_ask
-    composed.assembly.robot.perception.see = watched  # type: ignore[method-assign]
-    run_session(composed, lambda: None, lambda line: None)
-    recording = RunRecording(file)
-    ticks = [one.tick for one in recording.moments()]
-    assert [one for tick in ticks for one in tick.commands] == list(asked.values())
-    states = list(dict.fromkeys(tick.conversation.state for tick in ticks))
-    assert states == ["idle", "listening", "thinking", "speaking", "interrupted"]
-    assert ticks[-1].conversation.end_reason == "not renewed"
-    again = rerun(recording)
-    assert again.is_same and again.sent_bytes_same and not again.notes
 
 
 # Gaze

@@ -3,30 +3,19 @@
 import ast
 import re
 from collections.abc import Iterator
-from dataclasses import fields
 from functools import cache
-from typing import Any, get_args
+from typing import Any
 
 import pytest
-from papers import COMMANDS, EMULATOR, PAPERS, ROOT, blocks, spans
+from papers import COMMANDS, PAPERS, ROOT, blocks, spans
 
-import gazerig
 from gazerig.config.entries import parse
 from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.parameters import apply_changes, value_of
-from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import Rig, load_rig
-from gazerig.drivers.bus.servo_models import SERVOS
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.plugins import BusPlugin
-from gazerig.drivers.servo_bus.family import Family
-from gazerig.gaze.track.track import LID_GROUPS, KeyFrame, Track
+from gazerig.gaze.track.track import Track
 from gazerig.params import Declaration, declarations
-from gazerig.robot.app.scene_files import scene_names
-from gazerig.robot.cli.examples import all_examples
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.kinematics import LOWER_NECK
 from gazerig.sim_mock.scenes import script
 
 # The documents describe every feature: without one of them, they cannot be compared with it.
@@ -210,141 +199,8 @@ def test_tests_and_functions_named_exist() -> None:
             assert name in known, f"{paper.name}: {name}"
 
 
-OUTCOMES = get_args(gazerig.Outcome)
-
-SAID = {
-    ". .venv/bin/activate",
-    *("v4l2-ctl", "not moving", "calibration"),
-    # of a program's own
-    *("import gazerig", "mypy --strict", "with", "for_s=2.0", "fast=True", *OUTCOMES),
-    # keys, lines and answers of the program
-    *(
-        "ok",
-        "signed_rank",
-        "rank_sum",
-        "chi_square",
-        "chi_square",
-        "cup: {held_by: anna, side: left}",
-        "bus ok",
-        "null",
-        "None",
-        "path",
-        '"baud": null',
-        '{"ok": ...}',
-        '{"error": ...}',
-    ),
-    *("q", "n", "y", "+", "-", "@", "left 3", "enter", "skip", "back", "end", "turn 300"),
-    # values, files and columns of a sweep
-    *("LOW:HIGH:STEPS", "LOW:HIGH", "sweep-my-visitor", "report.KEY", "verdict.KEY"),
-    *("table.csv", "table.parquet", "response.png", "runs.jsonl", "arguments.json", "results.json"),
-    *("dcmotor", "filterexact"),  # of MuJoCo
-    # formats, bytes, and what is typed elsewhere
-    *("{all: 0.5}", "{jaw: 8, left_brow: 10}", "refuse", "slow", "joint", "time", "angle", "frame"),
-    *("time,x,y", "start,duration,part", "N: [x0, y0, x1, y1]", "start + k * period"),
-    *("84 00 70 2E", "2B", "83 01", "17", "FF FF 01 02 01 FB", "pytest -k e17"),
-    *("sudo udevadm control --reload", "sudo usermod -aG dialout $USER", "ls /dev/serial/by-id"),
-    *("sudo raspi-config", "sudo usermod -aG i2c $USER", "/dev/i2c-*"),
-    *("sudo systemctl stop ModemManager", "robot", "./face", "myrig.yaml.bak-20260131-235958"),
-    *('bus="ideal"', "with", "pre-commit install", "_deg", "_rad", "_ms", "_m", "p_world_m"),
-    *(
-        'page="127.0.0.1:8080"',
-        "say=print",
-        "fast=True",
-        "mock=True",
-        "gazerig.open",
-        "gazerig.connect()",
-    ),
-    *(
-        "[tool.importlinter]",
-        "sleep_until",
-        "retune",
-        "faults",
-        "_obey",
-        "camera.latest",
-    ),
-}
-"""Spans that name nothing which could be looked up."""
-
-
-def test_every_span_names_something_that_is_there() -> None:
-    words = {*keys(), *defined(), *SERVOS, *scene_names(), *all_examples(), *_modes(), *LOWER_NECK}
-    words |= {field.name for field in fields(script.WorldCameraParams)}
-    words |= {field.name for field in (*fields(Family), *fields(BusPlugin))} | {
-        *DYNAMIXEL.registers,
-        *FEETECH.registers,
-    }
-    words |= {field.name for field in (*fields(KeyFrame), *fields(Track))} | {*LID_GROUPS}
-    scripts = (
-        *(script.SceneScript, script.PersonScript, script.PlaceScript),
-        *(script.ThingScript, script.Act, script.ExpectedLook),
-        *(script.SwayScript, script.WaveScript),
-    )
-    words |= {field.name for one in scripts for field in fields(one)}
-    words |= {*get_args(script.Do), *shipped_names("worlds", WORLDS), script.HEAD, script.BASE}
-    forms = (
-        *(design.StudyDesign, design.Presentation, design.Trials),
-        *(design.Questionnaire, design.Item, design.Condition, design.Hypothesis),
-    )
-    words |= {field.name for form in forms for field in fields(form)}
-    words |= {*shipped_names("studies", HOME), *shipped_names("questionnaires", HOME)}
-    for paper in PAPERS:
-        if paper in (EMULATOR, PARAMETERS):
-            continue  # their tables are compared with the emulator and the declarations
-        for span in spans(paper):
-            if span.startswith(
-                ("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")
-            ):
-                continue
-            messages = r"/api/v1/|\?|\{|\"stay|\$XDG|/tmp/|Auth"
-            if paper.name == "connect-your-program.md" and re.match(messages, span):
-                continue  # read by test_programs
-            if named := re.match(r"(?:PYTHONPATH=\S+ )?python (\S+\.py)", span):
-                assert (ROOT / named[1]).exists(), f"{paper.name}: {span}"
-                continue
-            if call := re.match(r"(gazerig|head)\.([a-z]\w*)(?=[(]|$)", span):
-                place: object = gazerig if call[1] == "gazerig" else gazerig.SimulatedHead
-                if hasattr(place, call[2]):
-                    continue
-            first = re.split(r"[ (:]", span)[0]
-            within = re.sub(r"^[a-z_.]+\.(?=[A-Z])", "", span)  # a module's
-            looked_up = {span, first, span.rpartition(".")[0], within}
-            assert span in SAID or looked_up & words or is_key(first) or _is_file(span), (
-                f"{paper.name}: `{span}`: mend the paper, or add it to SAID"
-            )
-
-
-def _modes() -> Iterator[str]:
-    for kind in ("characters", "profiles", "rules", "rigs"):
-        yield from shipped_names(kind)
-
-
-def _is_file(span: str) -> bool:
-    return any((ROOT / base / span).exists() for base in ("", "robot")) or span.endswith(
-        (".py", ".yaml")
-    )
-
-
-def test_the_glossary_has_a_line_for_every_section_of_gaze() -> None:
-    text = (ROOT / "docs/glossary.md").read_text("utf-8")
-    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| ")][1:]
-    assert len(rows) >= 60 and all(len(row) == 4 and all(row) for row in rows)
-    terms = [row[0].removeprefix("| ") for row in rows]
-    assert terms == sorted(terms, key=str.lower) and len(set(terms)) == len(terms)
-    # The sections whose names are terms of the field; the others are plain words.
-    sections = declarations(GazeConfig).keys() - {
-        "chooser", "attention", "idle", "lids", "mouth", "oculomotor",
-    }  # fmt: skip
-    named = set(re.findall(r"`gaze\.(\w+)", text)) | {"tracks" for term in terms if term == "track"}
-    assert sections <= named
-
-
 def test_every_numbered_check_listed_is_a_test() -> None:
     text = (ROOT / "docs/checks.md").read_text("utf-8")
     listed = [int(number) for number in re.findall(r"^\| E(\d+) \|", text, re.M)]
     tested = {int(name[6:].split("_")[0]) for name in defined() if re.match(r"test_e\d+_", name)}
     assert listed == sorted(tested) and len(listed) >= 19
-
-
-def test_the_project_speaks_of_itself_alone() -> None:
-    for paper in [*PAPERS, ROOT / "CHANGELOG.md"]:
-        assert "/shared" not in paper.read_text(encoding="utf-8")

@@ -39,7 +39,6 @@ TO_SERVOS = [
 ]
 ON_A_RECORDING = [w for w in COMMANDS if re.match(r"export|rerun ", w)]
 ENDLESS = [w for w in COMMANDS if w.startswith("emulate ")]
-LIVE = {*TO_A_HEAD, *TO_SERVOS, *ON_A_RECORDING, *ENDLESS}
 
 
 @pytest.fixture(scope="module")

@@ -3,21 +3,19 @@
 The packages are large, and their users have them: without one, its tests are skipped.
 """
 
-import asyncio
 import inspect
 import re
-from collections.abc import AsyncIterator
 from typing import Any, get_args
 
 import pytest
 from aiohttp import web
 from fakes.talking_head import TalkingHead, until
 from fakes.voice_assistant import free_port
-from test_doors import CONVERSATIONS, SAID, audio, event, run
+from test_doors import CONVERSATIONS, audio, event, run
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
-from gazerig.doors import livekit, openai_realtime, pipecat
+from gazerig.doors import openai_realtime
 from gazerig.doors.door import DoorLink
 
 BETA = ("response.audio.delta", "response.audio.done", "response.audio_transcript.delta")
@@ -27,10 +25,6 @@ BETA = ("response.audio.delta", "response.audio.done", "response.audio_transcrip
 def needs(module: str, package: str) -> Any:
     """Return a module of a neighbour's package, or skip the test."""
     return pytest.importorskip(module, reason=f"pip install {package}")
-
-
-def link_to(head: TalkingHead) -> DoorLink:
-    return DoorLink(head.connect, head.said.append)
 
 
 # OpenAI
@@ -93,85 +87,3 @@ def test_openai_s_client_talks_through_the_relay() -> None:
 
     run(openai_realtime.DOOR, scenario, f"ws://127.0.0.1:{port}", bind)
     assert seen == [("/v1/realtime?model=m", "Bearer hush"), "response.create"]
-
-
-# Pipecat
-
-
-def test_an_observer_of_pipecat_s_pipeline_steers_the_head() -> None:
-    frames = needs("pipecat.frames.frames", "pipecat-ai")
-    from pipecat.processors.filters.identity_filter import IdentityFilter
-    from pipecat.tests.utils import SleepFrame, run_test
-
-    head = TalkingHead()
-    observer = pipecat.HeadObserver(link=link_to(head))
-    sent = (
-        frames.UserStartedSpeakingFrame(), frames.UserStoppedSpeakingFrame(),
-        frames.LLMFullResponseStartFrame(), frames.LLMTextFrame(SAID),
-        frames.TTSAudioRawFrame(bytes(640), 16_000, 1),
-        frames.BotStartedSpeakingFrame(), frames.UserStartedSpeakingFrame(),
-        frames.UserStoppedSpeakingFrame(), frames.UserStartedSpeakingFrame(),
-        frames.InterruptionFrame(), frames.BotStoppedSpeakingFrame(),
-    )  # fmt: skip
-
-    async def scenario() -> None:
-        spaced = [one for frame in sent for one in (frame, SleepFrame(0.1))]
-        await run_test(IdentityFilter(), frames_to_send=spaced, observers=[observer])
-
-    asyncio.run(scenario())
-    assert head.states == [
-        "listening", "thinking", "speaking", "interrupt", "speaking", "interrupt", "idle"
-    ]  # fmt: skip
-    assert head.orders[2] == ("speaking", None, SAID) and not head.said
-    assert head.mouths == [(16_000, 1, bytes(640))] and not head.sounds
-
-
-# LiveKit
-
-
-def test_livekit_s_session_steers_the_head() -> None:
-    """A session without a room says a sound, and its user interrupts it."""
-    agents = needs("livekit.agents", "livekit-agents")
-    from livekit import rtc
-    from livekit.agents.voice.io import AudioOutput, AudioOutputCapabilities
-
-    class Loudspeaker(AudioOutput):
-        def __init__(self) -> None:
-            super().__init__(label="test", capabilities=AudioOutputCapabilities(pause=False))
-            self.said_s = 0.0
-
-        async def capture_frame(self, frame: Any) -> None:
-            await super().capture_frame(frame)
-            if not self.said_s:
-                self.on_playback_started(created_at=0.0)
-            self.said_s += frame.duration
-
-        def flush(self) -> None:
-            super().flush()
-            self.on_playback_finished(playback_position=self.said_s, interrupted=False)
-            self.said_s = 0.0
-
-        def clear_buffer(self) -> None:
-            pass
-
-    head = TalkingHead()
-
-    async def sound() -> AsyncIterator[Any]:
-        for _ in range(20):
-            yield rtc.AudioFrame(bytes(960), 24_000, 1, 480)
-            await asyncio.sleep(0.02)
-
-    async def scenario() -> None:
-        session = agents.AgentSession()
-        link = livekit.follow(session, link=link_to(head))
-        session.output.audio = Loudspeaker()
-        await session.start(agents.Agent(instructions=""), record=False)
-        await until(lambda: head.last == "listening")
-        await session.say("Good morning", audio=sound())
-        await until(lambda: head.states == ["listening", "speaking", "listening"])
-        await session.aclose()
-        await until(lambda: head.last == "idle")
-        await link.close()
-
-    asyncio.run(scenario())
-    assert not head.said

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
-from exported_run import RATE_HZ, Run, seen
+from exported_run import Run, seen
 from msgspec.structs import replace
 from present import present
 
@@ -277,33 +277,3 @@ def test_a_blink_ends_no_stay_and_a_saccade_does(face: Run, tmp_path: Path) -> N
 
 
 # --- pymovements judges
-
-
-def judged(path: Path, columns: list[str]):
-    """Open the samples as a laboratory would."""
-    pymovements = pytest.importorskip("pymovements")
-    gaze = pymovements.gaze.from_csv(
-        path,
-        experiment=pymovements.Experiment(1920, 1080, 60, 34, 65, "center", RATE_HZ),
-        time_column="time_s",
-        time_unit="s",
-        position_columns=columns,
-    )
-    # A servo's step in one tick is 17.6 deg/s: seven samples smooth that.
-    gaze.pos2vel("savitzky_golay", window_length=7, degree=2)
-    return gaze
-
-
-def test_pymovements_finds_the_same_saccades(face: Run, tables: tuple[Path, ...]) -> None:
-    gaze = judged(tables[0], ["x_deg", "y_deg"])
-    gaze.detect("microsaccades", threshold=(30.0, 30.0), threshold_factor=1, minimum_duration=15)
-    theirs = gaze.events.frame.select("onset", "offset").to_numpy()[:, 0] / 1e3
-    ours = face.onsets_s("saccade")
-    theirs, ours = theirs[theirs > SETTLED_S], ours[ours > SETTLED_S]
-    assert len(ours) > 40
-    apart = np.abs(theirs[None, :] - ours[:, None])
-    # Saccades of 30 ms and less can stay below its threshold.
-    assert np.mean(apart.min(axis=1) <= 0.015) >= 0.95
-    assert np.mean(apart.min(axis=0) <= 0.015) >= 0.97
-    # And it is the onsets that agree: 40 ms later there is none.
-    assert np.mean(np.abs(theirs[None, :] - ours[:, None] - 0.04).min(axis=1) <= 0.01) < 0.1

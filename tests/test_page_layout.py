@@ -115,34 +115,6 @@ def test_nothing_is_cut_off_covered_or_too_small(shown: Shown, state: str, size:
     assert stop is not None and stop[3] - stop[1] >= 44.0
 
 
-def apart(one: tuple[float, ...] | None, other: tuple[float, ...] | None) -> bool:
-    if one is None or other is None:
-        return True
-    beside = one[2] <= other[0] + 1 or other[2] <= one[0] + 1
-    return beside or one[3] <= other[1] + 1 or other[3] <= one[1] + 1
-
-
-@pytest.mark.parametrize("tab", TABS)
-def test_a_drawer_leaves_head_stop_and_buttons_in_sight(shown: Shown, tab: str, size: str) -> None:
-    shown.state("awake")
-    shown.tab(tab)
-    try:
-        assert faults(shown.browser) == []
-        found = boxes(shown.browser)
-        for part in ("stage", "camera", "rig-stop", "moves", "tabs"):
-            assert apart(found["drawer"], found[part]), f"the drawer lies over {part}"
-        left, top, right, bottom = found["stage"] or (0.0, 0.0, 0.0, 0.0)
-        width, height = SIZES[size]
-        if size == "phone":
-            assert right - left == width and bottom - top > 0.2 * height
-        elif size in ("least", "small", "narrow"):
-            assert right - left >= 0.4 * width and bottom - top > 0.4 * height
-        else:
-            assert right - left >= 0.6 * width and bottom - top > 0.6 * height
-    finally:
-        shown.tab(tab)
-
-
 @pytest.mark.parametrize("size", ["laptop"], indirect=True)
 def test_what_is_not_new_is_grey_and_has_its_age(shown: Shown, size: str) -> None:
     script = """['#stage', '#camera .picture'].map(name => {

@@ -6,8 +6,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gazerig.config.schema import load_rig
-from gazerig.features.lab.report.gaze_trace import GazeTraceBuilder
 from gazerig.features.lab.report.turns import STATES, Role, TurnTrace
 from gazerig.gaze.angles import yaw_pitch
 from gazerig.gaze.attention.conversation import (
@@ -16,10 +14,6 @@ from gazerig.gaze.attention.conversation import (
     ConversationParams,
 )
 from gazerig.gaze.types import Target, TurnState
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, TickLoop
-from gazerig.robot.model.commands import Talk, TalkOrder
 
 Script = Literal[Role, "interrupted"]
 
@@ -71,34 +65,3 @@ def model_alone(role: Script, seed: int, minutes: float, step_s: float = 0.02) -
         rows.append((t_s, STATES.index(state), number, degrees(yaw), degrees(pitch)))
     table = np.array(rows)
     return TurnTrace(table[:, 0], table[:, 1], table[:, 2], table[:, 3:], np.zeros(len(table)))
-
-
-def whole_product(role: Script, seed: int, minutes: float) -> TurnTrace:
-    """Return the trace of a simulated rig: from reported states to measured joints."""
-    rng, builder = np.random.default_rng((seed, 9)), GazeTraceBuilder()
-    made = assemble(
-        load_rig("desk"), RunOptions(mock=True, fast=True, seed=seed, scene="face-to-face")
-    )
-    made.robot.start(made.clock)
-
-    def watch(tick: Tick) -> None:
-        if tick.t_s > 2.0:
-            builder.update(tick)
-
-    try:
-        loop = TickLoop(made.robot, made.clock, made.loop, lambda s: None, watch)
-        script, end_s = scripted_turns(role, rng), 2.0
-        while (now_s := made.clock.now_s()) < 60.0 * minutes + 2.0:
-            if now_s >= end_s:
-                state, lasts_s = next(script)
-                end_s = now_s + lasts_s
-                order: TalkOrder = "interrupt" if state == "interrupted" else state
-                planned_s = lasts_s + 10.0 * (role == "interrupted")
-                made.robot.command(
-                    Talk(order, seconds=planned_s if state == "speaking" else None, stay=True)
-                )
-            assert loop.step() is None
-    finally:
-        made.robot.stop()
-        made.close()
-    return builder.trace().turns()

@@ -3,7 +3,7 @@
 from typing import get_args
 
 import pytest
-from reported_turns import model_alone, whole_product
+from reported_turns import model_alone
 
 from gazerig.features.lab.analysis.human_norms import BY_KEY
 from gazerig.features.lab.report.statistics import judge_without_interval
@@ -17,9 +17,3 @@ def test_looks_away_have_the_share_rate_and_direction_of_people(role: Role) -> N
     for one in measures(model_alone(role, 1, 20.0, 0.05)):
         if one.key.endswith(role) or (one.key in ("turn_begins", "turn_ends") and len(one.rows)):
             assert judge_without_interval(one, BY_KEY[one.key]).verdict == "pass", one.key
-
-
-def test_the_product_answers_reports_in_time() -> None:
-    found = {one.key: one for one in measures(whole_product("interrupted", 2, 1.0))}
-    for key, at_most_ms in (("turn_motion", 150.0), ("turn_thinks", 500.0), ("turn_yields", 200.0)):
-        assert len(found[key].rows) > 0 and found[key].rows.max() <= at_most_ms, key
