@@ -12,6 +12,7 @@ from bus_kinds import BOARDS, FEETECH, SMART, TICK_S, every_kind, in_process
 from dynamixel_sdk import PacketHandler
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.types import LimpableBus
 
 SILENT_S = 3.9
 """An adapter that is away for this long is used again."""
@@ -209,6 +210,7 @@ def test_single_servos_are_limp_and_hold_again_without_a_jump(name):
     bench = in_process(name)
     bus = bench.hold()
     bench.go(bus, [0.5] * 4)
+    assert isinstance(bus, LimpableBus)
     bus.set_limp({1})
     assert bench.holding() == [True, False, True, True]
     goals = [0.6, 0.9, 0.6, 0.6]

@@ -11,6 +11,7 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
+from gazerig.sim_mock.device import Device
 
 RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker", "pca9685": "maker"}
 FAULTS = {
@@ -26,7 +27,8 @@ class Watched:
     """A robot in simulated time and its emulated devices, in the order of its buses."""
 
     def __init__(self, monkeypatch, rig):
-        self.devices, build = [], run_bus.build
+        self.devices: list[Device] = []
+        build = run_bus.build
 
         def kept(*given):
             self.devices.append(build(*given))
