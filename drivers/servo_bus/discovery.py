@@ -121,14 +121,15 @@ def scan_ids(
         request = codec.identity_request(codec.BROADCAST)
         port.write(request)
         size = len(request) + codec.STATUS_OVERHEAD + codec.IDENTITY_LENGTH
-        raw = read_until_quiet(port, quiet_s + size * BITS_PER_BYTE / baud)
+        raw = without_echo(read_until_quiet(port, quiet_s + size * BITS_PER_BYTE / baud), request)
     else:
         raw = b""
         for servo_id in range(family.highest_id + 1) if ids is None else ids:
             if progress is not None:
                 progress(baud, servo_id)
             request = codec.identity_request(servo_id)
-            raw += transact(port, family, request, codec.IDENTITY_LENGTH, quiet_s)[0]
+            answer, _ = transact(port, family, request, codec.IDENTITY_LENGTH, quiet_s)
+            raw += without_echo(answer, request)
         raw += port.read_until(_ROOM, port.now_s() + REPLY_S)
     whole = [status for status in codec.parse_statuses(raw) if status.intact]
     used = sum(codec.STATUS_OVERHEAD + len(status.params) for status in whole)
@@ -149,8 +150,12 @@ def has_any_reply(port: BusPort, family: Family) -> bool:
     port.drain()
     port.write(question)
     received = port.read_until(_ROOM, port.now_s() + REPLY_S)
-    # An adapter with an echo returns the request before the answers.
-    return bool(received.replace(question, b"", 1))
+    return bool(without_echo(received, question))
+
+
+def without_echo(received: bytes, request: bytes) -> bytes:
+    """Return received bytes without the request, which an adapter with an echo returns first."""
+    return received.replace(request, b"", 1)
 
 
 def ping(
@@ -184,7 +189,7 @@ def count_corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANS
         request = family.codec.read(servo_id, first.address, length)
         raw, status = transact(port, family, request, length, REPLY_S, servo_id)
         if status is None:
-            bad += bool(raw)
+            bad += bool(without_echo(raw, request))
         elif len(status.params) == length:
             places.append(position.decode(status.params[at : at + position.size]))
     # A checksum of one byte over two mixed answers may match by chance, but not the position.
