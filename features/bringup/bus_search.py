@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from gazerig.drivers.bus.servo_families import FAMILY_OF
-from gazerig.drivers.bus.servo_models import BUS_KINDS, BusKind
+from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
 from gazerig.drivers.serial.list_ports import POLOLU
@@ -124,17 +124,3 @@ def search_bus(
 def found_servos(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServo]]:
     """Return all servos that answered, with their kinds."""
     return [(one.kind, servo) for one in rounds for servo in one.found]
-
-
-def parse_kind(text: str) -> BusKind:
-    """Parse the name of a kind.
-
-    Raises:
-        ValueError: the kind does not exist.
-    """
-    for kind in ORDER:
-        if text == kind:
-            return kind
-    if text in BUS_KINDS:
-        raise ValueError(f"{text}: hangs on no serial port: gazerig doctor RIG asks it")
-    raise ValueError(f"{text}: not one of {', '.join(sorted(ORDER))}")

@@ -1,12 +1,13 @@
-"""Search for the only connected servo, and assignment of its id and baud rate.
+"""Search for a new servo, alone or in a chain, and assignment of its id and baud rate.
 
-Only one servo may be connected: two servos with the same id appear as one, and both would receive
-the new id.
+A servo is connected alone, or it is the factory-new spare of the only servo that a chain misses:
+two servos with the same id appear as one, and both would receive the new id.
 
-Id and baud rate take effect immediately, after the status packet of their own write. If the memory
-has a lock, they are written with it open; otherwise they would be lost at the next power-off. It is
-closed under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech memory table
-    STS3215.
+Id and baud rate take effect immediately, after the status packet of their own write. The id comes
+first: in a chain the servo is alone at the factory's baud rate, but perhaps not with its id at the
+chain's. If the memory has a lock, they are written with it open; otherwise they would be lost at
+the next power-off. It is closed under the new id and at the new rate. Sources: ROBOTIS e-Manual;
+Feetech memory table STS3215.
 """
 
 from collections.abc import Sequence
@@ -27,6 +28,23 @@ from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_kinds import ServoKind, Tell
 
+FACTORY_ID = 1
+"""Id of a new servo."""
+
+
+class Answers(NamedTuple):
+    """Servos that answered; one of several with the same id twice.
+
+    spoilt_bauds: baud rates at which bytes came that were no answers, or two servos share an id
+    """
+
+    found: Sequence[FoundServo]
+    spoilt_bauds: Sequence[int]
+
+
+Spare = tuple[FoundServo, ServoConfig]
+"""A factory-new servo, and the setup of the missing one that it replaces."""
+
 
 class SetupResult(NamedTuple):
     """Result for one servo: its state before and now, and the written values."""
@@ -41,33 +59,82 @@ def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
     return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.scan_rates)))
 
 
-def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell) -> FoundServo:
-    """Find the only connected servo, at any id and baud rate; all rates are searched.
+def search_rates(
+    port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell, thorough: bool = False
+) -> Answers:
+    """Find all connected servos at some baud rates.
+
+    thorough: read every id at the first rates even if no servo answers a broadcast ping
 
     Raises:
-        ServoMissing: no servo or more than one answers.
         PortError: the port cannot be opened.
         BusLost: it has disappeared.
     """
-    found: list[FoundServo] = []
-    junk = 0
+    family, found, spoilt = kind.family, list[FoundServo](), list[int]()
     for baud in bauds:
         tell(f"asking at {baud} bit/s")
-        if not port.setBaudRate(baud) or (found and not has_any_reply(port, kind.family)):
+        quick = not thorough or bool(found)
+        if not port.setBaudRate(baud) or (quick and not has_any_reply(port, family)):
             continue
-        answers, noise = scan_ids(port, kind.family, baud)
-        found += answers
-        junk += noise
-        shared = answers and count_corrupt(port, kind.family, answers[0].id) >= SHARED
-        found += [answers[0]] if shared else []
-    where = port.port_name
+        answers, junk = scan_ids(port, family, baud)
+        each = dict.fromkeys(answers)
+        shared = [one for one in each if count_corrupt(port, family, one.id) >= SHARED]
+        found += [*answers, *shared]
+        spoilt += [baud] if junk or shared else []
+    return Answers(found, spoilt)
+
+
+def find_spare(
+    port: BusPort,
+    kind: ServoKind,
+    chain: Sequence[ServoConfig],
+    baud: int,
+    found: Sequence[FoundServo],
+) -> Spare | None:
+    """Return the factory-new servo that replaces the only missing one of a chain.
+
+    None if not exactly one is missing, or not exactly one other servo answers and is such a one.
+    If its assignment was interrupted, it has its id at the factory's baud rate.
+
+    Args:
+        port: open port.
+        kind: kind of the servos.
+        chain: setups of all servos of the chain.
+        baud: baud rate of the chain.
+        found: servos that answered, at all rates.
+    """
+    wanted = {setup.id: setup for setup in chain}
+    present = {one.id for one in found if one.baud == baud}
+    missing = [setup for setup in chain if setup.id not in present]
+    others = [one for one in found if one.baud != baud or one.id not in wanted]
+    if (len(missing), len(others)) != (1, 1):
+        return None
+    (setup,), (spare,) = missing, others
+    new = spare.baud == kind.family.factory_baud and spare.id in (FACTORY_ID, setup.id)
+    fits = spare.number == kind.family.models[setup.model].number
+    if not (new and fits and port.setBaudRate(baud)):
+        return None
+    # An answer of the missing one may only have been lost, or spoilt by another with its id.
+    is_silent = ping(port, kind.family, setup.id, baud) is None
+    is_free = is_silent and not count_corrupt(port, kind.family, setup.id, SHARED)
+    return (spare, setup) if is_free else None
+
+
+def find_alone(answers: Answers, where: str) -> FoundServo:
+    """Return the only servo that answered on the port ``where``.
+
+    Raises:
+        ServoMissing: no servo or more than one answered.
+    """
+    found, spoilt_bauds = answers
     if len(found) > 1:
         named = [f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found]
         crowd = f"{len(named)} servos answer: {', '.join(named)}"
-        if len(set(named)) < len(named):
-            crowd = f"two servos answer as {named[0]}"
+        twice = [name for name in named if named.count(name) > 1]
+        if twice:
+            crowd = f"two servos answer as {twice[0]}"
         raise ServoMissing(f"{where}: {crowd}: connect one servo alone")
-    if not found and junk:
+    if not found and spoilt_bauds:
         raise ServoMissing(
             f"{where}: answers in pieces only: connect one servo alone, and check its plug"
         )
@@ -99,17 +166,12 @@ def assign_servo(
     Its torque is switched off. The message of every failure has the present id and rate.
 
     Raises:
-        ValueError: the id or baud rate does not exist.
         ServoMissing: the servo has another model, or does not answer afterwards.
         ServoFault: it refuses.
         PortError: the adaptor does not support a rate.
         BusLost: the port has disappeared.
     """
     refuse_model(found, kind, setup, port.port_name)
-    if not 0 <= setup.id <= kind.family.highest_id:
-        raise ValueError(f"id {setup.id} is not in 0..{kind.family.highest_id}")
-    if baud not in kind.family.baud_rates:
-        raise ValueError(f"{baud} bit/s is none of {', '.join(map(str, kind.family.baud_rates))}")
     return _Assignment(port, kind, found).carry_out(setup.id, baud, tell)
 
 

@@ -56,7 +56,7 @@ def test_scan_lists_every_servo():
         (("scan", "--bauds", "123"), "--bauds 123: not all or some of 9600"),
         (("scan",), "no serial port on USB"),
         (("scan", "--port", "/dev/ttyNONE"), "no serial port /dev/ttyNONE"),
-        (("scan", "--kind", "pca9685"), "--kind pca9685: hangs on no serial port"),
+        (("scan", "--kind", "pca9685"), "--kind pca9685: not one of maestro, dynamixel"),
         (("scan", "--kind", "feetech", "--bauds", "9600", "--port", "/dev/x"), "none of them is"),
         (("doctor", "dsk"), "nothing named 'dsk'"),
         (("setup", "--joint", "neck"), "--joint neck: unknown; joints are left_eye_pan"),

@@ -1,7 +1,7 @@
 """The command ``gazerig doctor``: examines every bus of a rig, and applies safe fixes."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Annotated
 
@@ -32,7 +32,6 @@ from gazerig.features.bringup.doctor.diagnostics import (
     BOARD,
     Diagnostic,
     Fix,
-    Level,
     finding_json,
     group_findings,
     summarize,
@@ -73,10 +72,17 @@ def doctor(
             findings = _examine_buses(model, lines, tell)
             if fix:
                 _apply_fixes(model, lines, findings, tell)
+                if any(checkup.is_adoption(one) for some in findings.values() for one in some):
+                    # The settings of a new servo are those of the factory.
+                    findings = _examine_buses(model, lines, lambda _: None)
+                    _apply_fixes(model, lines, findings, tell)
                 tell("after that:")
                 findings = _examine_buses(model, lines, tell)
         eyes = [examine_detector(model.detector)]
-        eyes += [Diagnostic(*one) for one in _weight_rows(model)]
+        eyes += [
+            Diagnostic(level, what, joint, cure)
+            for level, joint, what, cure in weight_findings(model)
+        ]
         show_findings(eyes, tell)
         if as_json:
             rows = [finding_json(one, bus) for bus, some in findings.items() for one in some]
@@ -93,12 +99,6 @@ def examine_detector(params: FaceDetectorParams) -> Diagnostic:
     """Return the finding about the detectors of faces and people, with its remedy."""
     text, cure = detector_status(params)
     return Diagnostic("note" if cure else "ok", text, "detector", cure)
-
-
-def _weight_rows(rig: Rig) -> Iterator[tuple[Level, str, str, str]]:
-    """Return level, fact, joint and remedy of the findings about the weight on a neck."""
-    for level, joint, what, cure in weight_findings(rig):
-        yield level, what, joint, cure
 
 
 def _examine_buses(
@@ -154,22 +154,24 @@ def _apply_fixes(
     for bus, line in lines.items():
         done += checkup.fix_latency(line.port_name, bench.host)
         if any(finding.fixes for finding in findings[bus]):
-            config = rig.bus_named(bus)
-            line.setBaudRate(config.section.baud)
-
-            def write_fix(
-                one: Fix, bus: str = bus, line: BusPort = line, config: BusConfig = config
-            ) -> str:
-                if one.servo_id == BOARD:
-                    return stop_script(line, config.maestro)
-                return apply_fix(line, servo_kind(setups_on(rig, bus)[0].model), one)
-
-            done += checkup.apply_fixes(write_fix, findings[bus])
+            write = partial(_write_fix, line, rig.bus_named(bus), setups_on(rig, bus))
+            done += checkup.apply_fixes(write, findings[bus])
             line.closePort()
     for one in done:
-        tell(str(one))
+        tell(one)
     if not done:
         tell("nothing that --fix may mend")
+
+
+def _write_fix(line: BusPort, config: BusConfig, setups: Sequence[ServoConfig], fix: Fix) -> str:
+    """Write one fix; return "" or the reason of a failure."""
+    if fix.servo_id == BOARD:
+        return stop_script(line, config.maestro)
+    kind, baud = servo_kind(setups[0].model), config.section.baud
+    if fix.register == checkup.ADOPT:
+        return checkup.adopt_spare(line, kind, fix, setups, baud, progress)
+    line.setBaudRate(baud)
+    return apply_fix(line, kind, fix)
 
 
 def show_findings(findings: Sequence[Diagnostic], tell: Tell) -> None:

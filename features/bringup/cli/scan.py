@@ -24,7 +24,6 @@ from gazerig.features.bringup.bus_search import (
     RATES,
     SearchRound,
     found_servos,
-    parse_kind,
     plan_search,
     search_bus,
 )
@@ -59,8 +58,8 @@ def scan(
     kind: Annotated[
         str | None,
         typer.Option(
-            help="dynamixel, feetech, maestro or pca9685; default: one after the other until "
-            "one answers, on an I2C bus pca9685. Required for a Maestro that cannot answer."
+            help="dynamixel, feetech or maestro; default: one after the other until one answers. "
+            "Required for a Maestro that cannot answer."
         ),
     ] = None,
     bauds: Annotated[str, typer.Option(help="all, or bit/s: 1000000,57600")] = "all",
@@ -77,10 +76,9 @@ def scan(
     """
     with clear_errors(rig or DEFAULT_RIG, port, mock):
         rates = parse_bauds(bauds)
-        try:
-            kinds = ORDER if kind is None else (parse_kind(kind),)
-        except ValueError as error:
-            raise SetupError(f"--kind {error}") from None
+        kinds = [one for one in ORDER if kind in (None, one)]
+        if not kinds:
+            raise SetupError(f"--kind {kind}: not one of {', '.join(ORDER)}")
         found_ports = bench.list_ports()
         if not as_json:
             for bus in sorted(Path("/dev").glob("i2c-*")):
@@ -92,7 +90,7 @@ def scan(
         with _paths(rig, mock, port, found_ports) as paths:
             answered = [
                 _boards(path, as_json)
-                if i2c or kind == "pca9685"
+                if i2c
                 else _search_port(path, kinds, rates, thorough, as_json)
                 for path, i2c in paths
             ]

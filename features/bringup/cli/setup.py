@@ -1,6 +1,6 @@
 """The command ``gazerig setup``: each servo gets its id, each board its settings."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Annotated
 
 import typer
@@ -35,8 +35,6 @@ from gazerig.robot.cli.terminal import RigArgument, clear_errors, confirm, say
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 app = typer.Typer()
-
-FACTORY_ID = 1
 
 
 @app.command()
@@ -84,48 +82,66 @@ def _set_up_chain(task: SetupTask) -> list[str]:
     count = len(task.setups)
     say(
         f"{task.title}: {count} of {len(task.rig.names)} servos to set up for {task.config.section.baud} "
-        "bit/s. Switch the servo supply off before you plug or unplug one."
+        "bit/s. Switch the servo supply off before you plug or unplug one. A new servo in the place "
+        "of the only missing one may be set up in the chain."
     )
-    left = []
+    done: set[str] = set()
     for n, one in enumerate(task.setups, 1):
-        say(f"{n} of {count}: connect the {one.model} of {servo_label(one)}, and no other servo")
-        if not _set_up_joint(task, one):
-            left.append(one.name)
-    return left
+        if one.name not in done:
+            label = servo_label(one)
+            say(f"{n} of {count}: connect the {one.model} of {label}, and no other servo")
+            done.update(_set_up_joint(task, one))
+    return [one.name for one in task.setups if one.name not in done]
 
 
-def _set_up_joint(task: SetupTask, one: ServoConfig) -> bool:
-    """Set one joint's servo up; repeat until it is done or skipped."""
+def _set_up_joint(task: SetupTask, one: ServoConfig) -> Collection[str]:
+    """Set one joint's servo up; repeat until it is done or skipped; return the joints done."""
     kind = servo_kind(one.model)
     # Factory settings.
-    spec = ServoSpec(FACTORY_ID, one.model, task.rig.joints[one.name].zero)
+    spec = ServoSpec(servo_setup.FACTORY_ID, one.model, task.rig.joints[one.name].zero)
     fresh = {task.bus: CHAINS[kind.name]((spec,), kind.family.factory_baud)}
     question = "   Enter: it is connected; s: skip this one; Ctrl-C: end "
     while True:
         if not task.yes and press_enter(question).lower().startswith("s"):
-            return False
+            return ()
         try:
             with (
                 rig_ports(task.rig, task.mock, task.port, fresh) as wired,
                 unopened_port(wired.paths[task.bus]) as line,
             ):
-                return _set_up(line, kind, one, task.config.section.baud, task.yes)
+                return _set_up(line, kind, one, task)
         except DriverError as error:
             if task.yes:
                 raise
             say(f"   {error}")
 
 
-def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes: bool) -> bool:
-    """Give the connected servo its id and baud rate; return False if the user skips it."""
-    found = servo_setup.find_alone(line, kind, servo_setup.search_order(kind, baud), progress)
+def _set_up(
+    line: BusPort, kind: ServoKind, wanted: ServoConfig, task: SetupTask
+) -> Collection[str]:
+    """Give the new servo its id and baud rate; return the joints that are done, () if skipped."""
+    baud, chain = task.config.section.baud, setups_on(task.rig, task.bus)
+    order = servo_setup.search_order(kind, baud)
+    answers = servo_setup.search_rates(line, kind, order, progress, thorough=True)
     clear_progress()
+    spare = servo_setup.find_spare(line, kind, chain, baud, answers.found)
+    joints = [wanted.name]
+    if spare is None or spare[1] not in task.setups:
+        found = servo_setup.find_alone(answers, line.port_name)
+    else:
+        found, wanted = spare
+        joints = [one.name for one in chain]
     firmware = kind.family.format_firmware(found.firmware)
     say(f"   found: {found.model}, firmware {firmware}, id {found.id} at {found.baud} bit/s")
+    if len(joints) > 1:
+        say(
+            f"   all others of the chain answer, so it is for {servo_label(wanted)}; its zero is "
+            f"another: then gazerig calibrate --joint {wanted.name}"
+        )
     servo_setup.refuse_model(found, kind, wanted, line.port_name)
     question = f"   give it id {wanted.id} and {baud} bit/s?"
-    if not yes and not confirm(question, default=True, err=True):
-        return False
+    if not task.yes and not confirm(question, default=True, err=True):
+        return ()
     result = servo_setup.assign_servo(line, kind, found, wanted, baud, progress)
     clear_progress()
     done = "; ".join(result.changes) or "nothing to change"
@@ -133,4 +149,4 @@ def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes:
         f"   {servo_label(wanted)}: {done}; answers as id {result.after.id} at "
         f"{result.after.baud} bit/s"
     )
-    return True
+    return joints

@@ -4,13 +4,12 @@ The examination only reads; ``apply_fixes`` writes the fixes of the findings, to
 is off, and moves nothing.
 """
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import servo_label
-from gazerig.drivers.errors import DriverError, PortError, SetupError
+from gazerig.drivers.errors import DriverError, PortError, ServoFault, ServoMissing, SetupError
 from gazerig.drivers.serial.list_ports import (
     ABSENT_I2C_REMEDY,
     RECOMMENDED_LATENCY_MS,
@@ -28,11 +27,11 @@ from gazerig.drivers.serial.list_ports import (
 )
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (
+    ANSWERS,
+    SHARED,
     FoundServo,
     count_corrupt,
-    has_any_reply,
     ping,
-    scan_ids,
 )
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
@@ -40,6 +39,13 @@ from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix,
 from gazerig.features.bringup.doctor.servo_checks import CHECKS
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.servo_kinds import ServoKind, Tell
+from gazerig.features.bringup.servo_setup import (
+    Answers,
+    Spare,
+    assign_servo,
+    find_spare,
+    search_rates,
+)
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, describe
 
@@ -49,44 +55,41 @@ ADVICE = {
         "{kind.no_reply} gazerig scan asks other kinds of servos, too"),
     "elsewhere": Advice("error", "answers at {found.baud} bit/s, the rig's rate is {baud}",
         "connect it alone and run gazerig setup --joint {setup.name}"),
+    "spare": Advice("error", "does not answer, but a new {setup.model} does (id {found.id} at "
+        "{found.baud} bit/s)", "gazerig doctor --fix gives that one id {setup.id} and {baud} bit/s; "
+        "then gazerig calibrate --joint {setup.name}, as its zero is another"),
     "pieces": Advice("error", "answers in pieces only: two servos share its id, or a plug is loose",
         "connect it alone and look with gazerig scan"),
+    "spares": Advice("warn", "at {baud} bit/s answers came in pieces: two new servos with one id?",
+        "connect one of them alone and run gazerig setup"),
     "silent": Advice("error", "does not answer",
         "check its two plugs; is its id set? gazerig setup, with it connected alone, reports it"),
     "new": Advice("warn",
-        "servo {found.id} ({found.model}) answers at {found.baud} bit/s and is none of the missing",
-        "a new one? connect it alone and run gazerig setup"),
+        "servo {found.id} ({found.model}) answers at {found.baud} bit/s and is none of the missing "
+        "({missing})", "a new one? connect it alone and run gazerig setup"),
     "stranger": Advice("warn", "servo {found.id} ({found.model}) answers and is not in the YAML",
         "take it off the bus, or give it the id of a joint with gazerig setup"),
 }
 # fmt: on
 
 
+ADOPT = "id"
+"""Register of the fix that gives a new servo the id and the baud rate of a missing one."""
+
+
 class Presence(NamedTuple):
     """Servos that answered at the rig's baud rate, by id, and missing ones.
 
     unexpected: servos that answered but are not in the YAML; elsewhere: at other baud rates
-    corrupt: number of incomplete answers out of six, by id, if any
+    shared_ids: ids that two servos seem to share; spare: replaces the only missing servo
     """
 
     present: dict[int, FoundServo]
     missing: tuple[ServoConfig, ...]
     unexpected: tuple[FoundServo, ...]
-    elsewhere: tuple[FoundServo, ...]
-    corrupt: dict[int, int]
-
-
-@dataclass(frozen=True, slots=True)
-class AppliedFix:
-    """One applied fix, or the reason why it was not applied."""
-
-    where: str
-    what: str
-    done: bool
-
-    def __str__(self) -> str:
-        """Write it on one line."""
-        return f"{self.where}: {self.what}"
+    elsewhere: Answers
+    shared_ids: set[int]
+    spare: Spare | None
 
 
 def examine_ports(
@@ -130,27 +133,41 @@ def examine_bus(
         BusLost: it has disappeared.
     """
     presence = find_servos(port, kind, setups, baud, tell)
-    if presence.missing and not presence.present and not presence.elsewhere:
+    if presence.missing and not presence.present and not presence.elsewhere.found:
         return [ADVICE["nobody"].at("the bus", baud=baud, kind=kind)]
-    at = {found.id: found for found in presence.elsewhere}
-    findings = []
-    for setup in presence.missing:
-        other = at.pop(setup.id, None)
-        cause = "elsewhere" if other else "pieces" if setup.id in presence.corrupt else "silent"
-        findings.append(ADVICE[cause].at(servo_label(setup), setup=setup, found=other, baud=baud))
-    findings += [ADVICE["new"].at("the bus", found=found) for found in at.values()]
-    findings += [ADVICE["stranger"].at("the bus", found=found) for found in presence.unexpected]
+    if presence.spare is not None:
+        found, setup = presence.spare
+        fix = Fix(found.id, ADOPT, setup.id, found.id)
+        facts = {"setup": setup, "found": found, "baud": baud}
+        findings = [ADVICE["spare"].at(servo_label(setup), fix, **facts)]
+    else:
+        findings = _absences(presence, kind, baud)
     states, registers = [], Registers(port, kind.family)
     for setup in setups:
         if setup.id in presence.present:
             tell(f"reading {servo_label(setup)}")
-            found, spoilt = presence.present[setup.id], presence.corrupt.get(setup.id, 0)
-            states.append(read_state(registers, CHECKS[kind.family.name], setup, found, spoilt))
+            found, is_shared = presence.present[setup.id], setup.id in presence.shared_ids
+            states.append(read_state(registers, CHECKS[kind.family.name], setup, found, is_shared))
     far = find_far({s.setup.name: s.position for s in states if s.position is not None})
     for state in states:
         findings += apply_rules(replace(state, far=far.get(state.setup.name, "")))
     if presence.present:
         findings += [Diagnostic("note", note, "the bus") for note in kind.notes]
+    return findings
+
+
+def _absences(presence: Presence, kind: ServoKind, baud: int) -> list[Diagnostic]:
+    """Return the findings about missing and unexpected servos without a fitting spare."""
+    at, findings = {found.id: found for found in presence.elsewhere.found}, []
+    for setup in presence.missing:
+        other = at.pop(setup.id, None)
+        cause = "elsewhere" if other else "pieces" if setup.id in presence.shared_ids else "silent"
+        findings.append(ADVICE[cause].at(servo_label(setup), setup=setup, found=other, baud=baud))
+    missing = ", ".join(f"{servo_label(setup)}: {setup.model}" for setup in presence.missing)
+    findings += [ADVICE["new"].at("the bus", found=found, missing=missing) for found in at.values()]
+    if kind.family.factory_baud in presence.elsewhere.spoilt_bauds:
+        findings.append(ADVICE["spares"].at("the bus", baud=kind.family.factory_baud))
+    findings += [ADVICE["stranger"].at("the bus", found=found) for found in presence.unexpected]
     return findings
 
 
@@ -163,32 +180,28 @@ def find_servos(
         PortError: the port cannot be opened.
         BusLost: it has disappeared.
     """
-    tell(f"asking all servos at {baud} bit/s")
     _open(port, baud)
-    answers, _ = scan_ids(port, kind.family, baud)
+    answers = [*search_rates(port, kind, (baud,), tell, thorough=True).found]
     there = {found.id: found for found in answers}
-    spoilt = {i: n for i, n in Counter(found.id for found in answers).items() if n > 1}
+    shared = {found.id for found in answers if answers.count(found) > 1}
     for setup in setups:
         if setup.id not in there:
             tell(f"asking {servo_label(setup)}")
             found = ping(port, kind.family, setup.id, baud, 2)
             if found is not None:
                 there[setup.id] = found
-        pieces = count_corrupt(port, kind.family, setup.id, 6 if setup.id in there else 1)
-        if pieces:
-            spoilt[setup.id] = pieces
+                answers.append(found)
+            tries = ANSWERS if found else 1
+            if count_corrupt(port, kind.family, setup.id, tries) >= min(SHARED, tries):
+                shared.add(setup.id)
     missing = tuple(setup for setup in setups if setup.id not in there)
     known = {setup.id for setup in setups}
     strangers = tuple(found for i, found in sorted(there.items()) if i not in known)
-    elsewhere: list[FoundServo] = []
-    for other in kind.family.scan_rates if missing else ():
-        if other != baud:
-            tell(f"a servo is missing: asking at {other} bit/s")
-            if port.setBaudRate(other) and has_any_reply(port, kind.family):
-                elsewhere += scan_ids(port, kind.family, other)[0]
-    if missing:
-        _open(port, baud)
-    return Presence(there, missing, strangers, tuple(elsewhere), spoilt)
+    others = [rate for rate in kind.family.scan_rates if rate != baud and missing]
+    elsewhere = search_rates(port, kind, others, tell)
+    spare = find_spare(port, kind, setups, baud, [*answers, *elsewhere.found])
+    _open(port, baud)
+    return Presence(there, missing, strangers, elsewhere, shared, spare)
 
 
 def _open(port: BusPort, baud: int) -> None:
@@ -199,21 +212,21 @@ def _open(port: BusPort, baud: int) -> None:
 # --- fixes
 
 
-def fix_latency(device: str, host: Host) -> list[AppliedFix]:
-    """Shorten the adaptor's latency timer if it is too long; needs write permission."""
+def fix_latency(device: str, host: Host) -> list[str]:
+    """Shorten the adaptor's latency timer if it is too long, and return a line about it.
+
+    It needs write permission.
+    """
     file = latency_file(device, host)
     was = None if file is None else latency_ms(file)
     if file is None or was is None or was <= RECOMMENDED_LATENCY_MS:
         return []
-    done = set_latency(file)
-    how = "done" if done else f"not done, {file} may not be written"
-    return [AppliedFix(device, f"latency timer {was} -> {RECOMMENDED_LATENCY_MS} ms: {how}", done)]
+    how = "done" if set_latency(file) else f"not done, {file} may not be written"
+    return [f"{device}: latency timer {was} -> {RECOMMENDED_LATENCY_MS} ms: {how}"]
 
 
-def apply_fixes(
-    write: Callable[[Fix], str], findings: Iterable[Diagnostic]
-) -> Iterator[AppliedFix]:
-    """Write the fixes of the findings, one after the other.
+def apply_fixes(write: Callable[[Fix], str], findings: Iterable[Diagnostic]) -> Iterator[str]:
+    """Write the fixes of the findings, one after the other; yield a line about each.
 
     write: writes one fix if that is safe; returns "" or the reason why it did not
 
@@ -223,9 +236,34 @@ def apply_fixes(
     for finding in findings:
         for fix in finding.fixes:
             why = write(fix)
-            yield AppliedFix(
-                finding.where, f"{fix}: {f'not done, {why}' if why else 'done'}", not why
-            )
+            yield f"{finding.where}: {fix}: {f'not done, {why}' if why else 'done'}"
+
+
+def adopt_spare(
+    port: BusPort, kind: ServoKind, fix: Fix, setups: Sequence[ServoConfig], baud: int, tell: Tell
+) -> str:
+    """Give a new servo its id and baud rate; return "" or the reason of a failure.
+
+    Raises:
+        PortError: the adaptor does not support a rate.
+        BusLost: the port has disappeared.
+    """
+    factory_baud = kind.family.factory_baud
+    _open(port, factory_baud)
+    spare = ping(port, kind.family, fix.servo_id, factory_baud)
+    if spare is None:
+        return "the servo does not answer"
+    setup = next(one for one in setups if one.id == fix.value)
+    try:
+        assign_servo(port, kind, spare, setup, baud, tell)
+    except (ServoFault, ServoMissing) as error:
+        return str(error)
+    return ""
+
+
+def is_adoption(finding: Diagnostic) -> bool:
+    """Return whether the fix of a finding gives a new servo its id."""
+    return any(fix.register == ADOPT for fix in finding.fixes)
 
 
 # --- the guardian

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.discovery import SHARED, FoundServo
+from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.drivers.servo_bus.family import Model
 from gazerig.drivers.servo_bus.feedback import nearest_turn
 from gazerig.drivers.servo_bus.registers import Registers
@@ -39,7 +39,7 @@ ADVICE = {
         "connect the right servo and run gazerig setup --joint {setup.name}, or correct the model "
         "in the YAML"),
     "collision": Advice("error",
-        "{corrupt} of 6 answers came in pieces: two servos share id {setup.id}, or a plug is loose",
+        "its answers come in pieces: two servos share id {setup.id}, or a plug is loose",
         "connect this joint's servo alone and look with gazerig scan; a second one with the same "
         "id gets its own by gazerig setup"),
     "mute": Advice("error", "answers pings and nothing else (Status Return Level 0)", FIX),
@@ -81,7 +81,7 @@ class ServoState:
     """State of one servo.
 
     values: registers by name, None without a valid answer
-    corrupt: number of incomplete answers out of six
+    shares_id: whether two servos seem to have its id
     far: why no torque would be switched on where its joint is, "" if it would
     """
 
@@ -89,7 +89,7 @@ class ServoState:
     setup: ServoConfig
     found: FoundServo
     values: Mapping[str, int | None]
-    corrupt: int = 0
+    shares_id: bool = False
     far: str = ""
 
     @property
@@ -143,7 +143,11 @@ class RegisterRule:
 
 
 def read_state(
-    registers: Registers, checks: ServoChecks, setup: ServoConfig, found: FoundServo, corrupt: int
+    registers: Registers,
+    checks: ServoChecks,
+    setup: ServoConfig,
+    found: FoundServo,
+    shares_id: bool,
 ) -> ServoState:
     """Read all registers of one servo that the rules need.
 
@@ -151,7 +155,7 @@ def read_state(
         BusLost: the port has disappeared.
     """
     values = registers.read_many(setup.id, checks.registers)
-    return ServoState(checks, setup, found, values, corrupt)
+    return ServoState(checks, setup, found, values, shares_id)
 
 
 def apply_rules(state: ServoState) -> list[Diagnostic]:
@@ -163,8 +167,8 @@ def apply_rules(state: ServoState) -> list[Diagnostic]:
     findings = []
     if state.found.number != state.model.number:
         findings.append(state.finding(ADVICE["model"]))
-    if state.corrupt >= SHARED:
-        findings.append(state.finding(ADVICE["collision"], corrupt=state.corrupt))
+    if state.shares_id:
+        findings.append(state.finding(ADVICE["collision"]))
     if not findings:
         silent = all(value is None for value in values.values())
         if silent and state.checks.ping_only:
