@@ -33,7 +33,7 @@ from gazerig.robot.dashboard.feed.snapshot import RunState, SnapshotBuilder
 from gazerig.robot.model.control_source import TrackState
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.types import Snapshot
-from gazerig.sim_mock.scenes.scene import ScenePicture
+from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 
 
 class Run(NamedTuple):
@@ -63,7 +63,7 @@ class Page:
         self.said: list[str] = []
         self.state = RunState({"lost": 3}, "wait", "talking", "shy", timing=IN_TIME)
         self.rigs = 0
-        self.picture: ScenePicture | None = None
+        self.picture: DrawnScene | None = None
         self.world: SmallWorld | None = None
         self.detector = ""
         self.publisher = Publisher(

@@ -92,7 +92,6 @@ class Renderer:
         size_px: tuple[int, int] | None = None,
         *,
         depth: bool = False,
-        rows: tuple[int, int] | None = None,
     ) -> Rendered:
         """Return the picture of a camera, without the lens's distortion.
 
@@ -103,7 +102,6 @@ class Renderer:
             p_m: (3,) position of the camera in the world.
             size_px: width and height; None: the largest.
             depth: whether to return distances, too.
-            rows: the first row and the one after the last, to render only this range.
 
         Raises:
             ValueError: the picture is larger than the renderer's largest, or the renderer is
@@ -115,17 +113,16 @@ class Renderer:
                 f"a picture of {width} x {height} does not fit into {self._size[0]} x "
                 f"{self._size[1]}"
             )
-        top, bottom = rows or (0, height)
-        rect = mujoco.MjrRect(0, 0, width, bottom - top)
-        rgb = np.empty((bottom - top, width, 3), np.uint8)
-        z = np.empty((bottom - top, width), np.float32) if depth else None
+        rect = mujoco.MjrRect(0, 0, width, height)
+        rgb = np.empty((height, width, 3), np.uint8)
+        z = np.empty((height, width), np.float32) if depth else None
         with self._lock:
             if not self._finalizer.alive:
                 raise ValueError("the renderer is closed")
             turn, place = np.asarray(R, float), np.asarray(p_m, float)
             # Geoms completely outside the picture are hidden: MuJoCo would draw all their
             # triangles.
-            sides, model = _sides(lens, width, (top, bottom)), self._model
+            sides, model = _sides(lens, width, height), self._model
             camera = (data.geom_xpos - place) @ turn
             out = (camera @ sides.T > model.geom_rbound[:, None]).any(axis=1)
             if self._shadows:  # a geom outside the picture may cast a shadow into it
@@ -136,7 +133,7 @@ class Renderer:
                 self._model, data, self._option, None, self._free, _ALL, self._scene
             )
             self._model.geom_group[:] = self._groups
-            self._look(lens, turn, place, width, (top, bottom))
+            self._look(lens, turn, place, width, height)
             with self._context.as_current():
                 mujoco.mjr_render(rect, self._scene, self._mjr)
                 mujoco.mjr_readPixels(rgb, z, rect, self._mjr)
@@ -160,7 +157,7 @@ class Renderer:
         R: Floats,
         p_m: Floats,
         width: int,
-        rows: tuple[int, int],
+        height: int,
     ) -> None:
         """Move the scene's camera, and a light fixed to it, to the pose of the camera."""
         forward, up = R[:, 2], -R[:, 1]
@@ -171,18 +168,18 @@ class Renderer:
             eye.pos, eye.forward, eye.up = p_m, forward, up
             eye.frustum_center = 0.5 * (left + right)
             eye.frustum_width = 0.5 * (right - left)
-            eye.frustum_top = (lens.cy_px + 0.5 - rows[0]) / lens.fy_px * _NEAREST_M
-            eye.frustum_bottom = (lens.cy_px + 0.5 - rows[1]) / lens.fy_px * _NEAREST_M
+            eye.frustum_top = (lens.cy_px + 0.5) / lens.fy_px * _NEAREST_M
+            eye.frustum_bottom = (lens.cy_px + 0.5 - height) / lens.fy_px * _NEAREST_M
             eye.frustum_near, eye.frustum_far = _NEAREST_M, _FARTHEST_M
         for light in self._scene.lights[: self._scene.nlight]:
             if light.headlight:
                 light.pos, light.dir = p_m, forward
 
 
-def _sides(lens: Intrinsics, width: int, rows: tuple[int, int]) -> Floats:
+def _sides(lens: Intrinsics, width: int, height: int) -> Floats:
     """Return the outward unit normals (5, 3) of the view's sides, in the camera's axes."""
     left, right = (-0.5 - lens.cx_px) / lens.fx_px, (width - 0.5 - lens.cx_px) / lens.fx_px
-    top, bottom = ((row - 0.5 - lens.cy_px) / lens.fy_px for row in rows)
+    top, bottom = ((row - 0.5 - lens.cy_px) / lens.fy_px for row in (0, height))
     out = np.array(
         [(-1.0, 0.0, left), (1.0, 0.0, -right), (0.0, -1.0, top), (0.0, 1.0, -bottom), (0, 0, -1.0)]
     )
@@ -249,9 +246,7 @@ class WorldPicture:
         """Return the name of the rendering library, "" before the first picture."""
         return self._renderer.backend if self._renderer is not None else ""
 
-    def draw(
-        self, seen_by: PinholeView, *, depth: bool = False, rows: tuple[int, int] | None = None
-    ) -> Rendered:
+    def draw(self, seen_by: PinholeView, *, depth: bool = False) -> Rendered:
         """Return a picture; see ``SceneView.draw``."""
         t_s, lens, size_px, R, p_m = seen_by
         self._place(self._data, t_s)
@@ -264,7 +259,7 @@ class WorldPicture:
             self._size = wide, high
         R_world_base, p_world_base_m = self._base
         R, p_m = compose(R_world_base, R), add(p_world_base_m, rotate(R_world_base, p_m))
-        return self._renderer.render(self._data, lens, R, p_m, size_px, depth=depth, rows=rows)
+        return self._renderer.render(self._data, lens, R, p_m, size_px, depth=depth)
 
     def close(self) -> None:
         """Free the renderer; safe to call twice."""

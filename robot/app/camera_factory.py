@@ -47,6 +47,7 @@ from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.motion_source import motion_finder
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -158,7 +159,7 @@ def scene_camera(
 
     drawn = PixelCameraParams(horizontal_field_deg=field_deg)
     faces, moves = own.make_detector(rig.detector), SyntheticMotionDetector(rig.motion)
-    return PixelCamera(drawn, scene, mount, where, faces, rng, moves, locate)
+    return PixelCamera(drawn, DrawnScene(scene), mount, where, faces, rng, moves, locate)
 
 
 def drawn_camera(

@@ -18,6 +18,7 @@ from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.types import DetectedFace, Detections, ImageArray
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount
+from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def scene_pixels(
     from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 
     params = PixelCameraParams(horizontal_field_deg=field_deg, latency_ms=0.0)
-    return PixelCamera(params, scene, mount, head, NoFaces(), rng)
+    return PixelCamera(params, DrawnScene(scene), mount, head, NoFaces(), rng)
 
 
 class NoFaces:

@@ -40,7 +40,7 @@ from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.remote.client import rig_name
 from gazerig.robot.remote.live_server import LiveServer
-from gazerig.sim_mock.scenes.scene import ScenePicture
+from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
@@ -182,7 +182,7 @@ class RunObservers:
 
     def _live_rig(self) -> LiveRig:
         made = self._made
-        picture = ScenePicture(made.scene) if made.scene is not None else None
+        picture = DrawnScene(made.scene) if made.scene is not None else None
         shapes = made.room.shapes() if made.room is not None else None
         return LiveRig(
             made.shown_rig(), self._emulated, picture, shapes, self._detector,

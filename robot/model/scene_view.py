@@ -38,15 +38,12 @@ class Rendered(NamedTuple):
 class SceneView(Protocol):
     """A renderer of a scene through a pinhole camera."""
 
-    def draw(
-        self, seen_by: PinholeView, *, depth: bool = False, rows: tuple[int, int] | None = None
-    ) -> Rendered:
+    def draw(self, seen_by: PinholeView, *, depth: bool = False) -> Rendered:
         """Return a picture.
 
         Args:
             seen_by: The camera.
             depth: Include distances, if the renderer has them.
-            rows: First row and the row after the last, to draw only these.
         """
         ...
 

@@ -5,10 +5,9 @@ distance. Detections arrive after a latency, at the camera's rate, inside its fi
 some are missed. Not modelled: motion blur, light, occlusion, false detections.
 """
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, inf, pi, radians
+from math import cos, pi, radians
 from typing import Annotated
 
 import numpy as np
@@ -21,6 +20,7 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount
+from gazerig.sim_mock.cameras.frame_times import FrameTimes
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 _FARTHEST_FACE_M = 4.0
@@ -72,14 +72,13 @@ class SceneCamera:
         locate: Locate | None = None,
         begins_s: float | None = None,
     ) -> None:
-        self._begins_s = begins_s
         self._params = params
         self._scene = scene
         self._mount = mount
         self._head_pose = head_pose
         self._rng = rng
         self._locate = locate
-        self._start_s: float | None = None
+        self._times = FrameTimes(params.rate_hz, params.latency_ms, begins_s)
         self._lens = intrinsics_of_view(
             radians(params.horizontal_field_deg), params.width_px, params.height_px
         )
@@ -87,56 +86,18 @@ class SceneCamera:
     @property
     def start_s(self) -> float | None:
         """Return the start of the scene; None if ``latest`` has not been called yet."""
-        return self._start_s
+        return self._times.start_s
 
     def open(self) -> None:
         """Start; the first frame is taken at the first call of ``latest``."""
-        self._on_the_way: deque[Detections] = deque()
-        self._arrived: Detections | None = None
-        self._start_s = self._begins_s
-        self._number = 0
-        self._due_s = -inf
-        self._arrives_s = inf
+        self._times.restart()
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the newest detections that have arrived by ``now_s``."""
-        if now_s >= self._due_s:
-            if self._start_s is None:
-                self._start_s = now_s
-            # A late call skips the frames that it missed, as a real camera's buffer does.
-            due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
-            self._number = max(self._number, due) + 1
-            R, p = self._mount.pose(*self._head_pose(now_s))
-            faces: list[DetectedFace] = []
-            blobs: list[MovingBlob] = []
-            scene_s = now_s - self._start_s
-            for index, person in enumerate(self._scene.people(scene_s)):
-                face = self._face(person, R, p, scene_s)
-                if face is not None:
-                    faces.append(face)
-                if person.hand is not None:
-                    hand = Thing(index, "hand", person.hand, _HAND_RADIUS_M)
-                    blobs.extend(self._blob(hand, R, p))
-            for thing in self._scene.things(scene_s):
-                blobs.extend(self._blob(thing._replace(id=_FIRST_THING_ID + thing.id), R, p))
-            faces.sort(key=lambda face: -face.box_px[2])
-            par = self._params
-            found = Detections(
-                now_s, self._number, par.width_px, par.height_px, tuple(faces), tuple(blobs)
-            )
-            self._on_the_way.append(found.locate_in_camera(self._locate))
-            self._due_s = self._start_s + self._number / self._params.rate_hz - 1e-9
-            self._arrives_s = self._arrival_s()
-        while now_s >= self._arrives_s:
-            self._arrived = self._on_the_way.popleft()
-            self._arrives_s = self._arrival_s()
-        return self._arrived
-
-    def _arrival_s(self) -> float:
-        """Return the arrival time of the oldest frame in transit."""
-        if not self._on_the_way:
-            return inf
-        return self._on_the_way[0].captured_s + self._params.latency_ms / 1e3 - 1e-9
+        scene_s = self._times.next_frame_s(now_s)
+        if scene_s is not None:
+            self._times.send(self._detect(now_s, scene_s).locate_in_camera(self._locate))
+        return self._times.arrived(now_s)
 
     def events(self) -> tuple[str, ...]:
         """Return no events: none can happen."""
@@ -144,6 +105,22 @@ class SceneCamera:
 
     def close(self) -> None:
         """Stop; there is nothing to free."""
+
+    def _detect(self, now_s: float, scene_s: float) -> Detections:
+        R, p = self._mount.pose(*self._head_pose(now_s))
+        faces: list[DetectedFace] = []
+        blobs: list[MovingBlob] = []
+        for index, person in enumerate(self._scene.people(scene_s)):
+            face = self._face(person, R, p, scene_s)
+            if face is not None:
+                faces.append(face)
+            if person.hand is not None:
+                blobs.extend(self._blob(Thing(index, "hand", person.hand, _HAND_RADIUS_M), R, p))
+        for thing in self._scene.things(scene_s):
+            blobs.extend(self._blob(thing._replace(id=_FIRST_THING_ID + thing.id), R, p))
+        faces.sort(key=lambda face: -face.box_px[2])
+        par, number = self._params, self._times.number
+        return Detections(now_s, number, par.width_px, par.height_px, tuple(faces), tuple(blobs))
 
     def _face(self, person: ScenePerson, R: Mat3, p: Vec3, scene_s: float) -> DetectedFace | None:
         """Project the landmarks; a face that is cut off, far or turned away is not detected."""

@@ -5,11 +5,9 @@ often it is read. World frame (x forward, y left, z up), metres, seconds from th
 scene. Not modelled: bodies below the neck, gait, facial expression.
 """
 
-from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
 from gazerig.gaze.types import Angles2, Vec3
-from gazerig.robot.model.scene_view import PinholeView, Rendered, SceneView
 
 
 class ScenePerson(NamedTuple):
@@ -101,21 +99,3 @@ def there_and_back(since_s: float, out_s: float, hold_s: float, back_s: float) -
     if since_s < out_s:
         return min_jerk(since_s / out_s)
     return min_jerk(min(1.0, (out_s + hold_s + back_s - since_s) / back_s))
-
-
-@dataclass(frozen=True)
-class ScenePicture(SceneView):
-    """Draws one scene plainly, without distances, for runs with a camera that returns no images."""
-
-    scene: Scene
-
-    def draw(
-        self, seen_by: PinholeView, *, depth: bool = False, rows: tuple[int, int] | None = None
-    ) -> Rendered:
-        """Return a camera's view; see ``SceneView.draw``."""
-        from gazerig.sim_mock.cameras.scene_picture import draw_picture
-
-        return Rendered(draw_picture(self.scene, seen_by)[slice(*(rows or (None,)))], None)
-
-    def close(self) -> None:
-        """Do nothing: there is nothing to free."""

@@ -27,14 +27,7 @@ class WorldCameraParams:
     depth: Annotated[bool, "whether distances are measured too, as by a stereo camera"] = False
     depth_noise_1_m: Annotated[float, Bounds(0, 0.2), "error of a distance at 1 m, metres; it grows with its square"] = 0.004
     exposure_ms: Annotated[float, Bounds(0, 100), "exposure time; a turning head blurs the picture"] = 8.0
-    sub_exposures: Annotated[int, Bounds(1, 32), "number of pictures averaged over an exposure; 1: one, blurred only by the turn"] = 1
-    read_out_ms: Annotated[float, Bounds(0, 100), "time from the first row to the last (rolling shutter); 0: all rows at once"] = 0.0
-    bands: Annotated[int, Bounds(2, 64), "number of row bands that are drawn separately for a rolling shutter"] = 8
-    blur_px: Annotated[float, Bounds(0, 10), "blur of the lens: standard deviation in pixels"] = 0.0
     noise_grey: Annotated[float, Bounds(0, 60), "standard deviation of the read-out noise, grey values"] = 3.0
-    shot_noise_grey: Annotated[float, Bounds(0, 60), "photon noise of a white pixel, grey values"] = 0.0
-    gain: Annotated[float, Bounds(0.05, 20), "brightness factor; values above white are over-exposed"] = 1.0
-    gamma: Annotated[float, Bounds(0.2, 5), "exponent of grey values between 0 and 1; above 1: darker mid-tones"] = 1.0
     shadow_px: Annotated[int, Bounds(0, 8192), "side of the shadow map; 0: no shadows"] = 512
     samples: Annotated[int, Bounds(0, 16), "samples per pixel against jagged edges; 0: one"] = 4
     reflections: Annotated[bool, "whether shiny floors reflect the objects on them"] = False

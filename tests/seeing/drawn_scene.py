@@ -21,6 +21,7 @@ from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
@@ -77,14 +78,13 @@ class Frame(NamedTuple):
         return [(id, (p[0], p[1], p[2])) for id, one, p in rows if one == kind]
 
 
-def frames(scene: Scene, start_s: float, end_s: float, depth: bool = False) -> Iterator[Frame]:
+def frames(scene: Scene, start_s: float, end_s: float) -> Iterator[Frame]:
     """Yield what perception makes of the frames of a part of a scene.
 
     Args:
         scene: what is drawn.
         start_s: from the scene's beginning.
         end_s: likewise.
-        depth: the camera measures distances, too.
     """
     rig, later = load_rig("desk"), _Later(scene, start_s)
     mount, rng = CameraMount(rig.camera), np.random.default_rng(0)
@@ -96,10 +96,10 @@ def frames(scene: Scene, start_s: float, end_s: float, depth: bool = False) -> I
     truth = SceneCamera(SceneCameraParams(latency_ms=0.0), later, mount, still, rng)
     truth.open()
     field = rig.camera.horizontal_field_deg
-    drawn = PixelCameraParams(latency_ms=0.0, depth=depth, horizontal_field_deg=field)
+    drawn = PixelCameraParams(latency_ms=0.0, horizontal_field_deg=field)
     locate = FrameLocator(None, radians(field))
     motion = SyntheticMotionDetector(rig.motion)
-    camera = PixelCamera(drawn, later, mount, still, faces, rng, motion, locate)
+    camera = PixelCamera(drawn, DrawnScene(later), mount, still, faces, rng, motion, locate)
     perception = Perception(mount, field, Tracker(rig.tracker))
     poses = PoseHistory(_Standing())  # type: ignore[arg-type]
     poses.remember(0.0, (0.0, 0.0, 0.0))

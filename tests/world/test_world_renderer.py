@@ -14,12 +14,7 @@ from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.description.links import IDENTITY, ORIGIN
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.scene_view import PinholeView, Rendered
-from gazerig.sim_mock.cameras.optics import (
-    CameraMotion,
-    OpticsParams,
-    expose,
-    through_lens,
-)
+from gazerig.sim_mock.cameras.optics import through_lens
 
 pytestmark = pytest.mark.usefixtures("renders")
 
@@ -37,12 +32,10 @@ POSES: list[tuple[Mat3, Vec3]] = [
 
 
 class Balls:
-    """White balls at known points in the dark; they move along y with a speed."""
+    """White balls at known points in the dark."""
 
     def __init__(
         self,
-        points: Floats = POINTS,
-        speed_m_s: float = 0.0,
         R_world_base: Mat3 = IDENTITY,
         p_world_base_m: Vec3 = ORIGIN,
     ) -> None:
@@ -52,7 +45,7 @@ class Balls:
         bodies = "".join(
             f'<body mocap="true" pos="{x} {y} {z}"><geom type="sphere" size="{RADIUS_M}"'
             ' rgba="1 1 1 1"/></body>'
-            for x, y, z in points
+            for x, y, z in POINTS
         )
         model = mujoco.MjModel.from_xml_string(
             '<mujoco><visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/>'
@@ -60,7 +53,7 @@ class Balls:
         )
 
         def place(data: Any, t_s: float) -> None:
-            data.mocap_pos[:] = points + (0.0, speed_m_s * t_s, 0.0)
+            data.mocap_pos[:] = POINTS
 
         params = RendererParams(shadow_px=0, skybox=False)
         self.picture = WorldPicture(model, place, params, (), R_world_base, p_world_base_m)
@@ -112,25 +105,6 @@ def test_a_point_lands_where_the_programs_own_lens_says(
         near = seen.depth_m[y - 1 : y + 2, x - 1 : x + 2].min()
         assert near == pytest.approx(metres - RADIUS_M, abs=0.004)
     assert np.isinf(seen.depth_m[0, 0])
-
-
-ONE = np.array([(1.5, 0.0, 0.0)])
-
-
-def width_px(image: np.ndarray) -> int:
-    """Return over how many columns there is light."""
-    return int((image.max(axis=(0, 2)) > 12).sum())
-
-
-def test_what_moves_itself_is_blurred_only_where_the_exposure_is_made_of_several() -> None:
-    still = CameraMotion(OPTICAL, (0.0, 0.0, 0.0), OPTICAL, (0.0, 0.0, 0.0), 0.0)
-    passing = Balls(ONE, speed_m_s=4.0)  # 560 px/s: 9 px in 16 ms
-    sharp, blurred = (
-        expose(passing.picture, OpticsParams(16.0, count), 0.0, LENS, SIZE, still).image
-        for count in (1, 8)
-    )
-    passing.picture.close()
-    assert width_px(blurred) - width_px(sharp) == pytest.approx(8, abs=2)
 
 
 def test_what_is_beside_the_picture_is_left_out_and_nothing_else() -> None:

@@ -169,8 +169,7 @@ class RenderedWorld(NamedTuple):
         lens = intrinsics_of_lens(self.camera.lens, field_rad, *size_px)
         view = world_view(self.spec, newest, asked)
         camera = PixelCamera(
-            params, self.scene, self.mount, head, detector, self.rng, find_motion, locate, view,
-            lens, begins_s,
+            params, view, self.mount, head, detector, self.rng, find_motion, locate, lens, begins_s,
         )  # fmt: skip
         view.draw(PinholeView(0.0, lens, size_px, _LEVEL, (0.0, 0.0, 0.0)))
         return camera

@@ -1,0 +1,24 @@
+"""View of a simulated scene through a camera; it can be sent to another process.
+
+Drawing needs OpenCV, which is imported with the first picture.
+"""
+
+from typing import NamedTuple
+
+from gazerig.robot.model.scene_view import PinholeView, Rendered
+from gazerig.sim_mock.scenes.scene import Scene
+
+
+class DrawnScene(NamedTuple):
+    """Draws the people and things of a scene in a room, without distances."""
+
+    scene: Scene
+
+    def draw(self, seen_by: PinholeView, *, depth: bool = False) -> Rendered:
+        """Return a picture; see ``SceneView.draw``."""
+        from gazerig.sim_mock.cameras.picture import draw_picture
+
+        return Rendered(draw_picture(self.scene, seen_by), None)
+
+    def close(self) -> None:
+        """Do nothing: there is nothing to free."""

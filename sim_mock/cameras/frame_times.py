@@ -1,0 +1,62 @@
+"""When a simulated camera exposes its frames, and when their detections arrive."""
+
+from collections import deque
+from math import inf
+
+from gazerig.drivers.types import Detections
+
+
+class FrameTimes:
+    """Frames at a constant rate that arrive after a constant latency.
+
+    Args:
+        rate_hz: frames per second.
+        latency_ms: delay from a frame to its detections.
+        begins_s: start of the scene; None: at the first frame.
+
+    Attributes:
+        start_s: start of the scene, None before it.
+        number: number of the newest frame, from 1.
+    """
+
+    def __init__(self, rate_hz: float, latency_ms: float, begins_s: float | None) -> None:
+        self._rate_hz, self._latency_s = rate_hz, latency_ms / 1e3
+        self._begins_s = begins_s
+        self.start_s: float | None = None
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin again with the first frame."""
+        self._on_the_way: deque[Detections] = deque()
+        self._arrived: Detections | None = None
+        self.start_s, self.number = self._begins_s, 0
+        self._due_s, self._arrives_s = -inf, inf
+
+    def next_frame_s(self, now_s: float) -> float | None:
+        """Return the time of the scene at which a frame is exposed now, None if none is due."""
+        if now_s < self._due_s:
+            return None
+        if self.start_s is None:
+            self.start_s = now_s
+        # A late call skips the frames that it missed, as a real camera's buffer does.
+        due = int((now_s - self.start_s) * self._rate_hz + 1e-6)
+        self.number = max(self.number, due) + 1
+        self._due_s = self.start_s + self.number / self._rate_hz - 1e-9
+        return now_s - self.start_s
+
+    def send(self, found: Detections) -> None:
+        """Send detections on their way."""
+        self._on_the_way.append(found)
+        self._arrives_s = self._next_arrival_s()
+
+    def arrived(self, now_s: float) -> Detections | None:
+        """Return the newest detections that have arrived."""
+        while now_s >= self._arrives_s:
+            self._arrived = self._on_the_way.popleft()
+            self._arrives_s = self._next_arrival_s()
+        return self._arrived
+
+    def _next_arrival_s(self) -> float:
+        if not self._on_the_way:
+            return inf
+        return self._on_the_way[0].captured_s + self._latency_s - 1e-9

@@ -1,0 +1,273 @@
+"""Drawing of a simulated scene in a camera's view: people of true size in a room.
+
+The people are those of the page's 3-D view; their eyes, noses and mouths are at the landmarks of
+gazerig.robot.model.face_geometry, so that a face detector made for people finds them there. Arms
+are drawn to raised hands only. Shapes are triangles in one colour each, the farthest first. Not
+drawn: arms that hang, expression, blinks; the eyes look straight ahead.
+"""
+
+from functools import lru_cache
+from math import atan2, pi
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from gazerig.drivers.types import ImageArray
+from gazerig.gaze.angles import rotation
+from gazerig.gaze.types import Floats
+from gazerig.robot.description.mesh import Painted, cap, lathe, paint
+from gazerig.robot.description.person_shape import LOOKS, hand, head_parts, torso
+from gazerig.robot.model.scene_view import PinholeView
+from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
+
+_NEAREST_M = 0.06
+"""Nothing nearer is drawn."""
+_FINENESS, _CHEST_M, _HAND_M = 0.4, 0.75, 0.1
+_SLEEVE_M, _WRIST_M = 0.052, 0.028
+_UPPER_ARM_M, _FOREARM_M = 0.30, 0.29
+_SHOULDER_M = np.array((0.10, 0.19, -0.17))
+"""Shoulder from the tip of the nose: backwards, to the side, and up."""
+_SPINE_M, _DARKER = -0.117, 0.85
+"""Axis of the chest behind the nose, and brightness of the dark fields of a pattern."""
+_TO_LIGHT: Floats = np.array((-0.52, 0.48, 0.71))
+_AMBIENT, _DIRECT = 0.66, 0.46
+_SHIFT = 4
+"""OpenCV draws polygons with a resolution of 1/16 pixel."""
+
+_ROOM_M, _ROOM_HEIGHT_M, _FLOOR_M = 3.2, 3.2, -0.72
+"""Radius of the round wall, its height up and down, and the height of the floor's far edge."""
+_PX_PER_M = 100.0
+_WALL_BGR, _FLOOR_BGR, _SKIRTING_BGR = (222, 226, 222), (120, 148, 172), (240, 242, 242)
+_PATCHES: tuple[tuple[float, float], ...] = ((0.06, 5.0), (0.18, 6.0), (0.6, 8.0))
+"""Sizes of the soft patches on the wall in metres, and their contrast in grey values."""
+_PAINTINGS = (
+    (1.2, 0.72, 0.34, 0.26, (206, 178, 150)),
+    (-0.35, 0.95, 0.20, 0.15, (172, 196, 168)),
+    (-1.3, 0.66, 0.24, 0.32, (150, 176, 206)),
+)
+"""Place along the wall and height, half width and height in metres, colour."""
+_STEP_PX = 8
+"""Distance of the pixels whose places on the wall are computed; between them they change evenly."""
+
+
+class _Solid(NamedTuple):
+    """A painted shape with its pose in the world; drawn from the farthest to the nearest."""
+
+    shape: Painted
+    R: Floats
+    p_m: Floats
+    distance_m: float
+    scale: float = 1.0
+
+
+def draw_picture(scene: Scene, seen_by: PinholeView) -> ImageArray:
+    """Return the camera's view of a scene, BGR."""
+    image, eye_m = _draw_room(seen_by), np.array(seen_by.p_m)
+    people = scene.people(seen_by.t_s)
+    solids: list[_Solid] = []
+    for number, person in enumerate(people):
+        solids += _person(person, number, eye_m)
+        if person.hand is not None:
+            solids += _arm(person, number, np.array(person.hand), eye_m)
+    for thing in scene.things(seen_by.t_s):
+        if thing.person is not None:
+            person = people[thing.person]
+            solids += _arm(person, thing.person, np.array(thing.p_world_m), eye_m)
+        else:
+            solids.append(_thing(thing, eye_m))
+    for solid in sorted(solids, key=lambda solid: -solid.distance_m):
+        _draw_solid(image, seen_by, solid)
+    return np.asarray(cv2.GaussianBlur(image, (3, 3), 0.6), np.uint8)
+
+
+def _person(person: ScenePerson, number: int, eye_m: Floats) -> list[_Solid]:
+    """Return a person's head and chest."""
+    place = np.array(person.p_world_face_m)
+    R_head = np.array(rotation((*person.face_yaw_pitch_rad, 0.0)))
+    to_eye = eye_m - place
+    away_m = float(np.linalg.norm(to_eye))
+    solid, features = head_parts(number, _FINENESS)
+    # The chest is drawn before the head in any case: the neck is in its collar.
+    chest = _Solid(_chest(number), _R_towards(to_eye), place, away_m + 0.01)
+    found = [chest, _Solid(solid, R_head, place, away_m)]
+    if to_eye @ R_head[:, 0] > 0.1 * away_m:
+        found.append(_Solid(features, R_head, place, away_m - 1e-3))
+    return found
+
+
+@lru_cache(maxsize=8)
+def _chest(number: int) -> Painted:
+    """Return a chest in a checked shirt."""
+    return _pattern(torso(number, _CHEST_M), _SPINE_M, 7.0, 9.0)
+
+
+@lru_cache(maxsize=8)
+def _palm(number: int) -> Painted:
+    """Return an open hand of radius 1."""
+    return _pattern(hand(number), 0.0, 5.0, 7.0)
+
+
+def _pattern(plain: Painted, axis_x_m: float, around: float, along: float) -> Painted:
+    """Return a shape with darker fields around and along an upright axis.
+
+    Motion is visible only where the brightness changes.
+    """
+    x, y, z = plain.mesh.vertices.T
+    field = np.sin(around * np.arctan2(y, x - axis_x_m) + 0.4) * np.cos(along * z)
+    return plain._replace(colours=plain.colours * np.where(field > 0.0, _DARKER, 1.0)[:, None])
+
+
+def _arm(person: ScenePerson, number: int, hand_m: Floats, eye_m: Floats) -> list[_Solid]:
+    """Return sleeve, forearm and hand; the elbow is as low as two links of true lengths allow."""
+    face_m = np.array(person.p_world_face_m)
+    R_chest = _R_towards(eye_m - face_m)
+    side = 1.0 if (hand_m - face_m) @ R_chest[:, 1] > 0.0 else -1.0
+    shoulder_m = face_m + R_chest @ (_SHOULDER_M * (-1.0, side, 1.0))
+    way = hand_m - shoulder_m
+    far_m = max(float(np.linalg.norm(way)), 1e-6)
+    ahead = way / far_m
+    reach_m = min(far_m, _UPPER_ARM_M + _FOREARM_M)  # a hand beyond it stretches the arm
+    along_m = 0.5 * (reach_m + (_UPPER_ARM_M**2 - _FOREARM_M**2) / reach_m)
+    down = np.array((0.0, 0.0, -1.0)) + ahead[2] * ahead
+    down /= max(float(np.linalg.norm(down)), 1e-6)
+    off_m = max(0.0, _UPPER_ARM_M**2 - along_m**2) ** 0.5
+    elbow_m = shoulder_m + ahead * along_m * far_m / reach_m + down * off_m
+    wrist_m = hand_m - (0.0, 0.0, 0.8 * _HAND_M)
+    return [
+        _link(_limb(number, True), shoulder_m, elbow_m, eye_m),
+        _link(_limb(number, False), elbow_m, wrist_m, eye_m),
+        _facing(_palm(number), hand_m, _HAND_M, 0.0, eye_m),
+    ]
+
+
+def _thing(thing: Thing, eye_m: Floats) -> _Solid:
+    shape = _palm(0) if thing.kind == "hand" else _ball()
+    return _facing(shape, np.array(thing.p_world_m), thing.radius_m, thing.turned_rad, eye_m)
+
+
+def _facing(
+    shape: Painted, p_m: Floats, radius_m: float, turned_rad: float, eye_m: Floats
+) -> _Solid:
+    """Return a shape of radius 1 whose x axis points to the camera, turned about it."""
+    R = _R_towards(eye_m - p_m) @ np.array(rotation((0.0, 0.0, -turned_rad)))
+    return _Solid(shape, R, p_m, float(np.linalg.norm(eye_m - p_m)), radius_m)
+
+
+def _R_towards(way: Floats) -> Floats:
+    """Return the rotation of an upright shape that faces along a way."""
+    return np.array(rotation((atan2(way[1], way[0]), 0.0, 0.0)))
+
+
+@lru_cache(maxsize=1)
+def _ball() -> Painted:
+    """Return a ball of radius 1 in six coloured sectors about x, so that its turns are visible."""
+    ball = paint(cap(1.0, pi, 9, 24), (96, 150, 200))
+    _, y, z = ball.mesh.vertices.T
+    ball.colours[np.sin(3.0 * np.arctan2(z, y)) > 0.0] = (238, 206, 120)
+    return ball
+
+
+@lru_cache(maxsize=8)
+def _limb(number: int, is_sleeve: bool) -> Painted:
+    """Return an arm's link of length 1 along z; the radius is in metres."""
+    look = LOOKS[number % len(LOOKS)]
+    thick = _SLEEVE_M if is_sleeve else 0.75 * _SLEEVE_M
+    thin = 0.75 * _SLEEVE_M if is_sleeve else _WRIST_M
+    length = np.linspace(0.0, 1.0, 11)
+    tube = [(thick + share * (thin - thick), share) for share in length.tolist()]
+    profile = [(0.0, -0.10), (0.7 * thick, -0.06), *tube, (0.0, 1.04)]
+    limb = paint(lathe(profile, around=16), look.shirt if is_sleeve else look.skin)
+    return _pattern(limb, 0.0, 4.0, 5.0 * pi)
+
+
+def _link(limb: Painted, start_m: Floats, end_m: Floats, eye_m: Floats) -> _Solid:
+    """Return a link between two points."""
+    way = end_m - start_m
+    length_m = max(float(np.linalg.norm(way)), 1e-6)
+    up = way / length_m
+    aside = np.cross((0.0, 1.0, 0.0) if abs(up[1]) < 0.9 else (1.0, 0.0, 0.0), up)
+    aside /= np.linalg.norm(aside)
+    R = np.stack((aside, np.cross(up, aside), up * length_m), axis=1)
+    middle_m = 0.5 * (start_m + end_m)
+    return _Solid(limb, R, start_m, float(np.linalg.norm(middle_m - eye_m)))
+
+
+def _draw_solid(image: ImageArray, seen_by: PinholeView, solid: _Solid) -> None:
+    """Draw a shape triangle by triangle, the farthest first, with diffuse shading."""
+    mesh, lens = solid.shape.mesh, seen_by.lens
+    world = solid.scale * mesh.vertices @ solid.R.T + solid.p_m
+    seen = (world - np.array(seen_by.p_m)) @ np.array(seen_by.R)
+    if seen[:, 2].min() < _NEAREST_M:
+        return
+    pixels = seen[:, :2] / seen[:, 2:] * (lens.fx_px, lens.fy_px) + (lens.cx_px, lens.cy_px)
+    if (pixels.max(axis=0) < 0.0).any() or (pixels.min(axis=0) > seen_by.size_px).any():
+        return
+    corners = pixels[mesh.faces]
+    one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    facing = np.flatnonzero(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0.0)
+    facing = facing[np.argsort(-seen[mesh.faces[facing], 2].sum(axis=1))]
+    assert solid.shape.normals is not None
+    normals = solid.shape.normals @ solid.R.T
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    bright = _AMBIENT + _DIRECT * np.clip(normals @ _TO_LIGHT, 0.0, 1.0)
+    lit = np.clip(solid.shape.colours * bright[:, None], 0.0, 255.0)
+    colours = lit[mesh.faces[facing]].mean(axis=1)[:, ::-1].tolist()
+    fixed = np.rint(corners[facing] * (1 << _SHIFT)).astype(np.int32)
+    for triangle, colour in zip(fixed, colours, strict=True):
+        cv2.fillConvexPoly(image, triangle, colour, cv2.LINE_8, _SHIFT)
+
+
+def _draw_room(seen_by: PinholeView) -> ImageArray:
+    """Return the view of the wall all round and of the floor painted below it."""
+    lens, (width, height) = seen_by.lens, seen_by.size_px
+    R, (x_m, y_m, z_m) = np.array(seen_by.R), seen_by.p_m
+    columns = np.arange(-_STEP_PX, width + 2 * _STEP_PX, _STEP_PX) + 0.5 * (_STEP_PX - 1)
+    rows = np.arange(-_STEP_PX, height + 2 * _STEP_PX, _STEP_PX) + 0.5 * (_STEP_PX - 1)
+    right, down = np.meshgrid((columns - lens.cx_px) / lens.fx_px, (rows - lens.cy_px) / lens.fy_px)
+    x, y, z = np.moveaxis(np.stack((right, down, np.ones_like(right)), axis=-1) @ R.T, -1, 0)
+    flat = np.maximum(x * x + y * y, 1e-6)
+    along = x * x_m + y * y_m
+    t = (np.sqrt(along * along + flat * (_ROOM_M**2 - x_m**2 - y_m**2)) - along) / flat
+    x, y, z = x_m + t * x, y_m + t * y, z_m + t * z
+    # Azimuths are relative to the camera's, so that they are continuous in its view.
+    ahead = atan2(R[1, 2], R[0, 2])
+    c, s = np.cos(ahead), np.sin(ahead)
+    azimuth = ahead + np.arctan2(c * y - s * x, c * x + s * y)
+    wall = _wall()
+    size = len(columns) * _STEP_PX, len(rows) * _STEP_PX
+    maps = (
+        0.5 * wall.shape[1] - azimuth * (wall.shape[1] / (2.0 * pi)),
+        np.clip((_ROOM_HEIGHT_M - z) * _PX_PER_M, 0.0, wall.shape[0] - 1.0),
+    )
+    own = slice(_STEP_PX, _STEP_PX + height), slice(_STEP_PX, _STEP_PX + width)
+    fine = [cv2.resize(one.astype(np.float32), size)[own] for one in maps]
+    seen = cv2.remap(wall, fine[0], fine[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+    return np.asarray(seen, np.uint8)
+
+
+@lru_cache(maxsize=1)
+def _wall() -> ImageArray:
+    """Return the wall all round: columns by azimuth, rows from the top down to the floor."""
+    width, height = round(2.0 * pi * _ROOM_M * _PX_PER_M), round(2.0 * _ROOM_HEIGHT_M * _PX_PER_M)
+    rng = np.random.default_rng(0)
+    grey = np.zeros((height, width))
+    for size_m, contrast in _PATCHES:
+        cells = round(height / _PX_PER_M / size_m), round(width / _PX_PER_M / size_m)
+        noise = rng.uniform(-contrast, contrast, cells)
+        grey += cv2.resize(noise, (width, height), interpolation=cv2.INTER_CUBIC)
+    edge = round((_ROOM_HEIGHT_M - _FLOOR_M) * _PX_PER_M)
+    grey[:edge] += np.linspace(-10.0, 10.0, edge)[:, None]
+    grey[edge:] += np.linspace(24.0, -24.0, height - edge)[:, None]
+    wall = grey[:, :, None] + np.array(_WALL_BGR)
+    wall[edge:] += np.subtract(_FLOOR_BGR, _WALL_BGR)
+    image: ImageArray = np.clip(wall, 0.0, 255.0).astype(np.uint8)
+    image[edge - 8 : edge] = _SKIRTING_BGR
+    for quarter in range(4):
+        for along_m, up_m, half_m, high_m, colour in _PAINTINGS:
+            x = round((quarter + 0.5) * width / 4 + (width / 8 - along_m * _PX_PER_M)) % width
+            y = round((_ROOM_HEIGHT_M - up_m) * _PX_PER_M)
+            for share, shade in ((1.0, (250, 250, 248)), (0.87, colour)):
+                half, high = round(share * half_m * _PX_PER_M), round(share * high_m * _PX_PER_M)
+                cv2.rectangle(image, (x - half, y - high), (x + half, y + high), shade, -1)
+    return image
