@@ -13,7 +13,7 @@ from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
-from gazerig.drivers.maestro.commands import MaestroCodec
+from gazerig.drivers.maestro.commands import SET_TARGET, MaestroCodec
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Bus, Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
@@ -71,7 +71,7 @@ def _maestro_pulses_on(bench: BusBench) -> None:
     assert bench.port.setBaudRate(115_200)
     codec = MaestroCodec()
     for setup, target in zip(bench.setups, bench.steps(START), strict=True):
-        bench.port.write(codec.target(setup.id, target))
+        bench.port.write(codec.number(SET_TARGET, setup.id, target))
     bench.wait(0.3)
     bench.port.closePort()
 
@@ -82,7 +82,7 @@ def _pca9685_pulses_on(bench: BusBench) -> None:
     channels = [Channel(setup) for setup in bench.setups]
     for channel, target in zip(channels, bench.steps(START), strict=True):
         channel.start(target, bench.now_s())
-    assert board.send_limits(channels, confirmed=True)
+    assert board.send_limits(channels)
     board.send_goals(channels)
     bench.wait(0.3)
     bench.port.closePort()

@@ -19,11 +19,10 @@ from gazerig.drivers.bus.port_bus import CUT, PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import Board, BoardLine
+from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
-from gazerig.drivers.hobby_board.start import HoldResult, enable_channels, hold_channel
-from gazerig.drivers.hobby_board.supervisor import CHECK_SUPPLY, BoardSupervisor, SilenceMonitor
+from gazerig.drivers.hobby_board.supervisor import BoardSupervisor
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import Feedback, ServoConfig
 
@@ -44,7 +43,6 @@ class HobbyBoardBus(PortBus):
 
     holding_text = "pulses still on"
     unconfirmed_text = "end of pulses not confirmed"
-    _line: BoardLine
     _supervisor: BoardSupervisor
 
     def __init__(self, board: Board, setups: Sequence[ServoConfig]) -> None:
@@ -56,26 +54,21 @@ class HobbyBoardBus(PortBus):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
         self._log = EventLog()
         self._nothing = Feedback.create_missing(len(self._ids))
-        self._loads, self._unmeasured = (0.0,) * len(self._ids), (False,) * len(self._ids)
-        self._apply_limits()
         self._reported = False
         self._create_parts()
 
     def _create_parts(self) -> None:
         """Create the stateful parts in their initial state."""
-        timing = self._board.timing
+        self._setups = self._target_setups
         self._channels = tuple(Channel(setup, self._board.longest_ramp_s) for setup in self._setups)
         self._supervisor = BoardSupervisor(self._board, self._channels, self._log)
-        self._silence = SilenceMonitor(self._log, self._line.lateness)
-        self._rx_bytes, self._byte_s = 0, -inf
         self._link = ReconnectingPort(
             self._port,
             self._board.params.baud,
-            timing.give_up_s,
+            self._board.timing.give_up_s,
             self._log,
             self._supervisor.mark_all_for_recovery,
         )
-        self._heard_s = -inf
         self._limp = set[Channel]()
 
     # --- public interface
@@ -87,8 +80,6 @@ class HobbyBoardBus(PortBus):
             PortError: the port cannot be opened.
             ServoMissing: the board or a channel does not answer.
         """
-        self._setups = self._target_setups
-        self._apply_limits()
         self._create_parts()
         baud = self._board.params.baud
         if not self._port.setBaudRate(baud):
@@ -96,11 +87,11 @@ class HobbyBoardBus(PortBus):
         try:
             self._port.clearPort()
             pulses = self._board.find(self._setups, self._log)
-            for channel, pulse in zip(self._channels, pulses, strict=True):
-                channel.adopt_position(pulse)
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise
+        for channel, pulse in zip(self._channels, pulses, strict=True):
+            channel.adopt_position(pulse)
         self._opened = True
 
     def read(self, now_s: float) -> Feedback:
@@ -118,40 +109,35 @@ class HobbyBoardBus(PortBus):
         if (link.down or link.release_due) and not self._reopen_if_needed(now_s):
             return self._nothing
         try:
-            answered = self._check_board(now_s)
+            answered = self._supervisor.check(now_s)
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
-        if not answered:
-            # If any byte arrives the board is present, and noise corrupts its answers.
-            silent_s = min(self._silence.silent_for_s(now_s), now_s - self._byte_s)
-            if silent_s >= self._board.timing.give_up_s:
-                fault = f"{self._port.port_name}: the board has not answered for {silent_s:.1f} s"
-                lateness = self._line.lateness
-                raise BusLost(lateness.blame(fault, CHECK_SUPPLY, now_s, now_s - silent_s))
-            return self._nothing
-        # All positions are estimated, none is measured.
-        at_s = self._heard_s
-        channels, nothing, pending = self._channels, self._nothing, self._supervisor.pending
+        if answered:
+            return self._estimate()
+        self._supervisor.check_silence(now_s)
+        return self._nothing
+
+    def _estimate(self) -> Feedback:
+        """Return the estimated state of all servos; none is measured."""
+        at_s, pending = self._port.now_s(), self._supervisor.pending
         position, velocity, on, faults = list[float](), list[float](), list[bool](), list[str]()
-        rearmed, missing = [False] * len(channels), list[int]()
-        for i, channel in enumerate(channels):
-            position.append(round(channel.ramp.shaft_steps))
-            velocity.append(channel.ramp.shaft_steps_s)
+        rearmed, missing = list[bool](), list[int]()
+        for i, channel in enumerate(self._channels):
+            lost = channel in pending
+            position.append(nan if lost else round(channel.ramp.shaft_steps))
+            velocity.append(nan if lost else channel.ramp.shaft_steps_s)
             on.append(channel.on)
             faults.append(channel.fault)
-            if pending and channel in pending:
-                position[i] = velocity[i] = nan
+            rearmed.append(not lost and channel.pop_rearmed())
+            if lost:
                 missing.append(i)
-            elif channel.rearmed or channel.entering:
-                rearmed[i] = channel.pop_rearmed()
-        load, times = self._loads, (at_s,) * len(channels)
-        if missing:
-            load = tuple([nan if i in missing else 0.0 for i in range(len(channels))])
-            times = tuple([-inf if i in missing else at_s for i in range(len(channels))])
+        nothing = self._nothing
+        load = tuple([nan if i in missing else 0.0 for i in range(len(on))])
+        times = tuple([-inf if i in missing else at_s for i in range(len(on))])
         return Feedback(
             tuple(position), tuple(velocity), load, times, nothing.temperature_c, nothing.voltage_v,
-            tuple(on), tuple(faults), self._unmeasured, tuple(rearmed), tuple(missing),
+            tuple(on), tuple(faults), (False,) * len(on), tuple(rearmed), tuple(missing),
         )  # fmt: skip
 
     def enable_torque(self) -> tuple[int, ...]:
@@ -159,7 +145,7 @@ class HobbyBoardBus(PortBus):
 
         A channel without pulses begins at its servo's last position, or at rest if it has not been
         held yet: the servo moves there immediately at its own speed, and the next such channel
-        follows ``stagger_ms`` later. A joint outside its limits moves inside at 30 deg/s.
+        follows ``stagger_s`` later. A joint outside its limits moves inside at 30 deg/s.
 
         Returns:
             The goals that are now active, in steps.
@@ -169,14 +155,13 @@ class HobbyBoardBus(PortBus):
             ServoMissing: the board does not answer, or a channel does not accept its goal.
         """
         self._setups = self._target_setups
-        self._apply_limits()
         for channel, setup in zip(self._channels, self._setups, strict=True):
             channel.set_target(setup)
         try:
             if not self._reported:
                 self._reported = True
                 self._log.add(UNMEASURED)
-            enable_channels(self._board, self._channels, self._log)
+            self._supervisor.enable()
         except ServoMissing:
             self.disable_torque()
             raise
@@ -185,7 +170,6 @@ class HobbyBoardBus(PortBus):
             raise
         self._link.release_due = False
         self._limp.clear()
-        self._supervisor.start_supervision()
         return tuple(channel.goal_steps for channel in self._channels)
 
     def set_limp(self, servos: Collection[int]) -> None:
@@ -197,11 +181,12 @@ class HobbyBoardBus(PortBus):
         if not self._supervisor.engaged or self._link.down:
             return
         wanted = [self._channels[i] for i in servos]
+        off = [channel for channel in wanted if channel.held]
+        ids = [channel.id for channel in off]
         try:
-            off = [channel for channel in wanted if channel.held]
             for _ in range(TRIES if off else 0):
-                self._board.stop([channel.id for channel in off])
-                pulses = self._board.read_pulses([channel.id for channel in off])
+                self._board.stop(ids)
+                pulses = self._board.read_pulses(ids)
                 if pulses is not None and not any(pulses):
                     for channel in off:
                         channel.record_stop()
@@ -209,7 +194,7 @@ class HobbyBoardBus(PortBus):
                     break
             for channel in self._limp.difference(wanted):
                 self._limp.discard(channel)
-                if hold_channel(self._board, channel, 0) is not HoldResult.HELD:
+                if self._supervisor.hold(channel, 0):
                     self._supervisor.pending.append(channel)
         except BusLost as lost:
             self._record_loss(lost)
@@ -224,66 +209,37 @@ class HobbyBoardBus(PortBus):
         Raises:
             ValueError: a goal is not a number, or their number is wrong.
         """
-        goals = [*map(int, clip_goals(goals_steps, self._lowest, self._highest))]
+        lowest = [setup.min_steps for setup in self._setups]
+        highest = [setup.max_steps for setup in self._setups]
+        goals = [*map(int, clip_goals(goals_steps, lowest, highest))]
         held = [channel for channel in self._channels if channel.held]
-        if not self._supervisor.engaged or self._link.down or not held:
+        supervisor = self._supervisor
+        if not supervisor.engaged or self._link.down or not held:
             return
         now_s = self._port.now_s()
         try:
-            if not self._supervisor.may_send_goals:
-                self._board.resend_pulses(held)
-                return
-            for channel, goal in zip(self._channels, goals, strict=True):
-                if channel.held:
-                    channel.record_goal(goal, now_s)
-            self._board.send_goals(held)
+            if supervisor.may_send_goals:
+                for channel, goal in zip(self._channels, goals, strict=True):
+                    if channel.held:
+                        channel.advance(now_s)
+                        channel.goal_steps = goal
+                self._board.send_goals(held)
+            elif not supervisor.is_ramped_by_board:
+                self._board.send_goals(held)  # the same once more: a write may have been damaged
         except BusLost as lost:
             self._record_loss(lost)
 
     def faults(self) -> tuple[str, ...]:
         """Return the present faults of channels and the board's errors of the last 10 s."""
-        channels = (f"{c.setup.label('channel')}: {c.fault}" for c in self._channels if c.fault)
+        channels = (f"{c.label}: {c.fault}" for c in self._channels if c.fault)
         errors = self._supervisor.recent_errors(self._port.now_s())
-        return (*channels, *(f"{self._board.texts.name}: {name}" for name in errors))
+        return (*channels, *(f"{self._board.name}: {name}" for name in errors))
+
+    # --- parts of PortBus
 
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
         for setup in setups:
             self._board.params.check_servo(setup)
-
-    # --- holding
-
-    def _apply_limits(self) -> None:
-        """Apply the ranges of the active setups."""
-        self._lowest = tuple(setup.min_steps for setup in self._setups)
-        self._highest = tuple(setup.max_steps for setup in self._setups)
-
-    # --- reading
-
-    def _check_board(self, now_s: float) -> bool:
-        """Read the board's status; return whether the board is known to be alive."""
-        if not self._silence.is_due(now_s):
-            return False
-        if self._silence.missed > TRIES:
-            errors = self._board.read_errors()
-            if errors is None:
-                self._silence.record_miss(now_s, self._last_byte_s(now_s))
-                return False
-            self._supervisor.record_errors(errors, self._port.now_s())
-        if not self._supervisor.check_status():
-            self._silence.record_miss(now_s, self._last_byte_s(now_s))
-            return False
-        self._heard_s = self._port.now_s()
-        self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
-        self._silence.record_answer(now_s)
-        return True
-
-    def _last_byte_s(self, now_s: float) -> float:
-        """Return the time of the last received byte, damaged or not."""
-        if self._board.line.rx_bytes != self._rx_bytes:
-            self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
-        return self._byte_s
-
-    # --- loss of the port
 
     def _switch_off(self) -> ReleaseResult:
         released = switch_off(self._board, self._ids)
@@ -293,11 +249,11 @@ class HobbyBoardBus(PortBus):
         return released
 
     def _servo_label(self, servo_id: int) -> str:
-        return next(c.setup for c in self._channels if c.id == servo_id).label("channel")
+        return next(c.label for c in self._channels if c.id == servo_id)
 
     def _cannot_release(self) -> str:
         """Return the text about servos whose pulses cannot be switched off."""
         return (
-            f"{self._port.port_name} is gone: pulses could not be stopped; "
-            f"{self._board.texts.unreachable_behaviour}: {CUT} to free them"
+            f"{self._port.port_name} is gone: pulses could not be stopped; the board keeps its "
+            f"last ones while it has power: {CUT} to free them"
         )

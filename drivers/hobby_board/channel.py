@@ -1,10 +1,9 @@
 """Channel of a board: its commanded pulse and its servo's estimated position."""
 
-from collections import deque
-from math import ceil, inf, sqrt
+from math import ceil, exp, inf, sqrt
 
 from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
-from gazerig.drivers.hobby_board.params import HOBBY
+from gazerig.drivers.hobby_board.params import HOBBY, US_STEPS
 from gazerig.drivers.types import ServoConfig
 
 _SLICE_S = 0.005
@@ -37,20 +36,6 @@ class Ramp:
         self.pulse_steps = pulse_steps
         self.shaft_steps_s = 0.0
         self._pulse_steps_s = 0.0
-
-    def stop(self) -> None:
-        """Record that there are no pulses: the shaft is assumed not to move."""
-        self.begin(self.shaft_steps)
-
-    def set_pulse(self, pulse_steps: float) -> None:
-        """Record the width that the board reports."""
-        self.pulse_steps = pulse_steps
-
-    def longest_s(self, way_steps: float) -> float:
-        """Return a time within which a pulse has moved this distance from rest, seconds."""
-        speed, accel = self.speed_steps_s, self.accel_steps_s2
-        cruise_s = way_steps / speed if speed else 0.0
-        return cruise_s + (2.0 * sqrt(way_steps / accel) if accel else 0.0)
 
     def advance(self, goal_steps: float, for_s: float) -> None:
         """Advance the pulse and the shaft towards a goal."""
@@ -86,12 +71,11 @@ class Ramp:
         self.pulse_steps, self.shaft_steps, self._pulse_steps_s = pulse, shaft, pulse_steps_s
 
 
-RECENT_S = 0.1
+BEHIND_S = 0.1
 """Longest delay of the board behind the last goals: its period is 20 ms, and lines are slow."""
 
-BEHIND_S = 0.04
-FINE_STEPS = 8
-"""Tolerance of an expected pulse: time of travel in seconds, and steps."""
+FINE_STEPS = 24
+"""Tolerance of an expected pulse at rest, half a degree: the grain of a PCA9685 is 20 steps."""
 
 
 class Channel:
@@ -102,53 +86,40 @@ class Channel:
     entering: whether it moves slowly into its limits
     rearmed: whether it was enabled again and that is not yet reported
     fault: reason why it stays without pulses; "" for none
-    reported: whether a difference between its pulses and the commanded ones was reported
-    sent_steps: pulse that was last sent, if the driver ramps it
 
     Args:
         setup: The servo.
         longest_ramp_s: Longest time for which the driver's ramp advances while nothing is sent,
-            seconds.
+            seconds; inf: the board itself ramps its pulses.
     """
 
     def __init__(self, setup: ServoConfig, longest_ramp_s: float = inf) -> None:
-        self._longest_lead_s = longest_ramp_s
-        self.setup = setup
+        self._longest_ramp_s = longest_ramp_s
         self.id = setup.id
-        self.on = self.held = self.entering = self.rearmed = self.off_goal_reported = False
+        self.on = self.held = self.entering = self.rearmed = False
         self.fault = ""
-        self.goal_steps = self.clip(_rest_steps(setup))
-        self.ramp = Ramp(self.goal_steps, _own_speed_steps_s(setup))
+        self.ramp = Ramp(0.0, 0.0)
         self._is_position_known = False
         self._at_s = -inf
-        self._settled_s = inf
-        self._recent: deque[tuple[float, int]] = deque()
-        self._bottom, self._top = -inf, inf
-        self._end_steps = 0
-        self.sent_steps = 0
+        self._moved_steps, self._other_steps = 0.0, 0
+        self.set_target(setup)
 
     def set_target(self, setup: ServoConfig) -> None:
         """Apply a changed setup of the same servo."""
         self.setup = setup
-        self.ramp.shaft_speed_steps_s = _own_speed_steps_s(setup)
+        self.ramp.shaft_speed_steps_s = setup.own_speed_steps_s or setup.max_speed_steps_s
         if not self._is_position_known:
-            self.goal_steps = self.clip(_rest_steps(setup))
+            middle = (setup.min_steps + setup.max_steps) // 2
+            rest = middle if setup.rest_steps is None else setup.rest_steps
+            self.goal_steps = min(max(rest, setup.min_steps), setup.max_steps)
             self.ramp.shaft_steps = self.goal_steps
+            if not self.on:
+                self.ramp.begin(self.goal_steps)
 
-    def clip(self, steps: float) -> int:
-        """Return the nearest goal within the limits.
-
-        Raises:
-            ValueError: ``steps`` is not a number.
-        """
-        low, high = self.setup.min_steps, self.setup.max_steps
-        if low <= steps <= high:
-            return int(steps)
-        if steps != steps:
-            raise ValueError("a goal is not a number: every goal must be a whole number of steps")
-        return low if steps < low else high
-
-    # --- commands
+    @property
+    def label(self) -> str:
+        """Return its label for messages."""
+        return self.setup.label("channel")
 
     @property
     def top_speed_steps_s(self) -> float:
@@ -157,147 +128,25 @@ class Channel:
             return entry_speed_steps_s(self.setup, HOBBY["hobby"].steps_per_turn)
         return self.setup.max_speed_steps_s
 
+    # --- commands
+
     def start(self, pulse_steps: int, now_s: float) -> int:
         """Hold at the present pulse, or at the last position if there is none; return the goal."""
-        self.goal_steps = self.clip(pulse_steps or round(self.ramp.shaft_steps))
+        wanted = pulse_steps or round(self.ramp.shaft_steps)
+        self.goal_steps = min(max(wanted, self.setup.min_steps), self.setup.max_steps)
         self.entering = pulse_steps not in (0, self.goal_steps)
         if not (self.on and pulse_steps):
             # A first pulse is not ramped, as there is no pulse to ramp from.
             self.ramp.begin(pulse_steps or self.goal_steps)
-        self.on, self.fault, self.off_goal_reported = True, "", False
+        self.on, self.fault = True, ""
         self._at_s = now_s
-        self._settled_s = inf
-        self._recent.clear()
-        self._bottom, self._top = -inf, inf
+        self._moved_steps, self._other_steps = 0.0, 0
         return self.goal_steps
 
-    def record_hold(self) -> None:
-        """Record that it holds its goal and follows new ones."""
+    def record_hold(self, pulse_steps: int) -> None:
+        """Record that it holds a pulse and follows new goals."""
         self.held = self._is_position_known = True
-
-    def record_release(self) -> None:
-        """Record that it follows no goals any more; its pulses may continue."""
-        self.held = self.entering = self.rearmed = False
-
-    def record_stop(self) -> None:
-        """Record that it outputs no pulses: its servo has no torque."""
-        self.record_release()
-        self.on = False
-        self.ramp.stop()
-
-    def record_goal(self, goal_steps: int, now_s: float) -> None:
-        """Record a goal that was sent."""
-        self.advance(now_s)
-        recent = self._recent
-        recent.append((now_s, self.goal_steps))
-        if recent[0][0] < now_s - RECENT_S:
-            self._forget(now_s)
-        if goal_steps != self.goal_steps or self._settled_s == inf:
-            way = abs(goal_steps - self.ramp.pulse_steps)
-            self._settled_s = now_s + self.ramp.longest_s(way) + RECENT_S
-        self.goal_steps = goal_steps
-
-    # --- estimated state
-
-    def advance(self, now_s: float) -> None:
-        """Advance the estimate to ``now_s``."""
-        spent_s = now_s - self._at_s
-        if self.on and 0.0 < spent_s < inf:
-            if spent_s > self._longest_lead_s:
-                # The ramp was paused, so it begins from rest.
-                self.ramp.advance(self.ramp.pulse_steps, spent_s - self._longest_lead_s)
-                spent_s = self._longest_lead_s
-            goal = self.goal_steps
-            self.ramp.advance(
-                goal if self._bottom <= goal <= self._top else self._reachable_pulse(goal), spent_s
-            )
-        self._at_s = now_s
-
-    def is_implausible(self, pulse_steps: int, now_s: float, led_away: bool = False) -> bool:
-        """Return whether a pulse cannot result from recent goals.
-
-        led_away: whether an error or a restart has briefly moved it towards its home
-        """
-        if not pulse_steps:
-            return True
-        if self._longest_lead_s < inf:
-            return abs(pulse_steps - self.sent_steps) > FINE_STEPS
-        self._forget(now_s)
-        places = [goal for _, goal in self._recent]
-        places.append(self.goal_steps)
-        room: float = FINE_STEPS
-        if led_away or now_s < self._settled_s:
-            places.append(round(self.ramp.pulse_steps))
-            room = self.pulse_tolerance_steps()
-        low, high = self._reachable_pulse(min(places)), self._reachable_pulse(max(places))
-        return not low - room <= pulse_steps <= high + room
-
-    def _reachable_pulse(self, steps: float) -> float:
-        """Return the pulse that a goal ends at, as far as the board's own range is known."""
-        return min(self._top, max(self._bottom, steps))
-
-    def _forget(self, now_s: float) -> None:
-        while self._recent and self._recent[0][0] < now_s - RECENT_S:
-            self._recent.popleft()
-
-    def pulse_tolerance_steps(self) -> float:
-        """Return the tolerance of an expected pulse, steps."""
-        return FINE_STEPS + self.ramp.speed_steps_s * BEHIND_S
-
-    def adopt_pulse(self, pulse_steps: int) -> None:
-        """Adopt the pulse width that the board reports."""
-        if pulse_steps and not self.held:
-            self.goal_steps = pulse_steps
-        if pulse_steps and self.held and not self.entering:
-            # No goal is outside, so a byte was damaged; answers have no checksum.
-            pulse_steps = self.clip(pulse_steps)
-        self.record_pulse(pulse_steps)
-
-    def record_expected_pulse(self, pulse_steps: int) -> None:
-        """Record that its pulse is as expected.
-
-        A pulse that the driver ramps is by now beyond the last one sent.
-        """
-        if self._longest_lead_s == inf:
-            self.adopt_pulse(pulse_steps)
-
-    def record_pulse(self, pulse_steps: int) -> None:
-        """Record its pulse, which may differ from its goal."""
-        self.on = pulse_steps > 0
-        if self.on:
-            self.ramp.set_pulse(pulse_steps)
-        else:
-            self.ramp.stop()
-
-    def is_off_goal(self, pulse_steps: int) -> bool:
-        """Record the end of a move; return whether it ended off goal twice at the same pulse."""
-        before, self._end_steps = self._end_steps, pulse_steps
-        short = self.goal_steps - pulse_steps
-        self._bottom = -inf
-        self._top = inf
-        self.ramp.set_pulse(pulse_steps)
-        if before != pulse_steps or abs(short) <= FINE_STEPS:
-            return False
-        if short > 0:
-            self._top = pulse_steps
-        else:
-            self._bottom = pulse_steps
-        return True
-
-    def adopt_position(self, pulse_steps: int) -> None:
-        """Adopt a pulse as the servo's position, as it has been unchanged for a long time."""
         self.adopt_pulse(pulse_steps)
-        if pulse_steps:
-            self.ramp.shaft_steps = pulse_steps
-            self._is_position_known = True
-
-    def is_within_limits(self) -> bool:
-        """Return whether the pulse is within the limits."""
-        return self.is_pulse_allowed(self.ramp.pulse_steps)
-
-    def is_pulse_allowed(self, pulse_steps: float) -> bool:
-        """Return whether a pulse is within the limits."""
-        return self.setup.min_steps <= pulse_steps <= self.setup.max_steps
 
     def record_rearm(self) -> None:
         """Record that it was enabled again: plans must begin at its pulse."""
@@ -309,11 +158,75 @@ class Channel:
         rearmed, self.rearmed = self.rearmed, False
         return rearmed or self.entering
 
+    def record_release(self) -> None:
+        """Record that it follows no goals any more; its pulses may continue."""
+        self.held = self.entering = self.rearmed = False
 
-def _rest_steps(setup: ServoConfig) -> float:
-    middle = (setup.min_steps + setup.max_steps) // 2
-    return middle if setup.rest_steps is None else setup.rest_steps
+    def record_stop(self, fault: str = "") -> None:
+        """Record that it outputs no pulses: its servo has no torque, and is assumed not to move."""
+        self.record_release()
+        self.on, self.fault = False, fault or self.fault
+        self.ramp.begin(self.ramp.shaft_steps)
 
+    # --- estimated state
 
-def _own_speed_steps_s(setup: ServoConfig) -> float:
-    return setup.own_speed_steps_s or setup.max_speed_steps_s
+    def advance(self, now_s: float) -> None:
+        """Advance the estimate to ``now_s``."""
+        spent_s = now_s - self._at_s
+        if self.on and 0.0 < spent_s < inf:
+            before = self.ramp.pulse_steps
+            if spent_s > self._longest_ramp_s:
+                # The ramp was paused, so it begins from rest.
+                self.ramp.advance(before, spent_s - self._longest_ramp_s)
+                spent_s = self._longest_ramp_s
+            self.ramp.advance(self.goal_steps, spent_s)
+            self._moved_steps *= exp(-spent_s / BEHIND_S)
+            self._moved_steps += abs(self.ramp.pulse_steps - before)
+        self._at_s = now_s
+
+    def is_expected(self, pulse_steps: int) -> bool:
+        """Return whether a pulse is the estimated one, or one shortly before."""
+        room = FINE_STEPS + self._moved_steps
+        expected = pulse_steps > 0 and abs(pulse_steps - self.ramp.pulse_steps) <= room
+        if expected:
+            self._other_steps = 0
+        return expected
+
+    def stays_at(self, pulse_steps: int) -> bool:
+        """Record a pulse that is not expected; return whether the last such pulse was the same."""
+        before, self._other_steps = self._other_steps, pulse_steps
+        return before == pulse_steps
+
+    def adopt_pulse(self, pulse_steps: int) -> None:
+        """Adopt the pulse width that the board reports, if the board ramps it."""
+        if pulse_steps and self.held:
+            if self._longest_ramp_s < inf:
+                return  # by now it is beyond the last one sent
+            if not self.entering:
+                # No goal is outside, so a byte was damaged; answers have no checksum.
+                pulse_steps = min(max(pulse_steps, self.setup.min_steps), self.setup.max_steps)
+        elif pulse_steps:
+            self.goal_steps = pulse_steps
+        if pulse_steps:
+            self.on, self.ramp.pulse_steps = True, pulse_steps
+        else:
+            self.on = False
+            self.ramp.begin(self.ramp.shaft_steps)
+
+    def adopt_position(self, pulse_steps: int) -> None:
+        """Adopt a pulse as the servo's position, as it has been unchanged for a long time."""
+        self.adopt_pulse(pulse_steps)
+        if pulse_steps:
+            self.ramp.shaft_steps = pulse_steps
+            self._is_position_known = True
+
+    def is_within_limits(self) -> bool:
+        """Return whether the pulse is within the limits."""
+        return self.setup.min_steps <= self.ramp.pulse_steps <= self.setup.max_steps
+
+    def difference_text(self) -> str:
+        """Return how its pulse differs from the commanded one."""
+        if not self.on:
+            return "has no pulses"
+        goal, pulse = self.goal_steps / US_STEPS, round(self.ramp.pulse_steps) / US_STEPS
+        return f"is sent to {goal:g} us and gets {pulse:g} us"

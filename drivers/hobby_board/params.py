@@ -1,8 +1,7 @@
 """Parameters of boards of hobby servos, set in a rig file."""
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
@@ -32,22 +31,20 @@ HOBBY = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HobbyBoardParams(ABC):
-    """Properties of a board."""
+class HobbyBoardParams:
+    """Properties of a board.
+
+    baud: rate of its port: USB accepts any, and a bridge to I2C has this one
+    pulse_range_us: shortest and longest pulse that may be sent, us, and the origin of both
+    """
+
+    baud: ClassVar[int] = 115_200
+    pulse_range_us: ClassVar[tuple[float, float, str]]
 
     @property
-    @abstractmethod
     def channels(self) -> int:
         """Return the number of channels."""
-
-    @property
-    @abstractmethod
-    def baud(self) -> int:
-        """Return the baud rate of its port."""
-
-    @abstractmethod
-    def pulse_range_us(self) -> tuple[float, float, str]:
-        """Return the shortest and longest pulse that may be sent, us, and the origin of both."""
+        raise NotImplementedError
 
     def check_servo(self, setup: "ServoConfig") -> None:
         """Reject a servo that no channel can have.
@@ -58,7 +55,7 @@ class HobbyBoardParams(ABC):
         if not 0 <= setup.id < self.channels:
             raise ValueError(f"channel {setup.id}: the board has channels 0 to {self.channels - 1}")
         low, high = setup.min_steps / US_STEPS, setup.max_steps / US_STEPS
-        least, most, decided = self.pulse_range_us()
+        least, most, decided = self.pulse_range_us
         if not least <= low <= high <= most:
             raise ValueError(
                 f"channel {setup.id}: its range {low:g}..{high:g} us must be within "

@@ -15,10 +15,10 @@ class Stoppable(Protocol):
     """The part of a board that a release needs."""
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
-        """Stop the pulses of channels."""
+        """Stop the pulses of channels; on the last try also by stronger means."""
 
     def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Return the present pulses, None if the board does not answer."""
+        """Return the confirmed present pulses of channels; None after a failure."""
 
 
 def switch_off(board: Stoppable, channels: Sequence[int]) -> ReleaseResult:
@@ -27,18 +27,16 @@ def switch_off(board: Stoppable, channels: Sequence[int]) -> ReleaseResult:
     Raises:
         BusLost: the port is lost.
     """
-    left = tuple(channels)
-    heard: set[int] = set()
+    left, heard = tuple(channels), False
     for attempt in range(TRIES):
         board.stop(left, attempt == TRIES - 1)
         found = board.read_pulses(left)
         if found is not None:
-            heard.update(left)
+            heard = True
             left = tuple(channel for channel, pulse in zip(left, found, strict=True) if pulse)
         if not left:
             break
-    holding = tuple(channel for channel in left if channel in heard)
-    return ReleaseResult(holding, tuple(channel for channel in left if channel not in heard))
+    return ReleaseResult(left, ()) if heard else ReleaseResult((), left)
 
 
 def stop_pulses(

@@ -1,15 +1,42 @@
 """Exchanges on one I2C bus: bounded waits, every transfer confirmed, counts.
 
 I2C has no checksums: an answer that causes an action is read twice.
+
+All servo ports carry bytes, and these bytes carry I2C in the format of NXP's SC18IM700: to a bridge
+on a serial line, to an emulated one on a pseudo-terminal, and to gazerig.drivers.i2c.port, which
+executes them on the kernel's buses. A transfer is S, the address with its direction bit, a count,
+for a write that number of bytes, and P. R, a register and P read a register of the bridge; register
+0A contains the result of the last transfer. Source: NXP, SC18IM700 data sheet, rev. 2 (10 August
+2007).
 """
 
 from collections import Counter
 from collections.abc import Sequence
 
 from gazerig.drivers.bus.timing import TIMING
-from gazerig.drivers.i2c.bridge import OUTCOMES, READ_STATUS
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
+
+START, STOP, READ_REGISTER = ord("S"), ord("P"), ord("R")
+STATUS_REGISTER = 0x0A
+READ_STATUS = bytes((READ_REGISTER, STATUS_REGISTER, STOP))
+OK, NO_ACKNOWLEDGE, TIMED_OUT = 0xF0, 0xF1, 0xF8
+NOT_ACKNOWLEDGED, BUS_STUCK = "not acknowledged", "bus stuck"
+FAILURES = {
+    **dict.fromkeys((NO_ACKNOWLEDGE, 0xF2, 0xF3), NOT_ACKNOWLEDGED),
+    TIMED_OUT: BUS_STUCK,
+}
+"""Status byte -> error."""
+
+
+def write(address: int, register: int, data: bytes) -> bytes:
+    """Build a write of some registers."""
+    return bytes((START, address << 1, len(data) + 1, register)) + data + bytes((STOP,))
+
+
+def read(address: int, register: int, length: int) -> bytes:
+    """Build a read of some registers."""
+    return bytes((START, address << 1, 1, register, START, address << 1 | 1, length, STOP))
 
 
 class I2cLine:
@@ -40,7 +67,7 @@ class I2cLine:
         self.tx_bytes += len(packet)
 
     def ask(self, transfers: Sequence[tuple[bytes, int]]) -> list[bytes] | None:
-        """Send transfers and return the bytes that each of them read; None if one failed.
+        """Send transfers and return the bytes that each of them reads; None if one failed.
 
         Args:
             transfers: Transfers, each with the number of bytes that it reads.
@@ -54,14 +81,24 @@ class I2cLine:
             if not self._late and not dropped:
                 self._owed_bytes = 0
         packet = b"".join([transfer + READ_STATUS for transfer, _ in transfers])
-        lengths = [length for _, length in transfers]
-        wanted = sum(lengths) + len(lengths)
+        wanted = sum(length + 1 for _, length in transfers)
         wire_s = (len(packet) + wanted) * self._byte_s
         deadline_s = port.now_s() + wire_s + self._reply_timeout_s
         answer, _ = port.exchange(packet, wanted, deadline_s)
         self.tx_bytes += len(packet)
         self.rx_bytes += len(answer)
-        self.failure = self._answer_error(answer, lengths)
+        found, statuses, at = list[bytes](), list[int](), 0
+        if len(answer) == wanted:
+            for _, length in transfers:
+                found.append(answer[at : at + length])
+                statuses.append(answer[at + length])
+                at += length + 1
+            failures = [FAILURES.get(one, "damaged") for one in statuses if one != OK]
+        else:
+            # A failed transfer returns only its status.
+            failures = [FAILURES.get(one, "incomplete") for one in answer if one != OK]
+            failures.append("incomplete" if answer else "timeout")
+        self.failure = failures[0] if failures else ""
         self._late = self.failure in ("timeout", "incomplete", "damaged")
         if self._late:
             self._owed_bytes += wanted - len(answer)
@@ -69,28 +106,7 @@ class I2cLine:
         if self.failure:
             self.errors[self.failure] += 1
             return None
-        found, at = [], 0
-        for length in lengths:
-            found.append(answer[at : at + length])
-            at += length + 1
         return found
-
-    @staticmethod
-    def _answer_error(answer: bytes, lengths: Sequence[int]) -> str:
-        """Return the error in an answer, "" for none."""
-        if not answer:
-            return "timeout"
-        if len(answer) < sum(lengths) + len(lengths):
-            # A failed transfer returns only its status.
-            failed = [OUTCOMES.get(byte, "incomplete") for byte in answer]
-            return next((reason for reason in failed if reason), "incomplete")
-        at = -1
-        for length in lengths:
-            at += length + 1
-            reason = OUTCOMES.get(answer[at], "damaged")
-            if reason:
-                return reason
-        return ""
 
     def write_confirmed(self, *packets: bytes) -> bool:
         """Send transfers that only write; return whether all were acknowledged."""

@@ -1,6 +1,6 @@
 """An I2C bus of the kernel as a byte port with the behaviour of a bridge chip.
 
-The commands are those of gazerig.drivers.i2c.bridge. The kernel itself frees a bus whose data line
+The commands are those of gazerig.drivers.i2c.line. The kernel itself frees a bus whose data line
 is held low, if its driver can.
 """
 
@@ -8,17 +8,18 @@ import errno
 import fcntl
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from smbus2 import SMBus, i2c_msg
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, commands
+from gazerig.drivers.i2c.line import NO_ACKNOWLEDGE, OK, READ_STATUS, START, STOP, TIMED_OUT
 from gazerig.drivers.serial.list_ports import open_failure_text
 
 I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703
 """Requests of the kernel's i2c-dev."""
+READ_FLAG = 0x0001
 TIMEOUT_10_MS = 2
 """Time-out of a transfer in units of 10 ms: 20 ms instead of one second."""
 
@@ -97,29 +98,29 @@ class I2cPort:
             self._on_traffic()
         if self._bus is None:
             raise self._lost("it is closed")
-        for parts in commands(data):
-            if not parts:
+        at = 0
+        while at < len(data):
+            if data.startswith(READ_STATUS, at):
                 self._waiting += bytes((self._status,))
-                continue
-            messages = [
-                i2c_msg.write(part.address, part.data)
-                if part.length is None
-                else i2c_msg.read(part.address, part.length)
-                for part in parts
-            ]
-            try:
-                self._check_free(parts[0].address)
-                self._bus.i2c_rdwr(*messages)
-            except OSError as error:
-                unplugged = self._bus.fd is not None and not os.path.exists(self.port_name)
-                if error.errno in _GONE or unplugged:
-                    raise self._lost(error) from error
-                self._status = TIMED_OUT if error.errno in _STUCK else NO_ACKNOWLEDGE
-                continue
-            self._status = OK
-            for part, message in zip(parts, messages, strict=True):
-                if part.length is not None:
-                    self._waiting += bytes(message)
+                at += len(READ_STATUS)
+            else:
+                at, messages = transfer_at(data, at)
+                self._status = self._execute(messages)
+
+    def _execute(self, messages: Sequence[Any]) -> int:
+        """Execute one transfer; return its status."""
+        try:
+            self._check_free(messages[0].addr)
+            self._bus.i2c_rdwr(*messages)
+        except OSError as error:
+            unplugged = self._bus.fd is not None and not os.path.exists(self.port_name)
+            if error.errno in _GONE or unplugged:
+                raise self._lost(error) from error
+            return TIMED_OUT if error.errno in _STUCK else NO_ACKNOWLEDGE
+        for message in messages:
+            if message.flags & READ_FLAG:
+                self._waiting += bytes(message)
+        return OK
 
     def _check_free(self, address: int) -> None:
         """Check that no kernel driver has claimed an address."""
@@ -178,3 +179,23 @@ class I2cPort:
 
     def _lost(self, reason: object) -> BusLost:
         return BusLost(f"{self.port_name} is gone ({reason}): check the adapter and its cable")
+
+
+def transfer_at(data: bytes, at: int) -> tuple[int, list[Any]]:
+    """Return the end of the transfer that begins at an index, and its messages.
+
+    Raises:
+        ValueError: the bytes are not a whole transfer.
+    """
+    messages = []
+    while len(data) > at + 2 and data[at] == START:
+        address, count = data[at + 1], data[at + 2]
+        at += 3
+        if address & 1:
+            messages.append(i2c_msg.read(address >> 1, count))
+        else:
+            messages.append(i2c_msg.write(address >> 1, data[at : at + count]))
+            at += count
+    if not messages or at >= len(data) or data[at] != STOP:
+        raise ValueError(f"no whole transfer: {data.hex(' ')}")
+    return at + 1, messages

@@ -9,14 +9,18 @@ from math import inf
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, goals_of
+from gazerig.drivers.hobby_board.board import ChannelStatus
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.start import read_every_pulse
+from gazerig.drivers.hobby_board.supervisor import read_every_pulse
 from gazerig.drivers.maestro.commands import (
     ACCEL_STEPS_S2,
     ERRORS,
+    GET_ERRORS,
+    GET_POSITION,
     MOST_INPUT,
+    SET_ACCELERATION,
+    SET_SPEED,
     SPEED_STEPS_S,
     accel_units,
     name_errors,
@@ -31,23 +35,15 @@ from gazerig.drivers.types import ServoConfig
 class MaestroBoard:
     """One board; implements gazerig.drivers.hobby_board.board.Board."""
 
-    noise_errors = ("damaged", "incomplete", *ERRORS)
-
+    name = "the board"
+    remedy = "set its channel to Servo and widen its range in Pololu's program, without a script"
     longest_ramp_s = inf
 
     def __init__(self, port: BusPort, params: MaestroParams, timing: BusTiming = TIMING) -> None:
         self.params, self.timing = params, timing
         self.line = MaestroLink(port, params, timing)
-        self.texts = BoardTexts(
-            name="the board",
-            no_pulses_remedy="set its channel to Servo in Pololu's program",
-            other_pulse_remedy="widen its range in Pololu's program, or delete the board's script",
-            noise_remedy="check cable and ground",
-            no_answer_remedy=f"has the board {params.channels} channels?",
-            unreachable_behaviour="the board keeps its last goals while it has power",
-        )
         self._errors_first = False
-        self._questions: dict[int, tuple[bytes, bytes]] = {}
+        self._unhandled_errors = 0
 
     def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
         """Find the board and return the pulses of these servos; nothing moves.
@@ -57,7 +53,7 @@ class MaestroBoard:
             ServoMissing: it does not answer, or a channel is not a servo channel.
         """
         where = self.line.port.port_name
-        register = self.line.wait_for_answer()
+        register = self.line.read_errors()
         if register is None:
             remedy = (
                 "take the first of its two USB ports and set it to 'USB Dual Port' in Pololu's "
@@ -84,21 +80,20 @@ class MaestroBoard:
 
     def prepare(self, log: EventLog) -> None:
         """Stop the board's own script if one runs, as it would also move servos."""
-        if self.line.ask(self.line.codec.script_status(), 1) == b"\0":
-            self.line.send(self.line.codec.stop_script())
+        if self.line.is_script_running():
+            self.line.stop_script()
             log.add("the board was running its own script: stopped")
 
     def read_status(self, channel: Channel) -> ChannelStatus | None:
         """Read one channel's pulse and the error register; None without an answer."""
-        questions = self._questions.get(channel.id)
-        if questions is None:
-            speech = self.line.codec
-            one, other = speech.position(channel.id), speech.errors()
-            questions = self._questions[channel.id] = one + other, other + one
+        codec = self.line.codec
+        position, errors = codec.command(GET_POSITION, channel.id), codec.command(GET_ERRORS)
         # The order alternates: on a line that repeats its last answer a pulse width takes the place
         # of the register, which is detected.
         self._errors_first = not self._errors_first
-        found = self.line.ask_words(questions[self._errors_first], 2)
+        found = self.line.ask_words(
+            errors + position if self._errors_first else position + errors, 2
+        )
         if found is None:
             return None
         pulse, register = found[::-1] if self._errors_first else found
@@ -106,40 +101,35 @@ class MaestroBoard:
             # Such errors do not exist: it is a pulse width instead of the register, or noise.
             self.line.errors["damaged"] += 1
             return None
-        return ChannelStatus(pulse, name_errors(register | self.line.take_errors()))
+        register, self._unhandled_errors = register | self._unhandled_errors, 0
+        return ChannelStatus(pulse, name_errors(register))
 
-    def read_errors(self) -> tuple[str, ...] | None:
-        """Read the errors once; None if the board is silent."""
-        register = self.line.read_errors()
-        return None if register is None else name_errors(register)
+    def send_limits(self, channels: Sequence[Channel]) -> bool:
+        """Arm speed and acceleration; return whether the board has found no error.
 
-    def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Return the confirmed present pulses of channels; None after a failure."""
-        return self.line.read_pulses(channels)
-
-    def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:
-        """Arm speed and acceleration; return False if a requested confirmation fails."""
-        packet, speech = b"", self.line.codec
+        On an error it may have stopped all pulses, so no command that moves a servo may follow.
+        """
+        packet, codec = b"", self.line.codec
         for channel in channels:
             speed = speed_units(channel.top_speed_steps_s)
             accel = accel_units(channel.setup.max_accel_steps_s2)
             channel.ramp.speed_steps_s = speed * SPEED_STEPS_S
             channel.ramp.accel_steps_s2 = accel * ACCEL_STEPS_S2
-            packet += speech.speed(channel.id, speed) + speech.acceleration(channel.id, accel)
-        if confirmed:
-            return self.line.send_checked(packet)
-        self.line.send(packet)
-        return True
+            packet += codec.number(SET_SPEED, channel.id, speed)
+            packet += codec.number(SET_ACCELERATION, channel.id, accel)
+        found = self.line.ask_words(packet + codec.command(GET_ERRORS), 1)
+        if found is None:
+            return False
+        self._unhandled_errors |= found[0]
+        return not found[0]
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
         """Send the goals of channels."""
-        self.line.send(self.line.codec.targets(goals_of(channels)))
+        self.line.send(self.line.codec.targets({one.id: one.goal_steps for one in channels}))
 
-    def resend_pulses(self, channels: Sequence[Channel]) -> None:
-        """Do nothing: a board that may have restarted would apply goals without any ramp."""
-
-    def advance_pulses(self, channels: Sequence[Channel]) -> None:
-        """Do nothing: the board ramps its pulses itself."""
+    def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+        """Return the confirmed present pulses of channels; None after a failure."""
+        return self.line.read_pulses(channels)
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses."""
@@ -167,5 +157,4 @@ class MaestroBus(HobbyBoardBus):
         params: MaestroParams,
         timing: BusTiming = TIMING,
     ) -> None:
-        self._maestro = MaestroBoard(port, params, timing)
-        super().__init__(self._maestro, setups)
+        super().__init__(MaestroBoard(port, params, timing), setups)

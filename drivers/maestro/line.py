@@ -4,11 +4,21 @@ Answers have no address and no checksum, so a late answer looks like any other. 
 answer the line is drained before the next request.
 """
 
+import struct
 from collections import Counter
 from collections.abc import Sequence
 
 from gazerig.drivers.bus.timing import TIMING, BusTiming
-from gazerig.drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, MaestroCodec, decode_words
+from gazerig.drivers.maestro.commands import (
+    GET_ERRORS,
+    GET_POSITION,
+    MOST,
+    PROTOCOL_ERROR,
+    SCRIPT_STATUS,
+    SET_TARGET,
+    STOP_SCRIPT,
+    MaestroCodec,
+)
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, QUIET_S, BusPort
@@ -17,7 +27,6 @@ AT_ONCE = 6
 """Largest number of requests in one write, as the board's receive buffer is small."""
 
 GREETINGS = 4
-
 
 ALIKE_STEPS, FASTEST_STEPS_S = 200, 40_000.0
 """Largest difference between two answers about a pulse, plus a speed times the time between
@@ -43,7 +52,6 @@ class MaestroLink:
         self._reply_timeout_s = timing.reply_timeout_s
         self._late = False
         self._owed_bytes = 0
-        self._unhandled_errors = 0
 
     def send(self, packet: bytes) -> None:
         """Send commands that are not answered."""
@@ -75,42 +83,32 @@ class MaestroLink:
 
     def ask_words(self, packet: bytes, count: int) -> tuple[int, ...] | None:
         """Send requests and return their answers as 16-bit words; None without a good answer."""
-        answer = self.ask(packet, WORD * count)
+        answer = self.ask(packet, 2 * count)
         if answer is None:
             return None
-        found = decode_words(answer)
+        found = struct.unpack(f"<{count}H", answer)
         if max(found) > MOST:
-            # No pulse width and no error register is this large: bytes were lost or added.
-            self.errors["damaged"] += 1
-            self._late = True
+            self._record_damage()
             return None
         return found
 
-    def send_checked(self, packet: bytes) -> bool:
-        """Send commands and return whether the board has found no error.
-
-        On an error it may have stopped all pulses, so no command that moves a servo may follow.
-        """
-        found = self.ask_words(packet + self.codec.errors(), 1)
-        if found is None:
-            return False
-        self._unhandled_errors |= found[0]
-        return not found[0]
-
-    def take_errors(self) -> int:
-        """Return the errors that ``send_checked`` has found since the last call."""
-        register, self._unhandled_errors = self._unhandled_errors, 0
-        return register
+    def _record_damage(self) -> None:
+        """Record that bytes were changed, lost or added."""
+        self.errors["damaged"] += 1
+        self._late = True
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses."""
         # Each by its own command, so that a damaged one affects no other.
-        self.send(b"".join(self.codec.target(channel, 0) for channel in channels))
+        self.send(b"".join(self.codec.number(SET_TARGET, channel, 0) for channel in channels))
 
-    def wait_for_answer(self) -> int | None:
-        """Read the errors until the board answers; None if it stays silent."""
-        answers = (self.read_errors() for _ in range(GREETINGS))
-        return next((register for register in answers if register is not None), None)
+    def read_errors(self) -> int | None:
+        """Read the error register, which clears it; None if the board is silent."""
+        for _ in range(GREETINGS):
+            found = self.ask_words(self.codec.command(GET_ERRORS), 1)
+            if found is not None:
+                return found[0]
+        return None
 
     def expects_crc(self) -> bool:
         """Return whether the board expects check bytes.
@@ -119,14 +117,18 @@ class MaestroLink:
         """
         if not self.codec.crc:
             return True
-        self.ask_words(self.codec.errors(), 1)
-        found = self.ask_words(self.codec.errors(), 1)
+        self.ask_words(self.codec.command(GET_ERRORS), 1)
+        found = self.ask_words(self.codec.command(GET_ERRORS), 1)
         return found is None or not found[0] >> PROTOCOL_ERROR & 1
 
-    def read_errors(self) -> int | None:
-        """Read the errors once; None without an answer."""
-        found = self.ask_words(self.codec.errors(), 1)
-        return found[0] if found is not None else None
+    def is_script_running(self) -> bool | None:
+        """Return whether the board's own script runs, None without an answer."""
+        status = self.ask(self.codec.command(SCRIPT_STATUS), 1)
+        return None if status is None else status == b"\0"
+
+    def stop_script(self) -> None:
+        """Stop the board's own script."""
+        self.send(self.codec.command(STOP_SCRIPT))
 
     def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Read the pulse widths of some channels, quarter microseconds; 0: no pulses.
@@ -147,8 +149,7 @@ class MaestroLink:
         # Only for several channels, as it takes 3 ms: all are read only after an anomaly.
         over = len(channels) > 1 and self.port.read_until(1, self.port.now_s() + QUIET_S)
         if over or not alike:
-            self.errors["damaged"] += 1
-            self._late = True
+            self._record_damage()
             return None
         return second
 
@@ -156,7 +157,7 @@ class MaestroLink:
         found: tuple[int, ...] = ()
         for i in range(0, len(channels), AT_ONCE):
             some = channels[i : i + AT_ONCE]
-            packet = b"".join(self.codec.position(channel) for channel in some)
+            packet = b"".join(self.codec.command(GET_POSITION, channel) for channel in some)
             got = self.ask_words(packet, len(some))
             if got is None:
                 return None

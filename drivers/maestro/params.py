@@ -4,7 +4,7 @@ Source: Pololu Maestro Servo Controller User's Guide (0J40).
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.params import Choices
@@ -18,12 +18,4 @@ class MaestroParams(HobbyBoardParams):
     crc: Annotated[bool, "Whether the board is set up for a CRC byte after every command; it ignores damaged commands then."] = False
     channels: Annotated[int, Choices(6, 12, 18, 24), "Number of channels of the board; the Micro Maestro has 6."] = 12
     # fmt: on
-
-    @property
-    def baud(self) -> int:
-        """Return the baud rate of its port, which accepts any."""
-        return 115_200
-
-    def pulse_range_us(self) -> tuple[float, float, str]:
-        """Return the shortest and longest pulse that a board can output."""
-        return 64.0, 4080.0, "the range of a Maestro"
+    pulse_range_us: ClassVar[tuple[float, float, str]] = (64.0, 4080.0, "the range of a Maestro")

@@ -1,14 +1,11 @@
 """Parameters of PCA9685 boards, set in a rig file."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
-from gazerig.drivers.pca9685.registers import CHANNELS, PulseClock, prescale_of
+from gazerig.drivers.pca9685.registers import CHANNELS, PulseClock
 from gazerig.params import Bounds
-
-BRIDGE_BAUD = 115_200
-"""Baud rate of a bridge's serial line; the rate of an I2C bus is set in the system."""
 
 _PULSES_HZ = 50.0
 """Analogue servos need 50 pulses per second."""
@@ -28,6 +25,7 @@ class Pca9685Params(HobbyBoardParams):
     oscillator_hz: Annotated[float, Bounds(22_000_000, 28_000_000),
         "Frequency of the boards' oscillators. It differs from board to board by some percent, and the pulse widths with it."] = 25e6
     # fmt: on
+    pulse_range_us: ClassVar[tuple[float, float, str]] = (500.0, 2500.0, "what most servos accept")
 
     def __post_init__(self) -> None:
         """Check that the values are consistent.
@@ -41,10 +39,6 @@ class Pca9685Params(HobbyBoardParams):
         if len(set(self.addresses)) < len(self.addresses):
             raise ValueError("two boards have the same address: each needs its own")
 
-    def pulse_range_us(self) -> tuple[float, float, str]:
-        """Return the shortest and longest pulse that may be sent."""
-        return 500.0, 2500.0, "what most servos accept"
-
     @property
     def addresses(self) -> tuple[int, ...]:
         """Return the addresses of all boards, in their order."""
@@ -53,14 +47,9 @@ class Pca9685Params(HobbyBoardParams):
     @property
     def clock(self) -> PulseClock:
         """Return the clock of the boards."""
-        return PulseClock(self.oscillator_hz, prescale_of(_PULSES_HZ, self.oscillator_hz))
+        return PulseClock.of_frequency(_PULSES_HZ, self.oscillator_hz)
 
     @property
     def channels(self) -> int:
         """Return the number of channels of all boards."""
         return CHANNELS * len(self.addresses)
-
-    @property
-    def baud(self) -> int:
-        """Return the baud rate of a bridge's serial line."""
-        return BRIDGE_BAUD

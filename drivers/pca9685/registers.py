@@ -4,7 +4,6 @@ Source: NXP, PCA9685 data sheet, rev. 4 (16 April 2015), section 7.3.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 from math import ceil, floor
 from typing import NamedTuple
 
@@ -20,23 +19,14 @@ TOTEM_POLE = 0x04
 """MODE2: outputs drive high and low, and change at the stop condition, never within a pulse."""
 FULL_OFF = 0x10
 """Bit in the high byte of OFF: no pulses, for any value of ON (7.3.3)."""
-OFF = bytes((0, 0, 0, FULL_OFF))
-
-SOFTWARE_RESET = 0x06
-"""Byte to the general call address that resets every PCA9685 to its power-up state (7.6)."""
 
 CHANNELS, COUNTS = 16, 4096
-LEAST_PRESCALE, MOST_PRESCALE = 3, 255
+LEAST_PRESCALE = 3
 START_S = 0.001
 """The oscillator is stable .5 ms after the end of sleep; a restart must not be requested earlier
 (7.3.1.1)."""
 
 US_STEPS = 4
-
-
-def prescale_of(frequency_hz: float, oscillator_hz: float) -> int:
-    """Return the prescaler for a frequency."""
-    return max(LEAST_PRESCALE, round(oscillator_hz / (COUNTS * frequency_hz)) - 1)
 
 
 class PulseClock(NamedTuple):
@@ -45,10 +35,25 @@ class PulseClock(NamedTuple):
     oscillator_hz: float
     prescale: int
 
+    @classmethod
+    def of_frequency(cls, frequency_hz: float, oscillator_hz: float) -> "PulseClock":
+        """Return the clock with the prescaler for a frequency of pulses."""
+        prescale = round(oscillator_hz / (COUNTS * frequency_hz)) - 1
+        return cls(oscillator_hz, max(LEAST_PRESCALE, prescale))
+
     @property
     def resolution_steps(self) -> float:
         """Return the length of one 4096th of the period, quarter microseconds."""
         return (self.prescale + 1) / self.oscillator_hz * 1e6 * US_STEPS
+
+    def counts_within(self, steps: int, low_steps: int, high_steps: int) -> int:
+        """Return the counts nearest to a pulse; if it is inside the limits, the counts are too."""
+        grain = self.resolution_steps
+        least, most = ceil(low_steps / grain), floor(high_steps / grain)
+        counts = round(steps / grain)
+        if not low_steps <= steps <= high_steps or least > most:
+            return counts
+        return min(max(counts, least), most)
 
 
 def output_register(channel: int) -> int:
@@ -58,7 +63,7 @@ def output_register(channel: int) -> int:
 
 def pulse_registers(counts: int) -> bytes:
     """Return the registers of a channel for a pulse; 0: none."""
-    return bytes((0, 0, counts & 0xFF, counts >> 8)) if counts else OFF
+    return bytes((0, 0, counts & 0xFF, counts >> 8)) if counts else bytes((0, 0, 0, FULL_OFF))
 
 
 def counts_of(registers: bytes) -> int:
@@ -82,28 +87,6 @@ def are_plausible(first_six: bytes, outputs: bytes, prescale: int) -> bool:
     low_bits = any(address & 1 for address in first_six[2:])
     high_bits = first_six[1] & 0xE0 or any(byte & 0xE0 for byte in outputs[1::2])
     return not low_bits and not high_bits and prescale >= LEAST_PRESCALE
-
-
-def counts_within(steps: int, low_steps: int, high_steps: int, grain_steps: float) -> int:
-    """Return the counts nearest to a pulse; if it is inside the limits, the counts are too.
-
-    Args:
-        steps: Pulse, quarter microseconds.
-        low_steps: Shortest pulse, quarter microseconds.
-        high_steps: Longest pulse, quarter microseconds.
-        grain_steps: Length of one count, quarter microseconds.
-    """
-    counts = round(steps / grain_steps)
-    least, most = _counts_between(low_steps, high_steps, grain_steps)
-    if not low_steps <= steps <= high_steps or least > most:
-        return counts
-    return min(max(counts, least), most)
-
-
-@lru_cache(maxsize=256)
-def _counts_between(low_steps: int, high_steps: int, grain_steps: float) -> tuple[int, int]:
-    """Return the smallest and largest counts whose pulses are inside the limits."""
-    return ceil(low_steps / grain_steps), floor(high_steps / grain_steps)
 
 
 def adjacent_runs(channels: Sequence[int]) -> list[list[int]]:

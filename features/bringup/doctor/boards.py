@@ -245,7 +245,7 @@ def _read_pulses(
         pulses[channel] = None if heard is None else heard[0]
     if None in pulses.values():
         # The unknown channel has now set an error in its register, which is not a fault.
-        line.wait_for_answer()
+        line.read_errors()
     return pulses
 
 
@@ -260,8 +260,8 @@ def stop_script(port: BusPort, params: MaestroParams) -> str:
     if found is None:
         raise PortError(f"{port.port_name}: no Maestro answers: gazerig doctor names the cure")
     line = MaestroLink(port, replace(params, crc=found.expects_crc))
-    line.send(line.codec.stop_script())
-    return "" if line.ask(line.codec.script_status(), 1) == b"\1" else "it runs on"
+    line.stop_script()
+    return "" if line.is_script_running() is False else "it runs on"
 
 
 # --- PCA9685
