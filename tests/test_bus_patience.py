@@ -8,7 +8,6 @@ from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks
 from gazerig.drivers.dynamixel.read_plan import INDIRECT_MAP
 from gazerig.drivers.event_log import MOST, EventLog, register_label
-from gazerig.drivers.serial.reconnect import Reconnect
 from gazerig.drivers.servo_bus.transaction import REFILL, RESERVE_S, WINDOW, AdaptiveTimeout
 from gazerig.drivers.types import ServoConfig
 
@@ -80,23 +79,6 @@ def test_the_indirect_map_fits_every_window():
         block = indirect_blocks(MODELS[name], firmware)[0]
         assert len(INDIRECT_MAP) <= block.entries
         assert all(block.target_low <= address <= block.target_high for address in INDIRECT_MAP)
-
-
-def test_a_lost_port_is_tried_ever_more_seldom_but_once_a_second():
-    link = Reconnect()
-    link.record_lost(10.0)
-    tries, now_s = [], 10.0
-    while now_s < 16.0:
-        now_s = round(now_s + 0.0625, 4)
-        if link.is_due(now_s):
-            tries.append(now_s - 10.0)
-            link.record_failed(now_s)
-    waits = [b - a for a, b in zip([0.0, *tries], tries, strict=False)]
-    doubled = [0.1, 0.2, 0.4, 0.8, 1.0, 1.0]
-    assert all(0.0 <= w - d <= 0.0625 for w, d in zip(waits, doubled, strict=False))
-    assert max(waits) <= 1.0625
-    assert round(link.record_reopened(16.0), 6) == 6.0
-    assert not link.down
 
 
 def test_the_journal_forgets_what_nobody_takes():

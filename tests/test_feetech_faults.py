@@ -13,7 +13,7 @@ from sts_rig import Rig
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.process.host_lateness import HostLateness
-from gazerig.drivers.servo_bus.recovery import FAR_SIDE
+from gazerig.drivers.servo_bus.supervisor import FAR_SIDE
 from gazerig.drivers.servo_bus.torque import read_positions
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.smart_servo.physics import ServoSpec

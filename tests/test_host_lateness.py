@@ -16,7 +16,8 @@ from gazerig.drivers.process.host_lateness import (
     HostLateness,
 )
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.servo_bus.faults import GARBLES, NOT_SET_UP
+from gazerig.drivers.servo_bus.faults import GARBLES
+from gazerig.drivers.servo_bus.supervisor import NOT_SET_UP
 
 SYNC_READ = 0x82
 

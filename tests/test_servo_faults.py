@@ -18,7 +18,7 @@ from feedback_rows import rows
 from moving_bus import IDS, LONGEST_S, NAMES
 
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
+from gazerig.drivers.servo_bus.supervisor import AGAIN_AND_AGAIN
 
 RIGS: dict[str, Callable[[], Any]] = {
     **{f"dynamixel {way}": partial(DynamixelRig, chosen) for way, chosen in WAYS.items()},

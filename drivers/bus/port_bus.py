@@ -117,7 +117,7 @@ class PortBus(ABC):
         self._supervisor.stop_supervision()
         if not self._opened:
             return
-        if self._link.down and not self._link.reopen_now(self._now_s):
+        if self._link.down and not self._link.reopen_now():
             self._link.record_failed_release()
             raise BusLost(self._cannot_release())
         self._switch_all_off()

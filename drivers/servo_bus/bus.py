@@ -1,8 +1,8 @@
 """Smart servos of one family on one serial bus: one read and one write per tick."""
 
 import struct
-from collections.abc import Callable, Collection, Mapping, Sequence
-from math import ceil
+from collections.abc import Collection, Mapping, Sequence
+from math import ceil, inf
 
 from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.plausibility import DISTURBED_S
@@ -15,24 +15,22 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.servo_bus.discovery import find
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_bus.faults import CHECK_SUPPLY, ServoHealth
+from gazerig.drivers.servo_bus.faults import CHECK_SUPPLY, SilenceLog
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.servo_bus.latched_faults import LatchedFaultSupervisor
 from gazerig.drivers.servo_bus.poll_list import PollList
 from gazerig.drivers.servo_bus.provisioning import Provisioning
-from gazerig.drivers.servo_bus.recovery import Recovery
+from gazerig.drivers.servo_bus.read_plan import Sample
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 from gazerig.drivers.servo_bus.sync_read import OWED_S, ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.drivers.servo_bus.transient_faults import TransientFaultSupervisor
 from gazerig.drivers.types import Feedback, ServoConfig
 
 _WATCHDOG_S = 0.2
 """Silence after which servos with a watchdog stop by themselves."""
-RESTART_S = 0.1
-"""Silence after which servos may have restarted because their power was cut."""
+POLL_S = 0.1
+"""Interval of the reads of values that a group read does not cover; the servos take turns."""
 
 
 class SmartServoBus(PortBus):
@@ -91,6 +89,7 @@ class SmartServoBus(PortBus):
         )
         self._damaged = 0
         self._unconfirmed: set[int] = set()
+        self._polled_s, self._turn = -inf, 0
         self._assemble(None)
 
     def _assemble(self, firmware: Mapping[int, int] | None) -> None:
@@ -104,20 +103,14 @@ class SmartServoBus(PortBus):
             self._port, self._baud, self._timing.give_up_s, log, self._reset_after_reconnect
         )
         self._poll_list = PollList(self._ids)
-        self._health = ServoHealth(by_id, log)
+        self._silence = SilenceLog(by_id, log, line.lateness)
         plan = self._plan = self._family.read_plan(self._setups, firmware)
         single = Registers(self._port, self._family, 1, self._line.lateness)
         self._provisioning = Provisioning(line, single, self._setups, log, plan.indirect_block)
-        self._recovery = Recovery(
-            line, self._provisioning, by_id, self._watchdog, self._health, log
-        )
-        self._speeds = self._recovery.speeds(self._ids, ())
         self._feedback = FeedbackColumns(self._family, self._setups)
         self._reader = SyncReader(line, self._poll_list, plan)
-        kind: Callable[..., Supervisor]
-        kind = LatchedFaultSupervisor if self._family.faults_latch else TransientFaultSupervisor
-        self._supervisor = kind(
-            line, by_id, self._recovery, self._health, self._feedback, plan, self._watchdog
+        self._supervisor = Supervisor(
+            line, by_id, self._provisioning, self._feedback, log, self._watchdog
         )
 
     # --- one reading
@@ -130,15 +123,12 @@ class SmartServoBus(PortBus):
                 return True
             if now_s - self._reader.unanswered_s <= OWED_S:
                 return True
-        return not self._supervisor.is_idle
+        return False
 
     def _apply_one_by_one(self, replies: dict[int, ServoReply], now_s: float) -> None:
         """Apply an answer servo by servo, each with its errors."""
         supervisor, feedback = self._supervisor, self._feedback
         feedback.begin()
-        if replies and self._health.silent_for_s(now_s) >= RESTART_S:
-            # All were silent together: their power may have been cut.
-            supervisor.mark_all_for_recovery()
         answered = bool(replies)
         if self._family.weak_check:
             replies = self._confirm_doubtful(replies, now_s)
@@ -147,10 +137,8 @@ class SmartServoBus(PortBus):
             slot = self._slot[servo_id]
             garbled = servo_id in self._poll_list.garbling_ids
             was_out = self._poll_list.record_answer(servo_id)
-            if was_out:
-                supervisor.check_after_silence(servo_id)
             if one.sample.error & self._family.codec.REFUSAL:
-                supervisor.check_status(servo_id, one.sample, now_s)
+                self._check(servo_id, one.sample)
                 self._line.errors["refused"] += 1
             elif was_out and (dark or garbled):
                 # The first answer after a long silence may be an old one. Two servos that answer
@@ -158,20 +146,46 @@ class SmartServoBus(PortBus):
                 # in 65,536 pass.
                 continue
             elif one.sample.is_blank:
-                supervisor.check_status(servo_id, one.sample, now_s)
+                self._check(servo_id, one.sample)
             elif believed or feedback.is_plausible(slot, one):
-                supervisor.check_status(servo_id, one.sample, now_s)
+                self._check(servo_id, one.sample)
                 feedback.apply_reply(slot, one)
             else:
                 self._line.errors["implausible"] += 1
         supervisor.record_out_of_group(self._poll_list.out_ids, now_s)
-        self._health.record_silent(
+        self._silence.update(
             {*self._poll_list.out_ids, *self._unconfirmed},
-            now_s,
             self._poll_list.garbling_ids | self._unconfirmed,
-            self._line.lateness,
             answered,
+            now_s,
         )
+
+    def _check(self, servo_id: int, sample: Sample) -> None:
+        """Check one servo's answer for faults, lost torque and lost settings."""
+        codec, supervisor = self._family.codec, self._supervisor
+        supervisor.check_status(servo_id, sample.error & codec.ALERT | (sample.status or 0))
+        names = {"torque": "torque_enable"}
+        if sample.torque is not None:
+            names |= {"acceleration": "acceleration", "torque_limit": "torque_limit"}
+        known = {name: getattr(sample, field) for field, name in names.items()}
+        values = {name: value for name, value in known.items() if value is not None}
+        if sample.is_blank:
+            values = {"torque_enable": -1}
+        supervisor.check_polled(servo_id, values)
+
+    def _poll(self, now_s: float) -> None:
+        """Read what a group read does not cover of one servo; the servos take turns."""
+        self._polled_s, self._turn = now_s, (self._turn + 1) % len(self._ids)
+        servo_id, slot = self._ids[self._turn], self._turn
+        if servo_id not in self._poll_list.group:
+            return
+        for torque in self._line.ask((servo_id,), "torque_enable").values():
+            self._feedback.set_torque(slot, bool(torque))
+            self._supervisor.check_polled(servo_id, {"torque_enable": torque})
+        volts = self._line.ask((servo_id,), "present_input_voltage")
+        warm = self._line.ask((servo_id,), "present_temperature")
+        if volts and warm:
+            self._feedback.set_climate(slot, volts[servo_id], warm[servo_id])
 
     def _confirm_doubtful(
         self, replies: dict[int, ServoReply], now_s: float
@@ -256,15 +270,15 @@ class SmartServoBus(PortBus):
                 doubtful = self._wary and self._is_doubtful(now_s)
                 if doubtful or not feedback.apply_whole(group, raw, at_s):
                     self._apply_one_by_one(reader.verified_replies(group, raw, at_s, now_s), now_s)
-                elif self._health.all_silent_since_s is not None:
-                    self._health.record_answered_again(now_s, line.lateness)
+            if not self._plan.covers_torque and now_s - self._polled_s >= POLL_S:
+                self._poll(now_s)
             if now_s >= supervisor.due_s:
                 supervisor.service(self._poll_list.group, now_s)
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
         if self._poll_list.is_troubled:
-            silent_s = self._health.silent_for_s(now_s)
+            silent_s = self._silence.silent_for_s(now_s)
             if silent_s >= self._timing.give_up_s:
                 fault = f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s"
                 raise BusLost(line.lateness.blame(fault, CHECK_SUPPLY, now_s, now_s - silent_s))
@@ -286,9 +300,7 @@ class SmartServoBus(PortBus):
         """
         try:
             self._apply_wanted()
-            # A servo may have restarted since it was prepared.
-            self._provisioning.apply(self._ids)
-            goals, outside = self._recovery.enable(self._ids)
+            goals = self._supervisor.enable_torque()
         except (ServoMissing, ServoFault):
             self.disable_torque()
             raise
@@ -296,8 +308,6 @@ class SmartServoBus(PortBus):
             self._link.record_failed_release()  # some servos may already have torque
             raise
         self._link.release_due = False
-        self._supervisor.start_supervision(outside)
-        self._speeds = self._recovery.speeds(self._ids, ())
         return goals
 
     def set_limp(self, servos: Collection[int]) -> None:
@@ -305,24 +315,12 @@ class SmartServoBus(PortBus):
 
         They hold their present position. One that refuses is set up again by later reads.
         """
-        supervisor, line = self._supervisor, self._line
-        before = supervisor.limp
-        off = {self._ids[i] for i in servos} - before
-        on = before - {self._ids[i] for i in servos}
-        if not (off or on) or not supervisor.engaged or self._link.down:
+        if not self._supervisor.engaged or self._link.down:
             return
         try:
-            if off:
-                released = switch_off(line, tuple(off))
-                off -= {*released.holding_ids, *released.unconfirmed_ids}
-            try:
-                self._recovery.enable(tuple(on))
-            except (ServoMissing, ServoFault):
-                supervisor.mark_for_recovery(on)
+            self._supervisor.set_limp({self._ids[i] for i in servos})
         except BusLost as lost:
             self._record_loss(lost)
-        else:
-            supervisor.set_limp((before | off) - on)
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo in one packet; goals are clipped to the limits.
@@ -337,10 +335,7 @@ class SmartServoBus(PortBus):
         supervisor, line = self._supervisor, self._line
         if not supervisor.engaged or self._link.down or line.starved:
             return
-        withheld = supervisor.withheld_ids(self._now_s) if supervisor.withholds_goals else ()
-        speeds, entering = self._speeds, supervisor.entering
-        if entering.places and self._family.goal_speed:
-            speeds = self._recovery.speeds(self._ids, entering.ids)
+        withheld, speeds = supervisor.withheld_ids(self._now_s), supervisor.speeds
         try:
             packet = self._goals.packet(goals, speeds)
         except struct.error:  # goals are usually whole numbers
@@ -371,7 +366,8 @@ class SmartServoBus(PortBus):
     def faults(self) -> tuple[str, ...]:
         """Return the present faults, one line each, e.g. "neck_yaw (servo 7): overload"."""
         return tuple(
-            f"{self._line.label(i)}: {fault}" for i, fault in sorted(self._health.faults.items())
+            f"{self._line.label(i)}: {fault}"
+            for i, fault in sorted(self._supervisor.faults.items())
         )
 
     def _switch_off(self) -> ReleaseResult:

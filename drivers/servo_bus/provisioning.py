@@ -55,6 +55,10 @@ class Provisioning:
         self._setups = {setup.id: setup for setup in setups}
         self._wanted = {setup.id: self._family.wanted_settings(setup) for setup in setups}
 
+    def wanted(self, servo_id: int) -> Mapping[str, int]:
+        """Return the required values of a servo's registers, by name."""
+        return self._wanted[servo_id]
+
     def apply(self, ids: Sequence[int]) -> None:
         """Set servos to position mode with their limits, speeds and gains.
 

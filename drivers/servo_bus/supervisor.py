@@ -1,254 +1,426 @@
-"""Supervision of servos between the exchanges, independent of a family's fault reports."""
+"""Care for the servos between the exchanges: faults, restarts, tripped watchdogs, limp joints.
 
-from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable, Mapping
-from math import inf, isfinite
+An answer that is not that of a healthy servo only marks the servo. After the read the supervisor
+asks each marked servo what is wrong with it. A fault is named, and asked about until it is gone. A
+servo without a fault is set up as at the start: nothing written to it before is relied on, settings
+are compared, the goal becomes the present position, and only then is torque switched on.
+"""
 
-from gazerig.drivers.bus.goal_limits import LimitRecovery
+from collections.abc import Collection, Mapping
+from math import inf
+
+from gazerig.drivers.bus.goal_limits import far_outside_steps
+from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.event_log import EventLog, RateLimitedLog
 from gazerig.drivers.process.host_lateness import LATE_COMPUTER
-from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.servo_bus.read_plan import ReadPlan, Sample
-from gazerig.drivers.servo_bus.recovery import Recovery
-from gazerig.drivers.servo_bus.torque import rearm_tripped
+from gazerig.drivers.servo_bus.provisioning import Provisioning
+from gazerig.drivers.servo_bus.torque import (
+    crosses_zero,
+    enable,
+    goal_speeds,
+    read_positions,
+    switch_off,
+    write_verified,
+)
 from gazerig.drivers.servo_bus.transaction import TRIES, Transactions
 from gazerig.drivers.types import ServoConfig
 
 AGAIN_S = 0.25
-"""Time between attempts to set a servo up again, or to read the cause of an alert."""
+"""Time between attempts to set a servo up, and between questions about a fault."""
+
+GONE_S = 1.0
+"""A fault that is not latched has ended when it was absent for this time: bits flicker at the
+threshold."""
+
+RESTART_S = 0.1
+"""Silence after which a servo may have restarted: it gets no goals until it is set up."""
+
+CHECK_S = 1.0
+"""Interval of the checks of the servos' watchdogs; the servos take turns."""
+
+TRIPPED = 255
+"""Value of Bus Watchdog after it has stopped the servo."""
+
+MOST_RESTARTS, WITHIN_S = 3, 10.0
+"""A servo that restarts more often than this within this time stays without torque."""
+
+ENTRY_S = 0.3
+"""Time beyond that of its way after which a servo has moved into its limits, or never will."""
+
+AGAIN_AND_AGAIN = "restarts again and again: supply too weak"
+FAR_SIDE = "is beyond its encoder's zero: turn it into its range by hand"
+NOT_SET_UP = "cannot be set up again"
+BAD_LINE = "a second servo with its id, or a bad cable"
 
 
-class Supervisor(ABC):
-    """Supervisor of the servos' health.
+class Supervisor:
+    """Supervisor of the servos of one bus.
 
     Args:
         line: Exchanges on the bus.
         setups: The servos by id.
-        recovery: Sets them up again.
-        health: Their faults.
+        provisioning: Their settings.
         feedback: Their feedback.
-        plan: Plan of their reads.
+        log: Records events.
         watchdog: Armed value of Bus Watchdog, in its units; 0 for none.
 
     engaged: whether torque is on
-    entering: servos that move slowly into their limits
-    withholds_goals: whether the supervisor may ever withhold goals
-    due_s: ``service`` has nothing to do before this time
     limp: servos whose torque is off on purpose
+    faults: present fault of a servo, by id
+    speeds: speed limits of all servos in register units, slow for those outside their limits
+    due_s: ``service`` has nothing to do before this time
     """
-
-    withholds_goals = False
 
     def __init__(
         self,
         line: Transactions,
         setups: Mapping[int, ServoConfig],
-        recovery: Recovery,
-        health: ServoHealth,
+        provisioning: Provisioning,
         feedback: FeedbackColumns,
-        plan: ReadPlan,
+        log: EventLog,
         watchdog: int = 0,
     ) -> None:
         self._line, self._family = line, line.family
         self._setups = setups
         self._ids = tuple(setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
-        self._recovery = recovery
-        self._health = health
+        self._provisioning = provisioning
         self._feedback = feedback
-        self._plan = plan
+        self._log, self._seldom = log, RateLimitedLog(log)
         self._watchdog = watchdog
         self.engaged = False
         self.limp: frozenset[int] = frozenset()
-        self.due_s = -inf
-        self.entering = LimitRecovery(setups)
-        self._suspects: set[int] = set()
-        self._rearmed: set[int] = set()
-        self._recover_at_s = self._check_at_s = -inf
+        self.faults: dict[int, str] = {}
+        self.due_s = self._check_at_s = -inf
         self._checked = 0
-        self._failures = 0
+        self._restarts: dict[int, list[float]] = {servo_id: [] for servo_id in self._ids}
+        self._faulty_s = dict.fromkeys(self._ids, -inf)
+        self._marked: dict[int, float] = {}  # time of the next attempt to set it up
+        self._problems: dict[int, tuple[str, int]] = {}  # result of attempts, and their number
+        self._held: set[int] = set()  # gets no goals until it is set up
+        self._silent_since_s: dict[int, float] = {}
+        self._rearmed: dict[int, float] = {}  # end of its slow way, -inf if it has none
+        self._set_speeds()
 
-    @property
-    def is_idle(self) -> bool:
-        """Return whether no servo has a condition that an answer could change."""
-        return True
+    def _set_speeds(self) -> None:
+        slow = [servo_id for servo_id, until_s in self._rearmed.items() if until_s > -inf]
+        self.speeds = goal_speeds(self._family, [*self._setups.values()], slow)
 
-    def start_supervision(self, entering: Collection[int]) -> None:
-        """Start supervision under torque; ``entering``: servos outside their limits."""
-        self.engaged, self.limp = True, frozenset()
-        for servo_id in tuple(self._recovery.astray):
-            self._end_astray(servo_id)
-        self.entering.begin(entering)
-        self._suspects.clear()
-        unit = self._family.watchdog_unit_s or 0.0
-        self._line.starving_s, self._line.tries = self._watchdog * unit or inf, 1
+    # --- torque of all servos
+
+    def check_prepared(self) -> None:
+        """Name the latched errors of servos that have just been prepared."""
+        if self._family.faults_latch:
+            for servo_id, bits in self._line.ask(self._ids, self._family.error_register).items():
+                if bits:
+                    self._record_fault(servo_id, " and ".join(self._family.name_errors(bits)))
+                    self._mark(servo_id)
+
+    def enable_torque(self) -> tuple[int, ...]:
+        """Set all servos up, switch their torque on, and supervise them; return their goals.
+
+        Raises:
+            ServoMissing: a servo does not answer or rejects a setting or its goal.
+            ServoFault: a servo refuses its torque, or would move in the wrong direction.
+        """
+        # A servo may have restarted since it was prepared.
+        self._provisioning.apply(self._ids)
+        goals, outside = enable(self._line, self._setups, self._ids, self._watchdog)
+        self.stop_supervision()
+        self._marked.clear()
+        self._problems.clear()
+        for servo_id in [*self.faults]:
+            self._clear_fault(servo_id)
+        self.engaged = True
+        unit_s = self._family.watchdog_unit_s or 0.0
+        self._line.starving_s, self._line.tries = self._watchdog * unit_s or inf, 1
         self._feedback.expect_torque(True)
         self._feedback.places.forget()
+        self._record_rearmed(outside)
+        return goals
 
     def stop_supervision(self) -> None:
         """Stop supervision, as the servos have no torque."""
         self.engaged, self.limp = False, frozenset()
-        self.entering.clear()
-        self._suspects.clear()
+        self._held.clear()
+        self._silent_since_s.clear()
         self._rearmed.clear()
         self._line.starving_s, self._line.starved, self._line.tries = inf, False, TRIES
         self._feedback.expect_torque(False)
 
-    def set_limp(self, ids: Collection[int]) -> None:
-        """Record the servos whose torque is off on purpose; others have it, limited slowly."""
-        for servo_id in self.limp.difference(ids):
-            steps = self._feedback.now.position_steps[self._slot[servo_id]]
-            if isfinite(steps):
-                self.entering.add_if_outside(servo_id, round(steps))
-        self.limp, self.due_s = frozenset(ids), -inf
-        self._feedback.expect_limp([self._slot[servo_id] for servo_id in ids])
+    def set_limp(self, wanted: Collection[int]) -> None:
+        """Switch torque off on these servos; all others that were limp get it again.
 
-    def mark_for_recovery(self, ids: Collection[int]) -> None:
-        """Mark servos for recovery."""
-        self._suspects.update(ids)
-        self._recover_at_s = self.due_s = -inf
-
-    def mark_all_for_recovery(self) -> None:
-        """Mark every servo for recovery."""
-        self._suspects.update(self._ids)
-        self._recover_at_s = -inf
-        self._feedback.places.forget()
-
-    @abstractmethod
-    def check_prepared(self) -> None:
-        """Check servos that have just been prepared."""
-
-    @abstractmethod
-    def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
-        """Check one servo's answer for faults and for lost torque or limits."""
-
-    @abstractmethod
-    def service(self, group: Collection[int], now_s: float) -> None:
-        """Do the tasks due after a read from ``due_s`` on; recover servos that work again.
+        A servo that does not confirm keeps its torque. One that refuses it is set up by later
+        reads.
 
         Raises:
             BusLost: the port is lost.
         """
+        off, on = tuple(set(wanted) - self.limp), tuple(self.limp.difference(wanted))
+        if not off and not on:
+            return
+        limp = self.limp.difference(on)
+        if off:
+            released = switch_off(self._line, off)
+            limp |= set(off).difference(released.holding_ids, released.unconfirmed_ids)
+        self.limp = limp
+        self._enable_again(on)
+        self._feedback.expect_limp([self._slot[servo_id] for servo_id in limp])
+
+    def _enable_again(self, ids: tuple[int, ...]) -> bool:
+        """Give some servos torque again at their present positions; return whether they have it."""
+        try:
+            _, outside = enable(self._line, self._setups, ids, self._watchdog)
+        except (ServoMissing, ServoFault):
+            for servo_id in ids:
+                self._mark(servo_id, is_held=True)
+            return False
+        self._record_rearmed(outside)
+        return True
+
+    def _record_rearmed(self, ways_s: Mapping[int, float]) -> None:
+        """Record servos that got torque, and the times of their ways into their limits."""
+        now_s = self._line.port.now_s()
+        self._rearmed |= {i: now_s + way_s + ENTRY_S for i, way_s in ways_s.items()}
+        self._set_speeds()
+        self.due_s = -inf
+
+    # --- goals
 
     def withheld_ids(self, now_s: float) -> frozenset[int]:
-        """Return the servos that must get no goals now."""
-        return frozenset()
+        """Return the servos that must get no goals now.
 
-    def check_after_silence(self, servo_id: int) -> None:  # noqa: B027  # some have nothing to do
-        """Check a servo that was out of the group."""
-
-    def record_out_of_group(self, out: Collection[int], now_s: float) -> None:  # noqa: B027
-        """Record the servos that are out of the group."""
-
-    # --- servos to be set up again
-
-    def _recover(self, group: Collection[int], now_s: float) -> None:
-        """Set up servos again that may have restarted and answer; try again later after a failure.
-
-        After a failure each is set up alone, so that no other servo waits for the failing one.
+        Some firmware switches torque on with a goal, so a servo that may have restarted, or has no
+        torque, first gets its present position as goal.
         """
-        ids = tuple(i for i in self._ids if i in self._suspects and i in group)
-        if not ids:
+        if not self._silent_since_s and not self._held:
+            return self.limp
+        silent = {i for i, at_s in self._silent_since_s.items() if now_s - at_s >= RESTART_S}
+        return self.limp | silent | self._held
+
+    # --- what answers tell
+
+    def check_status(self, servo_id: int, error: int) -> None:
+        """Check the error bits of an answer: those of the packet, and of the fault's register."""
+        if error:
+            self._mark(servo_id)
+
+    def check_polled(self, servo_id: int, values: Mapping[str, int]) -> None:
+        """Check registers of one servo, by name, that are read at intervals."""
+        if values.get(self._family.error_register):
+            self._mark(servo_id)
+        if not self.engaged or servo_id in self.limp:
             return
-        if self._failures:
-            ids = (ids[self._failures % len(ids)],)
-        self._recover_at_s = now_s + AGAIN_S
-        found = self._recovery.recover(ids, self.engaged, now_s)
-        if found is None:
-            if self._failures:
-                self._health.record_not_set_up(ids[0], now_s, self._line.lateness)
-            self._failures += 1
-            return
-        self._suspects.difference_update(ids)
-        if not self._suspects:
-            self._failures = 0
-        elif self._failures:
-            self._recover_at_s = now_s
-        at_s = self._line.port.now_s()
-        for servo_id in ids:
-            self._health.record_set_up(servo_id)
-            self._name_fault(servo_id)
-        if self.limp:
-            self.set_limp(self.limp.difference(found))
-        for servo_id, position in found.items():
-            self._line.errors["rearmed"] += 1
-            slot = self._slot[servo_id]
-            self._feedback.hold(slot, position, at_s, self.engaged)
-            self._clear_state(servo_id)
-            if self.engaged:
-                self._rearmed.add(servo_id)
-                self.entering.add_if_outside(servo_id, position)
+        speed, accel = self._family.arming.limits_speed, self._setups[servo_id].max_accel_steps_s2
+        wanted = {**self._provisioning.wanted(servo_id), "torque_enable": 1}
+        if not speed:
+            wanted[self._family.arming.register] = self._family.acceleration_units(accel)
+        if any(values.get(name, value) != value for name, value in wanted.items()):
+            self._mark(servo_id, is_held=True)
 
-    def _check_turned_back(self, servo_id: int, sample: Sample) -> None:
-        """Set a servo without torque up again that was turned back into its range by hand."""
-        if not sample.is_blank and not self._recovery.astray_text(servo_id, sample.position):
-            self._end_astray(servo_id)
-            self.mark_for_recovery((servo_id,))
+    def record_out_of_group(self, out: Collection[int], now_s: float) -> None:
+        """Record the servos that do not answer; those that return later may have restarted."""
+        for servo_id in [i for i in self._silent_since_s if i not in out]:
+            since_s = self._silent_since_s.pop(servo_id)
+            if now_s - since_s >= RESTART_S:
+                self._mark(servo_id, is_held=True)
+        for servo_id in out:
+            self._silent_since_s.setdefault(servo_id, now_s)
 
-    def _end_astray(self, servo_id: int) -> None:
-        self._recovery.astray.discard(servo_id)
-        if servo_id in self._health.faults:
-            self._health.latches.add(servo_id)
-            self._health.record_cleared(servo_id)
-            self._name_fault(servo_id)
+    def mark_all_for_recovery(self) -> None:
+        """Mark every servo, as the port was lost."""
+        for servo_id in self._ids:
+            self._mark(servo_id, is_held=True)
+        self._feedback.places.forget()
 
-    def _clear_state(self, servo_id: int) -> None:  # noqa: B027  # most have nothing to add
-        """Clear the state of a servo that works again."""
+    def _mark(self, servo_id: int, is_held: bool = False) -> None:
+        """Mark a servo; ``is_held``: it gets no goals until it is set up."""
+        if servo_id not in self._marked:
+            self._marked[servo_id] = self.due_s = -inf
+        if is_held and self.engaged:
+            self._held.add(servo_id)
 
-    def recover_tripped(self, group: Iterable[int]) -> None:
-        """Rearm servos that were stopped by their own watchdog."""
+    # --- after every read
+
+    def service(self, group: Collection[int], now_s: float) -> None:
+        """Do the tasks that are due after a read: one servo is set up at most.
+
+        Args:
+            group: Servos that answer.
+            now_s: Present time.
+
+        Raises:
+            BusLost: the port is lost.
+        """
+        due = [i for i, at_s in self._marked.items() if at_s <= now_s and i in group]
+        if due:
+            self._attend(min(due, key=self._marked.__getitem__), now_s)
+        if self._watchdog and self.engaged and now_s >= self._check_at_s:
+            # This also handles a host that slept.
+            self._check_at_s = now_s + CHECK_S
+            self._checked = (self._checked + 1) % len(self._ids)
+            servo_id = self._ids[self._checked]
+            if servo_id in group and servo_id not in self.limp:
+                self._check_watchdog(servo_id)
+        if self._rearmed:
+            self._mark_feedback(now_s)
+        self.due_s = min(
+            -inf if self._rearmed else inf,
+            min(self._marked.values(), default=inf),
+            self._check_at_s if self._watchdog and self.engaged else inf,
+        )
+
+    def _check_watchdog(self, servo_id: int) -> None:
+        value = self._line.ask((servo_id,), "bus_watchdog").get(servo_id, self._watchdog)
+        if value == TRIPPED:  # if one servo has starved, the others have too
+            self._line.starved = True
+        elif value != self._watchdog:
+            self._mark(servo_id, is_held=True)
+
+    def recover_tripped(self, group: Collection[int]) -> None:
+        """Rearm servos that were stopped by their own watchdog; they refuse goals until then.
+
+        Raises:
+            BusLost: the port is lost.
+        """
         self._line.starved = False
-        ids = tuple(group)
-        if not ids:
+        values = self._line.ask(tuple(group), "bus_watchdog") if group else {}
+        tripped = tuple(servo_id for servo_id, value in values.items() if value == TRIPPED)
+        if not tripped or not self._enable_again(tripped):
             return
-        healed = rearm_tripped(self._line, ids, self._watchdog, self._recovery.clip)
-        self._rearmed.update(healed)
-        self.due_s = -inf
-        if healed:
-            now_s = self._line.port.now_s()
-            late = self._line.lateness.cause(now_s)
-            self._line.errors[LATE_COMPUTER if late else "watchdog"] += len(healed)
-            self._health.record_stopped(len(healed), late, now_s)
+        self._rearmed = {**dict.fromkeys(tripped, -inf), **self._rearmed}
+        now_s = self._line.port.now_s()
+        late = self._line.lateness.cause(now_s)
+        self._line.errors[LATE_COMPUTER if late else "watchdog"] += len(tripped)
+        servos = f"the watchdog of {len(tripped)} servo{'s' if len(tripped) > 1 else ''}"
+        cause = f"{late}, so {servos} stopped them"
+        if not late:
+            cause = f"{servos} stopped them, as packets get lost: check cable and plugs"
+        self._seldom.add(f"{cause}; they continue from their position", now_s, cause[:8])
 
-    def _name_fault(self, servo_id: int) -> None:
-        """Copy a servo's fault to the feedback."""
-        self._feedback.record_fault(self._slot[servo_id], self._health.faults.get(servo_id, ""))
+    # --- one marked servo
 
-    def _next_to_check(self, group: Collection[int], again_s: float) -> int | None:
-        """Return the next servo in rotation, None if it is out of the group."""
-        self._check_at_s = again_s
-        self._checked = (self._checked + 1) % len(self._ids)
-        servo_id = self._ids[self._checked]
-        return servo_id if servo_id in group else None
+    def _attend(self, servo_id: int, now_s: float) -> None:
+        """Find out what a marked servo lacks, and set it up if it has no fault."""
+        before, self._line.tries = self._line.tries, 1  # other servos are waiting
+        try:
+            position, problem = self._set_up(servo_id, now_s)
+        except (ServoMissing, ServoFault) as error:
+            position, problem = 0, NOT_SET_UP
+            if isinstance(error, ServoFault):
+                problem = f"{NOT_SET_UP}: {error}"
+                switch_off(self._line, (servo_id,))
+        finally:
+            self._line.tries = before
+        # Damaged bytes may look like a fault: it must be found twice.
+        before_problem, times = self._problems.get(servo_id, ("", 0))
+        times = times + 1 if problem == before_problem else 1
+        if problem:
+            self._problems[servo_id] = problem, times
+            self._marked[servo_id] = now_s
+            if times > 1 or problem == NOT_SET_UP:
+                self._marked[servo_id] = inf if problem == AGAIN_AND_AGAIN else now_s + AGAIN_S
+            if times == 2:
+                if problem == NOT_SET_UP:
+                    problem = self._line.lateness.blame(problem, BAD_LINE, now_s)
+                self._record_fault(servo_id, problem)
+            return
+        del self._marked[servo_id]
+        self._problems.pop(servo_id, None)
+        self._held.discard(servo_id)
+        if servo_id in self.faults:
+            self._clear_fault(servo_id)
+            self._log.add(f"{self._line.label(servo_id)}: the fault is gone")
+        arms, at_s = self.engaged and servo_id not in self.limp, self._line.port.now_s()
+        self._feedback.hold(self._slot[servo_id], position, at_s, arms)
+
+    def _set_up(self, servo_id: int, now_s: float) -> tuple[int, str]:
+        """Set a servo up as at the start, holding its position if it shall have torque.
+
+        Returns:
+            Its position, and why it was not set up, "" if it was.
+
+        Raises:
+            ServoMissing: it does not answer or rejects something.
+            ServoFault: it refuses its torque.
+        """
+        line, family, setup = self._line, self._family, self._setups[servo_id]
+        ids, arms = (servo_id,), self.engaged and servo_id not in self.limp
+        line.write_all(ids, "status_return_level", [family.answer_level])
+        names = ("torque_enable", "model_number", family.error_register)
+        found = [line.ask(ids, name).get(servo_id) for name in names]
+        if None in found:
+            raise ServoMissing(f"{line.label(servo_id)} does not answer")
+        torque, number, bits = found
+        (position,) = read_positions(line, ids)
+        if number != family.models[setup.model].number:
+            return position, f"is no longer {setup.model}: exchanged?"
+        if arms and not torque:
+            self._held.add(servo_id)
+            self._feedback.set_torque(self._slot[servo_id], False)
+        if bits:
+            self._faulty_s[servo_id] = now_s
+            return position, " and ".join(family.name_errors(bits))
+        if servo_id in self.faults and now_s - self._faulty_s[servo_id] < (
+            0.0 if family.faults_latch else GONE_S
+        ):
+            return position, self.faults[servo_id]
+        if arms:
+            text = far_outside_steps(setup, position)
+            text = FAR_SIDE if crosses_zero(family, setup, position) else text
+            if text:
+                switch_off(line, ids)
+                return position, text
+            restarts = [t_s for t_s in self._restarts[servo_id] if now_s - t_s < WITHIN_S]
+            self._restarts[servo_id] = restarts
+            if not torque and len(restarts) >= MOST_RESTARTS:
+                return position, AGAIN_AND_AGAIN
+        self._provisioning.apply(ids)
+        if arms:
+            _, outside = enable(line, self._setups, ids, self._watchdog)
+            self._record_rearmed({servo_id: -inf, **outside})
+            line.errors["rearmed"] += 1
+            if not torque:
+                line.errors["restarted"] += 1
+                restarts.append(now_s)
+                self._log.add(f"{line.label(servo_id)} restarted: set up again")
+            (position,) = read_positions(line, ids)
+        return position, ""
+
+    def _record_fault(self, servo_id: int, fault: str) -> None:
+        if self.faults.get(servo_id) != fault:
+            self.faults[servo_id] = fault
+            self._line.errors["alert"] += 1
+            self._log.add(f"{self._line.label(servo_id)}: {fault}")
+            self._feedback.record_fault(self._slot[servo_id], fault)
+
+    def _clear_fault(self, servo_id: int) -> None:
+        del self.faults[servo_id]
+        self._feedback.record_fault(self._slot[servo_id], "")
 
     # --- marks on answers
 
     def _mark_feedback(self, now_s: float) -> None:
-        """Mark servos that enter their limits slowly, and once those that got torque again.
+        """Mark answers of servos that got torque again: plans must begin at their positions.
 
-        On arrival a servo gets its full speed.
+        A servo outside its limits is marked until it has moved inside; then it gets its full speed.
         """
-        for slot, servo_id in enumerate(self._ids if self.entering.places else ()):
-            if servo_id not in self.entering:
-                continue
-            steps = self._feedback.position(slot)
-            if steps is not None:
-                self._feedback.mark_rearmed(slot)
-                if self.entering.has_arrived(servo_id, steps, now_s) and self._restore_full_speed(
-                    servo_id
-                ):
-                    self.entering.end(servo_id)
-        for servo_id in tuple(self._rearmed):
+        for servo_id, until_s in [*self._rearmed.items()]:
             slot = self._slot[servo_id]
             if self._feedback.position(slot) is not None:
-                self._rearmed.discard(servo_id)
                 self._feedback.mark_rearmed(slot)
+                if until_s == -inf or now_s >= until_s and self._restore_full_speed(servo_id):
+                    del self._rearmed[servo_id]
+                    self._set_speeds()
 
     def _restore_full_speed(self, servo_id: int) -> bool:
         """Restore full speed, with the next goal or by a write; return whether a servo has it."""
-        if self._family.goal_speed:
-            return True
-        name = self._family.arming.register
-        (speed,) = self._recovery.speeds((servo_id,), ())
-        self._line.write_all((servo_id,), name, (speed,))
-        return self._line.ask((servo_id,), name).get(servo_id) == speed
+        speed = goal_speeds(self._family, (self._setups[servo_id],), ())
+        try:
+            if not self._family.goal_speed:
+                write_verified(self._line, (servo_id,), self._family.arming.register, speed)
+        except ServoMissing:
+            return False
+        return True

@@ -3,22 +3,23 @@
 Some firmware follows the last goal as soon as torque is switched on, some switches torque on with a
 goal, and some wraps the position by a turn at that moment. So the first goal is the present
 position, with its speed if a goal includes one. It is read back before torque is switched on, and
-positions are read again afterwards.
+positions are read again before and afterwards.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from typing import TypeVar
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TYPE_CHECKING
 
+from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.transaction import Transactions
 
+if TYPE_CHECKING:  # the guardian starts without numpy
+    from gazerig.drivers.types import ServoConfig
+
 TRIES = 3
-TRIPPED = 255
-"""Value of Bus Watchdog after it has stopped the servo."""
 
 JUMP_TURN = 0.25
 """Share of a turn that no hand moves a joint while torque is switched on: it has wrapped."""
@@ -29,21 +30,88 @@ STILL_STEPS = 16
 LEAST_S, MOST_S = 0.005, 0.02
 """Time-outs of an answer beyond its time on the wire, when torque is released on a raw port."""
 
-Value = TypeVar("Value")
+
+def enable(
+    line: Transactions, setups: Mapping[int, "ServoConfig"], ids: Sequence[int], watchdog: int
+) -> tuple[tuple[int, ...], dict[int, float]]:
+    """Set goals to the present positions, clipped to the limits, then switch torque on.
+
+    Servos outside their limits move inside slowly.
+
+    Args:
+        line: Exchanges on the bus.
+        setups: All servos by id.
+        ids: Servos that get torque.
+        watchdog: Value of Bus Watchdog, in its units; 0 for none.
+
+    Returns:
+        The goals in steps, and by id the times that servos outside need, seconds.
+
+    Raises:
+        ServoMissing: a servo does not answer or rejects its goal.
+        ServoFault: a servo refuses its torque, or would move in the wrong direction.
+    """
+    family = line.family
+    if not ids:
+        return (), {}
+    if family.watchdog_unit_s is not None:
+        write_verified(line, ids, "bus_watchdog", [0] * len(ids))
+    present = dict(zip(ids, read_positions(line, ids), strict=True))
+    for servo_id, steps in present.items():
+        if crosses_zero(family, setups[servo_id], steps):
+            low, high = setups[servo_id].min_steps, setups[servo_id].max_steps
+            raise ServoFault(
+                f"{line.label(servo_id)} is at {steps}, beyond its encoder's zero, and would move "
+                f"into {low}..{high} in the wrong direction: turn it into that range by hand"
+            )
+    goals = [min(max(present[i], setups[i].min_steps), setups[i].max_steps) for i in ids]
+    own = [setups[i] for i in ids]
+    outside = {
+        one.id: abs(goal - present[one.id]) / entry_speed_steps_s(one, family.steps_per_turn)
+        for one, goal in zip(own, goals, strict=True)
+        if goal != present[one.id]
+    }
+    speeds = goal_speeds(family, own, outside)
+    accelerations = [family.acceleration_units(one.max_accel_steps_s2) for one in own]
+    armed = speeds if family.arming.limits_speed else accelerations
+    write_verified(line, ids, family.arming.register, armed)
+    _switch_on(line, present, dict(zip(ids, zip(goals, speeds, strict=True), strict=True)))
+    if family.watchdog_unit_s is not None:
+        write_verified(line, ids, "bus_watchdog", [watchdog] * len(ids))
+    return tuple(goals), outside
+
+
+def crosses_zero(family: Family, setup: "ServoConfig", steps: int) -> bool:
+    """Return whether a servo's nearest way into its limits leads across its encoder's zero.
+
+    The servo itself would move in the other direction.
+    """
+    if not family.single_turn:
+        return False
+    away = max(setup.min_steps - steps, steps - setup.max_steps)
+    return away > family.steps_per_turn - (setup.max_steps - setup.min_steps) - away
+
+
+def goal_speeds(
+    family: Family, setups: Sequence["ServoConfig"], outside: Collection[int]
+) -> list[int]:
+    """Return speed limits in register units, slow for servos outside their limits, by id."""
+    turn = family.steps_per_turn
+    return [
+        family.speed_units(
+            entry_speed_steps_s(one, turn) if one.id in outside else one.max_speed_steps_s
+        )
+        for one in setups
+    ]
 
 
 def read_positions(line: Transactions, ids: Sequence[int]) -> tuple[int, ...]:
     """Read every position, in the servos' own count.
 
-    They become the first goals: with a weak checksum, two answers must agree.
-
     Raises:
-        ServoMissing: a servo does not answer, or its answers disagree.
+        ServoMissing: a servo does not answer.
     """
     found = line.ask(ids, "present_position")
-    if line.family.weak_check:
-        again = line.ask(tuple(found), "present_position")
-        found = {i: now for i, now in again.items() if abs(now - found[i]) <= STILL_STEPS}
     _raise_missing(line, [servo_id for servo_id in ids if servo_id not in found])
     return tuple(found[servo_id] for servo_id in ids)
 
@@ -56,54 +124,35 @@ def write_verified(
     Raises:
         ServoMissing: a servo does not answer or rejects it.
     """
+    wanted = dict(zip(ids, values, strict=True))
     _send_until(
-        line,
-        dict(zip(ids, values, strict=True)),
-        lambda left: line.write_all(tuple(left), name, left.values()),
-        lambda left: line.ask(left, name),
-        name,
+        line, name, wanted, lambda left: line.write_all(left, name, [wanted[i] for i in left])
     )
-
-
-def _send_goals(line: Transactions, wanted: Mapping[int, tuple[int, int]]) -> None:
-    goals = [goal for goal, _ in wanted.values()]
-    speeds = [speed for _, speed in wanted.values()]
-    line.send(line.family.create_goal_packets(tuple(wanted)).packet(goals, speeds))
-
-
-def _ask_goals(
-    line: Transactions, present: Mapping[int, tuple[int, int]], ids: Sequence[int]
-) -> dict[int, tuple[int, int]]:
-    """Read goals and goal speeds; a goal that only followed the shaft counts as the wanted one.
-
-    present: position and wanted goal of servos without torque
-    """
-    goal, speed = (line.family.registers[name] for name in ("goal_position", "goal_speed"))
-    span = speed.address + speed.size - goal.address
-    found = {}
-    for i, data in line.ask_bytes(ids, goal.address, span).items():
-        steps = goal.decode(data[: goal.size])
-        place, wanted = present.get(i, (steps, steps))
-        # The goal of a servo without torque may follow its shaft, which cannot cause a jump.
-        near = abs(steps - place) <= STILL_STEPS
-        found[i] = wanted if near else steps, speed.decode(data[-speed.size :])
-    return found
 
 
 def _send_until(
     line: Transactions,
-    wanted: Mapping[int, Value],
-    send: Callable[[Mapping[int, Value]], None],
-    ask: Callable[[Sequence[int]], Mapping[int, Value]],
     name: str,
+    wanted: Mapping[int, int],
+    send: Callable[[Sequence[int]], None],
+    resting: Mapping[int, int] | None = None,
 ) -> None:
-    """Send and read until every servo has its wanted value."""
-    left: dict[int, Value] = dict(wanted)
-    found: Mapping[int, Value] = {}
+    """Send and read until every servo has its wanted value.
+
+    resting: positions of servos without torque: their goals may follow their shafts, which cannot
+        cause a jump
+    """
+    left, found = dict(wanted), dict[int, int]()
     for _ in range(TRIES):
-        send(left)
-        found = ask(tuple(left))
-        left = {servo_id: v for servo_id, v in left.items() if found.get(servo_id) != v}
+        send(tuple(left))
+        found = line.ask(tuple(left), name)
+        left = {i: value for i, value in left.items() if found.get(i) != value}
+        if resting:
+            left = {
+                i: value
+                for i, value in left.items()
+                if i not in found or abs(found[i] - resting[i]) > STILL_STEPS
+            }
         if not left:
             return
     _raise_missing(line, [servo_id for servo_id in left if servo_id not in found])
@@ -113,44 +162,43 @@ def _send_until(
     )
 
 
-def switch_on(
-    line: Transactions, ids: Sequence[int], goals: Sequence[int], speeds: Sequence[int]
+def _switch_on(
+    line: Transactions, present: Mapping[int, int], goals: Mapping[int, tuple[int, int]]
 ) -> None:
-    """Set the goals, then switch torque on, and check that no position has changed.
+    """Set the goals with their speeds, then switch torque on; no position may change by that."""
+    family, ids = line.family, tuple(goals)
+    steps = {servo_id: goal for servo_id, (goal, _) in goals.items()}
 
-    Raises:
-        ServoMissing: a servo does not answer or rejects its goal.
-        ServoFault: a servo refuses its torque, or its position jumped.
-    """
-    family = line.family
-    wanted = dict(zip(ids, zip(goals, speeds, strict=True), strict=True))
-    send = partial(_send_goals, line)
-    if family.goal_speed:
-        before = read_positions(line, ids)
-        places = dict(zip(ids, zip(before, goals, strict=True), strict=True))
-        _send_until(line, wanted, send, partial(_ask_goals, line, places), "goal_position")
-    else:
-        write_verified(line, ids, "goal_position", goals)
-        before = read_positions(line, ids)
+    def send(left: Sequence[int]) -> None:
+        builder = family.create_goal_packets(left)
+        line.send(builder.packet([goals[i][0] for i in left], [goals[i][1] for i in left]))
+
+    _send_until(line, "goal_position", steps, send, present if family.goal_speed else None)
+    before = read_positions(line, ids)
+    # Damaged bytes may pass a checksum of one byte: a goal from them would be a jump.
+    moved = [i for i, at in zip(ids, before, strict=True) if abs(at - present[i]) > STILL_STEPS]
+    if moved:
+        named = ", ".join(map(line.label, moved))
+        raise ServoMissing(f"{line.port.port_name}: {named} does not rest: hold it still")
     try:
         write_verified(line, ids, "torque_enable", [1] * len(ids))
     except ServoMissing:
-        ailing = find_faults(line, ids)
-        if not ailing:
-            raise
         named = ", ".join(
             f"{line.label(i)}: {' and '.join(family.name_errors(bits))}"
-            for i, bits in ailing.items()
+            for i, bits in line.ask(ids, family.error_register).items()
+            if bits
         )
+        if not named:
+            raise
         raise ServoFault(f"{named}: let it cool, free it, {family.fault_cure}") from None
     for servo_id, was, now in zip(ids, before, read_positions(line, ids), strict=True):
         if abs(now - was) > JUMP_TURN * family.steps_per_turn:
             raise ServoFault(
-                f"{line.label(servo_id)}: position jumped from {was} to {now} when torque was switched on: "
-                f"{family.jump_cure}"
+                f"{line.label(servo_id)}: position jumped from {was} to {now} when torque was "
+                f"switched on: {family.jump_cure}"
             )
     if family.goal_speed:
-        _send_until(line, wanted, send, partial(_ask_goals, line, {}), "goal_position")
+        _send_until(line, "goal_position", steps, send)
 
 
 def switch_off(line: Transactions, ids: Sequence[int]) -> ReleaseResult:
@@ -189,36 +237,6 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
         )
     released = switch_off(Transactions(port, family, LEAST_S, MOST_S, baud), ids)
     return (*released.holding_ids, *released.unconfirmed_ids)
-
-
-def find_faults(line: Transactions, ids: Sequence[int]) -> dict[int, int]:
-    """Return the error bits of the answering servos that have any, by id."""
-    found = line.ask(ids, line.family.error_register)
-    return {servo_id: bits for servo_id, bits in found.items() if bits}
-
-
-def rearm_tripped(
-    line: Transactions, ids: Sequence[int], watchdog: int, clip: Callable[[int, int], int]
-) -> tuple[int, ...]:
-    """Rearm tripped bus watchdogs; the servos' goals become their present positions.
-
-    A tripped servo does not move and refuses goals. ``clip(id, steps)`` keeps a goal inside the
-    limits.
-
-    Returns:
-        The ids of the rearmed servos.
-    """
-    state = line.ask(ids, "bus_watchdog")
-    tripped = [servo_id for servo_id, value in state.items() if value == TRIPPED]
-    if not tripped:
-        return ()
-    found = line.ask(tripped, "present_position")
-    healed = tuple(found)
-    if healed:
-        line.write_all(healed, "bus_watchdog", [0] * len(healed))
-        line.write_all(healed, "goal_position", [clip(i, found[i]) for i in healed])
-        line.write_all(healed, "bus_watchdog", [watchdog] * len(healed))
-    return healed
 
 
 def _raise_missing(line: Transactions, missing: Sequence[int]) -> None:
