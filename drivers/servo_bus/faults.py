@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping
 
-from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.event_log import EventLog, RateLimitedLog
 from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S, HostLateness
 from gazerig.drivers.types import ServoConfig
 
@@ -12,8 +12,9 @@ BAD_LINE = "a second servo with its id, or a bad cable"
 
 CHECK_SUPPLY = "check servo power and cable"
 
-SAY_SILENT_S = 0.25
-"""Silence after which a servo is reported: one lost answer is not an event."""
+SAY_SILENT_S, BUSY_S = 0.25, 2.0
+"""Silence after which a servo is reported: one lost answer is not an event. The longer one counts
+while answers arrive late."""
 
 
 class SilenceLog:
@@ -29,6 +30,7 @@ class SilenceLog:
         self, setups: Mapping[int, ServoConfig], log: EventLog, lateness: HostLateness
     ) -> None:
         self._setups, self._log, self._lateness = setups, log, lateness
+        self._seldom = RateLimitedLog(log)
         self._silent_since: dict[int, float] = {}
         self._reported: set[int] = set()
         self._all_since_s: float | None = None
@@ -60,15 +62,21 @@ class SilenceLog:
                     f"{self._label(servo_id)} answers again after {now_s - since_s:.1f} s"
                 )
         for servo_id in out:
-            silent_s = now_s - self._silent_since.setdefault(servo_id, now_s)
-            due = silent_s >= SAY_SILENT_S and servo_id not in self._reported
-            if self._all_since_s is None and due:
+            self._silent_since.setdefault(servo_id, now_s)
+        late = self._lateness.late_answers(now_s)
+        longest_s = now_s - min(self._silent_since.values(), default=now_s)
+        if late and SAY_SILENT_S <= longest_s < BUSY_S:
+            self._seldom.add(f"this computer is busy: {late} answers late in the last s", now_s)
+            return
+        for servo_id in out if self._all_since_s is None else ():
+            silent_s = now_s - self._silent_since[servo_id]
+            if servo_id not in self._reported and silent_s >= SAY_SILENT_S:
                 self._reported.add(servo_id)
-                what, remedy = "does not answer", CHECK_SUPPLY
+                text = f"{self._label(servo_id)} does not answer: {CHECK_SUPPLY}"
                 if servo_id in garbling:
-                    what, remedy = GARBLES, BAD_LINE
-                fault = f"{self._label(servo_id)} {what}"
-                self._log.add(self._lateness.blame(fault, remedy, now_s))
+                    fault = f"{self._label(servo_id)} {GARBLES}"
+                    text = self._lateness.blame(fault, BAD_LINE, now_s)
+                self._log.add(text)
         all_s = self._all_since_s
         if all_s is not None and not self._all_reported and now_s - all_s >= BLAME_S:
             self._all_reported = True

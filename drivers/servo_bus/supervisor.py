@@ -367,17 +367,14 @@ class Supervisor:
             0.0 if family.faults_latch else GONE_S
         ):
             return position, self.faults[servo_id]
-        if arms:
-            text = far_outside_steps(setup, position)
-            text = FAR_SIDE if crosses_zero(family, setup, position) else text
-            if text:
-                switch_off(line, ids)
-                return position, text
-            restarts = [t_s for t_s in self._restarts[servo_id] if now_s - t_s < WITHIN_S]
-            self._restarts[servo_id] = restarts
-            if not torque and len(restarts) >= MOST_RESTARTS:
-                return position, AGAIN_AND_AGAIN
+        if arms and (text := self._misplaced_text(setup, position)):
+            switch_off(line, ids)
+            return position, text
         self._provisioning.apply(ids)
+        restarts = [t_s for t_s in self._restarts[servo_id] if now_s - t_s < WITHIN_S]
+        self._restarts[servo_id] = restarts
+        if arms and not torque and len(restarts) >= MOST_RESTARTS:
+            return position, AGAIN_AND_AGAIN
         if arms:
             _, outside = enable(line, self._setups, ids, self._watchdog)
             self._record_rearmed({servo_id: -inf, **outside})
@@ -388,6 +385,12 @@ class Supervisor:
                 self._log.add(f"{line.label(servo_id)} restarted: set up again")
             (position,) = read_positions(line, ids)
         return position, ""
+
+    def _misplaced_text(self, setup: ServoConfig, position: int) -> str:
+        """Return why a servo must get no torque where it is, "" if it may."""
+        if crosses_zero(self._family, setup, position):
+            return FAR_SIDE
+        return far_outside_steps(setup, position)
 
     def _record_fault(self, servo_id: int, fault: str) -> None:
         if self.faults.get(servo_id) != fault:
