@@ -5,6 +5,7 @@ torque on and after a restart without a jump and at the configured speed, goals 
 NaN refused, missing servos named, a port that stays away given up.
 """
 
+import itertools
 from statistics import mean
 
 import pytest
@@ -53,14 +54,13 @@ def test_one_silent_servo_costs_at_most_two_percent_of_a_cycle(name):
     assert {missing for _, missing in struck} == {(2,)}
     # The first time all of the reserve is waited: this computer might have paused.
     assert struck[0][0] < usual_s + 0.02
-    assert mean(s for s, _ in struck[1:]) <= 1.02 * usual_s
+    assert mean(s for s, _ in struck[1:]) <= 1.02 * usual_s < 0.0018
     bench.command("clear")
     bench.recovered(bus)
 
 
 ONE = ("lose {}", "delay {} 8", "delay {} 60", "truncate {} 5", "corrupt {}")
-ALL = ("lose all", "delay all 15", "delay all 80 count 9", "truncate all 6", "corrupt all",
-       "noise before", "noise after")  # fmt: skip
+ALL = ("lose all", "delay all 15", "delay all 80 count 9", "truncate all 6", "corrupt all")
 
 
 @pytest.mark.parametrize("fault", [*ONE, *ALL])
@@ -193,16 +193,27 @@ def test_torque_off_is_confirmed_and_names_who_was_not_reached(name):
 
 
 @every_kind()
-def test_torque_comes_on_and_goes_although_writes_are_lost(name):
+def test_torque_comes_on_and_goes_although_packets_are_lost(name):
     bench = in_process(name)
-    bus = bench.bus()
+    bus, write, count = bench.bus(), bench.port.write, itertools.count()
+    every = 1000 if name in BOARDS else 4  # a board that hears less is reported
     bus.open()
-    bench.command("lose-writes 2")
+    bench.port.write = lambda data: None if next(count) % every == 1 else write(data)  # type: ignore[method-assign]
     bus.enable_torque()
     assert all(bench.holding())
-    bench.command("lose-writes 2")
     bus.disable_torque()
     assert not any(bench.holding())
+
+
+@every_kind()
+def test_a_second_open_changes_nothing(name):
+    """An EEPROM lasts for some thousand writes."""
+    bench = in_process(name)
+    bus = bench.hold()
+    bus.disable_torque()
+    bus.close()
+    bus.open()
+    assert not has_line(bus.events(), "->")
 
 
 @every_kind()
