@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 
 from branch import Branch
 from feedback_rows import rows
-from struck_rigs import rig_of
 
-from gazerig.config.rig import Rig
+from gazerig.config.rig import BusConfig, Rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.types import LimpableBus
 from gazerig.robot.app.bus_wiring import bus_ports, guarded_rig_bus, rig_bus, servo_configs
@@ -26,6 +26,14 @@ from gazerig.sim_mock.pty.client import PtyBuses
 
 SLOW_DEG_S = 4.0
 PATIENCE_S = 30.0
+RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker", "pca9685": "maker"}
+"""The shipped rig of each kind of bus."""
+
+
+def rig_of(kind: str) -> Rig:
+    """Return the shipped rig of a kind, with the other board where its own has none."""
+    rig = load_rig(RIGS[kind])
+    return replace(rig, bus=BusConfig("/dev/i2c-1", "pca9685")) if kind == "pca9685" else rig
 
 
 def slow(kind: str) -> Rig:

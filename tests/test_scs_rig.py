@@ -10,7 +10,7 @@ from served_rigs import hide_real_ports, served
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.feetech.scs import FEETECH_SCS, SCS_REGISTERS
+from gazerig.drivers.feetech.scs import FEETECH_SCS
 from gazerig.drivers.servo_bus.discovery import count_corrupt, scan_ids
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.guardian.process import releaser
@@ -57,18 +57,6 @@ def test_both_series_are_known_by_one_search():
     assert count_corrupt(bench.port, FEETECH_SCS, 1) == 0
     bench.chain.faults.command("collide 1")
     assert count_corrupt(bench.port, FEETECH_SCS, 1) >= 2
-
-
-def test_registers_have_the_high_byte_first_and_their_own_lock():
-    bench = Bench()
-    registers = Registers(bench.port, FEETECH_SCS)
-    assert registers.read(2, "present_position") == 300
-    assert registers.write_persistent(1, "max_position_limit", 900)
-    bench.chain[1].restart()
-    bench.now_s += 1.0
-    assert registers.read(1, "max_position_limit") == 900
-    assert registers.read(1, "lock") == 1
-    assert (SCS_REGISTERS["lock"].address, "torque_limit" in SCS_REGISTERS) == (48, False)
 
 
 def test_the_guardian_lets_go_of_servos_without_sync_read():

@@ -1,7 +1,7 @@
 """Noise on the line of smart servos, to and fro: damaged bytes are never data."""
 
 import pytest
-from bus_kinds import SMART, in_process
+from bus_kinds import BOARDS, SMART, in_process
 
 PERCENT = (0.5, 3.0, 10.0)
 DAMAGED = 10_000
@@ -27,3 +27,22 @@ def test_ten_thousand_damaged_bytes_make_no_wrong_value(name):
             bench.recovered(bus)
     assert fresh > 0.2 * DAMAGED and bus.faults() == ()
     assert bus.health().errors["corrupt"] > 0.02 * DAMAGED
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_noise_on_the_line_of_a_board_leads_no_joint_out_for_long_and_passes(name):
+    """Its bytes have no check: a pulse made by noise lasts until the next goals."""
+    bench = in_process(name)
+    bus, kind = bench.hold(), bench.kind
+    bench.ticks(bus, 0.3)
+    bench.command("static 0.5")
+    outside = 0
+    for _ in range(500):
+        bench.tick(bus, follows=False)
+        outside += any(not kind.low - 30 <= at <= kind.high + 30 for at in bench.places())
+    assert outside <= 10
+    bench.command("clear")
+    for _ in range(200):
+        feedback = bench.tick(bus, follows=False)
+    assert not feedback.missing and all(feedback.torque)
+    bench.go(bus, [0.5] * 4)

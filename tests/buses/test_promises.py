@@ -6,13 +6,14 @@ NaN refused, missing servos named, a port that stays away given up.
 """
 
 import itertools
+from contextlib import suppress
 from statistics import mean
 
 import pytest
 from bus_kinds import BOARDS, FEETECH, SMART, TICK_S, every_kind, in_process
 from dynamixel_sdk import PacketHandler
 
-from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.types import LimpableBus
 
 SILENT_S = 3.9
@@ -88,6 +89,18 @@ def test_an_adapter_that_echoes_costs_nothing(name):
     bus = bench.hold()
     assert all(f.missing == () and all(f.torque) for f in bench.ticks(bus, 1.0))
     assert bus.health().errors == {}
+
+
+@every_kind(*BOARDS, why="a board does not measure its servos")
+def test_a_joint_that_a_hand_has_turned_is_believed_soon(name):
+    bench = in_process(name)
+    bus = bench.hold()
+    bench.ticks(bus, 0.3)
+    bus.disable_torque()
+    bench.run(bus, 1.0)  # it comes to rest
+    bench.command(f"turn {bench.setups[1].id} {-0.3 * (bench.kind.high - bench.kind.low)}")
+    feedback = bench.run(bus, 0.1)
+    assert abs(feedback.position_steps[1] - bench.places()[1]) <= 2
 
 
 # --- what comes back
@@ -189,6 +202,41 @@ def test_torque_off_is_confirmed_and_names_who_was_not_reached(name):
     lines = bus.events()
     assert has_line(lines, label(bench, 1), "torque-off not confirmed", "cut the servo power")
     assert not any(label(bench, i) in line for i in (0, 2, 3) for line in lines)
+    assert not any(bench.holding())
+
+
+@every_kind()
+def test_a_torque_off_while_unplugged_is_carried_out_when_the_port_is_back(name):
+    bench = in_process(name)
+    bus = bench.hold(give_up_s=1.0)
+    bench.ticks(bus, 0.1)
+    bench.command("unplug")
+    with pytest.raises(BusLost):
+        bus.disable_torque()
+
+    def read_on(seconds):
+        for _ in range(round(seconds / TICK_S)):
+            bench.wait(TICK_S)
+            with suppress(BusLost):
+                bus.read(bench.now_s())
+
+    read_on(3.0)  # longer than it takes to give up
+    assert all(bench.holding())
+    bench.command("plug")
+    read_on(0.5)
+    assert not any(bench.holding())
+    assert has_line(bus.events(), "torque switched off")
+    read_on(1.0)
+    assert not any(bench.holding())
+    bus.enable_torque()
+    read_on(0.2)
+    assert all(bench.holding())
+    bus.disable_torque()
+    bench.command("unplug")
+    with pytest.raises(BusLost):
+        bus.enable_torque()
+    bench.command("plug")
+    read_on(1.5)
     assert not any(bench.holding())
 
 

@@ -3,17 +3,15 @@
 from math import degrees
 
 import pytest
+from loop_deaths import RIGS, rig_of
 from mixed_rig import mixed_rig
 
 import gazerig.robot.app.run_bus as run_bus
-from gazerig.config.rig import BusConfig
-from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
 from gazerig.sim_mock.device import Device
 
-RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker", "pca9685": "maker"}
 FAULTS = {
     "dynamixel": ("lose 3 for 0.3", "delay all 3 for 0.2", "unplug for 0.3", "brown-out 5"),
     "feetech": ("lose 3 for 0.3", "delay all 3 for 0.2", "unplug for 0.3", "brown-out 5"),
@@ -50,17 +48,9 @@ class Watched:
         return tick
 
 
-def rig_on(kind):
-    """Return the shipped rig of a kind, with the other board where its own has none."""
-    rig = load_rig(RIGS[kind])
-    if kind == "pca9685":
-        rig = rig.__class__(**{**vars(rig), "bus": BusConfig("/dev/i2c-1", kind)})
-    return rig
-
-
 @pytest.mark.parametrize("kind", RIGS)
 def test_it_goes_on_looking(monkeypatch, kind):
-    robot, missed = Watched(monkeypatch, rig_on(kind)), 0
+    robot, missed = Watched(monkeypatch, rig_of(kind)), 0
     for k in range(400):
         if k % 80 == 40 and k < 340:
             robot.devices[0].faults.command(FAULTS[kind][k // 80])
@@ -91,7 +81,7 @@ def test_what_befalls_one_bus_leaves_the_joints_of_the_others_moving(monkeypatch
 
 @pytest.mark.parametrize("kind", ["dynamixel", "feetech"])
 def test_a_jammed_joint_is_released_within_a_fifth_of_a_second(monkeypatch, kind):
-    rig = rig_on(kind)
+    rig = rig_of(kind)
     robot, joint = Watched(monkeypatch, rig), rig.names.index("left_eye_pan")
     for _ in range(150):
         robot.tick()
