@@ -114,6 +114,10 @@ SMART, FEETECH, BOARDS = tuple(_SMART), ("feetech", "scs"), tuple(_BOARDS)
 KINDS = (*SMART, *BOARDS)
 
 
+POTENTIOMETER = 1023
+"""Last step that an SCS servo measures."""
+
+
 class WrongValueError(AssertionError):
     """A fresh position that the servo did not have during the read."""
 
@@ -147,7 +151,8 @@ class Bench(BusBench):
         self.seen.append(self.places())
         board_room = 0.2 if follows else inf
         room = (board_room if self.kind.board else 0.003) * (self.kind.high - self.kind.low)
-        for i, true in enumerate(zip(*self.seen, strict=True)):
+        for i, places in enumerate(zip(*self.seen, strict=True)):
+            true = [min(at, POTENTIOMETER) for at in places] if self.name == "scs" else places
             at = feedback.position_steps[i]
             if i not in feedback.missing and not min(true) - room <= at <= max(true) + room:
                 raise WrongValueError(f"{began_s:.3f} s: servo {i} at {at}, truly {true}")
