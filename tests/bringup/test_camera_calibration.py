@@ -47,13 +47,7 @@ from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.sim_mock.cameras.charuco_scene import (
-    BoardCamera,
-    BoardCameraParams,
-    BoardScene,
-    hand_held_pose,
-    true_lens,
-)
+from gazerig.sim_mock.cameras.charuco_scene import BoardScene, hand_held_pose, true_lens
 
 SIZE = (640, 400)
 BOARD = CharucoBoard()
@@ -72,7 +66,7 @@ def seen_board(
     return DetectedBoard(np.flatnonzero(inside), px[inside], BOARD.corners_m[inside])
 
 
-LENS = true_lens(*SIZE)
+LENS = true_lens()
 GUESS = intrinsics_of_view(radians(69.0), *SIZE)
 VIEWS = 16
 
@@ -81,9 +75,7 @@ def corners(
     number: int, noise_px: float, rng: np.random.Generator, lens: Intrinsics
 ) -> DetectedBoard:
     """Detections of the board, without a picture."""
-    return seen_board(
-        *hand_held_pose(number, BoardCameraParams(), lens, BOARD), lens, noise_px, rng
-    )
+    return seen_board(*hand_held_pose(number, lens, BOARD), lens, noise_px, rng)
 
 
 def some_views(noise_px: float = 0.3, count: int = VIEWS) -> list[DetectedBoard]:
@@ -108,10 +100,10 @@ def assert_true(found: LensCalibration, true: Intrinsics) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_lens_from_pictures_is_within_one_percent(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    camera = BoardCamera(BoardCameraParams(), LENS, BOARD, rng)
+    camera = BoardScene(CAMERA, BOARD, KINEMATICS, rng)
     views = []
     for number in range(24):
-        pose = hand_held_pose(number + 5 * seed, camera.params, LENS, BOARD)
+        pose = hand_held_pose(number + 5 * seed, LENS, BOARD)
         seen = BOARD.find(camera.image(*pose))
         assert seen is not None
         # 0.3 px on top of what the drawn pictures' own noise and blur do.
