@@ -4,6 +4,7 @@ Every curve is what the models give at this moment; human data are marked as suc
 their sources.
 """
 
+import sys
 from collections.abc import Callable
 from functools import partial
 from math import degrees, pi, radians, sin
@@ -29,7 +30,9 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions  # noqa: E402
 from gazerig.robot.control.loop import Tick, run  # noqa: E402
-from gazerig.sim_mock.true_gaze import (  # noqa: E402
+
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+from true_gaze import (  # noqa: E402
     angles_of_place,
     gaze_angles,
     gaze_error_rad,

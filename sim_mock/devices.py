@@ -1,31 +1,17 @@
-"""Emulated devices as plain data that can be sent to another process, and their construction."""
+"""Emulated devices: descriptions that can be sent to another process, and their construction."""
 
-import base64
-import pickle
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from gazerig.drivers.bus.servo_models import HOBBY_KINDS, BusKind
-from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
+from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import PluginError
-from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
-from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, find, load
-from gazerig.params import choices_of
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec
 from gazerig.sim_mock.smart_servo.head_weight import HeadWeight
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
-from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
-
-BAUDS: dict[BusKind, tuple[int, ...]] = {
-    "dynamixel": DYNAMIXEL_BAUDS,
-    "feetech": FEETECH_BAUDS,
-}
-"""Bit/s to which smart servos can be set; a port of boards accepts any."""
-CHANNELS: tuple[int, ...] = choices_of(MaestroParams, "channels")
-"""Sizes of a Maestro."""
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +27,6 @@ class _SmartServoLine:
     servos: tuple[ServoSpec, ...]
     baud: int | None = None
     weight: HeadWeight | None = None
-    listens: ClassVar[str] = "the servos listen"
 
 
 class DynamixelLine(_SmartServoLine):
@@ -72,7 +57,6 @@ class MaestroLine:
     servos: tuple[HobbySpec, ...] = ()
     baud: ClassVar[int | None] = None
     kind: ClassVar[BusKind] = "maestro"
-    listens: ClassVar[str] = "the board listens"
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +73,6 @@ class Pca9685Line:
     servos: tuple[HobbySpec, ...] = ()
     baud: ClassVar[int | None] = None
     kind: ClassVar[BusKind] = "pca9685"
-    listens: ClassVar[str] = "the boards listen"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,22 +80,17 @@ class PluginLine:
     """The servos of a package's bus.
 
     kind: kind of the bus
-    settings: its parameters, pickled and encoded as text
+    settings: its parameters
     servos: servos in the order of the joints
     """
 
     kind: BusKind
-    settings: str
+    settings: object
     servos: tuple[EmulatedJoint, ...]
     baud: int | None = None
-    listens: ClassVar[str] = "the servos listen"
 
 
 Emulated = DynamixelLine | FeetechLine | MaestroLine | Pca9685Line | PluginLine
-ShippedLine = DynamixelLine | FeetechLine | MaestroLine | Pca9685Line
-_KINDS: dict[str, type[ShippedLine]] = {
-    one.kind: one for one in (DynamixelLine, FeetechLine, MaestroLine, Pca9685Line)
-}
 
 
 class ShaftMakers(NamedTuple):
@@ -147,8 +125,7 @@ def build(
         make = load(BUS, what.kind, BusPlugin).device
         if make is None:
             raise ValueError(f"{find(BUS, what.kind).label} has no emulated device")
-        params = pickle.loads(base64.b85decode(what.settings))
-        device: Device = make(params, what.servos, now_s, seed)
+        device: Device = make(what.settings, what.servos, now_s, seed)
         return device
     # A chain or board is imported when it is built: a process that starts a server needs none.
     if isinstance(what, MaestroLine):
@@ -181,35 +158,4 @@ def plugin_line(kind: BusKind, params: object, servos: tuple[EmulatedJoint, ...]
     """
     if load(BUS, kind, BusPlugin).device is None:
         raise PluginError(f"{find(BUS, kind).label} has no emulated device: run it without --mock")
-    return PluginLine(kind, base64.b85encode(pickle.dumps(params)).decode(), servos)
-
-
-def device_data(what: Emulated) -> dict[str, object]:
-    """Return a device as JSON data."""
-    return {"kind": what.kind, **asdict(what)}
-
-
-def device_of_data(data: Mapping[str, Any]) -> Emulated:
-    """Return a device from the data of ``packed``; servos may be as short as [1, "xl330-m077"].
-
-    Raises:
-        ValueError: the kind of device is unknown.
-        TypeError: a setting is unknown.
-    """
-    settings = dict(data)
-    kind = settings.pop("kind", None)
-    if "settings" in settings:
-        servos = tuple(EmulatedJoint(**one) for one in settings.pop("servos"))
-        return PluginLine(str(kind), servos=servos, **settings)
-    if kind not in _KINDS:
-        raise ValueError(f"unknown device kind {kind!r}: expected {', '.join(_KINDS)}")
-    read = HobbySpec._make if kind in HOBBY_KINDS else _servo_of_data
-    settings["servos"] = tuple(read(spec) for spec in settings.get("servos", ()))
-    if settings.get("weight") is not None:
-        settings["weight"] = HeadWeight.of_data(settings["weight"])
-    return _KINDS[kind](**settings)
-
-
-def _servo_of_data(data: Any) -> ServoSpec:
-    spec = ServoSpec(*data)
-    return spec._replace(physics=Physics(*spec.physics), quirks=Quirks(*spec.quirks))
+    return PluginLine(kind, params, servos)

@@ -8,7 +8,7 @@ arithmetic. What is not served here is opened as ever.
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import pytest
@@ -17,9 +17,10 @@ from gazerig.drivers.serial import port as ports
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import build, device_of_data
+from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.pty.client import _ServerProcess
+from gazerig.sim_mock.pty.client import ServerProcess
+from gazerig.sim_mock.pty.line import BusSettings
 
 START_S = 1000.0
 """No port was opened at the beginning of time."""
@@ -50,37 +51,35 @@ class _Wires:
     def __init__(self, clock: SimulatedClock) -> None:
         self._clock = clock
         self._devices: dict[str, Device] = {}
-        self._of: dict[_ServerProcess, dict[str, str]] = {}
+        self._of: dict[ServerProcess, dict[str, str]] = {}
         self._terminals: dict[str, tuple[int, int]] = {}
 
     def start(
-        self, server: _ServerProcess, buses: Sequence[Mapping[str, object]], world: object = None
+        self, server: ServerProcess, buses: Sequence[BusSettings], world: object = None
     ) -> list[str]:
-        """Stands for _ServerProcess._start."""
+        """Stands for ServerProcess.serve."""
         assert world is None  # a world's servos answer on terminals alone
         paths: dict[str, str] = {}
         for bus in buses:
-            assert not bus.get("wire_time") and not bus.get("turnaround_us")
+            assert not bus.wire_time
             # The doctor looks whether a path is a serial port; nothing goes through this one.
             ends = os.openpty()
             path = os.ttyname(ends[1])
-            device = build(device_of_data(bus["device"]), self._clock.now_s, bus.get("seed", 0))  # type: ignore[arg-type]
-            for case, value in bus.get("choices", {}).items():  # type: ignore[attr-defined]
-                device.choose_behaviour(case, value)
-            paths[str(bus.get("name", ""))] = path
+            device = build(bus.device, self._clock.now_s)
+            paths[bus.name or ""] = path
             self._devices[path], self._terminals[path] = device, ends
         self._of[server] = paths
         return list(paths.values())
 
-    def command(self, server: _ServerProcess, text: str, bus: str = "") -> str:
-        """Stands for _ServerProcess.command."""
+    def command(self, server: ServerProcess, text: str, bus: str = "") -> str:
+        """Stands for ServerProcess.command."""
         if server not in self._of:
             raise RuntimeError("the emulated bus is not running: start it first")
         done = self._devices[self._of[server][bus]].faults.command(text)
         return json.dumps({"ok": "status", **json.loads(done)}) if done[:1] == "{" else done
 
-    def stop(self, server: _ServerProcess) -> None:
-        """Stands for _ServerProcess.stop."""
+    def stop(self, server: ServerProcess) -> None:
+        """Stands for ServerProcess.stop."""
         for path in self._of.pop(server, {}).values():
             del self._devices[path]
             for end in self._terminals.pop(path):
@@ -102,11 +101,11 @@ def simulated_wires() -> Iterator[SimulatedClock]:
     clock = SimulatedClock(START_S)
     with pytest.MonkeyPatch.context() as patch:
         wires = _Wires(clock)
-        patch.setattr(_ServerProcess, "_start", lambda server, *given: wires.start(server, *given))
+        patch.setattr(ServerProcess, "serve", lambda server, *given: wires.start(server, *given))
         patch.setattr(
-            _ServerProcess, "command", lambda server, text, bus="": wires.command(server, text, bus)
+            ServerProcess, "command", lambda server, text, bus="": wires.command(server, text, bus)
         )
-        patch.setattr(_ServerProcess, "stop", lambda server: wires.stop(server))
+        patch.setattr(ServerProcess, "stop", lambda server: wires.stop(server))
         patch.setattr(ports, "BlockingPort", wires.port)
         patch.setattr(RealClock, "now_s", lambda _: clock.now_s())
         patch.setattr(RealClock, "sleep_until", lambda _, t_s: clock.sleep_until(t_s))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fakes.runs import play
 from numpy.typing import NDArray
+from true_gaze import angles_of_place, gaze_angles, gaze_error_rad, true_part
 
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
@@ -19,7 +20,6 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import Value
 from gazerig.sim_mock.cameras.rendered import PixelCameraParams
-from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_error_rad, true_part
 
 KEEPS_TO_THE_FACE: dict[str, Value] = {
     "gaze.looks_away": "none",

@@ -1,6 +1,7 @@
 """A bus of another package passes the shipped suites and moves a rig; no line of ours knows it."""
 
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -26,7 +27,7 @@ from gazerig.robot.description.build import describe
 from gazerig.robot.guardian.process import releaser
 from gazerig.robot.guardian.release_plan import decode, encode
 from gazerig.robot.model.clock import SimulatedClock
-from gazerig.sim_mock.devices import build, device_data, device_of_data
+from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort
 
 
@@ -108,7 +109,7 @@ def test_its_section_is_checked(example, tmp_path):
 def test_the_guardian_switches_its_torque_off(example):
     rig, clock = load_rig(str(HEAD)), SimulatedClock(1.0)
     assert not has_watchdog(rig, "")
-    device: Any = build(device_of_data(device_data(emulated_lines(rig)[""])), clock.now_s)
+    device: Any = build(pickle.loads(pickle.dumps(emulated_lines(rig)[""])), clock.now_s)
     port = InProcessPort(device, sleep_until=clock.sleep_until)
     for servo in device.servos.values():
         servo.torque = True

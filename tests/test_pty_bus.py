@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -18,10 +19,12 @@ from gazerig.drivers.serial import port as serial_port
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus, PtyBuses
+from gazerig.sim_mock.pty.line import BusSettings
+from gazerig.sim_mock.pty.server import ServerSettings
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 SPECS = [(1, "xl330-m288", 2048), (2, "xl330-m288", 1000), (3, "xl330-m288", 3000)]
-DEVICE = {"kind": "dynamixel", "servos": SPECS}
+DEVICE = DynamixelLine(tuple(ServoSpec(*spec) for spec in SPECS))
 ROOT = Path(__file__).parents[1]
 PING, PONG = bytes.fromhex("FFFFFD0001030001194E"), 14
 STS_PING, STS_PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
@@ -39,45 +42,37 @@ def path():
         yield bus.start(SPECS)
 
 
-def start_server(**options) -> subprocess.Popen:
-    return subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "gazerig.sim_mock.pty.server",
-            json.dumps({"buses": [{"device": DEVICE}], "until_eof": True}),
-        ],
-        cwd=ROOT,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        **options,
-    )
+@pytest.fixture
+def server(tmp_path):
+    """Start a server as a client does, and give it with its terminal."""
+    settings = tmp_path / "settings"
+    settings.write_bytes(pickle.dumps(ServerSettings((BusSettings(DEVICE),), until_eof=True)))
+    command = [sys.executable, "-m", "gazerig.sim_mock.pty.server", str(settings)]
+    with subprocess.Popen(
+        command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as started:
+        yield started, json.loads(present(started.stdout).readline())["path"]
 
 
-def test_the_server_says_its_path_and_ends_with_its_parents_pipe():
-    server = start_server()
-    terminal = json.loads(present(server.stdout).readline())["path"]
+def test_the_server_says_its_path_and_ends_with_its_parents_pipe(server):
+    process, terminal = server
     assert Path(terminal).is_char_device()
-    present(server.stdin).close()
-    assert server.wait(60) == 0
-    present(server.stdout).close()
+    present(process.stdin).close()
+    assert process.wait(60) == 0
 
 
-def test_the_server_ignores_ctrl_c_and_heeds_sigterm():
-    server = start_server()
-    terminal = json.loads(present(server.stdout).readline())["path"]
-    server.send_signal(signal.SIGINT)
+def test_the_server_ignores_ctrl_c_and_heeds_sigterm(server):
+    process, terminal = server
+    process.send_signal(signal.SIGINT)
     port = BlockingPort(terminal)
     port.setBaudRate(1_000_000)
     assert PacketHandler(2.0).ping(port, 1)[1] == COMM_SUCCESS
     port.closePort()
     held = os.open(terminal, os.O_RDONLY | os.O_NOCTTY)
-    server.terminate()
-    assert server.wait(60) == 0
+    process.terminate()
+    assert process.wait(60) == 0
     assert os.read(held, 1) == b""  # hung up; another test may have its number by now
     os.close(held)
-    present(server.stdin).close()
-    present(server.stdout).close()
 
 
 def test_the_server_loads_nothing_heavy():
@@ -126,7 +121,6 @@ def client(strict):
     yield port
     port.closePort()
     strict.command("clear")
-    strict.command("set baud heed")
 
 
 def found(port, servo_id=1):

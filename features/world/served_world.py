@@ -96,7 +96,7 @@ class ServedWorld:
 
     def device(self, bus: BusSettings) -> Device:
         """Return an emulated device whose servos move the joints of the world's rig."""
-        return self.world.device(bus.device, bus.name or "", bus.seed)
+        return self.world.device(bus.device, bus.name or "")
 
     def obey(self, text: str) -> str:
         """Execute a command of the world; return {"ok": ...} or {"error": ...} as JSON."""

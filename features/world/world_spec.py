@@ -1,6 +1,5 @@
 """The content of a world as plain data that can be sent to another process."""
 
-import pickle
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -39,21 +38,6 @@ class WorldSpec(NamedTuple):
         from gazerig.features.world.model import world_model
 
         return world_model(self.figures, self.rigs, self.mjcf_file)
-
-    @property
-    def make(self) -> str:
-        """Return the server's factory, as of ``SentSurroundings.make``."""
-        return "gazerig.features.world.serve:serve"
-
-    def write(self, folder: Path) -> None:
-        """Write it for another process of this program, which shares the people's motion."""
-        (folder / _SPEC).write_bytes(pickle.dumps(self.with_shared_file(folder)))
-
-    @staticmethod
-    def read(folder: Path) -> "WorldSpec":
-        """Read a file of ``write``; the folder must not be writable by other users."""
-        found: WorldSpec = pickle.loads((folder / _SPEC).read_bytes())
-        return found
 
     def with_shared_file(self, folder: Path) -> "WorldSpec":
         """Return the same world with its people's motion in a file of the folder."""

@@ -2,49 +2,96 @@
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.bus.servo_models import BusKind
+from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.params import choices_of
 from gazerig.robot.app.run_bus import emulated_lines
-from gazerig.robot.cli import emulate_options as options
 from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.terminal import clear_errors
-from gazerig.sim_mock.device_cases import CASES
-from gazerig.sim_mock.device_spec import EXAMPLE, line_of
-from gazerig.sim_mock.devices import BAUDS, CHANNELS, Emulated, MaestroLine, Pca9685Line, PluginLine
+from gazerig.robot.cli.terminal import clear_errors, complete_rig
+from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE, line_of
+from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.pty.server import ServerSettings, run
 from gazerig.sim_mock.pty.server import say as say_line
 
 app = typer.Typer()
 
-_KNOWN_BY: dict[BusKind, str] = {
-    "dynamixel": "servos know",
-    "feetech": "STS servos support",
-}
-"""Text before the supported baud rates of smart servos."""
+DEFAULT_BAUD = 1_000_000
+_BAUDS: dict[str, tuple[int, ...]] = {"dynamixel": DYNAMIXEL_BAUDS, "feetech": FEETECH_BAUDS}
+_CHANNELS: tuple[int, ...] = choices_of(MaestroParams, "channels")
 
 
 @app.command(cls=RigCommand)
 def emulate(
-    rig: options.Rig = None,
-    servos: options.Servos = None,
-    maestro: options.Maestro = None,
-    pca9685: options.Pca9685 = None,
-    link: options.Link = None,
-    baud: options.Baud = None,
-    any_baud: options.AnyBaud = False,
-    wire_time: options.WireTime = False,
-    turnaround_us: options.TurnaroundUs = 0.0,
-    firmware: options.Firmware = None,
-    crc: options.Crc = False,
-    case: options.Case = None,
-    until_eof: options.UntilEof = False,
+    rig: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="RIG",
+            help="Emulate all buses of a rig, each with its own terminal.",
+            autocompletion=complete_rig,
+        ),
+    ] = None,
+    servos: Annotated[
+        str | None,
+        typer.Option(
+            metavar="IDS:MODEL,...",
+            help=f"The servos of one line, for example {EXAMPLE}, or 1-6:sts3215.",
+        ),
+    ] = None,
+    maestro: Annotated[
+        int | None,
+        typer.Option(
+            metavar="CHANNELS",
+            help="A Pololu Maestro with a hobby servo on each of its 6, 12, 18 or 24 channels.",
+        ),
+    ] = None,
+    pca9685: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS,...",
+            help="PCA9685 boards behind an I2C bridge, with a hobby servo on each channel: 0x40.",
+        ),
+    ] = None,
+    link: Annotated[
+        Path | None,
+        typer.Option(
+            help="Path under which it can be opened, also after unplug and plug. "
+            "Further buses of a rig add their names: LINK-NAME."
+        ),
+    ] = None,
+    baud: Annotated[
+        int | None,
+        typer.Option(
+            help=f"Baud rate of smart servos in bit/s (default {DEFAULT_BAUD}, or the rig's)."
+        ),
+    ] = None,
+    wire_time: Annotated[
+        bool, typer.Option("--wire-time", help="Simulate the time of bytes on the line.")
+    ] = False,
+    firmware: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=255,
+            help=f"Firmware version of all servos (default {DEFAULT_FIRMWARE}); for STS servos "
+            "the number after 3.",
+        ),
+    ] = None,
+    crc: Annotated[
+        bool, typer.Option("--crc", help="With --maestro: it requires a CRC after every command.")
+    ] = False,
+    until_eof: Annotated[
+        bool, typer.Option("--until-eof", help="Stop at the end of standard input.")
+    ] = False,
 ) -> None:
     """Emulate servos on a pseudo-terminal; print its path as JSON and accept fault commands.
 
@@ -55,37 +102,34 @@ def emulate(
             raise SetupError(
                 f"name a rig, or its servos: --servos {EXAMPLE}, --maestro 12 or --pca9685 0x40"
             )
-        if maestro is not None and firmware is not None:
-            raise SetupError("--firmware: a Maestro does not report its version on this line")
-        if maestro is None and crc:
-            raise SetupError("--crc: only with --maestro")
+        devices: dict[str, Emulated]
         if servos is not None:
-            devices: Mapping[str, Emulated] = {"": line_of(servos, firmware, options.DEFAULT_BAUD)}
+            devices = {"": line_of(servos, firmware, DEFAULT_BAUD)}
         elif maestro is not None:
-            if maestro not in CHANNELS:
-                sizes = ", ".join(map(str, CHANNELS))
+            if maestro not in _CHANNELS:
+                sizes = ", ".join(map(str, _CHANNELS))
                 raise SetupError(f"--maestro {maestro}: a board has {sizes} channels")
             devices = {"": MaestroLine(maestro, crc)}
         elif pca9685 is not None:
             devices = {"": _parse_boards(pca9685)}
         else:
-            devices = _rig_devices(rig or "", firmware)
+            devices = emulated_lines(load_rig(rig or ""))
+        devices = {name: _changed(device, firmware, baud) for name, device in devices.items()}
         several = len(devices) > 1
         if baud is not None and several:
             raise SetupError("--baud: the buses of this rig have their own rates; see its file")
-        buses = [
+        buses = tuple(
             BusSettings(
-                _set_baud(device, baud, any_baud),
+                device,
                 name if several else None,
                 wire_time,
-                turnaround_us,
-                None if link is None else f"{link}-{name}" if name else str(link),
+                None if link is None else f"{link}-{name}" if several and name else str(link),
             )
             for name, device in devices.items()
-        ]
-        served = ServerSettings(_apply_choices(buses, case or []), until_eof)
+        )
+        say = _print_answer if sys.stdout.isatty() else say_line
         try:
-            run(served, _print_answer if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
+            run(ServerSettings(buses, until_eof), say, heed_ctrl_c=True)
         except ValueError as error:
             raise SetupError(str(error)) from None
 
@@ -99,46 +143,18 @@ def _parse_boards(text: str) -> Pca9685Line:
         ) from None
 
 
-def _rig_devices(name: str, firmware: int | None) -> dict[str, Emulated]:
-    """Return the devices on every bus of a rig by the bus's name, "" for a single bus."""
-    lines = emulated_lines(load_rig(name))
-    for bus, line in lines.items():
-        if firmware is not None and not isinstance(line, MaestroLine | Pca9685Line | PluginLine):
-            servos = tuple(servo._replace(firmware=firmware) for servo in line.servos)
-            lines[bus] = replace(line, servos=servos)
-    return lines if len(lines) > 1 else dict(zip(("",), lines.values(), strict=True))
-
-
-def _set_baud(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
-    """Return a device with another baud rate; None keeps its own rate."""
-    if isinstance(device, MaestroLine | Pca9685Line | PluginLine):
+def _changed(device: Emulated, firmware: int | None, baud: int | None) -> Emulated:
+    """Return smart servos with another firmware and baud rate; None keeps their own."""
+    if not isinstance(device, DynamixelLine | FeetechLine):
         return device
-    known = BAUDS[device.kind]
+    known = _BAUDS[device.kind]
     if baud is not None and baud not in known:
         rates = ", ".join(map(str, known))
-        raise SetupError(f"--baud {baud}: {_KNOWN_BY[device.kind]} {rates}")
-    if baud is None and not any_baud:
-        return device
-    return replace(device, baud=None if any_baud else baud)
-
-
-def _apply_choices(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSettings, ...]:
-    """Return every bus with the settings that its kind supports."""
-    known = {case: None for bus in buses for case in CASES.get(bus.device.kind, {})}
-    choices = {}
-    for text in given:
-        name, _, value = text.partition("=")
-        if not name or not value:
-            raise SetupError(f"--set {text}: not CASE=VALUE; cases: {', '.join(known)}")
-        if name.replace("_", "-") not in known:
-            raise SetupError(f"--set {text}: unknown case; available: {', '.join(known)}")
-        choices[name.replace("_", "-")] = value
-    return tuple(
-        replace(
-            bus, choices={k: v for k, v in choices.items() if k in CASES.get(bus.device.kind, {})}
-        )
-        for bus in buses
-    )
+        raise SetupError(f"--baud {baud}: servos of this kind know {rates}")
+    if firmware is not None:
+        servos = tuple(servo._replace(firmware=firmware) for servo in device.servos)
+        device = replace(device, servos=servos)
+    return device if baud is None else replace(device, baud=baud)
 
 
 def _print_answer(line: str) -> None:

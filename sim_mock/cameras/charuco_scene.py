@@ -36,8 +36,8 @@ _OFF_MM: Vec3 = (6.0, -4.0, 5.0)
 _OFF_DEG: Angles3 = (2.0, -3.0, 1.5)
 
 
-class BoardView:
-    """SceneView of a board; poses of the camera are in the frame of the board."""
+class HeldBoard:
+    """SceneView of a board alone; poses of the camera are in the frame of the board."""
 
     def __init__(self, board: CharucoBoard) -> None:
         edge = round(_PAPER_EDGE_MM * _TEXTURE_PX_PER_MM)
@@ -96,7 +96,7 @@ class BoardScene:
             else intrinsics_of_lens(camera.lens, radians(field_deg), *SIZE_PX)
         )
         self.head_rad: Angles3 = (0.0, 0.0, 0.0)
-        self._board, self._view = board, BoardView(board)
+        self._board, self._view = board, HeldBoard(board)
         self._sensor = Sensor(SensorParams(), rng)
         self._where, self._geometry = CameraMount(self.mount), geometry
         wide, high = board.size_m

@@ -1,38 +1,26 @@
 """Starts, commands and stops emulated buses on pseudo-terminals in another process."""
 
 import json
+import pickle
 import subprocess
 import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Protocol, Self
+from typing import Any, Self
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
 from gazerig.drivers.process.own_folder import OwnFolder
-from gazerig.sim_mock.devices import DynamixelLine, Emulated, device_data
+from gazerig.sim_mock.devices import DynamixelLine, Emulated
+from gazerig.sim_mock.pty.line import BusSettings
+from gazerig.sim_mock.pty.server import SentSurroundings, ServerSettings
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 STOP_S = 2.0
 
 
-class SentSurroundings(Protocol):
-    """Surroundings that the server's process creates."""
-
-    @property
-    def make(self) -> str:
-        """Return "module:function", which creates a ``server.ServedSurroundings``.
-
-        Its arguments are the folder and a function that returns the host's time in seconds.
-        """
-        ...
-
-    def write(self, folder: Path) -> None:
-        """Write the data of that function into a folder."""
-        ...
-
-
-class _ServerProcess:
+class ServerProcess:
     """A server process of ``gazerig.sim_mock.pty.server``."""
 
     def __init__(self) -> None:
@@ -42,37 +30,35 @@ class _ServerProcess:
         self.joints: dict[str, int] = {}
         """Index of each joint in the state of the surroundings; {} without these."""
 
-    def _start(
-        self, buses: Sequence[Mapping[str, object]], surroundings: SentSurroundings | None = None
+    def serve(
+        self, buses: Sequence[BusSettings], surroundings: SentSurroundings | None = None
     ) -> list[str]:
-        """Start it with these settings of buses; return the path of each."""
+        """Start it; return the path of each bus, which does not change when it is unplugged.
+
+        Raises:
+            SetupError: the surroundings cannot be used; the message gives the reason.
+            RuntimeError: the server did not start; its message is on standard error.
+        """
         self._folder = OwnFolder("servos")
         folder = self._folder.path
-        links = [str(folder / f"tty{k or ''}") for k in range(len(buses))]
-        linked = [{**bus, "link": link} for bus, link in zip(buses, links, strict=True)]
-        more: dict[str, object] = {}
-        if surroundings is not None:
-            surroundings.write(folder)
-            more["surroundings"] = {"factory": surroundings.make, "folder": str(folder)}
-        settings = json.dumps({"buses": linked, "until_eof": True, **more})
+        around = None if surroundings is None else (surroundings.in_folder(folder), folder)
+        linked = tuple(replace(bus, link=str(folder / f"tty{k}")) for k, bus in enumerate(buses))
+        settings = folder / "settings"
+        settings.write_bytes(pickle.dumps(ServerSettings(linked, True, around)))
         self._server = child_process.start(
             # The servos must outlive their client's shutdown: they end when their input does.
             "gazerig.sim_mock.pty.server",
-            settings,
+            str(settings),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
-        lines = [self._read_line() for _ in range(len(buses) + (surroundings is not None))]
-        said = [json.loads(line) for line in lines if line]
-        refused = next((one["error"] for one in said if "error" in one), None)
-        if refused is not None or not all(lines):
+        try:
+            if surroundings is not None:
+                self.joints = self._read_answer()["joints"]
+            return [str(self._read_answer()["path"]) for _ in buses]
+        except BaseException:
             self.stop()
-            if refused is not None:
-                raise SetupError(refused)
-            raise RuntimeError("the emulated bus did not start: its message is above")
-        if surroundings is not None:
-            self.joints = said.pop(0)["joints"]
-        return [str(one["path"]) for one in said]
+            raise
 
     @property
     def folder(self) -> Path:
@@ -84,9 +70,7 @@ class _ServerProcess:
     @property
     def pid(self) -> int:
         """Return the server's process id."""
-        if self._server is None:
-            raise RuntimeError("the emulated bus is not running: start it first")
-        return self._server.pid
+        return self._running().pid
 
     def command(self, text: str, bus: str = "") -> str:
         """Run a fault command in the server, on the bus of this name; return its description.
@@ -97,21 +81,18 @@ class _ServerProcess:
             ValueError: the command is invalid; the message names the wrong word and valid ones.
             RuntimeError: the server is not running.
         """
-        if self._server is None or self._server.stdin is None:
-            raise RuntimeError("the emulated bus is not running: start it first")
+        pipe = self._running().stdin
+        assert pipe is not None
         line = f"{bus}: {text}" if bus else text
         with self._asking:
-            self._server.stdin.write(line.replace("\n", " ").encode() + b"\n")
-            self._server.stdin.flush()
-            answer = json.loads(self._read_line() or '{"error": "the emulated bus has ended"}')
-        if "error" in answer:
-            raise ValueError(answer["error"])
+            pipe.write(line.replace("\n", " ").encode() + b"\n")
+            pipe.flush()
+            try:
+                answer = self._read_answer()
+            except (SetupError, RuntimeError) as error:
+                raise ValueError(str(error)) from None
         answer.pop("bus", None)
         return json.dumps(answer) if len(answer) > 1 else str(answer["ok"])
-
-    def _read_line(self) -> bytes:
-        assert self._server is not None and self._server.stdout is not None
-        return self._server.stdout.readline()
 
     def stop(self) -> None:
         """End the server; safe to call twice."""
@@ -137,8 +118,25 @@ class _ServerProcess:
         """End the server."""
         self.stop()
 
+    def _running(self) -> subprocess.Popen[bytes]:
+        if self._server is None:
+            raise RuntimeError("the emulated bus is not running: start it first")
+        return self._server
 
-class PtyBus(_ServerProcess):
+    def _read_answer(self) -> dict[str, Any]:
+        """Return the server's next message; raise SetupError with its message if it refuses."""
+        pipe = self._running().stdout
+        assert pipe is not None
+        line = pipe.readline()
+        if not line:
+            raise RuntimeError("the emulated bus did not start or has ended: its message is above")
+        answer: dict[str, Any] = json.loads(line)
+        if "error" in answer:
+            raise SetupError(answer["error"])
+        return answer
+
+
+class PtyBus(ServerProcess):
     """One emulated bus in its own process, and its terminal."""
 
     def start(
@@ -146,44 +144,17 @@ class PtyBus(_ServerProcess):
         specs: Sequence[ServoSpec | tuple[int, str, float]],
         baud: int | None = None,
         wire_time: bool = False,
-        turnaround_us: float = 0.0,
-        choices: Mapping[str, str] | None = None,
     ) -> str:
-        """Start a server for Dynamixel servos; return the path to open as a serial port.
-
-        The other arguments are those of ``start_device``.
-        """
+        """Start a server for Dynamixel servos; return the path to open as a serial port."""
         line = DynamixelLine(tuple(ServoSpec(*spec) for spec in specs), baud)
-        return self.start_device(line, wire_time, turnaround_us, choices)
+        return self.start_device(line, wire_time)
 
-    def start_device(
-        self,
-        device: Emulated,
-        wire_time: bool = False,
-        turnaround_us: float = 0.0,
-        choices: Mapping[str, str] | None = None,
-        seed: int = 0,
-    ) -> str:
-        """Start a server for servos or a board; return the path to open as a serial port.
-
-        The path does not change with ``unplug`` and ``plug``. The other arguments are those of
-        gazerig.sim_mock.pty.line.BusSettings.
-
-        Raises:
-            RuntimeError: the server did not start; its message is on standard error.
-        """
-        bus: dict[str, object] = {
-            "device": device_data(device),
-            "wire_time": wire_time,
-            "turnaround_us": turnaround_us,
-            "choices": dict(choices or {}),
-            "seed": seed,
-        }
-        (path,) = self._start([bus])
-        return path
+    def start_device(self, device: Emulated, wire_time: bool = False) -> str:
+        """Start a server for servos or a board; return the path to open as a serial port."""
+        return self.serve([BusSettings(device, wire_time=wire_time)])[0]
 
 
-class PtyBuses(_ServerProcess):
+class PtyBuses(ServerProcess):
     """All emulated buses of a rig in one process."""
 
     def start(
@@ -191,11 +162,7 @@ class PtyBuses(_ServerProcess):
     ) -> dict[str, str]:
         """Start a server for the devices of every bus; return the path of each, by the same names.
 
-        Raises:
-            SetupError: the surroundings cannot be used; the message gives the reason.
-            RuntimeError: the server did not start; its message is on standard error.
+        The errors are those of ``serve``.
         """
-        buses: list[dict[str, object]] = [
-            {"name": name, "device": device_data(device)} for name, device in devices.items()
-        ]
-        return dict(zip(devices, self._start(buses, surroundings), strict=True))
+        buses = [BusSettings(device, name) for name, device in devices.items()]
+        return dict(zip(devices, self.serve(buses, surroundings), strict=True))

@@ -1,38 +1,31 @@
 """Emulated servos and boards on pseudo-terminals, in their own process.
 
-``python -m gazerig.sim_mock.pty.server '{"buses": [{"device": {"kind": "dynamixel", "servos":
-[[1, "xl330-m077", 2048]]}}]}'`` prints one JSON line per bus with its terminal's path and serves
-clients that connect and disconnect. It reads commands as lines from standard input and answers
-each with one JSON line: {"ok": ...} or {"error": ...}. With several buses a command begins with
-the name of its bus: ``neck: lose 3``; a command without a name is for the bus without one. It
-imports nothing heavy, so that it starts within a tenth of a second; with "surroundings" in its
-settings it creates these, and all servos of all buses are in them.
+It prints one JSON line per bus with its terminal's path and serves clients that connect and
+disconnect. It reads commands as lines from standard input and answers each with one JSON line:
+{"ok": ...} or {"error": ...}. With several buses a command begins with the name of its bus:
+``neck: lose 3``; a command without a name is for the bus without one. It imports nothing heavy, so
+that it starts within a tenth of a second; surroundings in its settings are created there, and all
+servos of all buses are in them.
 
 A server in a thread of the client's process would compete with it for the interpreter lock.
 """
 
 import json
 import os
+import pickle
 import select
 import signal
 import sys
-import threading
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from types import FrameType
-from typing import Any, Protocol
+from typing import Protocol
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process.priority import SHORT_S, request_slice
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import device_of_data
 from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
-
-_LOOK_MS = 200
 
 
 class ServedSurroundings(Protocol):
@@ -64,28 +57,20 @@ class ServedSurroundings(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class SurroundingsSettings:
-    """How to create surroundings.
+class SentSurroundings(Protocol):
+    """Surroundings that are sent to the server's process."""
 
-    Attributes:
-        factory: "module:function".
-        folder: holds their data; the function receives it and the clock.
-    """
+    def in_folder(self, folder: Path) -> "SentSurroundings":
+        """Return the surroundings that share their files in a folder."""
+        ...
 
-    factory: str
-    folder: str
-
-    def create(self) -> ServedSurroundings:
-        """Return the surroundings.
+    def serve(self, folder: Path, clock_s: Callable[[], float]) -> ServedSurroundings:
+        """Return the surroundings in the server.
 
         Raises:
             SetupError: they cannot be used.
         """
-        module, _, function = self.factory.partition(":")
-        make = getattr(import_module(module), function)
-        made: ServedSurroundings = make(Path(self.folder), time.monotonic)
-        return made
+        ...
 
 
 @dataclass(frozen=True)
@@ -95,75 +80,67 @@ class ServerSettings:
     Attributes:
         buses: each on its own terminal.
         until_eof: stop at the end of standard input.
-        surroundings: surroundings of all servos; None: each has its own mechanics.
+        surroundings: surroundings of all servos, and their folder; None: each servo has its own
+            mechanics.
     """
 
     buses: tuple[BusSettings, ...]
     until_eof: bool = False
-    surroundings: SurroundingsSettings | None = None
-
-
-class ServerStopped(Exception):
-    """SIGTERM or Ctrl-C was received."""
+    surroundings: tuple[SentSurroundings, Path] | None = None
 
 
 class Server:
-    """Serves every bus on its own terminal until it is stopped."""
+    """Serves every bus on its own terminal until it is stopped.
+
+    Raises:
+        ValueError, OSError, SetupError: the settings are invalid.
+    """
 
     def __init__(self, settings: ServerSettings, say: Callable[[str], None]) -> None:
-        self._settings = settings
-        self._say = say
-        warn = None if settings.until_eof else _warn
-        self.lines: list[TerminalLine] = []
+        self._until_eof, self._say = settings.until_eof, say
         self._partial_command = b""
-        self.is_over = False
-        """Set by a signal handler: an exception alone may be swallowed where it is raised."""
-        names = [bus.name for bus in settings.buses]
-        if not names or len(set(names)) < len(names):
-            raise ValueError(f"every bus needs its own name; given {names}")
+        self.lines: dict[str, TerminalLine] = {}
+        self.surroundings: ServedSurroundings | None = None
+        if settings.surroundings is not None:
+            sent, folder = settings.surroundings
+            self.surroundings = sent.serve(folder, time.monotonic)
+        warn = None if settings.until_eof else _warn
         try:
-            self.surroundings: ServedSurroundings | None = None
-            if settings.surroundings is not None:
-                with _exit_with_client(settings.until_eof):
-                    self.surroundings = settings.surroundings.create()
             for bus in settings.buses:
-                device = None
-                if self.surroundings is not None:
-                    device = self.surroundings.device(bus)
-                self.lines.append(TerminalLine(bus, time.monotonic, say, warn, device))
+                device = None if self.surroundings is None else self.surroundings.device(bus)
+                line = TerminalLine(bus, time.monotonic, say, warn, device)
+                self.lines[bus.name or ""] = line
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
         """Remove all terminals."""
-        for line in self.lines:
+        for line in self.lines.values():
             line.close()
 
-    def serve(self, commands: int | None) -> None:
-        """Serve until ``commands`` ends, if the settings require it, or a signal stops it."""
-        try:
-            while not self.is_over:
-                watched = [fd for line in self.lines for fd in line.watched_files()]
-                if commands is not None:
-                    watched.append(commands)
-                wait_s = min([line.wait_s() for line in self.lines])
-                if self.surroundings is not None:
-                    wait_s = min(wait_s, self.surroundings.wait_s())
-                ready, _, _ = select.select(watched, (), (), wait_s)
-                now_s = time.monotonic()
-                if commands in ready and not self._take_commands(commands):
-                    if self._settings.until_eof:
-                        return
-                    commands = None
-                for line in self.lines:
-                    line.serve(ready, now_s)
-                if self.surroundings is not None:
-                    self.surroundings.serve(any([line.heard for line in self.lines]))
-        finally:
-            self.close()
-
-    # --- commands
+    def serve(self, commands: int | None, stop: int) -> None:
+        """Serve until ``stop`` becomes readable, or until ``commands`` ends, if that is set."""
+        lines = self.lines.values()
+        while True:
+            watched = [stop, *(fd for line in lines for fd in line.watched_files())]
+            wait_s = min([line.wait_s() for line in lines])
+            if commands is not None:
+                watched.append(commands)
+            if self.surroundings is not None:
+                wait_s = min(wait_s, self.surroundings.wait_s())
+            ready, _, _ = select.select(watched, (), (), wait_s)
+            now_s = time.monotonic()
+            if stop in ready:
+                return
+            if commands in ready and not self._take_commands(commands):
+                if self._until_eof:
+                    return
+                commands = None
+            for line in lines:
+                line.serve(ready, now_s)
+            if self.surroundings is not None:
+                self.surroundings.serve(any([line.heard for line in lines]))
 
     def _take_commands(self, commands: int | None) -> bool:
         """Run received command lines; return False at the end of standard input."""
@@ -180,47 +157,17 @@ class Server:
         return bool(came)
 
     def _obey(self, text: str) -> str:
-        """Run a command: on its bus, on the bus without a name, or in the surroundings."""
+        """Run a command: in the surroundings, on its bus, or on the bus without a name."""
         if self.surroundings is not None and text.split()[0] in self.surroundings.commands:
             return self.surroundings.obey(text)
-        named = {line.settings.name or "": line for line in self.lines}
-        for name, line in named.items():
-            if text.startswith(f"{name}:"):
-                return line.obey(text[len(name) + 1 :].strip())
-        first, last = next(iter(named)), next(reversed(named))
-        if "" not in named and len(named) > 1:
-            names = ", ".join(named)
+        name, _, command = text.partition(":")
+        if name in self.lines and command:
+            return self.lines[name].obey(command.strip())
+        if "" not in self.lines:
+            names = ", ".join(self.lines)
+            first = next(iter(self.lines))
             return json.dumps({"error": f"name the bus first ({names}): {first}: {text}"})
-        answer = named.get("", named[first]).obey(text)
-        if text == "help" and len(named) > 1:
-            hint = f"buses: {', '.join(filter(None, named))}; a command for one: {last}: {text}"
-            answer = json.dumps({"ok": f"{json.loads(answer)['ok']}\n{hint}"})
-        return answer
-
-
-@contextmanager
-def _exit_with_client(until_eof: bool) -> Iterator[None]:
-    """End this process with its client even while surroundings are created, which takes seconds."""
-    made = threading.Event()
-    number: int | None = None
-    if until_eof and sys.stdin is not None:
-        with suppress(OSError, ValueError):  # a program may have replaced it
-            number = sys.stdin.fileno()
-
-    def watch() -> None:
-        client = select.poll()
-        assert number is not None
-        client.register(number, 0)  # a hang-up is always reported
-        while not made.is_set():
-            if client.poll(_LOOK_MS):
-                os._exit(0)
-
-    if number is not None:
-        threading.Thread(target=watch, daemon=True).start()
-    try:
-        yield
-    finally:
-        made.set()
+        return self.lines[""].obey(text)
 
 
 def _warn(text: str) -> None:
@@ -233,30 +180,30 @@ def run(settings: ServerSettings, say: Callable[[str], None], heed_ctrl_c: bool)
     Raises:
         ValueError, OSError: the settings are invalid.
     """
-    servers: list[Server] = []
+    stop, wake = os.pipe()
+    os.set_blocking(wake, False)
 
-    def stop(number: int, frame: FrameType | None) -> None:
-        for server in servers:
-            server.is_over = True
-        raise ServerStopped
+    def end(number: int, frame: object) -> None:
+        os.write(wake, b"x")
 
-    signal.signal(signal.SIGTERM, stop)
-    signal.signal(signal.SIGINT, stop if heed_ctrl_c else signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, end)
+    signal.signal(signal.SIGINT, end if heed_ctrl_c else signal.SIG_IGN)
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)
     try:
-        try:
-            server = Server(settings, say)
-        except SetupError as error:
-            say(json.dumps({"error": str(error)}))
-            return
-        servers.append(server)
+        server = Server(settings, say)
+    except SetupError as error:
+        say(json.dumps({"error": str(error)}))
+        return
+    try:
         if server.surroundings is not None:
             say(json.dumps({"joints": server.surroundings.joints()}))
-        for line in server.lines:
+        for line in server.lines.values():
             say(line.address_json())
-        server.serve(sys.stdin.fileno() if sys.stdin is not None else None)
-    except (ServerStopped, BrokenPipeError):
+        server.serve(sys.stdin.fileno() if sys.stdin is not None else None, stop)
+    except BrokenPipeError:
         return
+    finally:
+        server.close()
 
 
 def say(line: str) -> None:
@@ -265,24 +212,10 @@ def say(line: str) -> None:
     sys.stdout.flush()
 
 
-def settings_of(settings: Mapping[str, Any]) -> ServerSettings:
-    """Return the settings decoded from JSON.
-
-    Raises:
-        ValueError, TypeError: a device or one of its settings is unknown.
-    """
-    buses = [
-        BusSettings(**{**bus, "device": device_of_data(bus["device"])}) for bus in settings["buses"]
-    ]
-    around = settings.get("surroundings")
-    surroundings = None if around is None else SurroundingsSettings(**around)
-    return ServerSettings(tuple(buses), settings.get("until_eof", False), surroundings)
-
-
 def main() -> None:
-    """Serve the buses of the settings on the command line."""
+    """Serve the buses of the settings in the file on the command line, as ``client`` packs them."""
     request_slice(SHORT_S)  # servos do not wait for a browser
-    run(settings_of(json.loads(sys.argv[1])), say, heed_ctrl_c=False)
+    run(pickle.loads(Path(sys.argv[1]).read_bytes()), say, heed_ctrl_c=False)
 
 
 if __name__ == "__main__":

@@ -8,10 +8,11 @@ from world_rigs import WorldBench, arm, read
 
 from gazerig.config.schema import load_rig
 from gazerig.features.world.run.run_world import rig_in_world
+from gazerig.features.world.serve import SentWorld
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.sim_mock.pty.line import BusSettings
-from gazerig.sim_mock.pty.server import Server, ServerSettings, SurroundingsSettings
+from gazerig.sim_mock.pty.server import Server, ServerSettings
 
 pytestmark = pytest.mark.usefixtures("mujoco")
 NECK = ("neck_yaw", "neck_pitch", "neck_roll")
@@ -94,10 +95,9 @@ def test_a_server_passes_a_push_on_to_its_world_and_everything_else_to_its_servo
 ) -> None:
     """``gazerig ctl fault`` orders both."""
     spec = WorldSpec(None, (rig_in_world(load_rig("desk"), looks=False),))
-    spec.write(tmp_path)
     (line,) = emulated_lines(load_rig("desk")).values()
-    files = SurroundingsSettings(spec.make, str(tmp_path))
-    server = Server(ServerSettings((BusSettings(line),), True, files), lambda text: None)
+    around = SentWorld(spec), tmp_path
+    server = Server(ServerSettings((BusSettings(line),), True, around), lambda text: None)
     try:
         assert "pushed left with 5 N" in server._obey("push head 5 left 0.1")
         assert "N is missing; usage: push BODY N" in server._obey("push head")

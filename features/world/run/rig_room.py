@@ -11,6 +11,7 @@ from gazerig.drivers.types import Camera
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
 from gazerig.features.world.run.run_world import RunWorld, world_ideal_bus
 from gazerig.features.world.run.sight import RenderedWorld, world_camera
+from gazerig.features.world.serve import SentWorld
 from gazerig.features.world.shapes import shapes_of
 from gazerig.features.world.world_spec import state_file
 from gazerig.robot.app.bus_wiring import guarded_rig_bus
@@ -92,7 +93,7 @@ def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> R
     if options.fast:
         return simulated_room(rig, options, clock, world, world.computed(clock.now_s))
     buses = PtyBuses()
-    paths = buses.start(emulated_lines(rig), world.spec)
+    paths = buses.start(emulated_lines(rig), SentWorld(world.spec))
     run_bus = RunBus(guarded_rig_bus(rig, paths), close=buses.stop, inject_fault=buses.command)
     joints = RigInState(rig_kinematics(rig), buses.joints)
     head = WorldPoses(state_file(buses.folder), joints)
