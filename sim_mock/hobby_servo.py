@@ -48,11 +48,11 @@ class HobbyServo:
     """
 
     def __init__(self, spec: HobbySpec | Sequence[float]) -> None:
-        self.spec = check_spec(HobbySpec(*spec))
+        self.spec = HobbySpec(*spec)
         self.place_steps = self._clip_to_stops(self.spec.start_steps)
         self.stuck = False
         self.width_steps = 0
-        self._share = 1.0 - exp(-STEP_S / self.spec.lag_s) if self.spec.lag_s > 0.0 else 1.0
+        self._share = 1.0 - exp(-STEP_S / self.spec.lag_s)
 
     @property
     def is_unpowered(self) -> bool:
@@ -63,11 +63,6 @@ class HobbyServo:
     def is_resting(self) -> bool:
         """Return whether the next step would not move it."""
         return self.place_steps == self._next_steps()
-
-    @property
-    def is_straining(self) -> bool:
-        """Return whether it pushes against an obstacle."""
-        return not self._is_in_dead_band() and self.is_resting
 
     def step(self) -> None:
         """Advance by 10 ms."""
@@ -83,37 +78,15 @@ class HobbyServo:
             raise ValueError(f"channel {self.spec.channel} is stuck; free it first")
         self.place_steps = self._clip_to_stops(self.place_steps + steps)
 
-    def _is_in_dead_band(self) -> bool:
-        return self.is_unpowered or abs(self.width_steps - self.place_steps) <= self.spec.dead_steps
-
     def _next_steps(self) -> float:
-        if self.stuck or self._is_in_dead_band():
+        way = self.width_steps - self.place_steps
+        if self.stuck or self.is_unpowered or abs(way) <= self.spec.dead_steps:
             return self.place_steps
         most = self.spec.speed_steps_s * STEP_S
-        move = (self.width_steps - self.place_steps) * self._share
-        return self._clip_to_stops(self.place_steps + min(max(move, -most), most))
+        return self._clip_to_stops(self.place_steps + min(max(way * self._share, -most), most))
 
     def _clip_to_stops(self, steps: float) -> float:
         return min(max(steps, self.spec.stop_low_steps), self.spec.stop_high_steps)
-
-
-def check_spec(spec: HobbySpec) -> HobbySpec:
-    """Return the spec if such a servo can exist.
-
-    Raises:
-        ValueError: a number is out of its range, named with the range.
-    """
-    for name, (low, high) in _RANGES.items():
-        value = getattr(spec, name)
-        if not low <= value <= high:
-            raise ValueError(f"servo on channel {spec.channel}: {name} is not in {low}..{high}")
-    for low_name, high_name in (
-        ("stop_low_steps", "stop_high_steps"),
-        ("min_steps", "max_steps"),
-    ):
-        if not getattr(spec, low_name) <= getattr(spec, high_name):
-            raise ValueError(f"servo on channel {spec.channel}: {low_name} is above {high_name}")
-    return spec
 
 
 HobbyMaker = Callable[[HobbySpec], HobbyServo]
@@ -128,30 +101,7 @@ def build_servos(
     Raises:
         ValueError: a spec's channel does not exist or has two servos.
     """
-    given: dict[int, HobbySpec] = {}
-    for spec in specs:
-        channel = int(spec[0])
-        if channel in given:
-            raise ValueError(
-                f"two servos are on channel {channel}: use a different channel for each, "
-                f"0 to {channels - 1}"
-            )
-        if not 0 <= channel < channels:
-            raise ValueError(f"servo on channel {channel}: channels are 0 to {channels - 1}")
-        given[channel] = HobbySpec(*spec)
+    given = {int(spec[0]): HobbySpec(*spec) for spec in specs}
+    if len(given) < len(specs) or not set(given) <= set(range(channels)):
+        raise ValueError(f"servos need different channels from 0 to {channels - 1}")
     return [make(given.get(channel, HobbySpec(channel))) for channel in range(channels)]
-
-
-_RANGES: dict[str, tuple[float, float]] = {
-    "channel": (0, 255),
-    "start_steps": (0.0, 16_383.0),
-    "speed_steps_s": (100.0, 1e6),
-    "lag_s": (0.0, 1.0),
-    "dead_steps": (0.0, 400.0),
-    "stop_low_steps": (0.0, 16_383.0),
-    "stop_high_steps": (0.0, 16_383.0),
-    "min_steps": (256, 13_120),
-    "max_steps": (256, 13_120),
-    "stall_torque_nm": (0.01, 10.0),
-}
-"""Range of a Maestro's pulses: 64..3280 us, user's guide, section 4.b."""

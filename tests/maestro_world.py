@@ -1,49 +1,97 @@
-"""An emulated Maestro on a clock of its own, and the bytes of its commands."""
+"""An emulated Maestro on a clock of its own, a port to it, and our driver."""
 
-from gazerig.sim_mock.maestro.board import build_board
-from gazerig.sim_mock.maestro.commands import ERRORS
+from typing import Any
+
+from gazerig.drivers.bus.timing import TIMING
+from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
+from gazerig.drivers.types import ServoConfig
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import ERRORS, build_board
 
 PROTOCOL = 1 << ERRORS.index("protocol")
+TICK_S = 0.01
+SETUPS = (
+    ServoConfig(0, "hobby", 4400, 7600, 12_000.0, "eyes", rest_steps=6100),
+    ServoConfig(1, "hobby", 4400, 7600, 12_000.0, "lid"),
+    ServoConfig(5, "hobby", 4400, 7600, 12_000.0, "brow", rest_steps=9000),
+)
+IDS = tuple(setup.id for setup in SETUPS)
 
 
-def words(*numbers):
-    return b"".join(bytes((n & 0x7F, n >> 7)) for n in numbers)
+def number(code, channel, value):
+    return bytes((code, channel, value & 0x7F, value >> 7))
 
 
 def target(channel, steps):
-    return bytes((0x84, channel)) + words(steps)
+    return number(0x84, channel, steps)
 
 
 def speed(channel, limit):
-    return bytes((0x87, channel)) + words(limit)
+    return number(0x87, channel, limit)
 
 
 def acceleration(channel, limit):
-    return bytes((0x89, channel)) + words(limit)
+    return number(0x89, channel, limit)
 
 
 class World:
-    """A board and its clock."""
+    """A board, a port to it, and a bus; time passes during waits."""
 
-    def __init__(self, channels=12, **options):
+    def __init__(self, channels=12, setups=SETUPS, timing=TIMING, crc=False, **options):
         self.now_s = 0.0
-        self.board = build_board(channels, lambda: self.now_s, **options)
+        self.sent: list[Any] = []
+        self.board = build_board(channels, lambda: self.now_s, crc, **options)
+        self.port = InProcessPort(self.board, self.sent.append, "emulated board", self._sleep_until)
+        self.bus = MaestroBus(self.port, setups, MaestroParams(crc, channels), timing)
 
-    def ask(self, data, baud=None):
-        return self.board.receive(bytes.fromhex(data) if isinstance(data, str) else data, baud)
+    def _sleep_until(self, at_s):
+        self.now_s = max(self.now_s, at_s)
 
     def after(self, seconds):
         self.now_s += seconds
         return self
 
+    def do(self, text):
+        return self.board.faults.command(text)
+
+    # --- past the driver
+
+    def ask(self, data):
+        """Send bytes, or text in hex; return the answers."""
+        data = bytes.fromhex(data) if isinstance(data, str) else data
+        return b"".join(p.data for reply in self.board.exchange(data) for p in reply.pieces)
+
     def position(self, channel=0):
         return int.from_bytes(self.ask(bytes((0x90, channel))), "little")
 
-    def positions(self):
-        return [self.position(c) for c in range(len(self.board.body.channels))]
+    def positions(self, channels=None):
+        return [self.position(c) for c in channels or range(len(self.board.channels))]
 
     def errors(self):
         return int.from_bytes(self.ask("A1"), "little")
 
-    def do(self, text):
-        return self.board.faults.command(text)
+    # --- with the driver
+
+    def held(self, *steps):
+        """Let the board hold the servos at these pulses, and then the bus."""
+        self.bus.open()
+        self.ask(b"".join(map(target, IDS, steps)))
+        assert self.bus.enable_torque() == steps
+        self.run(0.1)
+        self.bus.events()
+        return self
+
+    def run(self, seconds, goals=None):
+        """Tick every 10 ms; return the feedback of all ticks."""
+        seen = []
+        for _ in range(round(seconds / TICK_S)):
+            self.now_s += TICK_S
+            seen.append(self.bus.read(self.now_s))
+            if goals is not None:
+                self.bus.write(goals)
+        return seen
+
+    def packets(self):
+        """Return what was sent since the last call."""
+        sent, self.sent[:] = list(self.sent), []
+        return sent

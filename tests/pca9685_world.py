@@ -1,20 +1,21 @@
-"""Hobby servos on emulated PCA9685 boards with our driver."""
+"""Hobby servos on emulated PCA9685 boards with our driver, and the kernel's bus to them."""
 
+import errno
+import os
 from typing import Any
-
-from feedback_rows import rows
 
 from gazerig.drivers.bus.timing import BusTiming
 from gazerig.drivers.pca9685.board import Pca9685Bus, Pca9685Params
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.pca9685.bridge import build_bridge
+from gazerig.sim_mock.pca9685.bridge import Bridge, TransferPart, build_bridge
 
 SPEED_STEPS_S = 4000.0
 GRAIN = 20
 BOARD = Pca9685Params()
 QUICK = BusTiming(stagger_s=0.0)
+READ_FLAG = 0x0001
 
 
 def setup(servo_id, **changes):
@@ -51,19 +52,21 @@ class World:
         self.bus.events()
         return self
 
-    def run(self, seconds, goals=None, period_s=0.01):
-        for _ in range(round(seconds / period_s)):
-            readings = rows(self.bus.read(self.now[0]))
+    def run(self, seconds, goals=None, bus=None):
+        """Tick every 10 ms; return the last feedback."""
+        bus = bus or self.bus
+        for _ in range(round(seconds / 0.01)):
+            feedback = bus.read(self.now[0])
             if goals is not None:
-                self.bus.write(goals)
-            self.now[0] += period_s
-        return readings
+                bus.write(goals)
+            self.now[0] += 0.01
+        return feedback
 
-    def chip(self, address=0x40):
-        return self.device.body.chips[address]
+    def registers(self, address=0x40):
+        return self.device.chips[address].registers
 
     def widths(self):
-        return [self.device.body.width_steps(s.id, self.now[0]) for s in self.setups]
+        return [self.device.pulse_steps(s.id) for s in self.setups]
 
     def places(self):
         positions = self.device.positions_steps()
@@ -71,3 +74,36 @@ class World:
 
     def command(self, text):
         return self.device.faults.command(text)
+
+
+class SMBus:
+    """An open bus with the interface of smbus2; errors are those of the kernel's drivers.
+
+    gone: whether the adapter was unplugged; stuck: whether the data line is held low
+    """
+
+    fd: int | None = None
+    gone = stuck = False
+
+    def __init__(self, device: Bridge) -> None:
+        self._device = device
+
+    def i2c_rdwr(self, *messages: Any) -> None:
+        """Execute smbus2's messages as one transfer."""
+        parts = [
+            TransferPart(one.addr, b"", one.len)
+            if one.flags & READ_FLAG
+            else TransferPart(one.addr, bytes(one))
+            for one in messages
+        ]
+        failed = errno.ENODEV if self.gone else errno.ETIMEDOUT if self.stuck else errno.EREMOTEIO
+        found = None if self.gone or self.stuck else self._device.transfer(parts)
+        if found is None:
+            raise OSError(failed, os.strerror(failed))
+        for one in messages:
+            if one.flags & READ_FLAG:
+                for at, byte in enumerate(found):
+                    one.buf[at] = bytes((byte,))
+
+    def close(self) -> None:
+        """Close."""

@@ -185,9 +185,8 @@ def test_the_emulators_commands_are_those_of_its_page() -> None:
     [
         ("## Where documents", DYNAMIXEL),
         ("Feetech STS servos:", FEETECH),
-        ("Pololu Maestro, as", MAESTRO),
     ],
-    ids=["dynamixel", "feetech", "maestro"],
+    ids=["dynamixel", "feetech"],
 )
 def test_the_emulators_cases_are_those_of_its_page(title: str, device: Any) -> None:
     table = EMULATOR.read_text(encoding="utf-8").split(title)[1].split("\n\n")[1]

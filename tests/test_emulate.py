@@ -16,7 +16,7 @@ from present import present
 from typer.testing import CliRunner
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.maestro.commands import MaestroCodec
+from gazerig.drivers.maestro.commands import GET_POSITION, MaestroCodec
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.cli import emulate as command
 from gazerig.robot.cli.emulate import app
@@ -136,7 +136,7 @@ def test_a_rig_of_hobby_servos_is_a_board_that_sends_no_pulses_yet():
     emulator = Emulator("maker")
     assert emulator.ready == {"path": emulator.path, "baud": None}
     # The rig's board requires a check byte: it does not answer packets without one.
-    plain, checked = MaestroCodec().position(0), MaestroCodec(crc=True).position(0)
+    plain, checked = (MaestroCodec(crc).command(GET_POSITION, 0) for crc in (False, True))
     assert asked(emulator.path, plain + bytes(1), 2, 115_200) == b""
     status = emulator.type("status")
     assert status["errors"] == ["crc"] and {servo["target"] for servo in status["servos"]} == {0}

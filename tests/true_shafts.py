@@ -29,6 +29,7 @@ from gazerig.robot.model.types import JointAngles
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, build
+from gazerig.sim_mock.hobby_board import HobbyBoard
 from gazerig.sim_mock.in_process_port import InProcessPort
 
 MS_S = 0.001
@@ -256,8 +257,8 @@ class Bench:
         joint = self.rig.joints[name]
         device, place = self.shafts.devices[joint.bus], servo_index(self.rig, name)
         steps = joint.steps(angle_rad) - device.positions_steps()[place]
-        if hasattr(device, "body"):
-            device.body.servos[place].turn(steps)
+        if isinstance(device, HobbyBoard):
+            device.servos[place].turn(steps)
         else:
             device.servos[place].drive.turn(steps)  # type: ignore[attr-defined]
 

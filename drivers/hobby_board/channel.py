@@ -205,12 +205,15 @@ class Channel:
             if not self.entering:
                 # No goal is outside, so a byte was damaged; answers have no checksum.
                 pulse_steps = min(max(pulse_steps, self.setup.min_steps), self.setup.max_steps)
+            # The estimate moves there once more, which is not a motion.
+            again_steps = abs(pulse_steps - self.ramp.pulse_steps)
+            self._moved_steps = max(0.0, self._moved_steps - again_steps)
         elif pulse_steps:
             self.goal_steps = pulse_steps
-        if pulse_steps:
-            self.on, self.ramp.pulse_steps = True, pulse_steps
+        self.on = pulse_steps > 0
+        if self.on:
+            self.ramp.pulse_steps = pulse_steps
         else:
-            self.on = False
             self.ramp.begin(self.ramp.shaft_steps)
 
     def adopt_position(self, pulse_steps: int) -> None:
@@ -224,9 +227,10 @@ class Channel:
         """Return whether the pulse is within the limits."""
         return self.setup.min_steps <= self.ramp.pulse_steps <= self.setup.max_steps
 
-    def difference_text(self) -> str:
-        """Return how its pulse differs from the commanded one."""
-        if not self.on:
+    def difference_text(self, pulse_steps: int) -> str:
+        """Return how a pulse differs from the commanded one."""
+        if not pulse_steps:
             return "has no pulses"
-        goal, pulse = self.goal_steps / US_STEPS, round(self.ramp.pulse_steps) / US_STEPS
-        return f"is sent to {goal:g} us and gets {pulse:g} us"
+        return (
+            f"is sent to {self.goal_steps / US_STEPS:g} us and gets {pulse_steps / US_STEPS:g} us"
+        )

@@ -134,8 +134,9 @@ class BoardSupervisor:
         # A first pulse is exact; another one may have been moving when it was read.
         room = FINE_STEPS + (BEHIND_S * channel.ramp.speed_steps_s if pulse_steps else 0.0)
         if not found[0] or not low - room <= found[0] <= high + room:
+            fault = channel.difference_text(found[0])
             channel.adopt_pulse(found[0])
-            return channel.difference_text()
+            return fault
         channel.record_hold(found[0])
         return ""
 
@@ -250,7 +251,8 @@ class BoardSupervisor:
                 is_sure = False
                 self._line.errors["other pulse"] += 1
                 if self.is_ramped_by_board and channel.stays_at(pulse):
-                    self._stop([channel], channel.difference_text(), self._board.remedy)
+                    fault = channel.difference_text(pulse)
+                    self._stop([channel], fault, self._board.remedy)
         if lost:
             self._record_lost(lost, errors, now_s)
         held = [channel for channel in self._channels if channel.held]
@@ -268,16 +270,14 @@ class BoardSupervisor:
         self._mark(lost)
         self._restarts = [at_s for at_s in self._restarts if now_s - at_s < WITHIN_S]
         self._restarts.append(now_s)
-        named = f" by an error ({' and '.join(errors)})" if errors else ""
-        if len(self._restarts) <= MOST_RESTARTS:
-            done = f"was sent home{named}" if errors else "restarted"
-            self._log.add(f"{who} {done}: set up again")
+        if len(self._restarts) > MOST_RESTARTS:
+            named = f" ({' and '.join(errors)})" if errors else ""
+            fault = f"loses its pulses again and again{named}"
+            self._stop(self.pending, fault, "check its supply, cable and ground")
         elif errors:
-            self._stop(
-                self.pending, f"is sent home again and again{named}", "check cable and ground"
-            )
+            self._log.add(f"{who} was sent home by an error ({' and '.join(errors)}): set up again")
         else:
-            self._stop(self.pending, "restarts again and again", "supply too weak")
+            self._log.add(f"{who} restarted: set up again")
 
     def _mark(self, channels: Sequence[Channel]) -> None:
         self._failed_tries = 0

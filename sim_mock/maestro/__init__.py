@@ -1,1 +1,1 @@
-"""Device side of a Pololu Maestro, and its hobby servos."""
+"""Device side of a Pololu Maestro."""

@@ -1,270 +1,223 @@
 """Device side of a Pololu Maestro: bytes in, bytes and pulses out, nothing opened.
 
-A board of 6, 12, 18 or 24 channels, all configured as servos, each with a hobby servo. Omitted:
-inputs, digital outputs, other periods than 20 ms, PWM (accepted, no effect), and scripts other
-than the one that a fault starts. Source: Pololu Maestro User's Guide (0J40), section 5; [A] is
-assumed.
+A board of 6, 12, 18 or 24 channels, all configured as servos that stop on an error, each with a
+hobby servo. Command bytes have bit 7 set, data bytes do not. Only the commands of our driver are
+known. Omitted: inputs, digital outputs, scripts, the serial time-out, other protocols and other
+reactions to errors. Source: Pololu Maestro User's Guide (0J40), section 5; [A] is assumed.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
-from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NO_DEVICE
 from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, word_choice
-from gazerig.sim_mock.faults.hobby import HobbyBoard, HobbyFaults, channel_word, hobby_verbs
+from gazerig.sim_mock.faults.hobby import HobbyFaults, hobby_commands
+from gazerig.sim_mock.hobby_board import HobbyBoard
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec, build_servos
-from gazerig.sim_mock.maestro.body import EmulatedChannel, MaestroBody
-from gazerig.sim_mock.maestro.commands import (
-    ERRORS,
-    GET_ERRORS,
-    GET_MOVING,
-    GET_POSITION,
-    GET_SCRIPT,
-    GO_HOME,
-    MINI_SSC,
-    RUN_SCRIPT,
-    RUN_SCRIPT_WITH,
-    SET_ACCELERATION,
-    SET_PWM,
-    SET_SPEED,
-    SET_TARGET,
-    SET_TARGETS,
-    STOP_SCRIPT,
-    CommandParser,
-    ParsedCommand,
-    decode_word,
-)
-from gazerig.sim_mock.maestro.settings import LIMITS, Settings, cases, change_setting, width_steps
+from gazerig.sim_mock.maestro.channel import EmulatedChannel
 from gazerig.sim_mock.replies import Piece
 
+SET_TARGET, SET_TARGETS, SET_SPEED, SET_ACCELERATION = 0x84, 0x9F, 0x87, 0x89
+GET_POSITION, GET_ERRORS, STOP_SCRIPT, GET_SCRIPT = 0x90, 0xA1, 0xA4, 0xAE
+DATA_BYTES = {
+    SET_TARGET: 3,
+    SET_TARGETS: 2,
+    SET_SPEED: 3,
+    SET_ACCELERATION: 3,
+    GET_POSITION: 1,
+    GET_ERRORS: 0,
+    STOP_SCRIPT: 0,
+    GET_SCRIPT: 0,
+}
+"""Number of data bytes; for set-targets those before the targets."""
+SETTERS = {
+    SET_TARGET: EmulatedChannel.set_target,
+    SET_TARGETS: EmulatedChannel.set_target,
+    SET_SPEED: EmulatedChannel.limit_speed,
+    SET_ACCELERATION: EmulatedChannel.limit_acceleration,
+}
+"""Commands with a number for a channel; set-targets has several for adjacent channels."""
 
-class MaestroFaults(HobbyFaults):
-    """Faults of one board; an id is a channel."""
+ERRORS = (
+    "signal",
+    "overrun",
+    "buffer-full",
+    "crc",
+    "protocol",
+    "timeout",
+    "script-stack",
+    "script-call-stack",
+    "script-counter",
+)
+"""Names by the bits of the error register."""
+
+SIZES = (6, 12, 18, 24)
+RESTART_S = 0.1
+"""Time from a dip of the supply until it receives again [A]."""
+
+
+class ParsedCommand(NamedTuple):
+    """One command, or the name of an error in the bytes; ``end``: its end among the bytes fed."""
+
+    end: int
+    code: int = 0
+    data: bytes = b""
+    error: str = ""
+
+
+class CommandParser:
+    """Stores the received bytes of an incomplete command.
+
+    mini: whether the board has more than six channels, and the command for several targets
+    crc: whether a check byte is expected after every command
+    """
+
+    def __init__(self, mini: bool, crc: bool) -> None:
+        self._mini, self._crc = mini, crc
+        self._packet = bytearray()
+
+    def forget(self) -> None:
+        """Drop an unfinished command."""
+        self._packet.clear()
+
+    def feed(self, data: bytes) -> Iterator[ParsedCommand]:
+        """Yield the commands that bytes complete, fed one by one."""
+        for end, byte in enumerate(data, 1):
+            packet = self._packet
+            if bool(packet) == (byte >= 0x80):
+                yield ParsedCommand(end, error="protocol")  # an unfinished command, or none
+                packet.clear()
+                if byte < 0x80:
+                    continue
+            packet.append(byte)
+            code = packet[0]
+            if code not in DATA_BYTES or (code == SET_TARGETS and not self._mini):
+                packet.clear()
+                yield ParsedCommand(end, error="protocol")
+                continue
+            size = 1 + DATA_BYTES[code]
+            if code == SET_TARGETS and len(packet) > 1:
+                size += 2 * packet[1]
+            if len(packet) == size + self._crc:
+                command, check = bytes(packet[:size]), packet[size:]
+                packet.clear()
+                if check and check[0] != crc7(command):
+                    yield ParsedCommand(end, error="crc")
+                else:
+                    yield ParsedCommand(end, code, command[1:])
+
+
+def crc7(data: bytes) -> int:
+    """Return the checksum of a command: CRC-7 with the polynomial 91 hex, lowest bit first."""
+    rest = 0
+    for byte in data:
+        rest ^= byte
+        for _ in range(8):
+            rest = (rest ^ 0x91 if rest & 1 else rest) >> 1
+    return rest
+
+
+class EmulatedMaestro(HobbyBoard):
+    """One board and its servos.
+
+    errors: its error register
+    is_script_running: whether its own script runs, which does nothing
+    """
 
     def __init__(
-        self, board: HobbyBoard, body: MaestroBody, commands: CommandTable, seed: int = 0
+        self, servos: Sequence[HobbyServo], now_s: Callable[[], float], crc: bool, seed: int
     ) -> None:
-        # A Maestro's packets begin with AA: a loose header and a babbling node send it.
-        super().__init__(board, commands, seed, header=b"\xaa")
-        self._body = body
+        super().__init__(servos, now_s, COMMANDS, seed)
+        self.channels = [EmulatedChannel(s.spec.min_steps, s.spec.max_steps) for s in servos]
+        self.errors = 0
+        self.is_script_running = False
+        self._parser = CommandParser(len(servos) > SIZES[0], crc)
+        self._awake_s = now_s()
 
-    def error(self, name: str) -> str:
-        """Register an error on the board; its channels react as configured."""
-        self._body.advance()
-        self._body.fail(name)
-        return f"the board has found an error: {name}"
+    def fail(self, error: str) -> None:
+        """Register an error by its name; every channel stops its pulses."""
+        self.errors |= 1 << ERRORS.index(error)
+        for channel in self.channels:
+            channel.set_target(0)
 
-    def set_script(self, what: int | bool) -> str:
-        """Start a script that does nothing or swings a channel, or end it (False)."""
-        if what is False:
-            self._body.advance()
-            self._body.stop_script()
-            return "no script runs"
-        if what is True:
-            self._body.run_script()
-            return "a script runs and does nothing"
-        self._hobby.find_servo(what)
-        self._body.run_script(what)
-        return f"a script swings channel {what} from end to end"
+    # --- parts of HobbyBoard
 
-    def board_status(self) -> dict[str, object]:
-        """Return the unread errors, and whether a script runs."""
-        named = [name for bit, name in enumerate(ERRORS) if self._body.errors >> bit & 1]
-        return {"errors": named, "script": self._body.script_running}
+    def status(self) -> dict[str, object]:
+        """Return the unread errors."""
+        return {"errors": [name for bit, name in enumerate(ERRORS) if self.errors >> bit & 1]}
+
+    def restart(self) -> None:
+        """Restart as after a dip of the supply, with an empty error register."""
+        self.advance()
+        self.errors = 0
+        for channel in self.channels:
+            channel.restart()
+        self._parser.forget()
+        self._awake_s = self.now_s() + RESTART_S
+
+    def target_steps(self, channel: int) -> int:
+        """Return the target of a channel, quarter microseconds; 0: no pulses."""
+        return self.channels[channel].target
+
+    def pulse_steps(self, channel: int) -> int:
+        """Return the present pulse of a channel, quarter microseconds; 0: none."""
+        return self.channels[channel].position
+
+    def step_outputs(self) -> bool:
+        """Advance the outputs by 10 ms; return whether they are at rest."""
+        for channel in self.channels:
+            channel.step()
+        return not any(channel.is_moving for channel in self.channels)
+
+    def execute(self, data: bytes) -> Iterator[tuple[int, Piece | None]]:
+        """Execute the commands in bytes; yield the end of each command, and its answer."""
+        if self.now_s() < self._awake_s - 1e-9:
+            return
+        for end, code, content, error in self._parser.feed(data):
+            if error:
+                self.fail(error)
+            elif code not in SETTERS or not self.is_struck("lose_writes"):
+                yield end, self._answer(code, content)
+
+    def _answer(self, code: int, data: bytes) -> Piece | None:
+        """Execute one command; an unknown channel is a protocol error [A]."""
+        if code in SETTERS:
+            first, *numbers = data[1:] if code == SET_TARGETS else data
+            words = [low | high << 7 for low, high in zip(numbers[::2], numbers[1::2], strict=True)]
+            channels = self.channels[first : first + len(words)]
+            if len(channels) < len(words):
+                self.fail("protocol")
+                return None
+            for channel, word in zip(channels, words, strict=True):
+                SETTERS[code](channel, word)
+        elif code == GET_POSITION:
+            if data[0] < len(self.channels):
+                return Piece(data[0], self.channels[data[0]].position.to_bytes(2, "little"))
+            self.fail("protocol")
+        elif code == GET_ERRORS:
+            errors, self.errors = self.errors, 0
+            return Piece(NO_DEVICE, errors.to_bytes(2, "little"))
+        elif code == GET_SCRIPT:
+            return Piece(NO_DEVICE, bytes((not self.is_script_running,)))
+        else:
+            self.is_script_running = False
+        return None
 
 
-_CHANNEL = channel_word(23)
-
-
-def _script(text: str) -> int | bool:
-    return text == "on" if text in ("on", "off") else _CHANNEL.read(text)
+def _error(faults: HobbyFaults, name: str) -> str:
+    board = faults.board
+    assert isinstance(board, EmulatedMaestro)
+    board.advance()
+    board.fail(name)
+    return f"the board has found an error: {name}"
 
 
 # fmt: off
-OWN: dict[str, Verb] = {
-    "error": Verb(MaestroFaults.error, (Argument("NAME", word_choice(*ERRORS)),),
+COMMANDS: CommandTable = hobby_commands(23, "targets and limits", {
+    "error": Verb(_error, (Argument("NAME", word_choice(*ERRORS)),),
                   f"the board finds an error: {', '.join(ERRORS)}"),
-    "script": Verb(MaestroFaults.set_script, (Argument("on|off|ID", _script),),
-                   "a script runs; with a channel it swings this from end to end"),
-}
+})
 # fmt: on
-
-COMMANDS = CommandTable(
-    hobby_verbs(_CHANNEL, "commands without an answer", OWN), cases(), "a channel"
-)
-
-
-SIZES = (6, 12, 18, 24)
-ASKING = (GET_POSITION, GET_MOVING, GET_ERRORS, GET_SCRIPT)
-
-
-class EmulatedMaestro:
-    """One board and its servos."""
-
-    def __init__(
-        self,
-        servos: Sequence[HobbyServo],
-        now_s: Callable[[], float],
-        settings: Settings | None = None,
-        seed: int = 0,
-    ) -> None:
-        self.now_s = now_s
-        self.body = MaestroBody(servos, now_s, settings or Settings())
-        self.faults = MaestroFaults(self, self.body, COMMANDS, seed)
-        self._wire = self.faults.wire
-        self.check_baud = False
-        self._parser = CommandParser(len(servos) > SIZES[0])
-        self._apply_settings(self.body.settings)
-        self._do: dict[int, Callable[[bytes], bytes | None]] = {
-            SET_TARGET: lambda data: self._apply_to_channel(data, EmulatedChannel.set_target),
-            SET_TARGETS: self._set_targets,
-            SET_SPEED: lambda data: self._apply_to_channel(data, EmulatedChannel.limit_speed),
-            SET_ACCELERATION: lambda data: self._apply_to_channel(
-                data, EmulatedChannel.limit_acceleration
-            ),
-            SET_PWM: lambda data: None,
-            GET_POSITION: self._get_position,
-            GET_MOVING: lambda data: bytes(
-                (any(c.is_moving_under_limit for c in self.body.channels),)
-            ),
-            GET_ERRORS: lambda data: self.body.read_errors().to_bytes(2, "little"),
-            GO_HOME: lambda data: self.body.move_all_to(self.body.settings.on_error),
-            STOP_SCRIPT: lambda data: self.body.stop_script(),
-            RUN_SCRIPT: lambda data: self._run_script(),
-            RUN_SCRIPT_WITH: lambda data: self._run_script(),
-            GET_SCRIPT: lambda data: bytes((not self.body.script_running,)),
-            MINI_SSC: self._mini_ssc,
-        }
-
-    # --- device interface
-
-    def understands_baud(self, client_baud: int) -> bool:
-        """Return whether a client at this baud rate is understood: on USB every one is."""
-        return True
-
-    def choose_behaviour(self, case: str, value: str) -> None:
-        """Change a setting of the board; it does not restart."""
-        self.body.advance()
-        if case in LIMITS:
-            steps = width_steps(case, value)
-            self.body.limit(*((steps, None) if case == "min-us" else (None, steps)))
-            return
-        self._apply_settings(change_setting(self.body.settings, case, value))
-        self.body.reset_timeout()
-
-    def _apply_settings(self, settings: Settings) -> None:
-        self.body.settings = settings
-        self._parser.crc = settings.crc
-
-    def restart(self) -> None:
-        """Restart as after a dip of the supply."""
-        self.body.restart()
-        self._parser.forget()
-
-    def find_servo(self, channel: int) -> HobbyServo:
-        """Return the servo of a channel, advanced to the present time."""
-        self.body.advance()
-        servos = self.body.servos
-        if not 0 <= channel < len(servos):
-            raise KeyError(f"no channel {channel}; channels are 0 to {len(servos) - 1}")
-        return servos[channel]
-
-    def channel_report(self, channel: int) -> dict[str, object]:
-        """Return a channel's target and its present pulse."""
-        one = self.body.channels[channel]
-        return {
-            "target": one.target,
-            "position": one.position,
-            "speed": one.speed,
-            "acceleration": one.acceleration,
-        }
-
-    def positions_steps(self) -> tuple[float, ...]:
-        """Return the true positions of the shafts now, in quarter microseconds, by channel."""
-        self.body.advance()
-        return tuple(servo.place_steps for servo in self.body.servos)
-
-    # --- bytes
-
-    def receive(self, data: bytes, client_baud: int | None = None) -> bytes:
-        """Process received bytes; return the bytes of the board's answers."""
-        replies = self.exchange(data, client_baud)
-        return b"".join(piece.data for reply in replies for piece in reply.pieces)
-
-    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
-        """Process received bytes; return the reply to each command in them."""
-        self.body.advance()
-        came = self._filter_input(data)
-        missing, replies = len(data) - len(came), []
-        for command in self._parser.feed(came):
-            pieces = self._execute(command)
-            if pieces:
-                replies.append(DeviceReply(missing + command.end, pieces))
-        return self.faults.add_line_noise(replies, data) if self._wire.has_any else replies
-
-    def _filter_input(self, data: bytes) -> bytes:
-        """Return the bytes that reach the board."""
-        if not self.body.is_awake or self.body.settings.mode == "mute":
-            return b""
-        now_s = self.now_s()
-        if not self._wire.has_any or not self._wire.is_on("lose_bytes", now_s):
-            return data
-        return bytes(b for b in data if self._wire.use_fault("lose_bytes", None, now_s) is None)
-
-    def _execute(self, command: ParsedCommand) -> list[Piece]:
-        """Execute one command; return the answer."""
-        if command.error:
-            self.body.fail(command.error)
-            return []
-        silent = self._wire.has_any and command.code not in ASKING
-        if silent and self._wire.use_fault("lose_writes", None, self.now_s()) is not None:
-            return []
-        answer = self._do[command.code](command.data)
-        self.body.reset_timeout()
-        if answer is None:
-            return []
-        asked = command.data[0] if command.code == GET_POSITION else NO_DEVICE
-        piece = Piece(asked, answer)
-        if not self._wire.has_any:
-            return [piece]
-        now_s = self.now_s()
-        if self._wire.use_fault("lose", piece.servo_id, now_s):
-            return []
-        return self._wire.spoil_pieces([piece], False, now_s)
-
-    # --- commands
-
-    def _apply_to_channel(self, data: bytes, do: Callable[[EmulatedChannel, int], None]) -> None:
-        """Apply a number to a channel; an unknown channel is a protocol error [A]."""
-        if data[0] < len(self.body.channels):
-            do(self.body.channels[data[0]], decode_word(data[1], data[2]))
-        else:
-            self.body.fail("protocol")
-
-    def _set_targets(self, data: bytes) -> None:
-        number, first = data[0], data[1]
-        if not number or first + number > len(self.body.channels):
-            self.body.fail("protocol")
-            return
-        for nth, channel in enumerate(self.body.channels[first : first + number], 1):
-            channel.set_target(decode_word(data[2 * nth], data[2 * nth + 1]))
-
-    def _get_position(self, data: bytes) -> bytes | None:
-        if data[0] < len(self.body.channels):
-            return self.body.channels[data[0]].position.to_bytes(2, "little")
-        self.body.fail("protocol")
-        return None
-
-    def _mini_ssc(self, data: bytes) -> None:
-        """Set a target of 8 bits: 127 is 1500 us, 0 and 254 are 476.25 us to either side."""
-        # Servo numbers beyond its own belong to other boards.
-        if data[0] < len(self.body.channels):
-            self.body.channels[data[0]].set_target(6000 + (data[1] - 127) * 15)
-
-    def _run_script(self) -> None:
-        """Handle the start of a script that does not exist [A]."""
-        self.body.stop_script()
-        self.body.fail("script-counter")
 
 
 def build_board(
@@ -282,5 +235,4 @@ def build_board(
     """
     if channels not in SIZES:
         raise ValueError(f"{channels} channels: a Maestro has {', '.join(map(str, SIZES))}")
-    built = build_servos(servos, channels, make_servo)
-    return EmulatedMaestro(built, now_s, Settings(crc=crc), seed)
+    return EmulatedMaestro(build_servos(servos, channels, make_servo), now_s, crc, seed)

@@ -1,1 +1,1 @@
-"""Emulated PCA9685 boards on an I2C bus, and their hobby servos."""
+"""Emulated PCA9685 boards on an I2C bus."""

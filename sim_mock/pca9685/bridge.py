@@ -1,4 +1,4 @@
-"""The host's end of an emulated I2C bus: command bytes in, answers out.
+"""Emulated PCA9685 boards with a hobby servo on each channel, on an I2C bus behind a bridge.
 
 Commands are those of NXP's SC18IM700, a bridge from a serial line to I2C: S, the address with its
 direction bit, a count and, for a write, its bytes; further S are further starts; P ends it. R, a
@@ -9,194 +9,147 @@ SC18IM700 data sheet, rev. 2 (10 August 2007).
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NO_DEVICE
-from gazerig.sim_mock.faults.hobby import HobbyFaults
+from gazerig.sim_mock.faults.grammar import TIME, Argument, Verb, count
+from gazerig.sim_mock.faults.hobby import hobby_commands
+from gazerig.sim_mock.faults.verbs import counted_command
+from gazerig.sim_mock.hobby_board import HobbyBoard
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec, build_servos
-from gazerig.sim_mock.pca9685.body import CASES, COMMANDS, BusStuck, NotAcknowledged, Pca9685Body
 from gazerig.sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
 from gazerig.sim_mock.replies import Piece
 
 START, STOP, READ_REGISTER = ord("S"), ord("P"), ord("R")
-STATUS_REGISTER = 0x0A
-OK, NO_ACKNOWLEDGE, TIMED_OUT = 0xF0, 0xF1, 0xF8
+OK, NO_ACKNOWLEDGE = 0xF0, 0xF1
+US_STEPS = 4
+
+# fmt: off
+COMMANDS = hobby_commands(255, "transfers that only write", {
+    "nack": Verb(counted_command("nack", "transfers are not acknowledged"), (Argument("N", count, True),),
+                 "the next N transfers are not acknowledged", TIME),
+})
+# fmt: on
 
 
-class _TransferPart(NamedTuple):
+class TransferPart(NamedTuple):
     """One start of a transfer; length: length of a read, None for a write."""
 
     address: int
     data: bytes
-    length: int | None
+    length: int | None = None
 
 
-class Bridge:
-    """One bus behind a bridge; a servo's id is 16 times its board's number plus its channel."""
+class Bridge(HobbyBoard):
+    """One bus behind a bridge; a servo's id is 16 times its board's number plus its channel.
+
+    chips: chips by their addresses
+    """
 
     def __init__(
         self,
+        chips: dict[int, Chip],
         servos: Sequence[HobbyServo],
         now_s: Callable[[], float],
-        addresses: Sequence[int],
-        oscillator_hz: float,
         seed: int,
     ) -> None:
-        self.now_s = now_s
-        chips = {address: Chip(oscillator_hz) for address in addresses}
-        self.body = Pca9685Body(chips, servos, now_s)
-        self.faults = HobbyFaults(self, COMMANDS, seed, header=b"S")
-        self._wire = self.faults.wire
-        self._order = {address: board for board, address in enumerate(addresses)}
+        super().__init__(servos, now_s, COMMANDS, seed)
+        self.chips = chips
         self._unread = b""
         self._status = OK
-        self._pointers: dict[int, int] = {}
-        self.check_baud = False
 
-    # --- device interface
-
-    def understands_baud(self, client_baud: int) -> bool:
-        """Return True, because it accepts any baud rate."""
-        return True
-
-    def choose_behaviour(self, case: str, value: str) -> None:
-        """Change a property of the boards."""
-        if case not in CASES:
-            raise ValueError(f"set {case!r}: unknown; expected {', '.join(CASES)}")
-        try:
-            mhz = float(value)
-        except ValueError:
-            mhz = 0.0
-        if not 20.0 <= mhz <= 30.0:
-            raise ValueError(f"{case} {value!r}: not a number of MHz from 20 to 30")
-        self.body.advance()
-        for chip in self.body.chips.values():
-            chip.oscillator_hz = mhz * 1e6
+    # --- parts of HobbyBoard
 
     def restart(self) -> None:
-        """Restart the boards as after a dip of their supply."""
-        self.body.restart()
+        """Restart all boards as after a dip of their supply."""
+        self.advance()
+        for chip in self.chips.values():
+            chip.reset()
 
-    def find_servo(self, place: int) -> HobbyServo:
-        """Return the servo of a channel, advanced to the present time."""
-        self.body.advance()
-        if not 0 <= place < len(self.body.servos):
-            raise KeyError(f"no channel {place}; channels are 0 to {len(self.body.servos) - 1}")
-        return self.body.servos[place]
+    def target_steps(self, channel: int) -> int:
+        """Return the pulse of a channel, quarter microseconds; 0: none."""
+        return self.pulse_steps(channel)
 
-    def channel_report(self, channel: int) -> dict[str, object]:
-        """Return the output of a channel, quarter microseconds."""
-        return {"target": self.body.width_steps(channel, self.now_s())}
+    def pulse_steps(self, channel: int) -> int:
+        """Return the true pulse of a channel, quarter microseconds; 0: none."""
+        board, nth = divmod(channel, CHANNELS)
+        width_s = tuple(self.chips.values())[board].width_s(nth)
+        return round(width_s * 1e6 * US_STEPS)
 
-    def positions_steps(self) -> tuple[float, ...]:
-        """Return the true positions of the shafts now, in quarter microseconds, by channel."""
-        self.body.advance()
-        return tuple(servo.place_steps for servo in self.body.servos)
+    def step_outputs(self) -> bool:
+        """Return True, as outputs change at once."""
+        return True
 
-    # --- bytes
-
-    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
-        """Process received bytes; return the reply to each command in them."""
-        self.body.advance()
-        came = data
-        if self._wire.has_any and self._wire.is_on("lose_bytes", self.now_s()):
-            came = bytes(
-                b for b in data if self._wire.use_fault("lose_bytes", None, self.now_s()) is None
-            )
-        missing, replies = len(data) - len(came), []
-        for end, pieces in self._execute_commands(came):
-            if pieces:
-                replies.append(DeviceReply(missing + end, pieces))
-        return self.faults.add_line_noise(replies, data) if self._wire.has_any else replies
-
-    def _execute_commands(self, came: bytes) -> Iterator[tuple[int, list[Piece]]]:
+    def execute(self, data: bytes) -> Iterator[tuple[int, Piece | None]]:
         """Execute every complete command; an incomplete one waits for the rest."""
         kept, at = len(self._unread), 0
-        text = self._unread + came
+        text = self._unread + data
         while at < len(text):
             if text[at] == READ_REGISTER:
-                if len(text) < at + 3:
+                end = at + 3
+                if len(text) < end:
                     break
-                known = text[at + 1] == STATUS_REGISTER and text[at + 2] == STOP
-                said = [Piece(NO_DEVICE, bytes((self._status,)))] if known else []
-                at += 3
-                yield at - kept, self._apply_faults(said)
+                yield end - kept, Piece(NO_DEVICE, bytes((self._status,)))
             elif text[at] == START:
                 found = _parse_transfer(text, at)
                 if found is None:
                     break
-                at, parts = found
-                yield at - kept, self._apply_faults(self._execute_transfer(parts))
+                end, parts = found
+                yield end - kept, self._answer(parts)
             else:
-                at += 1  # not a command: skip the byte
+                end = at + 1  # not a command: skip the byte
+            at = end
         self._unread = text[at:]
 
-    def _apply_faults(self, pieces: list[Piece]) -> list[Piece]:
-        """Return an answer as it arrives; faults of one channel affect only its registers."""
-        if not self._wire.has_any or not pieces:
-            return pieces
-        now_s = self.now_s()
-        left = [p for p in pieces if self._wire.use_fault("lose", p.servo_id, now_s) is None]
-        return self._wire.spoil_pieces(left, False, now_s)
-
-    def _execute_transfer(self, parts: Sequence[_TransferPart]) -> list[Piece]:
-        """Execute one transfer; the first part that fails ends it."""
+    def _answer(self, parts: Sequence[TransferPart]) -> Piece | None:
+        """Execute one transfer; return the bytes that it reads, which can be one channel's."""
+        is_write = all(part.length is None for part in parts)
         self._status = OK
-        now_s, said = self.now_s(), []
-        if self._wire.has_any:
-            if self._wire.use_fault("nack", None, now_s) is not None:
-                self._status = NO_ACKNOWLEDGE
-                return []
-            asks = any(part.length is not None for part in parts)
-            if not asks and self._wire.use_fault("lose_writes", None, now_s) is not None:
-                return []
-            self.body.stuck = self._wire.is_on("stuck", now_s)
-            self.body.absent = self._wire.is_on("absent", now_s)
-            self.body.foreign = self._wire.is_on("foreign", now_s)
-        else:
-            self.body.stuck = self.body.absent = self.body.foreign = False
-        try:
-            for part in parts:
-                if part.length is None:
-                    self.body.write(part.address, part.data)
-                    self._pointers[part.address] = part.data[0] if part.data else 0
-                else:
-                    data = self.body.read(part.address, part.length)
-                    said.append(Piece(self._channel_of(part), data))
-        except NotAcknowledged:
-            self._status = NO_ACKNOWLEDGE
-        except BusStuck:
-            self._status = TIMED_OUT
-        return said
-
-    def _channel_of(self, part: _TransferPart) -> int:
-        """Return the channel whose registers are read, NO_DEVICE unless it is exactly one."""
-        register = self._pointers.get(part.address, 0) - LED0
-        if part.length != 4 or register % 4 or not 0 <= register < 4 * CHANNELS:
-            return NO_DEVICE
-        return self._order.get(part.address, 0) * CHANNELS + register // 4
-
-
-def _parse_transfer(text: bytes, at: int) -> tuple[int, list[_TransferPart]] | None:
-    """Return the end of a transfer and its parts, None while bytes are missing."""
-    parts: list[_TransferPart] = []
-    while True:
-        if at >= len(text):
+        if is_write and self.is_struck("lose_writes"):
             return None
-        if text[at] == STOP:
-            return at + 1, parts
+        found = self.transfer(parts)
+        if found is None:
+            self._status = NO_ACKNOWLEDGE
+        if not found:
+            return None
+        (address, data, _), channel = parts[0], NO_DEVICE
+        if data and LED0 <= data[0] < LED0 + 4 * CHANNELS:
+            channel = [*self.chips].index(address) * CHANNELS + (data[0] - LED0) // 4
+        return Piece(channel, found)
+
+    def transfer(self, parts: Sequence[TransferPart]) -> bytes | None:
+        """Execute one transfer; return the bytes that it reads, None if it is not acknowledged."""
+        self.advance()
+        if self.is_struck("nack"):
+            return None
+        found = b""
+        for address, data, length in parts:
+            chip = self.chips.get(address)
+            if chip is None:
+                return None
+            if length is not None:
+                found += chip.read(length)
+            elif data:
+                chip.write(data)
+        return found
+
+
+def _parse_transfer(text: bytes, at: int) -> tuple[int, list[TransferPart]] | None:
+    """Return the end of a transfer and its parts, None while bytes are missing."""
+    parts: list[TransferPart] = []
+    while at < len(text):
         if text[at] != START:
-            return at + 1, []  # malformed: it is dropped
+            return at + 1, parts if text[at] == STOP else []  # malformed: it is dropped
         if len(text) < at + 3:
             return None
         address, count = text[at + 1], text[at + 2]
         at += 3
         if address & 1:
-            parts.append(_TransferPart(address >> 1, b"", count))
+            parts.append(TransferPart(address >> 1, b"", count))
             continue
         if len(text) < at + count:
             return None
-        parts.append(_TransferPart(address >> 1, text[at : at + count], None))
+        parts.append(TransferPart(address >> 1, text[at : at + count]))
         at += count
+    return None
 
 
 def build_bridge(
@@ -207,16 +160,13 @@ def build_bridge(
     servos: Sequence[HobbySpec | Sequence[float]] = (),
     make_servo: HobbyMaker = HobbyServo,
 ) -> Bridge:
-    """Build the boards of one bus; channels without a spec have a default servo.
+    """Build boards at addresses; channels without a spec have a default servo.
 
     Raises:
         ValueError: such boards or servos do not exist.
     """
-    if not addresses or len(set(addresses)) < len(addresses):
-        raise ValueError(f"every board needs its own address; given {list(addresses)}")
-    for address in addresses:
-        if not 0x40 <= address <= 0x7F:
-            raise ValueError(f"address {address:#x}: a PCA9685 has 0x40 to 0x7f")
-    count = CHANNELS * len(addresses)
-    built = build_servos(servos, count, make_servo)
-    return Bridge(built, now_s, addresses, oscillator_hz, seed)
+    if len(set(addresses)) < len(addresses) or not set(addresses) <= set(range(0x40, 0x80)):
+        raise ValueError(f"boards need different addresses from 0x40 to 0x7f, not {addresses}")
+    chips = {address: Chip(oscillator_hz) for address in addresses}
+    built = build_servos(servos, CHANNELS * len(chips), make_servo)
+    return Bridge(chips, built, now_s, seed)

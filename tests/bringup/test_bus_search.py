@@ -32,25 +32,17 @@ class Line:
         return list(search_bus(self.port, usb, plan_search(usb, kinds, rates), thorough))
 
 
-def maestro(channels=12, crc=False, **chosen):
-    board = build_board(channels, lambda: 0.0, crc=crc)
-    for case, value in chosen.items():
-        board.choose_behaviour(case.replace("_", "-"), value)
-    return board
-
-
 # --- a board is never sent what moves it
 
 BOARDS = {
-    "as from the shop": maestro(),
-    "micro": maestro(6),
-    "with check bytes": maestro(crc=True),
+    "as from the shop": build_board(12, lambda: 0.0),
+    "micro": build_board(6, lambda: 0.0),
+    "with check bytes": build_board(12, lambda: 0.0, crc=True),
 }
 
 
 @pytest.mark.parametrize("board", BOARDS.values(), ids=list(BOARDS))
 def test_a_board_is_recognised_before_anything_could_move_it(board):
-    board.choose_behaviour("on-error", "ignore")
     board.exchange(bytes.fromhex("8403102F"))
     before = [one["target"] for one in board.faults.reports()]
     line = Line(board)
@@ -61,7 +53,8 @@ def test_a_board_is_recognised_before_anything_could_move_it(board):
 
 
 def test_a_port_of_pololu_is_never_sent_servo_packets_even_where_nobody_answers():
-    board = maestro(mode="mute")
+    board = build_board(12, lambda: 0.0)
+    board.faults.command("lose all")
     line = Line(board)
     (only,) = line.search(usb=MINI, rates=None)
     assert only.board is None and line.sent and b"\xff" not in line.sent

@@ -96,7 +96,6 @@ def test_doctor_finds_and_fixes():
 def test_doctor_examines_every_bus_and_says_which(mixed):
     with served(mixed) as (ports, paths, command):
         command("error protocol")
-        command("script on")
         command("overload 7", "neck")
         command("voltage 1 12.0", "tilt")
         code, out, _ = invoked("doctor", mixed, "--port", ports)
@@ -104,13 +103,12 @@ def test_doctor_examines_every_bus_and_says_which(mixed):
         main, neck, tilt = re.split(r"^bus \w+ \(.*\):$", out, flags=re.MULTILINE)
         assert f"bus neck (dynamixel, {paths['neck']}):" in out
         assert f"the main bus (maestro, {paths['']}):" in main
-        assert "serial protocol error" in main and "runs a script" in main
+        assert "serial protocol error" in main
         assert "neck_yaw (servo 7): has latched: overload" in neck
         assert "neck_pitch (servo 1): 12.0 V, its limits are" in tilt and "sts3215-12v" in tilt
         code, out, _ = invoked("doctor", mixed, "--port", ports, "--json", "--fix")
         found = json.loads(out)
         assert {one["bus"] for one in found} == {"", "neck", "tilt"}
-        assert not any("script" in one["what"] and one["level"] == "warn" for one in found)
 
 
 # --- setup

@@ -8,7 +8,7 @@ from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one
 from present import present
 
 from gazerig.drivers.feetech.memory_table import TABLE_END
-from gazerig.drivers.i2c import bridge
+from gazerig.drivers.i2c.line import write
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.pca9685.registers import (
@@ -389,7 +389,7 @@ class BoardRig:
         return examine_maestro(self.port, self.params, self.setups, self.usb)
 
     def errors(self):
-        return self.board.faults.board_status()["errors"]
+        return self.board.errors
 
 
 def test_a_good_board_and_what_no_board_tells():
@@ -409,13 +409,13 @@ def test_nothing_moves_and_no_error_is_made():
     rig = BoardRig(usb=MINI)
     rig.do("84 00 70 2E")
     rig.check()
-    assert [one["position"] for one in rig.board.faults.reports()] == [6000] + [0] * 11
-    assert rig.errors() == [] and b"\xff" not in rig.sent
+    assert [one["target"] for one in rig.board.faults.reports()] == [6000] + [0] * 11
+    assert rig.errors() == 0 and b"\xff" not in rig.sent
 
 
 def test_nobody_answers():
     rig = BoardRig()
-    rig.board.choose_behaviour("mode", "mute")
+    rig.board.faults.command("lose all")
     (only,) = rig.check()
     assert only.level == "error" and "USB Dual Port" in only.remedy
 
@@ -435,7 +435,7 @@ def test_a_channel_that_may_not_be_there_is_not_asked_for_while_servos_have_puls
     rig.do("84 00 70 2E")
     assert one(rig.check(), "note", "eyes_tilt (channel 8)", "was not read")
     assert bytes.fromhex("9008") not in rig.sent
-    assert rig.board.faults.reports()[0]["position"] == 6000
+    assert rig.board.faults.reports()[0]["target"] == 6000
     known = BoardRig(12, setups=(CHANNEL_PAN, far), usb=MINI)
     known.do("84 00 70 2E")
     assert not any(f.where == "eyes_tilt (channel 8)" for f in known.check())
@@ -458,13 +458,13 @@ def test_errors_that_it_held(name, says, level, cure):
 
 def test_a_script_is_stopped_by_fix():
     rig = BoardRig()
-    rig.board.faults.command("script 0")
+    rig.board.is_script_running = True
     findings = rig.check()
     assert one(findings, "warn", "the board", "runs a script")
-    assert rig.board.faults.board_status()["script"]  # looking alone does not stop it
+    assert rig.board.is_script_running  # looking alone does not stop it
     (done,) = apply_fixes(lambda _: stop_script(rig.port, rig.params), findings)
     assert done == "the board: script 1 -> 0: done"
-    assert not rig.board.faults.board_status()["script"] and worst_level(rig.check()) != "warn"
+    assert not rig.board.is_script_running and worst_level(rig.check()) != "warn"
 
 
 # --- PCA9685
@@ -492,7 +492,7 @@ class Pca9685Rig:
             (MODE1, bytes((AWAKE,))),
             (LED0 + 4 * channel, pulse_registers(counts)),
         ):
-            self.port.write(bridge.write(0x40, register, data))
+            self.port.write(write(0x40, register, data))
             self.now_s += 0.01
 
 

@@ -527,7 +527,7 @@ class LinkageBench:
     def pulse(self) -> int:
         """Return the pulse that the board gives now."""
         report = cast(Any, self.board).faults.reports()[self.channel]
-        position = report["position"]
+        position = report["target"]
         assert isinstance(position, int)
         return position
 
@@ -578,7 +578,7 @@ def test_eyes_are_measured_and_their_pulses_end() -> None:
 def test_a_channel_that_gives_pulses_does_not_jump(maker_rig: Rig) -> None:
     bench = LinkageBench("eyes_pan", "", "1550", "", "", "1450", "", "")
     bench.port.setBaudRate(115_200)
-    bench.port.write(MaestroCodec(crc=maker_rig.bus.maestro.crc).target(0, 1534 * 4))
+    bench.port.write(MaestroCodec(crc=maker_rig.bus.maestro.crc).targets({0: 1534 * 4}))
     bench.clock.sleep_until(1.0)
     before = bench.place_us()
     bench.hobby.open()

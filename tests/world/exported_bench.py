@@ -119,7 +119,7 @@ class Both:
                 write(servo, "goal_position", steps)
             else:
                 (board,) = bench.devices.values()
-                board.body.channels[joint.id].set_target(steps)
+                board.channels[joint.id].set_target(steps)
 
     def _from_deg(self, name: str) -> float:
         return self._move.from_deg if name == self._move.joint else 0.0

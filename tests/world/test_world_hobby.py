@@ -14,10 +14,10 @@ def test_hobby_servos_follow_their_pulses_as_those_with_mechanics_of_their_own(n
     bench = WorldBench(name)
     joint = bench.rig.names[0]
     for board in (*bench.devices.values(), *bench.own_devices.values()):
-        board.body.channels[bench.rig.joints[joint].id].set_target(6000)
+        board.channels[bench.rig.joints[joint].id].set_target(6000)
     bench.pass_ms(600)
     for board in (*bench.devices.values(), *bench.own_devices.values()):
-        board.body.channels[bench.rig.joints[joint].id].set_target(6000 + MOVE)
+        board.channels[bench.rig.joints[joint].id].set_target(6000 + MOVE)
     halfway_ms = [0, 0]
     for servo in bench.both(joint):
         assert abs(servo.place_steps - 6000) <= 2 * servo.spec.dead_steps
@@ -42,6 +42,6 @@ def test_a_hobby_servo_without_pulses_is_limp() -> None:
     servo.turn(300.0)
     bench.pass_ms(200)
     assert servo.place_steps == pytest.approx(before + 300.0, abs=3.0)
-    bench.devices[""].body.channels[bench.rig.joints[joint].id].set_target(round(before))
+    bench.devices[""].channels[bench.rig.joints[joint].id].set_target(round(before))
     bench.pass_ms(400)
     assert abs(servo.place_steps - before) <= 30.0

@@ -62,11 +62,11 @@ def test_upper_and_lower_lids_hold_each_other_off() -> None:
     wanted = {"left_upper_lid": -24.0, "left_lower_lid": -12.0}
     for name, angle in wanted.items():
         joint = bench.rig.joints[name]
-        bench.devices[""].body.channels[joint.id].set_target(round(joint.steps(radians(angle))))
+        bench.devices[""].channels[joint.id].set_target(round(joint.steps(radians(angle))))
     bench.pass_ms(500)
     for name, angle in wanted.items():
         assert degrees(bench.world.joints_rad()[name]) > angle + 2.0
-        assert bench.servos[name].is_straining
+        assert bench.servos[name].is_resting
     assert (
         sum(degrees(bench.world.joints_rad()[name]) for name in wanted) > -29.5
     )  # they meet at -28

@@ -24,7 +24,7 @@ def test_buses_of_three_kinds_share_one_world(tmp_path: Path) -> None:
     write(yaw, "goal_position", read(yaw, "present_position") + 200)
     write(pitch, "goal_position", round(pitch.position_steps) + 100)
     joint = bench.rig.joints[eyes]
-    bench.devices[""].body.channels[joint.id].set_target(round(joint.steps(radians(12.0))))
+    bench.devices[""].channels[joint.id].set_target(round(joint.steps(radians(12.0))))
     before = bench.world.joints_rad()
     bench.pass_ms(900)
     angles = bench.world.joints_rad()

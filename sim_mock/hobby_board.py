@@ -1,0 +1,124 @@
+"""An emulated board with a hobby servo on each channel, and its line.
+
+Time passes in whole steps of 10 ms; a servo gets a new pulse every second step.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+
+from gazerig.sim_mock.device import DeviceReply
+from gazerig.sim_mock.faults.grammar import CommandTable
+from gazerig.sim_mock.faults.hobby import HobbyFaults
+from gazerig.sim_mock.hobby_servo import STEP_S, HobbyServo
+from gazerig.sim_mock.replies import Piece
+
+STEPS_S = round(1.0 / STEP_S)
+
+
+class HobbyBoard(ABC):
+    """One board, or several on one line.
+
+    servo_power: whether the servos have their supply, which the board does not detect
+    """
+
+    check_baud = False
+
+    def __init__(
+        self,
+        servos: Sequence[HobbyServo],
+        now_s: Callable[[], float],
+        commands: CommandTable,
+        seed: int,
+    ) -> None:
+        self.now_s = now_s
+        self.servos = tuple(servos)
+        self.servo_power = True
+        self.faults = HobbyFaults(self, commands, seed)
+        self._wire = self.faults.wire
+        self._step = self._step_number()
+
+    # --- what a kind of board defines
+
+    @abstractmethod
+    def restart(self) -> None:
+        """Restart as after a dip of the supply."""
+
+    @abstractmethod
+    def target_steps(self, channel: int) -> int:
+        """Return the commanded pulse of a channel, quarter microseconds; 0: none."""
+
+    @abstractmethod
+    def pulse_steps(self, channel: int) -> int:
+        """Return the present pulse of a channel, quarter microseconds; 0: none."""
+
+    @abstractmethod
+    def step_outputs(self) -> bool:
+        """Advance the outputs by 10 ms; return whether they are at rest."""
+
+    @abstractmethod
+    def execute(self, data: bytes) -> Iterator[tuple[int, Piece | None]]:
+        """Execute the commands in bytes; yield the end of each command, and its answer."""
+
+    def status(self) -> dict[str, object]:
+        """Return further entries of the fault command ``status``."""
+        return {}
+
+    # --- device interface
+
+    def understands_baud(self, client_baud: int) -> bool:
+        """Return whether a client at this baud rate is understood: every one is."""
+        return True
+
+    def choose_behaviour(self, case: str, value: str) -> None:
+        """Refuse a case, as a board has none.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError(f"set {case!r}: unknown; a board of hobby servos has no cases")
+
+    def find_servo(self, channel: int) -> HobbyServo:
+        """Return the servo of a channel, advanced to the present time."""
+        self.advance()
+        if not 0 <= channel < len(self.servos):
+            raise KeyError(f"no channel {channel}; channels are 0 to {len(self.servos) - 1}")
+        return self.servos[channel]
+
+    def positions_steps(self) -> tuple[float, ...]:
+        """Return the true positions of the shafts now, in quarter microseconds, by channel."""
+        self.advance()
+        return tuple(servo.place_steps for servo in self.servos)
+
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
+        """Process received bytes; return the reply to each command in them."""
+        self.advance()
+        replies = []
+        for end, piece in self.execute(data):
+            if piece is not None and not self.is_struck("lose", piece.servo_id):
+                pieces = self._wire.spoil_pieces([piece], False, self.now_s())
+                replies.append(DeviceReply(end, pieces))
+        return self.faults.add_line_noise(replies, data) if self._wire.has_any else replies
+
+    def is_struck(self, kind: str, channel: int | None = None) -> bool:
+        """Return whether a fault of this kind strikes now, and count it."""
+        return self._wire.use_fault(kind, channel, self.now_s()) is not None
+
+    # --- time
+
+    def _step_number(self) -> int:
+        return int(self.now_s() * STEPS_S + 1e-3)  # the margin keeps 0.03 s from being two steps
+
+    def advance(self) -> None:
+        """Advance to the present time."""
+        until = self._step_number()
+        while self._step < until:
+            self._step += 1
+            is_resting = self.step_outputs()
+            for channel, servo in enumerate(self.servos):
+                pulse = self.pulse_steps(channel) if self.servo_power else 0
+                if self._step % 2 == 0:
+                    servo.width_steps = pulse
+                servo.step()
+                is_resting = is_resting and servo.is_resting and servo.width_steps == pulse
+            if is_resting:
+                self._step = until
