@@ -1,17 +1,17 @@
-"""Search for servos at every baud rate, and comparison of found and expected servos.
+"""Search for servos, and comparison of found and expected servos.
 
 If the servos answer a broadcast ping one after another, a broadcast ping is sent. Otherwise all
 would answer together and corrupt each other, so the identity of every id is read. An answer
 contains its id, so an answer that an adapter delivers late is still counted.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
-from gazerig.drivers.servo_bus.family import Family, Identity, Status
+from gazerig.drivers.servo_bus.family import Family, Identity
 from gazerig.drivers.servo_bus.registers import REPLY_S, Registers, transact
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
@@ -28,9 +28,6 @@ SHARED, ANSWERS = 2, 6
 _ROOM = 1 << 12
 _MOST = 1 << 13
 """Largest number of bytes read; more than the answers of all ids."""
-
-Progress = Callable[[int, int], None]
-"""Called with the baud rate and the id that is pinged."""
 
 
 class FoundServo(NamedTuple):
@@ -65,48 +62,35 @@ class BaudScan(NamedTuple):
 def scan(
     port: BusPort,
     family: Family,
-    bauds: Sequence[int] | None = None,
+    baud: int,
     thorough: bool = False,
-    progress: Progress | None = None,
-    ids: Sequence[int] | None = None,
     family_of: Mapping[str, Family] | None = None,
-) -> Iterator[BaudScan]:
-    """Search at one baud rate after another; the port stays open at the last.
+) -> BaudScan:
+    """Search at one baud rate, at which the port stays open.
 
     Args:
         port: Port to open.
         family: Family of the servos.
-        bauds: Baud rates; None for all of the family.
+        baud: Baud rate, bit/s.
         thorough: Wait longer, and read every id even if no servo answers a broadcast ping.
-        progress: Called for every id that is read alone.
-        ids: Ids to read if ids are read alone; None for all.
         family_of: Families of models with the same packets but another table.
 
     Raises:
         PortError: the port cannot be opened.
         BusLost: the port is lost.
     """
-    for baud in family.scan_rates if bauds is None else bauds:
-        if not port.setBaudRate(baud):
-            yield BaudScan(baud, False)
-            continue
-        if not thorough and not has_any_reply(port, family):
-            yield BaudScan(baud, True)
-            continue
-        quiet_s = family.thorough_s if thorough else family.quiet_s
-        found, junk = scan_ids(port, family, baud, quiet_s, progress, ids)
-        each = {one.id: (family_of or {}).get(one.model, family) for one in found}
-        shared = tuple(i for i, its in each.items() if count_corrupt(port, its, i) >= SHARED)
-        yield BaudScan(baud, True, found, junk, shared)
+    if not port.setBaudRate(baud):
+        return BaudScan(baud, False)
+    if not thorough and not has_any_reply(port, family):
+        return BaudScan(baud, True)
+    found, junk = scan_ids(port, family, baud, family.thorough_s if thorough else family.quiet_s)
+    each = {one.id: (family_of or {}).get(one.model, family) for one in found}
+    shared = tuple(i for i, its in each.items() if count_corrupt(port, its, i) >= SHARED)
+    return BaudScan(baud, True, found, junk, shared)
 
 
 def scan_ids(
-    port: BusPort,
-    family: Family,
-    baud: int,
-    quiet_s: float | None = None,
-    progress: Progress | None = None,
-    ids: Sequence[int] | None = None,
+    port: BusPort, family: Family, baud: int, quiet_s: float | None = None
 ) -> tuple[tuple[FoundServo, ...], int]:
     """Search for servos at one baud rate; return them and the number of bytes outside any packet.
 
@@ -124,19 +108,22 @@ def scan_ids(
         raw = without_echo(read_until_quiet(port, quiet_s + size * BITS_PER_BYTE / baud), request)
     else:
         raw = b""
-        for servo_id in range(family.highest_id + 1) if ids is None else ids:
-            if progress is not None:
-                progress(baud, servo_id)
+        for servo_id in range(family.highest_id + 1):
             request = codec.identity_request(servo_id)
             answer, _ = transact(port, family, request, codec.IDENTITY_LENGTH, quiet_s)
             raw += without_echo(answer, request)
         raw += port.read_until(_ROOM, port.now_s() + REPLY_S)
     whole = [status for status in codec.parse_statuses(raw) if status.intact]
     used = sum(codec.STATUS_OVERHEAD + len(status.params) for status in whole)
-    found = [one for status in whole if (one := _found(family, status, baud)) is not None]
+    identities = [(status.id, codec.parse_identity(status)) for status in whole]
+    found = [_found_servo(family, i, identity, baud) for i, identity in identities if identity]
     # A broadcast ping is answered once; a servo read alone may answer again, late.
     each = found if family.broadcast_ping else dict.fromkeys(found)
     return tuple(each), max(0, len(raw) - used)
+
+
+def _found_servo(family: Family, servo_id: int, identity: Identity, baud: int) -> FoundServo:
+    return FoundServo(servo_id, *identity, baud, family.model_name(identity.model_number))
 
 
 def has_any_reply(port: BusPort, family: Family) -> bool:
@@ -162,15 +149,8 @@ def ping(
     port: BusPort, family: Family, servo_id: int, baud: int, tries: int = 2
 ) -> FoundServo | None:
     """Return model and firmware of one servo, None without an intact answer."""
-    codec = family.codec
-    for _ in range(tries):
-        port.drain()
-        request = codec.identity_request(servo_id)
-        _, status = transact(port, family, request, codec.IDENTITY_LENGTH, REPLY_S, servo_id)
-        found = None if status is None else _found(family, status, baud)
-        if found is not None:
-            return found
-    return None
+    identity = Registers(port, family, tries).identify(servo_id)
+    return None if identity is None else _found_servo(family, servo_id, identity, baud)
 
 
 def count_corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANSWERS) -> int:
@@ -200,92 +180,66 @@ def count_corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANS
 def read_until_quiet(port: BusPort, quiet_s: float) -> bytes:
     """Return all bytes that arrive until the line has been quiet for ``quiet_s``."""
     end_s = port.now_s() + BABBLE_S
-    raw = port.read_until(1, port.now_s() + quiet_s)
-    while raw and port.now_s() < end_s and len(raw) <= _MOST:
-        more = port.read_until(1, port.now_s() + quiet_s)
-        if not more:
-            break
+    raw = b""
+    while more := port.read_until(1, port.now_s() + quiet_s):
         raw += more
+        if port.now_s() >= end_s or len(raw) > _MOST:
+            break
     return raw
-
-
-def _found(family: Family, status: Status, baud: int) -> FoundServo | None:
-    """Return the servo that an answer identifies, or None."""
-    identity = family.codec.parse_identity(status)
-    if identity is None:
-        return None
-    return FoundServo(status.id, *identity, baud, family.model_name(identity.model_number))
-
-
-def identities(line: Transactions) -> dict[int, Identity]:
-    """Return the identities of all servos on a bus, expected or not."""
-    quiet_s = min(line.family.quiet_s, FIND_QUIET_S)
-    found, _ = scan_ids(line.port, line.family, line.baud, quiet_s)
-    return {one.id: Identity(one.number, one.firmware) for one in found}
 
 
 def find(
     line: Transactions, registers: Registers, setups: Sequence[ServoConfig], log: EventLog
 ) -> dict[int, int]:
-    """Find every servo and check its model and firmware; return the firmware of each.
+    """Find every servo and check its model; return the firmware of each.
 
     Servos without a setup are not changed, and logged if a broadcast ping finds them.
 
     Raises:
-        ServoMissing: some are absent, of another model or too old; the message names all of them,
-            and the unexpected servos.
+        ServoMissing: some are absent or of another model; the message names all of them, and the
+            unexpected servos.
     """
-    family, began_s = line.family, line.port.now_s()
-    identified = identities(line) if family.broadcast_ping else {}
-    found = {
-        # Two servos with one id, or a noisy line, corrupt a broadcast answer: also read alone.
-        setup.id: identified.get(setup.id) or registers.identify(setup.id)
-        for setup in setups
-    }
-    problems = [
-        text for setup in setups if (text := _servo_problem(family, setup, found[setup.id]))
-    ]
+    family, began_s, where = line.family, line.port.now_s(), line.port.port_name
+
+    def identities() -> dict[int, Identity]:
+        servos, _ = scan_ids(line.port, family, line.baud, min(family.quiet_s, FIND_QUIET_S))
+        return {one.id: Identity(one.number, one.firmware) for one in servos}
+
+    def refuse(fault: str, remedy: str) -> ServoMissing:
+        now_s = line.port.now_s()
+        return ServoMissing(line.lateness.blame(f"{where}: {fault}", remedy, now_s, began_s))
+
+    present = identities() if family.broadcast_ping else {}
+    # Two servos with one id, or a noisy line, corrupt a broadcast answer: also read alone.
+    own = {one.id: present.get(one.id) or registers.identify(one.id) for one in setups}
+    problems = [text for one in setups if (text := _problem(family, one, own[one.id]))]
     if problems and not family.broadcast_ping:
         # An unexpected servo may be the missing one; only now is it worth reading every id.
-        identified = identities(line)
-    strangers = {i: identity for i, identity in identified.items() if i not in found}
-    where = line.port.port_name
-    if not any(found.values()) and not strangers:
-        raise ServoMissing(
-            line.lateness.blame(
-                f"{where}: no servo answers",
-                "check servo power, cable and baud rate",
-                line.port.now_s(),
-                began_s,
-            )
-        )
+        present = identities()
+    strangers = {
+        servo_id: family.model_name(identity.model_number)
+        for servo_id, identity in sorted(present.items())
+        if servo_id not in own
+    }
+    if not any(own.values()) and not strangers:
+        raise refuse("no servo answers", "check servo power, cable and baud rate")
     if problems:
-        there = "; ".join(problems)
+        remedy = "check cables and ids"
         if strangers:
-            named = ", ".join(
-                f"{i} ({family.model_name(one.model_number)})"
-                for i, one in sorted(strangers.items())
-            )
-            there += f"; unexpected: servo {named}"
-        swapped = (
-            "; is one of them the missing one?" if strangers and None in found.values() else ""
-        )
-        raise ServoMissing(
-            line.lateness.blame(
-                f"{where}: {there}", f"check cables and ids{swapped}", line.port.now_s(), began_s
-            )
-        )
-    for servo_id, identity in sorted(strangers.items()):
-        model = family.model_name(identity.model_number)
+            named = ", ".join(f"{servo_id} ({model})" for servo_id, model in strangers.items())
+            problems.append(f"unexpected: servo {named}")
+            if None in own.values():
+                remedy += "; is one of them the missing one?"
+        raise refuse("; ".join(problems), remedy)
+    for servo_id, model in strangers.items():
         log.add(f"servo {servo_id} ({model}) belongs to no joint: not used")
-    return {servo_id: identity.firmware for servo_id, identity in found.items() if identity}
+    return {servo_id: identity.firmware for servo_id, identity in own.items() if identity}
 
 
-def _servo_problem(family: Family, setup: ServoConfig, found: Identity | None) -> str:
+def _problem(family: Family, setup: ServoConfig, found: Identity | None) -> str:
     """Return the problem of one servo, "" for none."""
-    who = setup.label()
     if found is None:
-        return f"{who} does not answer"
+        return f"{setup.label()} does not answer"
     if found.model_number != family.models[setup.model].number:
-        return f"{who} is {family.model_name(found.model_number)}, not {setup.model}"
+        return f"{setup.label()} is {family.model_name(found.model_number)}, not {setup.model}"
     return ""

@@ -102,7 +102,7 @@ def search_bus(
         if met not in (None, kind):
             return
         if kind != "maestro":
-            (one,) = scan(port, KINDS[kind].family, (baud,), thorough, family_of=FAMILY_OF)
+            one = scan(port, KINDS[kind].family, baud, thorough, FAMILY_OF)
             looked = SearchRound(
                 kind,
                 baud,
