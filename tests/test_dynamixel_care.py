@@ -120,21 +120,6 @@ def test_an_alert_whose_name_is_not_told_is_asked_about_seldom(fast):
     assert quiet == 14 + 3
 
 
-def test_a_watchdog_that_tripped_unnoticed_is_found_where_servos_were_read_without_torque():
-    rig = Rig().open()
-    for _ in range(3):
-        rig.tick()
-    rig.bus.enable_torque()
-    for _ in range(100):
-        rig.tick([2000] * 3)
-    # Packets to one servo get lost, although the host has sent them in time.
-    rig.chain[2].memory.set("bus_watchdog", 255)
-    for _ in range(600):
-        rig.tick([2000] * 3)
-    assert rig.errors() == {"watchdog": 1}
-    assert any("watchdog of 1 servo stopped them" in line for line in rig.bus.events())
-
-
 def test_one_silent_servo_of_nine_costs_little_time(fast):
     """Simulated time of a line at 1 Mbaud: no host and no scheduler in it."""
     now_s = [0.0]

@@ -122,6 +122,8 @@ def test_an_alert_that_was_there_before_opening_is_named():
     rig = Rig()
     rig.chain[3].fail("overheating")
     rig.open()
+    for _ in range(3):
+        rig.tick()
     assert rig.bus.faults() == ("servo 3: overheating",)
 
 

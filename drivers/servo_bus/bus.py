@@ -237,7 +237,6 @@ class SmartServoBus(PortBus):
             first.disable(self._ids)
             first.apply(self._ids)
             self._line.starved = False
-            self._supervisor.check_prepared()
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise

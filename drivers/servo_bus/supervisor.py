@@ -26,18 +26,12 @@ from gazerig.drivers.servo_bus.torque import (
 from gazerig.drivers.servo_bus.transaction import TRIES, Transactions
 from gazerig.drivers.types import ServoConfig
 
-AGAIN_S = 0.25
-"""Time between attempts to set a servo up, and between questions about a fault."""
-
-GONE_S = 1.0
-"""A fault that is not latched has ended when it was absent for this time: bits flicker at the
-threshold."""
+AGAIN_S = 0.5
+"""Time between attempts to set a servo up, and between questions about a fault, whose bit may
+flicker at its threshold."""
 
 RESTART_S = 0.1
 """Silence after which a servo may have restarted: it gets no goals until it is set up."""
-
-CHECK_S = 1.0
-"""Interval of the checks of the servos' watchdogs; the servos take turns."""
 
 TRIPPED = 255
 """Value of Bus Watchdog after it has stopped the servo."""
@@ -92,10 +86,8 @@ class Supervisor:
         self.engaged = False
         self.limp: frozenset[int] = frozenset()
         self.faults: dict[int, str] = {}
-        self.due_s = self._check_at_s = -inf
-        self._checked = 0
+        self.due_s = -inf
         self._restarts: dict[int, list[float]] = {servo_id: [] for servo_id in self._ids}
-        self._faulty_s = dict.fromkeys(self._ids, -inf)
         self._marked: dict[int, float] = {}  # time of the next attempt to set it up
         self._problems: dict[int, tuple[str, int]] = {}  # result of attempts, and their number
         self._held: set[int] = set()  # gets no goals until it is set up
@@ -108,14 +100,6 @@ class Supervisor:
         self.speeds = goal_speeds(self._family, [*self._setups.values()], slow)
 
     # --- torque of all servos
-
-    def check_prepared(self) -> None:
-        """Name the latched errors of servos that have just been prepared."""
-        if self._family.faults_latch:
-            for servo_id, bits in self._line.ask(self._ids, self._family.error_register).items():
-                if bits:
-                    self._record_fault(servo_id, " and ".join(self._family.name_errors(bits)))
-                    self._mark(servo_id)
 
     def enable_torque(self) -> tuple[int, ...]:
         """Set all servos up, switch their torque on, and supervise them; return their goals.
@@ -223,8 +207,7 @@ class Supervisor:
     def record_out_of_group(self, out: Collection[int], now_s: float) -> None:
         """Record the servos that do not answer; those that return later may have restarted."""
         for servo_id in [i for i in self._silent_since_s if i not in out]:
-            since_s = self._silent_since_s.pop(servo_id)
-            if now_s - since_s >= RESTART_S:
+            if now_s - self._silent_since_s.pop(servo_id) >= RESTART_S:
                 self._mark(servo_id, is_held=True)
         for servo_id in out:
             self._silent_since_s.setdefault(servo_id, now_s)
@@ -257,27 +240,9 @@ class Supervisor:
         due = [i for i, at_s in self._marked.items() if at_s <= now_s and i in group]
         if due:
             self._attend(min(due, key=self._marked.__getitem__), now_s)
-        if self._watchdog and self.engaged and now_s >= self._check_at_s:
-            # This also handles a host that slept.
-            self._check_at_s = now_s + CHECK_S
-            self._checked = (self._checked + 1) % len(self._ids)
-            servo_id = self._ids[self._checked]
-            if servo_id in group and servo_id not in self.limp:
-                self._check_watchdog(servo_id)
         if self._rearmed:
             self._mark_feedback(now_s)
-        self.due_s = min(
-            -inf if self._rearmed else inf,
-            min(self._marked.values(), default=inf),
-            self._check_at_s if self._watchdog and self.engaged else inf,
-        )
-
-    def _check_watchdog(self, servo_id: int) -> None:
-        value = self._line.ask((servo_id,), "bus_watchdog").get(servo_id, self._watchdog)
-        if value == TRIPPED:  # if one servo has starved, the others have too
-            self._line.starved = True
-        elif value != self._watchdog:
-            self._mark(servo_id, is_held=True)
+        self.due_s = -inf if self._rearmed else min(self._marked.values(), default=inf)
 
     def recover_tripped(self, group: Collection[int]) -> None:
         """Rearm servos that were stopped by their own watchdog; they refuse goals until then.
@@ -294,11 +259,11 @@ class Supervisor:
         now_s = self._line.port.now_s()
         late = self._line.lateness.cause(now_s)
         self._line.errors[LATE_COMPUTER if late else "watchdog"] += len(tripped)
-        servos = f"the watchdog of {len(tripped)} servo{'s' if len(tripped) > 1 else ''}"
-        cause = f"{late}, so {servos} stopped them"
-        if not late:
-            cause = f"{servos} stopped them, as packets get lost: check cable and plugs"
-        self._seldom.add(f"{cause}; they continue from their position", now_s, cause[:8])
+        cause = late or "packets get lost (check cable and plugs)"
+        self._seldom.add(
+            f"{cause}, so the watchdog of {len(tripped)} servos stopped them; they continue from "
+            "their position", now_s,
+        )  # fmt: skip
 
     # --- one marked servo
 
@@ -361,12 +326,7 @@ class Supervisor:
             self._held.add(servo_id)
             self._feedback.set_torque(self._slot[servo_id], False)
         if bits:
-            self._faulty_s[servo_id] = now_s
             return position, " and ".join(family.name_errors(bits))
-        if servo_id in self.faults and now_s - self._faulty_s[servo_id] < (
-            0.0 if family.faults_latch else GONE_S
-        ):
-            return position, self.faults[servo_id]
         if arms and (text := self._misplaced_text(setup, position)):
             switch_off(line, ids)
             return position, text
