@@ -1,11 +1,7 @@
-"""The servo driver under faults of bytes, servos or the whole line."""
-
-from typing import Any
+"""The servo driver under damaged and late bytes."""
 
 import pytest
 from fakes.dynamixels import IDS, Rig
-
-from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 
 GROUP_READS = (0x82, 0x8A)
 
@@ -29,9 +25,6 @@ def data_of(raw, servo_id, fast):
     """Return the offset of the first byte of a servo's data in an answer of three."""
     size, head = ((len(raw) - 8) // 3, 8 + 2) if fast else (len(raw) // 3, 9)
     return head + size * IDS.index(servo_id)
-
-
-# --- bytes
 
 
 @pytest.mark.parametrize("victim", IDS)
@@ -113,122 +106,3 @@ def test_a_late_answer_is_never_taken_for_a_fresh_one(rig):
         rig.now_s += 0.02
         last = rig.tick(dt_s=0.0)
     assert [r.position_steps for r in last] == [round(x) for x in rig.chain.positions_steps()]
-
-
-# --- servos
-
-
-def test_an_alert_that_was_there_before_opening_is_named():
-    rig = Rig()
-    rig.chain[3].fail("overheating")
-    rig.open()
-    for _ in range(3):
-        rig.tick()
-    assert rig.bus.faults() == ("servo 3: overheating",)
-
-
-@pytest.mark.parametrize(
-    ("spoil", "error", "told"),
-    [
-        (lambda chain: chain[3].fail("overload"), ServoFault, "servo 3: overload: let it cool"),
-        (lambda chain: chain[2].restart(), ServoMissing, "servo 2 does not answer"),
-    ],
-    ids=["latched", "silent"],
-)
-def test_engaging_such_a_servo_names_it_and_leaves_all_without_torque(spoil, error, told):
-    rig = Rig().open()
-    spoil(rig.chain)
-    with pytest.raises(error, match=told):
-        rig.bus.enable_torque()
-    assert not any(servo.torque for servo in rig.chain.servos)
-
-
-@pytest.mark.parametrize("turn", [4096, -4096])
-def test_a_position_that_wraps_as_the_torque_comes_on_is_found(turn):
-    rig = Rig().open()
-    servo = rig.chain[2]
-
-    def wrap(code, raw):
-        if servo.torque and 0 < servo.shaft.x < 4000:
-            servo.shaft.x += turn
-        return raw
-
-    rig.port.spoil = wrap
-    with pytest.raises(ServoFault, match=f"servo 2: position jumped from 2002 to {2002 + turn}"):
-        rig.bus.enable_torque()
-    assert not any(s.torque for s in rig.chain.servos)
-
-
-def test_torque_does_not_come_on_before_the_goal_is_known_to_be_kept():
-    rig = Rig().open()
-    rig.chain[1].shaft.place(2400)
-    real = rig.chain[1].write
-    refused = []
-
-    def deaf_to_goals(address, data):
-        if address == 116:
-            refused.append(data)
-            return 6
-        return real(address, data)
-
-    rig.chain[1].write = deaf_to_goals
-    with pytest.raises(ServoMissing, match="goal_position is not accepted .servo 1: 2400."):
-        rig.bus.enable_torque()
-    assert len(refused) == 3
-    assert rig.chain[1].shaft.x == 2400
-
-
-# --- the bus
-
-
-@pytest.mark.parametrize("fast", [True, False])
-def test_a_bus_without_any_answer_is_given_up_in_the_end(fast):
-    rig = Rig(fast, give_up_s=1.6).open()
-    rig.bus.enable_torque()
-    rig.bus.events()
-    rig.port.spoil = lambda code, raw: b""
-    start_s = rig.now_s
-    with pytest.raises(BusLost, match="no servo has answered for 1.6 s"):
-        for _ in range(1000):
-            assert rig.tick() == (None, None, None)
-    assert 1.6 <= rig.now_s - start_s <= 1.63
-    assert rig.bus.events() == ("no servo answers: check servo power and cable",)
-
-
-def test_release_survives_a_dead_bus(rig):
-    rig.bus.enable_torque()
-    rig.port.spoil = lambda code, raw: b""
-    rig.bus.disable_torque()
-    assert not any(servo.torque for servo in rig.chain.servos)
-
-
-def test_release_repeats_until_the_torque_is_off(rig):
-    rig.bus.enable_torque()
-    stubborn = rig.chain[2]
-    ignored: list[Any] = []
-    real = stubborn.write
-
-    def hard_of_hearing(address, data):
-        if address == 64 and len(ignored) < 3:
-            ignored.append(data)
-            return 0
-        return real(address, data)
-
-    stubborn.write = hard_of_hearing
-    rig.bus.disable_torque()
-    assert len(ignored) == 3
-    assert not stubborn.torque
-
-
-def test_release_counts_a_servo_that_keeps_its_torque(rig):
-    rig.bus.enable_torque()
-    rig.chain[2].write = lambda address, data: 0
-    rig.bus.disable_torque()
-    assert rig.errors() == {"refused": 1}
-
-
-def test_release_and_close_before_open_do_nothing():
-    rig = Rig()
-    rig.bus.disable_torque()
-    rig.bus.close()
-    assert rig.sent == []

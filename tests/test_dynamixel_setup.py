@@ -6,7 +6,7 @@ from feedback_rows import rows
 from present import present
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -19,9 +19,9 @@ def rig():
     return Rig()
 
 
-def test_open_prepares_the_servos(rig):
+def test_open_writes_what_differs_says_so_and_then_nothing(rig):
     servo = rig.chain[2]
-    for name, value in (("operating_mode", 4), ("drive_mode", 4), ("status_return_level", 1)):
+    for name, value in (("operating_mode", 4), ("drive_mode", 4), ("max_position_limit", 2500)):
         servo.memory.set(name, value)
     servo.status_level = 1
     servo.write(64, b"\x01")
@@ -29,28 +29,15 @@ def test_open_prepares_the_servos(rig):
     get = servo.memory.get
     assert (get("torque_enable"), servo.torque) == (0, False)
     assert (get("operating_mode"), get("drive_mode"), get("return_delay_time")) == (3, 0, 0)
+    assert (get("min_position_limit"), get("max_position_limit")) == (1000, 3000)
     assert (get("profile_acceleration"), get("profile_velocity")) == (0, 383)
     assert (get("status_return_level"), get("bus_watchdog")) == (2, 0)
-
-
-def test_opening_a_prepared_bus_writes_nothing_to_the_eeprom():
-    rig = Rig().open()
-    rig.sent.clear()
-    rig.open()
-    writes = [packet for packet in rig.sent if packet[7] == 3]
-    assert [packet for packet in writes if packet[8] < 64] == []
-    assert writes == []
-
-
-def test_open_sets_the_limits_of_the_setup_and_says_so(rig):
-    rig.chain[2].memory.set("max_position_limit", 2500)
-    rig.open()
-    get = rig.chain[2].memory.get
-    assert (get("min_position_limit"), get("max_position_limit")) == (1000, 3000)
     events = rig.bus.events()
     assert "servo 2: Max Position Limit 2500 -> 3000" in events
     assert "servo 2: Return Delay Time 250 -> 0" in events
-    assert rig.bus.events() == ()
+    rig.sent.clear()
+    rig.open()
+    assert [packet for packet in rig.sent if packet[7] == 3] == [] == list(rig.bus.events())
 
 
 def test_one_message_names_missing_unexpected_and_wrong_servos_by_joint(rig):
@@ -118,13 +105,6 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
         assert (present(reading).torque, present(reading).fault) == (True, "")
         assert present(reading).voltage_v == pytest.approx(5.0, abs=0.3)
         assert present(reading).temperature_c == 30
-
-
-def test_open_with_an_impossible_baud_rate_names_it(rig):
-    setups = [ServoConfig(1, "xl330-m077", 1000, 3000, 6000.0)]
-    rig.bus = SmartServoBus(DYNAMIXEL, rig.port, setups, baud=1234)
-    with pytest.raises(PortError, match="cannot run at 1234 bit/s"):
-        rig.open()
 
 
 def test_a_lost_setup_answer_is_asked_for_again(rig):

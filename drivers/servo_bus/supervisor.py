@@ -30,6 +30,9 @@ AGAIN_S = 0.5
 """Time between attempts to set a servo up, and between questions about a fault, whose bit may
 flicker at its threshold."""
 
+PAUSE_S = 0.25
+"""Time after a failed attempt in which no servo is set up."""
+
 RESTART_S = 0.1
 """Silence after which a servo may have restarted: it gets no goals until it is set up."""
 
@@ -86,7 +89,7 @@ class Supervisor:
         self.engaged = False
         self.limp: frozenset[int] = frozenset()
         self.faults: dict[int, str] = {}
-        self.due_s = -inf
+        self.due_s = self._pause_until_s = -inf
         self._restarts: dict[int, list[float]] = {servo_id: [] for servo_id in self._ids}
         self._marked: dict[int, float] = {}  # time of the next attempt to set it up
         self._problems: dict[int, tuple[str, int]] = {}  # result of attempts, and their number
@@ -238,7 +241,7 @@ class Supervisor:
             BusLost: the port is lost.
         """
         due = [i for i, at_s in self._marked.items() if at_s <= now_s and i in group]
-        if due:
+        if due and now_s >= self._pause_until_s:
             self._attend(min(due, key=self._marked.__getitem__), now_s)
         if self._rearmed:
             self._mark_feedback(now_s)
@@ -274,6 +277,7 @@ class Supervisor:
             position, problem = self._set_up(servo_id, now_s)
         except (ServoMissing, ServoFault) as error:
             position, problem = 0, NOT_SET_UP
+            self._pause_until_s = now_s + PAUSE_S  # it takes time that other servos wait
             if isinstance(error, ServoFault):
                 problem = f"{NOT_SET_UP}: {error}"
                 switch_off(self._line, (servo_id,))
@@ -287,9 +291,10 @@ class Supervisor:
             self._marked[servo_id] = now_s
             if times > 1 or problem == NOT_SET_UP:
                 self._marked[servo_id] = inf if problem == AGAIN_AND_AGAIN else now_s + AGAIN_S
-            if times == 2:
-                if problem == NOT_SET_UP:
-                    problem = self._line.lateness.blame(problem, BAD_LINE, now_s)
+            if times == 2 and problem == NOT_SET_UP:
+                fault = f"{self._line.label(servo_id)} {NOT_SET_UP}"
+                self._log.add(self._line.lateness.blame(fault, BAD_LINE, now_s))
+            elif times == 2:
                 self._record_fault(servo_id, problem)
             return
         del self._marked[servo_id]
