@@ -4,7 +4,7 @@ Only registers that differ are written: EEPROM wears out, and a write to it requ
 a lock to be opened and closed. Every write is logged.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoMissing
@@ -12,6 +12,7 @@ from gazerig.drivers.event_log import EventLog, register_label
 from gazerig.drivers.servo_bus.family import Register
 from gazerig.drivers.servo_bus.read_plan import AddressMap
 from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
 
@@ -101,16 +102,13 @@ class Provisioning:
         """Make servos answer every instruction, and switch torque and bus watchdog off.
 
         Raises:
-            ServoMissing: a servo does not answer.
+            ServoMissing: a servo does not confirm it.
         """
         # A servo may be set to answer only reads; this write needs no answer and changes that.
         self._registers.write_all(ids, "status_return_level", self._family.answer_level)
-        watchdog = () if self._family.watchdog_unit_s is None else ("bus_watchdog",)
-        for name in ("torque_enable", *watchdog):
-            register = self._family.registers[name]
-            found = self._line.ask(ids, name)
-            self._raise_missing(ids, found, name)
-            self._correct([Difference(i, register, on, 0) for i, on in found.items() if on])
+        released = switch_off(self._line, ids)
+        left = {*released.holding_ids, *released.unconfirmed_ids}
+        self._raise_missing(ids, set(ids) - left, "torque_enable")
 
     def differences(self, ids: Sequence[int]) -> list[Difference]:
         """Read servos and return the registers with wrong values.
@@ -143,8 +141,8 @@ class Provisioning:
     def _correct(self, differences: Sequence[Difference]) -> None:
         """Write the registers that differ; EEPROM without torque and with the lock open."""
         lock = self._family.lock_register
-        kept = [d.servo_id for d in differences if lock is None or d.register.area == "eeprom"]
-        for servo_id in dict.fromkeys(kept):
+        ids = dict.fromkeys(one.servo_id for one in differences)
+        for servo_id in ids:
             self._write(servo_id, "torque_enable", 0)
             if lock:
                 self._write(servo_id, lock, 0)
@@ -154,15 +152,14 @@ class Provisioning:
                 if register.name == lock or self._write(servo_id, register.name, wanted):
                     self._log.add(f"{who}: {register_label(register.name)} {found} -> {wanted}")
         finally:
-            open_ones = [d.servo_id for d in differences if d.register.name == lock]
-            for servo_id in dict.fromkeys([*kept, *open_ones]) if lock else ():
+            for servo_id in ids if lock else ():
                 self._write(servo_id, str(lock), 1)
 
     def _write(self, servo_id: int, name: str, value: int) -> bool:
         """Write a register; return whether the servo accepted it."""
         written = self._registers.write(servo_id, name, value)
         if not written and not self._registers.refusal:
-            self._raise_missing((servo_id,), {}, name)
+            self._raise_missing((servo_id,), (), name)
         return written
 
     def _addresses(self, ids: Sequence[int], block: AddressMap) -> dict[int, bytes]:
@@ -170,7 +167,7 @@ class Provisioning:
         self._raise_missing(ids, found, "indirect addresses")
         return found
 
-    def _raise_missing(self, ids: Iterable[int], found: Mapping[int, object], what: str) -> None:
+    def _raise_missing(self, ids: Iterable[int], found: Collection[int], what: str) -> None:
         missing = [self._setups[i].label() for i in ids if i not in found]
         if missing:
             fault = (
