@@ -5,7 +5,7 @@ would answer together and corrupt each other, so the identity of every id is rea
 contains its id, so an answer that an adapter delivers late is still counted.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoMissing
@@ -42,51 +42,6 @@ class FoundServo(NamedTuple):
     firmware: int
     baud: int
     model: str
-
-
-class BaudScan(NamedTuple):
-    """Result of the search at one baud rate.
-
-    is_supported: whether the adaptor supports the rate; junk_bytes: number of bytes outside any
-        packet
-    shared_ids: ids that two servos seem to share, as their longer answers are incomplete
-    """
-
-    baud: int
-    is_supported: bool
-    found: tuple[FoundServo, ...] = ()
-    junk_bytes: int = 0
-    shared_ids: tuple[int, ...] = ()
-
-
-def scan(
-    port: BusPort,
-    family: Family,
-    baud: int,
-    thorough: bool = False,
-    family_of: Mapping[str, Family] | None = None,
-) -> BaudScan:
-    """Search at one baud rate, at which the port stays open.
-
-    Args:
-        port: Port to open.
-        family: Family of the servos.
-        baud: Baud rate, bit/s.
-        thorough: Wait longer, and read every id even if no servo answers a broadcast ping.
-        family_of: Families of models with the same packets but another table.
-
-    Raises:
-        PortError: the port cannot be opened.
-        BusLost: the port is lost.
-    """
-    if not port.setBaudRate(baud):
-        return BaudScan(baud, False)
-    if not thorough and not has_any_reply(port, family):
-        return BaudScan(baud, True)
-    found, junk = scan_ids(port, family, baud, family.thorough_s if thorough else family.quiet_s)
-    each = {one.id: (family_of or {}).get(one.model, family) for one in found}
-    shared = tuple(i for i, its in each.items() if count_corrupt(port, its, i) >= SHARED)
-    return BaudScan(baud, True, found, junk, shared)
 
 
 def scan_ids(

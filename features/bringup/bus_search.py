@@ -25,7 +25,13 @@ from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
 from gazerig.drivers.serial.list_ports import POLOLU
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.discovery import FoundServo, scan
+from gazerig.drivers.servo_bus.discovery import (
+    SHARED,
+    FoundServo,
+    count_corrupt,
+    has_any_reply,
+    scan_ids,
+)
 from gazerig.features.bringup.servo_kinds import KINDS
 
 ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
@@ -102,15 +108,7 @@ def search_bus(
         if met not in (None, kind):
             return
         if kind != "maestro":
-            one = scan(port, KINDS[kind].family, baud, thorough, FAMILY_OF)
-            looked = SearchRound(
-                kind,
-                baud,
-                one.is_supported,
-                one.found,
-                one.junk_bytes,
-                one.shared_ids,
-            )
+            looked = _search_servos(port, kind, baud, thorough)
         elif port.setBaudRate(baud):
             # Every board has the first six channels; others might cause an error.
             board = probe(port, MaestroParams())
@@ -119,6 +117,18 @@ def search_bus(
             looked = SearchRound(kind, baud, is_supported=False)
         met = kind if looked.has_answer else met
         yield looked
+
+
+def _search_servos(port: BusPort, kind: BusKind, baud: int, thorough: bool) -> SearchRound:
+    family = KINDS[kind].family
+    if not port.setBaudRate(baud):
+        return SearchRound(kind, baud, is_supported=False)
+    if not thorough and not has_any_reply(port, family):
+        return SearchRound(kind, baud)
+    found, junk = scan_ids(port, family, baud, family.thorough_s if thorough else family.quiet_s)
+    tables = {one.id: FAMILY_OF.get(one.model, family) for one in found}
+    shared = tuple(i for i, table in tables.items() if count_corrupt(port, table, i) >= SHARED)
+    return SearchRound(kind, baud, found=found, unknown_bytes=junk, shared_ids=shared)
 
 
 def found_servos(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServo]]:
