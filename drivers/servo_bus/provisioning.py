@@ -69,21 +69,22 @@ class Provisioning:
             ServoMissing: a servo does not answer or rejects a setting.
             BusLost: the port is lost.
         """
-        differences = self.differences(ids)
-        if differences:
-            self._correct(differences)
-            for _ in range(self._family.correction_passes - 1):
-                self._correct(self.differences(ids))
+        for _ in range(self._family.correction_passes):
             differences = self.differences(ids)
-            if differences:
-                named = "; ".join(
-                    f"{self._setups[servo_id].label()} does not accept "
-                    f"{register_label(register.name)} {wanted}, it has {found}"
-                    for servo_id, register, found, wanted in differences
-                )
-                raise ServoMissing(
-                    f"{self._port_name}: {named}: restart its power or correct the rig file"
-                )
+            if not differences:
+                break
+            self._correct(differences)
+        else:
+            differences = self.differences(ids)
+        if differences:
+            named = "; ".join(
+                f"{self._setups[servo_id].label()} does not accept "
+                f"{register_label(register.name)} {wanted}, it has {found}"
+                for servo_id, register, found, wanted in differences
+            )
+            raise ServoMissing(
+                f"{self._port_name}: {named}: restart its power or correct the rig file"
+            )
         if self._block is not None:
             block = self._block
             for servo_id, data in self._addresses(ids, block).items():
