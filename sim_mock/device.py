@@ -23,7 +23,7 @@ class DeviceFaults(Protocol):
     wire: ActiveFaults
 
     def is_on(self, kind: str) -> bool:
-        """Return whether echo, babble, unplug, deny or block is active."""
+        """Return whether echo, unplug, deny or block is active."""
         ...
 
     def command(self, text: str) -> str:

@@ -1,23 +1,21 @@
-"""Answers of emulated servos, and the timed pieces of bytes that carry them."""
+"""Instructions to emulated servos, and the timed pieces of bytes that carry their answers."""
 
 from typing import NamedTuple
 
 BROADCAST = 0xFE
 
 
-class Answer(NamedTuple):
-    """The answer of one servo.
+class Instruction(NamedTuple):
+    """An instruction packet.
 
-    delay_s: its return delay; late_s: additional delay
-    twin: the simultaneous answer of another servo with the same id
+    params: without byte stuffing
+    end: position of its last byte + 1, counted from the first byte of the newest piece
     """
 
     servo_id: int
-    error: int
+    code: int
     params: bytes
-    delay_s: float = 0.0
-    late_s: float = 0.0
-    twin: "Answer | None" = None
+    end: int
 
 
 class Piece(NamedTuple):

@@ -16,8 +16,6 @@ Dynamixel servos, is 0 by default.
 from collections import deque
 
 from gazerig.sim_mock.device import Device, DeviceReply
-from gazerig.sim_mock.faults.active import NO_DEVICE
-from gazerig.sim_mock.replies import Piece
 
 BITS_PER_BYTE = 10
 PACK_S = 0.001
@@ -40,13 +38,11 @@ class ServoLine:
         self.turnaround_s = turnaround_s
         self._late: deque[tuple[float, bytes]] = deque()
         self._host_free_s = self._line_free_s = 0.0
-        self._said = b""
 
     @property
     def is_busy(self) -> bool:
-        """Return whether bytes are in transit, or may arrive without a request."""
-        faults = self.device.faults
-        return bool(self._late) or (faults.wire.has_any and faults.is_on("babble"))
+        """Return whether bytes are in transit."""
+        return bool(self._late)
 
     def next_due_s(self) -> float | None:
         """Return the arrival time of the next bytes, None if none are in transit."""
@@ -60,9 +56,7 @@ class ServoLine:
     def take_arrived(self) -> bytes:
         """Return the bytes that have arrived since the last call."""
         now_s = self.device.now_s()
-        out = (
-            [self.device.faults.wire.babble_bytes(now_s)] if self.device.faults.wire.has_any else []
-        )
+        out = list[bytes]()
         while self._late and self._late[0][0] <= now_s:
             out.append(self._late.popleft()[1])
         return b"".join(out)
@@ -70,47 +64,32 @@ class ServoLine:
     def send(self, data: bytes, baud: int, now_s: float | None = None) -> bytes:
         """Send the host's bytes now, or at ``now_s``; return the bytes that arrive immediately."""
         wire = self.device.faults.wire
-        faulty = wire.has_any
-        if faulty:
+        if wire.has_any:
             data = wire.add_noise(data, self.device.now_s())
         replies = self.device.exchange(data, baud)
-        if faulty:
+        if wire.has_any:
             noise_s = self.device.now_s()
-            said = b"".join(piece.data for reply in replies for piece in reply.pieces)
-            before, self._said = self._said, said or self._said
             replies = [
                 DeviceReply(
                     r.end, [p._replace(data=wire.add_noise(p.data, noise_s)) for p in r.pieces]
                 )
                 for r in replies
             ]
-            if said and before and wire.use_fault("repeat", None, noise_s) is not None:
-                first = replies[0]
-                replies[0] = DeviceReply(first.end, [Piece(NO_DEVICE, before), *first.pieces])
         if self.wire_time:
             self._queue_on_line(
                 data, replies, baud, self.device.now_s() if now_s is None else now_s
             )
-            return self.take_arrived()
-        if not replies:
-            return b""
-        if not self._late and not wire.has_any and not self._any_late(replies):
+        elif wire.has_any or self._late:
+            # The only delays are those of faults.
+            sent_s = self.device.now_s()
+            due_s = max(sent_s, self._late[-1][0] if self._late else sent_s)
+            for reply in replies:
+                for piece in reply.pieces:
+                    due_s += piece.late_s
+                    self._late.append((due_s, piece.data))
+        else:
             return b"".join([piece[1] for reply in replies for piece in reply[1]])
-        # The only delays are those of faults.
-        sent_s = self.device.now_s()
-        due_s = max(sent_s, self._late[-1][0] if self._late else sent_s)
-        for reply in replies:
-            for piece in reply.pieces:
-                due_s += piece.late_s
-                self._late.append((due_s, piece.data))
         return self.take_arrived()
-
-    def _any_late(self, replies: list[DeviceReply]) -> bool:
-        for _, pieces in replies:
-            for _, _, _, late_s in pieces:
-                if late_s:
-                    return True
-        return False
 
     def _queue_on_line(
         self, data: bytes, replies: list[DeviceReply], baud: int, now_s: float

@@ -16,9 +16,9 @@ from gazerig.sim_mock.devices import (
     build,
 )
 from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
-BUILT = ServoSpec(7, "xl330-m288", 1000, 45, Physics(stop_low_steps=900.0), Quirks(True), 3)
+BUILT = ServoSpec(7, "xl330-m288", 1000, 45, Physics(stop_low_steps=900.0))
 LINES: list[Emulated] = [
     DynamixelLine((BUILT, ServoSpec(1, "xc330-m288")), 57_600),
     FeetechLine((ServoSpec(253, "sts3215", 5, physics=Physics(load_nm=0.1)),)),

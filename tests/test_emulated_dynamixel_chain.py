@@ -7,9 +7,14 @@ import pytest
 from servo_bench import READ, DynamixelBench
 
 from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks, registers_of
-from gazerig.sim_mock.dynamixel.memory import ACCESS, DATA_LENGTH, DATA_RANGE, DynamixelMemory
 from gazerig.sim_mock.dynamixel.packets import status
-from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.dynamixel.servo import (
+    ACCESS,
+    DATA_LENGTH,
+    DATA_RANGE,
+    DynamixelMemory,
+    DynamixelServo,
+)
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 instruction = DynamixelBench.instruction
@@ -90,8 +95,10 @@ def test_stuffed_write_is_unstuffed():
     packet = vector("FF FF FD 00 01 0A 00 03 68 00 FF FF FD FD 00 E2 7A")
     # The value 0x00FDFFFF is out of range for Goal Velocity, and is refused as such.
     assert bench.chain.receive(packet)[8] == 6
-    indirect = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\xfd\x00")
-    assert bench.chain.receive(indirect)[8] == 0
+    indirect = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\x00")
+    assert bench.chain.receive(indirect) == b""  # without its byte stuffing it is dropped
+    stuffed = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\xfd\x00")
+    assert bench.chain.receive(stuffed)[8] == 0
     assert bench.read(1, 224, 4) == 0x00FDFFFF
 
 
@@ -167,7 +174,7 @@ def test_every_register_keeps_to_its_access_range_and_size(model):
             assert memory.fields(at, bytes(size)) == ACCESS, register.name
             continue
         if register.high is not None and register.high + 1 < 1 << 8 * size - register.signed:
-            assert memory.fields(at, raw(register.high, size)) == ((register, register.high),)
+            assert memory.fields(at, raw(register.high, size)) == [(register, register.high)]
             assert memory.fields(at, raw(register.high + 1, size)) == DATA_RANGE, register.name
         if register.low:
             assert memory.fields(at, raw(register.low - 1, size)) == DATA_RANGE, register.name
@@ -180,11 +187,11 @@ def test_what_no_register_covers_can_neither_be_read_nor_written(model):
     memory = DynamixelMemory(model, 53)
     known = {a for r in registers_of(model) for a in range(r.address, r.address + r.size)}
     for address in set(range(148)) - known:
-        assert memory.read(address, 1) is None
+        assert memory.range(address, 1) is None
         assert memory.fields(address, b"\0") == ACCESS
     last = 661 if model.family == "x430" else 251
-    assert memory.read(last, 1) == b"\0"
-    assert memory.read(last, 2) is None
+    assert memory.range(last, 1) is not None
+    assert memory.range(last, 2) is None
 
 
 @EVERY

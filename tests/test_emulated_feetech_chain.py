@@ -1,23 +1,14 @@
-"""The emulated STS bus against the written rules: instructions, memory, lock, groups, quirks."""
+"""The emulated STS bus: the maker's packets, memory, lock, faults and protections."""
 
 import pytest
-from servo_bench import ALL, PING, FeetechBench
+from hypothesis import given
+from hypothesis import strategies as st
+from servo_bench import ALL, PING, READ, SYNC_READ, FeetechBench
 
-from gazerig.drivers.feetech import memory_table as feetech_table
-from gazerig.sim_mock.feetech.memory import STS
+from gazerig.sim_mock.feetech.packets import find_instructions, signed
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-
-def three(**options):
-    return FeetechBench(*[(i, "sts3215", 1000.0 * i) for i in (1, 2, 3)], **options)
-
-
-def restart(bench, servo_id=1):
-    """Cut the power for a moment."""
-    bench.chain.faults.command(f"brown-out {servo_id}")
-    bench.wait(1.0)
-
-
-# --- who is there
+VOLTAGE, HEAT, OVERLOAD = 1, 4, 32
 
 
 @pytest.fixture
@@ -25,30 +16,61 @@ def bench():
     return FeetechBench()
 
 
-def test_registers_lie_where_the_drivers_table_has_them():
-    theirs = {(r.address, r.size, r.sign) for r in feetech_table.REGISTERS.values()}
-    own = (*STS.permanent, *STS.ram, *STS.fixed)
-    ours = {(r.address, r.size, r.sign) for r in own}
-    live = {at for at, _, _ in theirs} & set(range(56, 71))
-    assert {row for row in theirs if row[0] not in live} <= ours
-    bench = FeetechBench()
-    differ = {
-        r.name
-        for r in feetech_table.registers_of(feetech_table.MODELS["sts3215"])
-        if r.initial is not None
-        and r.area == "eeprom"
-        and bench.read(1, r.address, r.size) != r.initial
-    }
-    # how servos leave the factory is reported differently
-    assert differ <= {"firmware_minor", "return_delay_time", "velocity_i_gain"}
+# --- packets
+
+MAKERS = {
+    "ping": "FF FF 01 02 01 FB",
+    "read": "FF FF 01 04 02 38 02 BE",
+    "write": "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5",
+    "sync write": "FF FF FE 20 83 2A 06 01 00 08 00 00 E8 03 02 00 08 00 00 E8 03"
+    " 03 00 08 00 00 E8 03 04 00 08 00 00 E8 03 58",
+}
+"""Examples of Feetech's protocol manual."""
+
+
+def test_the_makers_examples_are_answered_to_the_byte():
+    bench = FeetechBench(*[(i, "sts3215", 1304.0) for i in (1, 2, 3, 4)])
+    said = [bench.chain.receive(bytes.fromhex(MAKERS[n])) for n in ("ping", "read", "write")]
+    assert said[0] == bytes.fromhex("FF FF 01 02 00 FC")
+    assert said[1] == bytes.fromhex("FF FF 01 04 00 18 05 DD")
+    assert said[2] == bytes.fromhex("FF FF 01 02 00 FC")
+    assert bench.read(1, 46, 2) == 1000
+    assert bench.chain.receive(bytes.fromhex(MAKERS["sync write"])) == b""
+    assert [bench.read(i, 42, 2) for i in (1, 2, 3, 4)] == [2048] * 4
+
+
+def test_bad_lengths_and_more_ff_before_the_id_are_passed_over():
+    for length in (0, 1):
+        bad = bytes((255, 255, 1, length))
+        assert len(find_instructions(bad + FeetechBench.instruction(1, 1), 0)[0]) == 1
+    found, _ = find_instructions(b"\xff" + FeetechBench.instruction(5, 1), 0)
+    assert found == [(5, 1, b"", 7)]
+
+
+@given(st.integers(0, 0xFD), st.sampled_from([2, 3, 6, 8, 0x82, 0x83]), st.data())
+def test_random_instructions_never_raise(servo_id, code, data):
+    bench = FeetechBench((1, "sts3215", 2048.0), (servo_id, "sts3215", 10.0))
+    for _ in range(4):
+        params = data.draw(st.binary(max_size=24))
+        target = data.draw(st.sampled_from((servo_id, 0xFE)))
+        bench.chain.receive(FeetechBench.instruction(target, code, params))
+        bench.now_s += 0.5
+    assert all(abs(x) < 1e7 for x in bench.chain.positions_steps())
+
+
+@pytest.mark.parametrize(
+    ("raw", "bit", "value"), [(0x8001, 15, -1), (0x7FFF, 15, 32767), (0x0464, 10, -100)]
+)
+def test_signs_stand_in_one_bit(raw, bit, value):
+    assert signed(raw, bit) == value
+
+
+# --- memory
 
 
 def test_a_model_that_is_not_feetechs_is_refused():
     with pytest.raises(ValueError, match=r"model 'xl330-m288': Feetech servos are sts3215"):
         FeetechBench((1, "xl330-m288", 0.0))
-
-
-# --- writes
 
 
 def test_read_only_registers_stay_and_nobody_complains(bench):
@@ -70,15 +92,66 @@ def test_only_what_is_written_while_it_is_open_is_kept(bench):
     bench.write(1, 21, 16)
     bench.write(1, 55, 1)
     bench.write(1, 23, 7)
-    restart(bench)
+    bench.chain.faults.command("brown-out 1")
+    bench.wait(1.0)
     assert [bench.read(1, at) for at in (21, 22, 23, 55)] == [16, 32, 0, 1]
 
 
-# --- groups
+# --- protections
 
 
-@pytest.mark.parametrize(("policy", "ids"), [("answer", [1, 2, 3]), ("silence", [])])
-def test_broadcast_ping(policy, ids):
-    bench = three()
-    bench.chain.choose_behaviour("broadcast-ping", policy)
-    assert [i for i, _, _ in bench.ask(ALL, PING)] == ids
+@pytest.mark.parametrize(("volts", "bits"), [(8.0, 0), (8.2, 1), (3.9, 1)])
+def test_voltage_stands_in_every_answer_as_long_as_it_is_wrong(bench, volts, bits):
+    bench.chain.faults.command(f"voltage 1 {volts}")
+    bench.wait(0.1)
+    assert bench.read(1, 62) == round(volts * 10)
+    assert bench.read(1, 65) == bits
+    assert [error for _, error, _ in bench.ask(1, READ, 0, 5)] == [bits]
+    assert [error for _, error, _ in bench.ask(ALL, SYNC_READ, 56, 2, 1)] == [bits]
+    bench.chain.faults.command("voltage 1 7.4")
+    bench.wait(0.1)
+    assert bench.error() == 0
+
+
+def test_heat_takes_the_torque_until_it_has_cooled_and_someone_switches_it_on(bench):
+    bench.enable_torque()
+    bench.chain.faults.command("overheat 1")
+    bench.wait(0.04)
+    assert (bench.error(), bench.read(1, 40), bench.read(1, 63)) == (HEAT, 0, 75)
+    bench.write(1, 40, 1)
+    assert bench.read(1, 40) == 0
+    bench.chain.faults.command("temperature 1 40")
+    bench.wait(0.1)
+    assert (bench.error(), bench.read(1, 40)) == (0, 0)
+    bench.write(1, 40, 1)
+    assert bench.read(1, 40) == 1
+
+
+def jammed():
+    """A servo that pushes against something."""
+    bench = FeetechBench(ServoSpec(1, "sts3215", 2048))
+    bench.enable_torque()
+    bench.chain.faults.command("stick 1")
+    bench.write(1, 42, 3000, 2)
+    return bench
+
+
+def test_an_overload_lowers_the_torque_after_its_time_until_a_new_goal():
+    bench = jammed()
+    bench.wait(1.9)
+    assert (bench.error(), bench.read(1, 60, 2, 10)) == (0, 1000)
+    bench.wait(0.2)
+    assert (bench.error(), bench.read(1, 60, 2, 10)) == (OVERLOAD, 200)
+    assert bench.read(1, 40) == 1
+    bench.chain.faults.command("free 1")
+    bench.wait(5.0)
+    assert bench.error() == OVERLOAD
+    bench.write(1, 42, 2990, 2)
+    assert bench.ask(1, PING)[0][1] == 0
+
+
+def test_a_torque_limit_below_it_never_overloads():
+    bench = jammed()
+    bench.write(1, 48, 790, 2)
+    bench.wait(10.0)
+    assert (bench.error(), bench.read(1, 60, 2, 10)) == (0, 790)

@@ -24,8 +24,8 @@ def command(bench, goal, speed=0, acceleration=0, time_ms=0):
 
 def led_to(bench):
     """Return the present position of the servo's profile."""
-    profile, drive = bench.chain.find_servo(1).shaft.profile, bench.chain[1].drive
-    return profile.r + drive.position_steps - drive.shaft.x
+    servo = bench.chain.find_servo(1)
+    return servo.shaft.r + servo.position_steps - servo.shaft.x
 
 
 # --- the path

@@ -260,7 +260,7 @@ class Bench:
         if isinstance(device, HobbyBoard):
             device.servos[place].turn(steps)
         else:
-            device.servos[place].drive.turn(steps)  # type: ignore[attr-defined]
+            device.servos[place].turn(steps)  # type: ignore[attr-defined]
 
     def start(self) -> None:
         """Switch torque on at the present positions."""

@@ -401,7 +401,7 @@ class WorldHobbyServo(HobbyServo):
         profile = PositionProfile(self.shaft.x)
         profile.rest(steps * self._unit)
         if not was:
-            self.shaft.start(profile)
+            self.shaft.start()
         self.shaft.profile = profile
         self.shaft.drive(self._loop)
 

@@ -18,8 +18,8 @@ from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.description.links import ServoDrive
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.devices import MaestroLine, Pca9685Line
-from gazerig.sim_mock.dynamixel.drive import POSITION, control_loop
-from gazerig.sim_mock.feetech.drive import D_SHARE, P_SHARE
+from gazerig.sim_mock.dynamixel.servo import POSITION, control_loop
+from gazerig.sim_mock.feetech.servo import D_SHARE, P_SHARE
 from gazerig.sim_mock.hobby_motor import HOBBY_PHYSICS, hobby_motor
 from gazerig.sim_mock.smart_servo.integration import SMOOTHING
 from gazerig.sim_mock.smart_servo.physics import (
@@ -75,7 +75,7 @@ def smart_loop(joint: JointParams) -> Loop:
     limit = round(strength * PWM_FULL)
     registers |= {"operating_mode": POSITION, "pwm_limit": limit, "goal_pwm": limit}
     registers["pwm_slope"] = STEEPEST_PWM
-    return control_loop(lambda name: registers.get(name, 0), model, 1)
+    return control_loop(lambda name: registers.get(name, 0), model)
 
 
 _NEAR_ZERO_RAD = radians(10.0)

@@ -7,159 +7,97 @@ import struct
 from collections.abc import Sequence
 from functools import partial
 
-from gazerig.drivers.dynamixel.control_table import EEPROM_END
-from gazerig.sim_mock.dynamixel.memory import DATA_RANGE, INSTRUCTION_ERROR
+from fastcrc.crc16 import umts
+
 from gazerig.sim_mock.dynamixel.packets import (
+    CRC,
+    HEAD,
     HEADER,
-    DynamixelFraming,
-    fast_pieces,
-    fast_reply,
+    STATUS,
+    find_instructions,
     status,
 )
-from gazerig.sim_mock.dynamixel.servo import DynamixelQuirks, DynamixelServo
-from gazerig.sim_mock.replies import Answer, Piece
-from gazerig.sim_mock.smart_servo.chain import GroupAction, ServoChain, build_chain
-from gazerig.sim_mock.smart_servo.faults import commands_of
-from gazerig.sim_mock.smart_servo.framing import (
-    ACTION,
-    FACTORY_RESET,
-    REG_WRITE,
-    WRITE,
-    Instruction,
+from gazerig.sim_mock.dynamixel.servo import ACCESS, INSTRUCTION_ERROR, DynamixelServo
+from gazerig.sim_mock.replies import BROADCAST, Instruction, Piece, merge
+from gazerig.sim_mock.smart_servo.chain import (
+    FAST_BULK_READ,
+    FAST_SYNC_READ,
+    GroupRead,
+    ServoChain,
+    build_chain,
+    sync_rows,
 )
-from gazerig.sim_mock.smart_servo.instructions import GroupRead, GroupWrite, InstructionSet, Result
+from gazerig.sim_mock.smart_servo.faults import commands_of
 
-CLEAR, BACKUP = 0x10, 0x20
-FAST_SYNC_READ, BULK_READ, BULK_WRITE, FAST_BULK_READ = 0x8A, 0x92, 0x93, 0x9A
-
-CRC_ERROR = 3
-CLEAR_TURNS = b"\x01\x44\x58\x4c\x22"
-BACKUP_KEY = b"CTRL"
-STORE, RESTORE = 1, 2
-RESET_ALL = b"\xff"
-NO_BROADCAST_RESET_SINCE = 42
-"""First firmware that ignores a broadcast reset of everything."""
+BULK_READ, BULK_WRITE = 0x92, 0x93
+MIN_WATCHDOG_MS = 20
 
 _ROW = struct.Struct("<BHH")
 
 
-def touches_eeprom(code: int, params: bytes) -> bool:
-    """Return whether an instruction may change id, baud rate, return delay or secondary id."""
-    if code in (WRITE, REG_WRITE):
-        return INSTRUCTIONS.address_of(params) < EEPROM_END
-    return code in (ACTION, FACTORY_RESET, BACKUP)
-
-
-def obeys_broadcast(servo: DynamixelServo, code: int, params: bytes) -> bool:
-    """Return whether a servo executes a broadcast instruction."""
-    reset = code == FACTORY_RESET and params == RESET_ALL
-    return not reset or servo.firmware < NO_BROADCAST_RESET_SINCE
-
-
-def bulk_rows(params: bytes) -> tuple[GroupRead, ...]:
-    """Parse the parameters of a bulk read."""
-    return tuple(_ROW.iter_unpack(params)) if len(params) % _ROW.size == 0 else ()
-
-
-def bulk_writes(params: bytes) -> list[GroupWrite]:
-    """Parse the parameters of a bulk write: id, address and data of each servo."""
-    out, at = [], 0
-    while len(params) - at > _ROW.size:
-        servo_id, address, length = _ROW.unpack_from(params, at)
-        at += _ROW.size + length
-        if at <= len(params):
-            out.append((servo_id, address, params[at - length : at]))
-    return out
-
-
-def _factory_reset(servo: DynamixelServo, params: bytes) -> Result:
-    return servo.factory_reset(params[0] if params else -1), b""
-
-
-def _backup(servo: DynamixelServo, params: bytes) -> Result:
-    if params[1:] != BACKUP_KEY or params[0] not in (STORE, RESTORE):
-        return DATA_RANGE, b""
-    return (servo.backup() if params[0] == STORE else servo.restore()), b""
-
-
-def _clear(servo: DynamixelServo, params: bytes) -> Result:
-    return (servo.clear_turns() if params == CLEAR_TURNS else DATA_RANGE), b""
-
-
-INSTRUCTIONS = InstructionSet[DynamixelServo](
-    2,
-    (INSTRUCTION_ERROR, b""),
-    {FACTORY_RESET: _factory_reset, CLEAR: _clear, BACKUP: _backup},
-)
-
-
-MIN_WATCHDOG_MS = 20
-
-
-class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
+class DynamixelChain(ServoChain[DynamixelServo]):
     """Dynamixel servos on one bus."""
 
-    servo_type, quirks_type, framing_type = DynamixelServo, DynamixelQuirks, DynamixelFraming
-    header, status, instructions = HEADER, staticmethod(status), INSTRUCTIONS
-    commands = commands_of(252, DynamixelQuirks, reset="id 1, 57600 baud; needs torque off")
-    eeprom_end = EEPROM_END
-    _framing: DynamixelFraming
-    _obeys_broadcast, _touches_eeprom = staticmethod(obeys_broadcast), staticmethod(touches_eeprom)
-
-    def _apply_quirks(self, quirks: DynamixelQuirks) -> None:
-        strict = quirks.stuffing == "strict"
-        if strict != self._framing.strict:
-            self._framing.forget()
-            self._framing.strict = strict
+    servo_type = DynamixelServo
+    find_instructions, status = staticmethod(find_instructions), staticmethod(status)
+    span = struct.Struct("<HH")
+    misunderstood = INSTRUCTION_ERROR, b""
+    commands = commands_of(252, "id 1, 57600 baud")
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
         """Trip expired bus watchdogs, reset the others, then execute the instruction."""
-        if instruction.code < 0:
-            return self._reject(instruction.servo_id)
         if self._now_ms - self._fed_ms >= MIN_WATCHDOG_MS:
             for servo in self.servos:
                 servo.advance(self._now_ms, self._fed_ms)
         self._fed_ms = self._now_ms
         return super()._execute(instruction)
 
-    def _reject(self, servo_id: int) -> list[Piece]:
-        """Answer an instruction with a wrong CRC, depending on the quirks."""
-        servo = self._by_id.get(servo_id)
-        if servo is None or not servo.advance(self._now_ms, self._fed_ms):
+    def _execute_group(self, code: int, params: bytes) -> list[Piece]:
+        """Execute an instruction to all servos."""
+        if code == FAST_SYNC_READ:
+            return self._answer_fast(sync_rows(self.span, params))
+        if code in (BULK_READ, FAST_BULK_READ) and len(params) % _ROW.size == 0:
+            rows = tuple(_ROW.iter_unpack(params))
+            return self._answer_rows(rows) if code == BULK_READ else self._answer_fast(rows)
+        if code == BULK_WRITE:
+            at = 0
+            while len(params) - at > _ROW.size:
+                servo_id, address, length = _ROW.unpack_from(params, at)
+                at += _ROW.size + length
+                if at <= len(params):
+                    self._write_part(servo_id, address, params[at - length : at])
             return []
-        if self.quirks.bad_crc == "silent" or servo.status_level < 2:
-            return []
-        error = CRC_ERROR | servo.error_flag
-        return self._apply_line_faults([Answer(servo_id, error, b"", self._delay_s[servo_id])])
+        return super()._execute_group(code, params)
 
-    # --- groups
-
-    def _group_instructions(self) -> dict[int, GroupAction]:
-        rows = self.instructions.sync_rows
-        return super()._group_instructions() | {
-            FAST_SYNC_READ: lambda params: self._answer_fast_sync_read(rows(params)),
-            BULK_READ: lambda params: self._answer_plain(bulk_rows(params)),
-            FAST_BULK_READ: lambda params: self._answer_fast_sync_read(bulk_rows(params)),
-            BULK_WRITE: lambda params: self._write_all(bulk_writes(params)),
-        }
-
-    def _answer_fast_sync_read(self, rows: Sequence[GroupRead]) -> list[Piece]:
-        """Return one packet of all answers; a servo that refuses fills its block with zeros."""
+    def _answer_fast(self, rows: Sequence[GroupRead]) -> list[Piece]:
+        """Return one packet of all answers; a missing block ends it."""
         length = 1 + sum([4 + row[2] for row in rows])
-        if not self._wire.has_any and not self._twins:
-            packet = fast_reply(self._by_id, rows, length, self._now_ms, self._fed_ms)
-            return [Piece(rows[0][0], packet, self._delay_s[rows[0][0]])] if packet else []
-        answers: list[Answer] = []
+        before = head = HEAD.pack(HEADER, BROADCAST, length, STATUS)
+        pieces, crc, pack = list[Piece](), umts(head), CRC.pack
         for servo_id, address, size in rows:
             servo = self._by_id.get(servo_id)
-            answer = (
-                self._group_part(servo_id, address, size) if servo and servo.fast_reads else None
-            )
-            if answer is None:
+            block = b"" if servo is None else self._block(servo, servo_id, address, size)
+            if servo is None or not block or self._is_muted(servo_id):
                 break
-            answers.append(answer if answer[2] else answer._replace(params=bytes(size)))
-        spoilt = fast_pieces(self._wire.spoil_answers(answers, True, self._now_s), length)
-        return self._wire.spoil_pieces(spoilt, True, self._now_s)
+            start, block = crc, block + pack(umts(block, crc))
+            for twin in self._twins.get(servo_id, ()) if self._twins else ():
+                other = self._block(twin, servo_id, address, size)
+                block = merge(block, other + pack(umts(other, start)))
+            crc = umts(block, start)
+            pieces.append(Piece(servo_id, before + block, 0.0 if pieces else servo.delay_s))
+            before = b""
+        return pieces
+
+    def _block(self, servo: DynamixelServo, servo_id: int, address: int, size: int) -> bytes:
+        """Return a servo's part of a fast read; it fills the part of a refused read with zeros."""
+        if not servo.advance(self._now_ms, self._fed_ms):
+            return b""
+        if not servo.fast_reads or not servo.answers_groups:
+            return b""
+        data, error = servo.read(address, size), servo.error_flag
+        if data is None:
+            data, error = bytes(size), error | ACCESS
+        return bytes((error, servo_id)) + data
 
 
 build_dynamixel = partial(build_chain, DynamixelChain)

@@ -1,148 +1,195 @@
-"""One emulated Dynamixel X servo: permitted writes, errors, watchdog, restarts.
+"""One emulated Dynamixel X servo: its control table, permitted writes, errors and watchdog.
 
-The control table is in gazerig.sim_mock.dynamixel.memory, modes, profiles and gains in its
-neighbours. Not emulated: play inside the gear, a blinking LED, the RC, S.Bus and iBus protocols
-of register 13.
+Places, access and ranges are those of the driver's table, as in the e-Manual. It moves in the modes
+with a position: 3, 4 (more than a turn) and 5 (with a limit of the current). The other modes can be
+set, then it does not move. Gains are divided as the ROBOTIS e-Manual documents (P 128, D 16, I
+65536). Their units are not documented. Assumed here: positions in steps, speeds in steps/ms, sums
+per ms; the output is in units of PWM (885 are 100 %). Registers without any effect: feed-forward,
+velocity gains, startup configuration, secondary id, moving threshold, LED.
 """
 
 import struct
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from collections.abc import Callable, Iterable, Iterator
+from math import inf
+from operator import itemgetter
+from typing import ClassVar, NamedTuple
 
 from gazerig.drivers.dynamixel.control_table import (
-    BACKUP_SINCE,
+    ACCELERATION_UNIT_STEPS_S2,
     BAUD_RATES,
     EEPROM_END,
     FAST_READ_SINCE,
+    GAINS,
     HARDWARE_ERRORS,
     MODELS,
-    SHADOW_OFF,
+    PWM_FULL,
+    VELOCITY_UNIT_STEPS_S,
     DynamixelModel,
     DynamixelRegister,
+    IndirectBlock,
+    indirect_blocks,
+    registers_of,
 )
-from gazerig.sim_mock.dynamixel.drive import (
-    DRIVEN_BY,
-    POSITION,
-    TORQUE_ON_BY_GOAL,
-    TRIPPED,
-    DynamixelDrive,
-    supported_modes,
-)
-from gazerig.sim_mock.dynamixel.memory import (
-    ACCESS,
-    DATA_LIMIT,
-    DATA_RANGE,
-    GOAL_AT,
-    GOAL_END,
-    INSTRUCTION_ERROR,
-    MOTION,
-    MOTION_AT,
-    REFERENCE,
-    REFERENCE_AT,
-    RESULT_FAIL,
-    SENSED,
-    SENSED_AT,
-    SURROUNDINGS,
-    SURROUNDINGS_AT,
-    Backup,
-    DynamixelMemory,
-    Fields,
-    SensedWindow,
-    in_eeprom,
-)
+from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
-from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
-from gazerig.sim_mock.smart_servo.quirks import ChainQuirks
+from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, ServoSpec
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
-GOALS = ("goal_pwm", "goal_current", "goal_velocity", "goal_position")
-MULTI_TURN_STEPS = 1_048_575
-WATCHDOG_AT = 98
-
-
-class WriteRules:
-    """Decides which writes are permitted, from table and state; changes nothing.
-
-    goal_range: permitted goal positions
-    """
-
-    def __init__(
-        self, memory: DynamixelMemory, model: DynamixelModel, drive: DynamixelDrive
-    ) -> None:
-        self._memory = memory
-        self._modes = supported_modes(model)
-        self._drive = drive
-        self.goal_range = (0, 0)
-
-    def apply_settings(self) -> None:
-        """Apply the present register values."""
-        get = self._memory.get
-        self.goal_range = -MULTI_TURN_STEPS, MULTI_TURN_STEPS
-        if self._drive.mode == POSITION:
-            self.goal_range = get("min_position_limit"), get("max_position_limit")
-
-    def is_permitted(self, address: int, data: bytes) -> Fields | int:
-        """Return the registers of a write, or the error number."""
-        fields = self._memory.fields(address, data)
-        if isinstance(fields, int):
-            return fields
-        for register, value in fields:
-            error = self._refusal(register, value)
-            if error:
-                return error
-        return fields
-
-    def goal_error(self, goal: int) -> int:
-        """Return the error number for a goal position, 0 if it may be written."""
-        if self._memory.bytes[WATCHDOG_AT] == TRIPPED:
-            return DATA_RANGE
-        low, high = self.goal_range
-        return 0 if low <= goal <= high else DATA_LIMIT
-
-    def _refusal(self, register: DynamixelRegister, value: int) -> int:
-        name = register.name
-        if register.address < EEPROM_END:
-            if self._drive.torque:
-                return ACCESS
-            unknown = name == "operating_mode" and value not in self._modes
-            return DATA_RANGE if unknown else 0
-        if name == "goal_position":
-            return self.goal_error(value)
-        if name in GOALS:
-            if self._memory.bytes[WATCHDOG_AT] == TRIPPED:
-                return DATA_RANGE
-            limit = self._memory.get(name.replace("goal_", "") + "_limit")
-            return 0 if -limit <= value <= limit else DATA_LIMIT
-        return 0
-
-
-BadCrc = Literal["silent", "reply"]
-Stuffing = Literal["accept", "strict"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class DynamixelQuirks(ChainQuirks):
-    """Choices of behaviour.
-
-    bad_crc: reply to a wrong CRC: silence, or error number 3
-    stuffing: an instruction with FF FF FD among its parameters that lacks byte stuffing is
-        understood by its length, or dropped
-    """
-
-    bad_crc: BadCrc = "silent"
-    stuffing: Stuffing = "accept"
-
-
+INSTRUCTION_ERROR, DATA_RANGE, DATA_LENGTH, DATA_LIMIT, ACCESS = 2, 4, 5, 6, 7
+"""Numbers of the status error byte (Protocol 2.0)."""
 ALERT = 0x80
-WATCHDOG_UNIT_MS = 20
 
-STARTS_WITH_TORQUE, RESTORES_RAM = 1, 2
-"""Bits of Startup Configuration (60)."""
+SENSED, SENSED_AT = struct.Struct("<hii"), 126
+"""Current, velocity, position: a control loop reads them every tick."""
+MOTION, MOTION_AT = struct.Struct("<HBBh"), 120
+"""Tick, moving, moving status, PWM."""
+REFERENCE, REFERENCE_AT = struct.Struct("<ii"), 136
+"""Velocity and position of the profile."""
+SENSED_SPAN = SENSED_AT, REFERENCE_AT
+PROFILED = (MOTION_AT, SENSED_AT), (REFERENCE_AT, REFERENCE_AT + REFERENCE.size)
+"""Addresses of the state of the profile, which a control loop rarely reads."""
 
-KEPT_BY_RESET: dict[int, tuple[str, ...]] = {0xFF: (), 1: ("id",), 2: ("id", "baud_rate")}
-"""Registers that each option of Factory Reset keeps."""
+GOAL_AT, GOAL_END, WATCHDOG_AT = 116, 120, 98
+WATCHDOG_UNIT_MS, TRIPPED = 20, 255
+"""Unit of Bus Watchdog, and its value after it has stopped the servo."""
 
+CURRENT, POSITION, EXTENDED, CURRENT_POSITION = 0, 3, 4, 5
+POSITION_MODES = POSITION, EXTENDED, CURRENT_POSITION
+MODES_WITHOUT_CURRENT = 1, POSITION, EXTENDED, 16
+MODES = CURRENT, CURRENT_POSITION, *MODES_WITHOUT_CURRENT
+
+REVERSE = 1
+"""Bit of Drive Mode (10)."""
+PWM_SLOPE_V_MS = 0.001977, 0.003955
+"""Unit of PWM Slope (62) of the models for 5 V and for 12 V."""
+MULTI_TURN_STEPS = 1_048_575
+HOMING_ACTS_STEPS = 1024
+"""Part of the homing offset that counts in position mode."""
+ARRIVED, RUNNING = 1, 2
+"""Bits of Moving Status (123)."""
+IN_POSITION_STEPS = 12
+"""Threshold of in position; the maker does not document it."""
+
+_SPEED_UNIT = VELOCITY_UNIT_STEPS_S / 1000.0
+_RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
 _IDENTITY = struct.Struct("<HB")
+
+Get = Callable[[str], int]
+
+
+def control_loop(get: Get, model: DynamixelModel) -> Loop:
+    """Return the controller that the registers describe."""
+    slew, torque_max, mode = inf, inf, get("operating_mode")
+    if mode not in POSITION_MODES:
+        return DISABLED
+    if model.family == "x330":
+        slew = get("pwm_slope") * PWM_SLOPE_V_MS[model.rated_v > 5.0] / model.rated_v
+    if mode == CURRENT_POSITION:
+        units = min(abs(get("goal_current")), get("current_limit"))
+        torque_max = units * model.current_unit_ma / 1000.0 / model.stall_current_a
+    return Loop(
+        p=get("position_p_gain") / 128.0 / PWM_FULL,
+        i=get("position_i_gain") / 65536.0 / PWM_FULL,
+        d=get("position_d_gain") / 16.0 / PWM_FULL,
+        u_max=min(get("pwm_limit"), abs(get("goal_pwm"))) / PWM_FULL,
+        torque_max=torque_max,
+        slew=slew,
+    )
+
+
+class ReadRange(NamedTuple):
+    """A range of addresses, resolved through the indirect windows.
+
+    fetch: returns the bytes of all real addresses, in runs of neighbours
+    sensed, profiled: whether it contains sensor values, or the state of the profile
+    """
+
+    fetch: Callable[[bytearray], Iterable[bytearray]]
+    sensed: bool
+    profiled: bool
+
+
+class DynamixelMemory(ServoMemory):
+    """One servo's control table.
+
+    ranges: ranges that were read, valid until an indirect address changes
+    """
+
+    def __init__(self, model: DynamixelModel, firmware: int) -> None:
+        blocks = indirect_blocks(model, firmware)
+        registers = (*registers_of(model), *_window_registers(blocks))
+        super().__init__(registers, max(r.address + r.size for r in registers))
+        self.by_address = {register.address: register for register in registers}
+        self._defined = {r.address + i for r in registers for i in range(r.size)}
+        self._pointers = {
+            b.data_base + i: b.address_base + 2 * i for b in blocks for i in range(b.entries)
+        }
+        self.ranges: dict[tuple[int, int], ReadRange] = {}
+        self.restore(eeprom=True)
+        self.restore(eeprom=False)
+
+    def set(self, name: str, value: int) -> None:
+        """Set a register regardless of its access."""
+        super().set(name, value)
+        if name.startswith("indirect_address"):
+            self.ranges.clear()
+
+    def real(self, address: int) -> int:
+        """Return the address to which an indirect data byte refers, and others unchanged."""
+        at = self._pointers.get(address)
+        return address if at is None else int.from_bytes(self.bytes[at : at + 2], "little")
+
+    def range(self, address: int, length: int) -> ReadRange | None:
+        """Return a range that is read, None if an address is not defined."""
+        places = range(address, address + length)
+        if not length or not self._defined.issuperset(places):
+            return None
+        runs: list[list[int]] = []
+        for real in map(self.real, places):
+            if runs and runs[-1][1] == real:
+                runs[-1][1] = real + 1
+            else:
+                runs.append([real, real + 1])
+
+        def touches(*spans: tuple[int, int]) -> bool:
+            return any(low < end and high > at for low, high in runs for at, end in spans)
+
+        # With a single slice, itemgetter would return the bytes themselves.
+        slices = [slice(low, high) for low, high in runs]
+        found = ReadRange(
+            itemgetter(*slices, slice(0, 0)), touches(SENSED_SPAN), touches(*PROFILED)
+        )
+        self.ranges[address, length] = found
+        return found
+
+    def fields(self, address: int, data: bytes) -> list[tuple[DynamixelRegister, int]] | int:
+        """Split bytes to write into registers with their values, or return the error number."""
+        places = [self.real(at) for at in range(address, address + len(data))]
+        fields, at = list[tuple[DynamixelRegister, int]](), 0
+        while at < len(data):
+            register = self.by_address.get(places[at])
+            if register is None or register.access == "r":
+                return ACCESS
+            end = at + register.size
+            if places[at:end] != list(range(register.address, register.address + register.size)):
+                return DATA_LENGTH
+            value, low, high = register.decode(data[at:end]), register.low, register.high
+            if (low is not None and value < low) or (high is not None and value > high):
+                return DATA_RANGE
+            fields.append((register, value))
+            at = end
+        return fields or DATA_LENGTH
+
+
+def _window_registers(blocks: Iterable[IndirectBlock]) -> Iterator[DynamixelRegister]:
+    """Yield the registers of the indirect windows; each starts as its own data byte."""
+    for block in blocks:
+        for i in range(block.entries):
+            at, data = block.address_base + 2 * i, block.data_base + i
+            yield DynamixelRegister(
+                f"indirect_address_{at}", at, 2, "rw", data, block.target_low, block.target_high
+            )
+            yield DynamixelRegister(f"indirect_data_{data}", data, 1, "rw", 0, 0, 255)
 
 
 class DynamixelServo(EmulatedServo):
@@ -154,229 +201,194 @@ class DynamixelServo(EmulatedServo):
 
     restart_ms = 400
     unreadable = ACCESS
-    none_registered = INSTRUCTION_ERROR
     read_level, answer_level = 1, 2
     error_bits: ClassVar = {name: 1 << bit for bit, name in HARDWARE_ERRORS.items()}
     model: DynamixelModel
     memory: DynamixelMemory
-    drive: DynamixelDrive
 
     def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = create_shaft) -> None:
-        self.model = MODELS[spec.model]
-        self.mute_reboot = Quirks(*spec.quirks).mute_reboot
-        self.memory = DynamixelMemory(self.model, spec.firmware)
-        self.memory.set("firmware_version", spec.firmware)
-        self.memory.set("id", spec.id)
-        self.baud_rates = BAUD_RATES[: (self.memory.register_named("baud_rate").high or 0) + 1]
-        self.drive = DynamixelDrive(self.memory, self.model, spec, make_shaft)
-        self._rules = WriteRules(self.memory, self.model, self.drive)
-        self.fast_reads = spec.firmware >= FAST_READ_SINCE[self.model.family]
-        self._new = spec.firmware >= BACKUP_SINCE[self.model.family]
-        self._backup = Backup()
-        super().__init__(spec, now_ms)
+        model = MODELS[spec.model]
+        memory = DynamixelMemory(model, spec.firmware)
+        memory.set("firmware_version", spec.firmware)
+        memory.set("id", spec.id)
+        self.baud_rates = BAUD_RATES[: (memory.registers["baud_rate"].high or 0) + 1]
+        self.fast_reads = spec.firmware >= FAST_READ_SINCE[model.family]
+        unit = model.current_unit_ma
+        # Models without a current sensor report load in 0.1 %.
+        self._current_full = model.stall_current_a * 1000.0 / unit if unit else 1000.0
+        super().__init__(spec, model, memory, now_ms, make_shaft)
 
-    def _load_limits(self) -> tuple[float, ...]:
-        """Return overload share and time from the physics, because no register holds them."""
-        return self._physics.overload_share, self._physics.overload_s
+    def _boot(self) -> None:
+        """Reset to power-on."""
+        self._mode = self.memory.get("operating_mode")
+        super()._boot()
+        self._reset_goals()
+        self._apply_settings()
+
+    def _reset_goals(self) -> None:
+        """Set the goals to their limits, and the goal position to the present position."""
+        for name in ("pwm", "current", "velocity"):
+            if f"goal_{name}" in self.memory.registers:
+                self.memory.set(f"goal_{name}", self.memory.get(f"{name}_limit"))
+        self._set_goal_here()
+
+    def _overload_limit(self) -> tuple[float, float]:
+        """Return it from the physics, because no register holds it."""
+        return self.physics.overload_share, self.physics.overload_s
+
+    def _set_controller(self) -> None:
+        """Apply the registers of profile, gains and limits."""
+        get = self.memory.get
+        self._goal_range = -MULTI_TURN_STEPS, MULTI_TURN_STEPS
+        if self._mode == POSITION:
+            self._goal_range = get("min_position_limit"), get("max_position_limit")
+        self._follows = self.torque and self._mode in POSITION_MODES
+        self._speed = get("profile_velocity") * _SPEED_UNIT
+        self._ramp = get("profile_acceleration") * _RAMP_UNIT
+        self.shaft.drive(control_loop(get, self.model) if self.torque else DISABLED)
 
     def identity(self) -> bytes:
         """Return model number and firmware."""
         return _IDENTITY.pack(self.model.number, self.firmware)
 
-    def _boot(self) -> None:
-        """Reset to power-on, with torque if Startup Configuration requires it."""
-        self._around: tuple[int, int] | None = None
-        super()._boot()
-        self.memory.set("backup_ready", self._backup.ready)
-        startup = self.memory.get("startup_configuration") if self._new else 0
-        if startup & RESTORES_RAM:
-            self._backup.recall(self.memory, eeprom=False)
-            self._apply_settings()
-        if startup & STARTS_WITH_TORQUE:
-            self.memory.set("torque_enable", 1)
-            self._switch(True)
+    # --- motion
 
-    def _apply_settings(self) -> None:
-        """Apply settings that have changed."""
-        shadow = self.memory.get("secondary_id")
-        self.shadow_id = None if shadow >= SHADOW_OFF else shadow
-        super()._apply_settings()
-        self._rules.apply_settings()
+    def _origin(self) -> tuple[int, int]:
+        offset = self.memory.get("homing_offset")
+        if self._mode == POSITION:
+            offset = max(-HOMING_ACTS_STEPS, min(HOMING_ACTS_STEPS, offset))
+        return -1 if self.memory.get("drive_mode") & REVERSE else 1, offset
 
-    def _protect_from(self, bits: int) -> None:
-        """Latch new hardware errors."""
-        if bits & ~self.errors:
-            self._latch(bits)
+    def _follow(self) -> None:
+        if self._follows:
+            goal = self._side * (self.memory.get("goal_position") - self._shift)
+            self.shaft.lead_to(float(goal), self._speed, self._ramp)
 
-    def _trip(self, after_ms: int) -> None:
+    def _trip(self) -> None:
         """Stop as the bus watchdog does; goals are refused until 98 is cleared."""
-        super()._trip(after_ms)
-        self.memory.set("bus_watchdog", TRIPPED)
-        self.drive.hold_position()
+        self.memory.bytes[WATCHDOG_AT] = TRIPPED
+        self.shaft.hold()
+        self._apply_settings()
 
     # --- reading
 
-    @property
-    def joint_steps(self) -> float:
-        """Return the position of the joint behind the play, in the registers' unit."""
-        return self.drive.joint_steps
-
     def read(self, address: int, length: int) -> bytes | None:
         """Return bytes of the control table, None if an address is not defined."""
-        memory = self.memory
-        gather = memory.gathers.get((address, length)) or memory.gather(address, length)
-        if gather is None:
+        memory, shaft, side = self.memory, self.shaft, self._side
+        found = memory.ranges.get((address, length)) or memory.range(address, length)
+        if found is None:
             return None
-        _, fetch, sensed, surroundings, profiled = gather
+        fetch, sensed, profiled = found
         into = memory.bytes
         if sensed:
-            SENSED.pack_into(into, SENSED_AT, *self.drive.sensed(self._ms))
-        if surroundings and self.stale_surroundings:
-            self._refresh_surroundings()
+            SENSED.pack_into(
+                into, SENSED_AT, round(side * shaft.effort * self._current_full),
+                round(side * shaft.v / _SPEED_UNIT), round(side * shaft.x + self._shift),
+            )  # fmt: skip
         if profiled:
-            tick_ms = self._ms - self._booted_ms & 0x7FFF
-            MOTION.pack_into(into, MOTION_AT, tick_ms, *self.drive.motion(self._ms))
-            REFERENCE.pack_into(into, REFERENCE_AT, *self.drive.reference())
+            self._refresh_profile(into)
         return b"".join(fetch(into))
 
-    def window(self, wanted: tuple[int, int, int]) -> SensedWindow | None:
-        """Return the layout of its part of a fast read, None if ``read`` must do it.
-
-        Args:
-            wanted: id, address, length.
-        """
-        memory = self.memory
-        if wanted not in memory.windows:
-            memory.window(wanted)
-        found = memory.windows[wanted]
-        if found is not None and found.surroundings and self.stale_surroundings:
-            self._refresh_surroundings()
-            return memory.windows.get(wanted) or memory.window(wanted)
-        return found
-
-    def _refresh_surroundings(self) -> None:
-        """Update voltage and temperature."""
-        self.stale_surroundings = False
-        around = self.voltage_01v, self.warmth_c
-        if around != self._around:
-            self._around = around
-            SURROUNDINGS.pack_into(self.memory.bytes, SURROUNDINGS_AT, *around)
-            self.memory.windows.clear()
+    def _refresh_profile(self, into: bytearray) -> None:
+        """Update the registers of the profile's state."""
+        shaft, side = self.shaft, self._side
+        running = self._follows and shaft.led
+        away = abs(self.memory.get("goal_position") - round(self.position_steps))
+        arrived = self._follows and not running and away <= IN_POSITION_STEPS
+        moving = running or abs(shaft.v / _SPEED_UNIT) > self.memory.get("moving_threshold")
+        tick = self._ms - self._booted_ms & 0x7FFF
+        status, pwm = running * RUNNING | arrived * ARRIVED, round(side * shaft.u * PWM_FULL)
+        MOTION.pack_into(into, MOTION_AT, tick, moving, status, pwm)
+        speed, place = round(side * shaft.r_v / _SPEED_UNIT), round(side * shaft.r + self._shift)
+        REFERENCE.pack_into(into, REFERENCE_AT, speed, place)
 
     # --- writing
 
     def write(self, address: int, data: bytes) -> int:
         """Write bytes as an instruction does; return the error number, 0 on success."""
-        if address == GOAL_AT and len(data) == GOAL_END - GOAL_AT and self.drive.follows:
+        if address == GOAL_AT and len(data) == GOAL_END - GOAL_AT and self._follows:
             return self._take_goal(data)
-        fields = self._rules.is_permitted(address, data)
+        fields = self.memory.fields(address, data)
         if isinstance(fields, int):
             return fields
         for register, value in fields:
-            self.memory.put(register, value)
-            name = register.name
-            drive = self.drive
-            if name == "torque_enable":
-                self._switch(bool(value))
-            elif name == "bus_watchdog":
-                self._watchdog_ms = value * WATCHDOG_UNIT_MS
-            elif name == "operating_mode":
-                drive.change_mode(value)
-            elif name in ("homing_offset", "drive_mode"):
-                drive.shift_origin()
-            elif name in GOALS:
-                self._command(name, value)
+            error = self._refusal(register, value)
+            if error:
+                return error
+        for register, value in fields:
+            self.memory.set(register.name, value)
+            self._react(register.name, value)
             self._apply_settings()
         return 0
+
+    def _refusal(self, register: DynamixelRegister, value: int) -> int:
+        """Return the error number of a write that the servo's state forbids, 0 if it may be."""
+        name = register.name
+        if register.address < EEPROM_END:
+            if self.torque:
+                return ACCESS
+            known = MODES_WITHOUT_CURRENT if self.model.current_limit is None else MODES
+            return DATA_RANGE if name == "operating_mode" and value not in known else 0
+        if not name.startswith("goal_"):
+            return 0
+        if self.memory.bytes[WATCHDOG_AT] == TRIPPED:
+            return DATA_RANGE
+        low, high = self._goal_range
+        if name != "goal_position":
+            high = self.memory.get(f"{name.removeprefix('goal_')}_limit")
+            low = -high
+        return 0 if low <= value <= high else DATA_LIMIT
 
     def _take_goal(self, data: bytes) -> int:
         """Write a goal position under torque by a shortcut, because it happens every tick."""
         value = int.from_bytes(data, "little", signed=True)
-        low, high = self._rules.goal_range
-        if not low <= value <= high or self.memory.bytes[WATCHDOG_AT] == TRIPPED:
-            return self._rules.goal_error(value)
-        self.memory.bytes[GOAL_AT:GOAL_END] = data
-        drive = self.drive
-        drive.set_goal(value)
-        drive.followed = GOAL_AT, data
-        return 0
-
-    def _command(self, name: str, value: int) -> None:
-        """Follow a new goal if the operating mode uses it."""
-        if name != DRIVEN_BY.get(self.drive.mode, "goal_position"):
-            return
-        if not self.torque and self._new and self.memory.get("drive_mode") & TORQUE_ON_BY_GOAL:
-            self.memory.set("torque_enable", 1)
-            self._switch(True)
-        elif self.torque and name == "goal_position":
-            self.drive.set_goal(value)
-        elif self.torque and name == "goal_velocity":
-            self.drive.set_goal_velocity(value)
-
-    def _switch(self, on: bool) -> None:
-        """Switch the torque; a latched error keeps it off."""
-        if on and self.errors & self.memory.get("shutdown"):
-            self.memory.set("torque_enable", 0)
-        else:
-            self.drive.switch(on)
-
-    # --- instructions
-
-    def store_write(self, address: int, data: bytes) -> int:
-        """Store a write for Action if it is permitted now; return the error number."""
-        fields = self._rules.is_permitted(address, data)
-        return fields if isinstance(fields, int) else super().store_write(address, data)
-
-    def factory_reset(self, option: int) -> int:
-        """Restore the EEPROM (0xFF all, 1 all but id, 2 all but id and baud), then restart."""
-        kept = KEPT_BY_RESET.get(option)
-        if kept is None:
+        low, high = self._goal_range
+        if self.memory.bytes[WATCHDOG_AT] == TRIPPED:
             return DATA_RANGE
-        if self.torque:
-            return ACCESS
-        self.memory.restore(lambda register: in_eeprom(register) and register.name not in kept)
-        self.restart()
+        if not low <= value <= high:
+            return DATA_LIMIT
+        self.memory.bytes[GOAL_AT:GOAL_END] = data
+        self.shaft.lead_to(float(self._side * (value - self._shift)), self._speed, self._ramp)
+        self.followed = GOAL_AT, data
         return 0
 
-    def reset_all(self) -> int:
-        """Restore factory settings, id 1; return the error number."""
-        return self.factory_reset(0xFF)
+    def _react(self, name: str, value: int) -> None:
+        """Carry out what a changed register starts."""
+        if name == "torque_enable":
+            # A latched error keeps the torque off.
+            self._switch(bool(value) and not self.errors & self.memory.get("shutdown"))
+        elif name == "bus_watchdog":
+            self._watchdog_ms = value * WATCHDOG_UNIT_MS
+        elif name == "operating_mode" and value != self._mode:
+            self._change_mode(value)
+        elif name == "drive_mode":
+            self._wrap_to_one_turn()
+        elif name == "homing_offset":
+            before = self._offset
+            self._side, self._offset = self._origin()
+            self._shift += self._offset - before
+        elif name.endswith("_limit"):
+            self._measure()
 
-    def clear_turns(self) -> int:
-        """Wrap a multi-turn position into one turn; refused while moving."""
-        return 0 if self.drive.clear_turns() else RESULT_FAIL
-
-    def backup(self) -> int:
-        """Store the control table; return the error number, 1 while the torque is on."""
-        if not self._new:
-            return INSTRUCTION_ERROR
-        if self.torque:
-            return RESULT_FAIL
-        self._backup.store(self.memory)
-        self.memory.set("backup_ready", 1)
-        return 0
-
-    def restore(self) -> int:
-        """Restore the stored control table and restart; return the error number."""
-        if not self._new:
-            return INSTRUCTION_ERROR
-        if self.torque or not self._backup.ready:
-            return RESULT_FAIL
-        self._backup.recall(self.memory, eeprom=True)
-        self.restart()
-        self._backup.recall(self.memory, eeprom=False)
-        self._apply_settings()
-        return 0
+    def _change_mode(self, mode: int) -> None:
+        """Set profile, gains and goals to a mode's start values, the position within one turn."""
+        self._mode = mode
+        for name, gain in zip(GAINS, self.model.gains, strict=True):
+            self.memory.set(name, gain)
+        for name in ("profile_acceleration", "profile_velocity"):
+            self.memory.set(name, 0)
+        self._wrap_to_one_turn()
+        self._reset_goals()
 
     # --- errors
 
-    def _latch(self, bits: int) -> None:
-        """Set bits of Hardware Error Status; those of Shutdown switch the torque off."""
-        self.errors |= bits
-        self.memory.set("hardware_error_status", self.errors)
-        if self.errors & self.memory.get("shutdown"):
-            self.memory.set("torque_enable", 0)
-            self._switch(False)
+    def _protect_from(self, bits: int) -> None:
+        """Latch new hardware errors; those of Shutdown switch the torque off."""
+        if bits & ~self.errors:
+            self.errors |= bits
+            self.memory.set("hardware_error_status", self.errors)
+            if self.torque and self.errors & self.memory.get("shutdown"):
+                self._switch(False)
 
     @property
     def error_flag(self) -> int:

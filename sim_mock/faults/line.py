@@ -41,11 +41,11 @@ class LineFaults(ABC):
     """Name of the object of an id, for messages."""
 
     def __init__(
-        self, chain: FaultTarget, commands: CommandTable, seed: int, header: bytes
+        self, chain: FaultTarget, commands: CommandTable, seed: int, header: bytes = b""
     ) -> None:
         self._chain = chain
         self.commands = commands
-        self.wire = ActiveFaults(seed, header)
+        self.wire = ActiveFaults(seed)
 
     @abstractmethod
     def reports(self) -> list[dict[str, object]]:
@@ -71,7 +71,6 @@ class LineFaults(ABC):
         count: int | None = None,
         seconds: float | None = None,
         numbers: tuple[float, ...] = (),
-        data: bytes | None = None,
     ) -> str:
         """Start a fault; return a description of the effect.
 
@@ -82,7 +81,6 @@ class LineFaults(ABC):
             count: number of answers.
             seconds: duration.
             numbers: parameters of the kind.
-            data: bytes of the kind, such as noise.
 
         Raises:
             KeyError: the servo does not exist.
@@ -90,7 +88,7 @@ class LineFaults(ABC):
         if servo_id is not None:
             self._chain.find_servo(servo_id)
         until_s = None if seconds is None else self._chain.now_s() + seconds
-        self.wire.add(LineFault(kind, servo_id, numbers, data, count, until_s))
+        self.wire.add(LineFault(kind, servo_id, numbers, count, until_s))
         span = "" if count is None else f" {count} times"
         span += "" if seconds is None else f" for {seconds:g} s"
         return text + (span or " until cleared")
@@ -105,7 +103,7 @@ class LineFaults(ABC):
     # --- all
 
     def is_on(self, kind: str) -> bool:
-        """Return whether echo, babble, unplug, deny or block is active."""
+        """Return whether echo, unplug, deny or block is active."""
         return self.wire.is_on(kind, self._chain.now_s())
 
     def choose_behaviour(self, case: str, value: str) -> str:
@@ -126,11 +124,7 @@ class LineFaults(ABC):
         return json.dumps({"servos": self.reports(), **self.board_status(), "faults": faults})
 
     def add_line_noise(self, replies: list[DeviceReply], data: bytes) -> list[DeviceReply]:
-        """Add the host's echo and a babbling node to replies, if the line has such faults."""
-        now_s = self._chain.now_s()
-        if self.wire.is_on("echo", now_s):
+        """Add the host's echo to replies, if the line has such a fault."""
+        if self.is_on("echo"):
             replies.insert(0, DeviceReply(len(data), [Piece(NO_DEVICE, data)]))
-        babble = self.wire.babble_bytes(now_s)
-        if babble:
-            replies.insert(0, DeviceReply(0, [Piece(NO_DEVICE, babble)]))
         return replies

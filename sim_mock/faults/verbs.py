@@ -11,17 +11,13 @@ from gazerig.sim_mock.faults.grammar import (
     Verb,
     any_word,
     count,
-    hex_bytes,
     id_or_all,
     integer_parser,
     number_parser,
-    word_choice,
 )
 from gazerig.sim_mock.faults.line import LineFaults
 
-_BYTE_COUNT = integer_parser(0, 1024, "a number of bytes")
-_BYTES = Argument("BYTES", _BYTE_COUNT)
-_N = Argument("N", _BYTE_COUNT)
+_BYTES = Argument("BYTES", integer_parser(0, 1024, "a number of bytes"))
 _TIMES = Argument("N", count, True)
 
 Do = Callable[..., str]
@@ -39,20 +35,6 @@ def answer_command(kind: str, text: str) -> Do:
     ) -> str:
         done = text.format(*numbers, label=faults.label(servo_id))
         return faults.begin(kind, servo_id, done, count, seconds, numbers)
-
-    return run_command
-
-
-def line_command(kind: str, text: str) -> Do:
-    """Return a command that starts a fault of the whole line; ``text``: its reply."""
-
-    def run_command(
-        faults: LineFaults,
-        *numbers: float,
-        count: int | None = None,
-        seconds: float | None = None,
-    ) -> str:
-        return faults.begin(kind, None, text.format(*numbers), count, seconds, numbers)
 
     return run_command
 
@@ -77,16 +59,9 @@ def switch_command(kind: str, text: str) -> Do:
     return run_command
 
 
-def _noise(
-    faults: LineFaults,
-    where: str,
-    data: bytes | None = None,
-    count: int | None = None,
-    seconds: float | None = None,
-) -> str:
-    what = "random bytes" if data is None else data.hex(" ")
-    text = f"noise ({what}) {where} answers"
-    return faults.begin(f"noise_{where}", None, text, count, seconds, (), data)
+def _static(faults: LineFaults, percent: float, seconds: float | None = None) -> str:
+    text = f"noise hits {percent:g} % of all bytes, both directions"
+    return faults.begin("static", None, text, None, seconds, (percent,))
 
 
 def _plug(faults: LineFaults) -> str:
@@ -104,46 +79,11 @@ def line_verbs(one: Argument) -> dict[str, Verb]:
                       "answer late; in a group the following servos wait, too", BOTH),
         "truncate": Verb(answer_command("truncate", "only {} bytes of answers of {label} arrive"),
                          (target, _BYTES), "only the first BYTES of an answer arrive", BOTH),
-        "duplicate": Verb(answer_command("duplicate", "answers of {label} arrive twice"), (target,),
-                          "answers arrive twice", BOTH),
         "corrupt": Verb(answer_command("corrupt", "a bit flips in answers of {label}"),
                         (target, Argument("BIT", integer_parser(0, 8191, "a bit"), True)),
                         "a bit flips, a random one by default", BOTH),
-        "drop": Verb(answer_command("drop", "byte {} is lost in answers of {label}"),
-                     (target, Argument("BYTE", integer_parser(-1024, 1023, "a byte"))),
-                     "byte BYTE of an answer is lost; -1 the last", BOTH),
-        "stall": Verb(answer_command("stall", "{label} stops for {:g} ms half-way through its answer"),
-                      (target, MS), "stop half-way through an answer", BOTH),
-        "noise": Verb(_noise, (Argument("before|after", word_choice("before", "after")),
-                               Argument("HEX|random", hex_bytes, True)),
-                      "bytes around every answer", BOTH),
-        "static": Verb(line_command("static", "noise hits {:g} % of all bytes, both directions"),
-                       (Argument("PERCENT", number_parser(0.0, 100.0, "a percentage")),),
+        "static": Verb(_static, (Argument("PERCENT", number_parser(0.0, 100.0, "a percentage")),),
                        "noise hits this share of all bytes, both directions", TIME),
-        "repeat": Verb(line_command("repeat", "the previous answers arrive again before the next"),
-                       (), "the last answers arrive again first", BOTH),
-    }
-
-
-def packet_verbs(one: Argument) -> dict[str, Verb]:
-    """Return the commands of lines with many servos; ``one`` parses an id."""
-    target = Argument(one.label, id_or_all(one.read))
-    return {
-        "fragment": Verb(answer_command("fragment", "a loose header before answers of {label}"),
-                         (target._replace(optional=True),),
-                         "a loose header before the real one", BOTH),
-        "reorder": Verb(line_command("reorder", "groups answer in reverse order"), (),
-                        "groups answer in reverse order", BOTH),
-        "wrong-id": Verb(answer_command("wrong_id", "{label} answers as {}"),
-                         (target, Argument("AS", integer_parser(0, 255, "an id"))), "answer under another id", BOTH),
-        "short": Verb(answer_command("short", "{label} answers {} bytes too few"), (target, _N),
-                      "N bytes of data too few, checksum right", BOTH),
-        "long": Verb(answer_command("long", "{label} answers {} bytes too many"), (target, _N),
-                     "N bytes of data too many, checksum right", BOTH),
-        "refuse": Verb(answer_command("refuse", "{label} answers with error {} and no data"),
-                       (target, Argument("NUMBER", integer_parser(0, 255, "an error number"))),
-                       "answer with an error number and no data", BOTH),
-        "lose-writes": loss_verb("lose_writes", "group writes"),
     }
 
 
@@ -157,8 +97,6 @@ def adapter_verbs() -> dict[str, Verb]:
     return {
         "echo": Verb(switch_command("echo", "the line echoes the host"), (SWITCH,),
                      "the host receives its own bytes", TIME),
-        "babble": Verb(switch_command("babble", "a broken node babbles"), (SWITCH,),
-                       "a broken node sends headers and noise all the time", TIME),
         "unplug": Verb(switch_command("unplug", "unplugged"), (), "pull the adapter out", TIME),
         "plug": Verb(_plug, (), "reconnect the adapter under its name"),
         "deny": Verb(switch_command("deny", "opening is forbidden"), (SWITCH,),
@@ -172,7 +110,7 @@ def closing_verbs(one: Argument) -> dict[str, Verb]:
     """Return the commands of every device, which are last in its help."""
     return {
         "set": Verb(LineFaults.choose_behaviour, (Argument("CASE", any_word), Argument("VALUE", any_word)),
-                    "choose a behaviour where documents and devices differ: see below"),
+                    "choose a behaviour of the device: see below"),
         "status": Verb(LineFaults.status, (), "all servos and faults as JSON"),
         "clear": Verb(LineFaults.clear, (one._replace(optional=True),),
                       "end faults of answers and line; effects on servos stay"),

@@ -1,4 +1,4 @@
-"""Packets of Feetech STS servos as they send them, and constants to find them on the line.
+"""Packets of Feetech STS servos as they send them, and instructions in a stream of bytes.
 
 An instruction is FF FF, id, length, instruction, parameters, checksum; a status has the error
 byte in place of the instruction. The length is the number of parameters + 2, the checksum the
@@ -7,16 +7,10 @@ parameters may contain a header. Signed numbers are sign and magnitude. Source: 
 communication protocol of the STS/SMS series.
 """
 
-from gazerig.sim_mock.smart_servo.framing import Framing, Instruction
+from gazerig.sim_mock.replies import Instruction
 
 HEADER = b"\xff\xff"
 BYTES = tuple(bytes((i,)) for i in range(256))
-SHORTEST = 6
-
-
-def checksum(body: bytes) -> int:
-    """Return the checksum of all bytes between header and checksum."""
-    return ~sum(body) & 0xFF
 
 
 def status(servo_id: int, error: int, params: bytes) -> bytes:
@@ -35,33 +29,34 @@ def unsigned(value: int, bit: int) -> int:
     """Encode sign and magnitude; a magnitude that does not fit below ``bit`` is clipped."""
     largest = (1 << bit) - 1
     if value >= 0:
-        return value if value <= largest else largest
-    return (-value if -value <= largest else largest) | 1 << bit
+        return min(value, largest)
+    return min(-value, largest) | 1 << bit
 
 
-class FeetechFraming(Framing):
-    """Finds instructions; packets with a wrong checksum are dropped silently."""
+def find_instructions(data: bytes, before: int) -> tuple[list[Instruction], bytes]:
+    """Return the instructions in these bytes, and the possible start of another.
 
-    def _search(self, data: bytes, before: int) -> tuple[list[Instruction], bytes]:
-        found: list[Instruction] = []
-        at = 0
-        while True:
-            at = data.find(HEADER, at)
-            if at < 0:
-                # The last byte may be the first byte of a header.
-                return found, data[-1:] if data.endswith(HEADER[:1]) else b""
-            head = data[at + 2 : at + 4]
-            if head[:1] == b"\xff":
-                at += 1
-                continue
-            end = at + 4 + head[1] if len(head) == 2 else len(data) + 1
-            if len(head) == 2 and head[1] < 2:
-                at += 2
-            elif end > len(data):
-                return found, data[at:]
-            elif checksum(data[at + 2 : end - 1]) != data[end - 1]:
-                at += 2
-            else:
-                params = data[at + 5 : end - 1]
-                found.append(Instruction(head[0], data[at + 4], params, end - before))
-                at = end
+    Packets with a wrong checksum are dropped silently.
+    before: number of bytes that arrived in earlier pieces
+    """
+    found: list[Instruction] = []
+    at = 0
+    while True:
+        at = data.find(HEADER, at)
+        if at < 0:
+            # The last byte may be the first byte of a header.
+            return found, data[-1:] if data.endswith(HEADER[:1]) else b""
+        head = data[at + 2 : at + 4]
+        if head[:1] == b"\xff":
+            at += 1
+            continue
+        end = at + 4 + head[1] if len(head) == 2 else len(data) + 1
+        if len(head) == 2 and head[1] < 2:
+            at += 2
+        elif end > len(data):
+            return found, data[at:]
+        elif ~sum(data[at + 2 : end - 1]) & 0xFF != data[end - 1]:
+            at += 2
+        else:
+            found.append(Instruction(head[0], data[at + 4], data[at + 5 : end - 1], end - before))
+            at = end

@@ -1,141 +1,241 @@
-"""One emulated Feetech servo: effects of writes, errors, restarts.
+"""One emulated Feetech servo, series STS and SCS: its registers, effects of writes, errors.
 
-The memory is in gazerig.sim_mock.feetech.memory, the drive of the shaft in its drive,
-undocumented behaviour in its ``FeetechQuirks``. Not emulated: reversed phases, angle resolution
-(30), a blinking LED, backup (09).
+Nothing is ever refused: a write to a read-only register, or of an id or baud rate that does not
+exist, is answered like any other and changes nothing. While Lock is 1, a write to the EEPROM area
+lasts until power-off; only writes while it is 0 are permanent. An overload lowers the torque until
+the next new goal; other errors in Unloading Condition switch it off.
+
+The registers' places are those of the driver's table. Of them have no effect: modes other than
+position (33 and, for SCS, both limits 0), phase (18), starting force and dead zones (24, 26, 27;
+without them friction keeps it up to 2 steps from its goal, as on a real servo), protection current
+(28), angular resolution (30), velocity gains (37, 39), LED (20), the factory's own (80-86).
+
+SCS servos have the high byte of a word first and a potentiometer of 1024 steps over less than a
+turn. They answer no sync read and have no offset, torque limit or current.
+
+Undocumented properties of the controller are assumed such that a servo with factory gains reaches
+full duty at 50 steps of error and does not overshoot: owners measure 20-30 steps at half the stall
+torque.
 """
 
 import struct
-from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from gazerig.drivers.feetech.memory_table import (
+    ACCELERATION_UNIT_STEPS_S2,
+    BAUD_RATES,
+    CURRENT_UNIT_MA,
     EEPROM_END,
+    HIGHEST_ID,
+    MODELS,
+    SCS_BAUD_RATES,
+    SCS_MODELS,
+    SCS_STEPS,
     SET_MIDDLE,
+    STATUS_ERRORS,
+    TORQUE_FULL,
     FeetechModel,
+    registers_of,
 )
-from gazerig.sim_mock.feetech.drive import CURRENT_UNIT_A, GOALS_AT, FeetechDrive
-from gazerig.sim_mock.feetech.memory import SERVO, FeetechMemory, model_and_table
+from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN as TURN
+from gazerig.drivers.feetech.scs import SCS_REGISTERS
+from gazerig.sim_mock.feetech.packets import signed, unsigned
+from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE
-from gazerig.sim_mock.smart_servo.quirks import ChainQuirks
-from gazerig.sim_mock.smart_servo.servo import EmulatedServo
+from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, ServoSpec
+from gazerig.sim_mock.smart_servo.servo import HEAT, OVERLOAD, REBOOT, VOLTAGE, EmulatedServo
 
-BroadcastPing = Literal["answer", "mix", "silence"]
-Goal = Literal["wait", "torque-on"]
-TorqueOn = Literal["old-goal", "present"]
-GoalTime = Literal["obey", "ignore"]
-OverloadEnds = Literal["new-goal", "goal-away", "torque", "restart"]
-Reboot = Literal["mute", "answer"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class FeetechQuirks(ChainQuirks):
-    """Choices of behaviour.
-
-    broadcast_ping: all answer in the order of their ids, all at the same time (the bytes mix), or
-        none
-    goal: a goal position written without torque waits for it, or switches the torque on; the
-        maker's own examples never switch it on, and the servo moves nevertheless [R]
-    torque_on: when the torque is switched on, the servo follows the old goal, or the goal becomes
-        the present position
-    goal_time: Goal Time (44) sets the duration of a move unless it is 0, or has no effect
-    overload_ends: the overload protection ends with a different goal, with a goal away from the
-        obstacle, only with torque off, or (in addition to all of these) with a restart
-    reboot: a reboot instruction is not answered, or is
-    """
-
-    broadcast_ping: BroadcastPing = "answer"
-    goal: Goal = "wait"
-    torque_on: TorqueOn = "old-goal"
-    goal_time: GoalTime = "obey"
-    overload_ends: OverloadEnds = "new-goal"
-    reboot: Reboot = "mute"
-
+SCS_TRAVEL_DEG = {"scs0009": 300.0, "scs15": 200.0}
+"""Travel of the potentiometer's 1024 steps."""
+RETURN_DELAY = 250
+"""As owners read it on delivery."""
 
 MIDDLE = 2048
 TIME_UNIT_S = 0.01
-TOO_HOT_C = 5.0
-"""Temperature above the limit of a motor that a fault has overheated."""
+SPEED_UNIT_STEPS_S = 50
+"""Unit of the register of the highest speed."""
+RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
+"""Unit of Acceleration (41) in steps/ms2."""
+P_SHARE, I_SHARE, D_SHARE = 1 / 1600, 1 / 1.6e6, 1 / 64
+"""Duty per unit of each gain for steps, steps times ms, and steps/ms, as shares of full duty."""
 
-ANGLE = 2
-"""Bit of Status (65) of a broken angle sensor; the other bits are its protection's."""
-
-FACTORY_AT = 78
-TORQUE_AT, GOAL_AT, GOAL_END, GOALS_END, LIMIT_END = 40, 42, 44, 48, 50
+SIZE = 256
+"""Addresses without a register read 0."""
+TORQUE_AT, GOALS_AT, GOAL_AT, GOAL_END, GOALS_END = 40, 41, 42, 44, 48
+_GOALS = {"little": struct.Struct("<BHHH"), "big": struct.Struct(">BHHH")}
+"""Acceleration, goal position, goal time, goal speed: written together in every tick."""
 SENSED_AT, SENSED_END = 56, 71
 _SENSED = {"little": struct.Struct("<HHHBBBBBHH"), "big": struct.Struct(">HHHBBBBBHH")}
 """56 position, speed, load, voltage, temperature, registered, status, moving, target, current."""
+
+Order = Literal["little", "big"]
+
+
+class FeetechMemory(ServoMemory):
+    """One servo's memory; ``bytes`` holds what is read; the permanent EEPROM is separate."""
+
+    def __init__(self, model: FeetechModel, servo_id: int, firmware: int) -> None:
+        scs = model.name in SCS_MODELS
+        super().__init__(SCS_REGISTERS.values() if scs else registers_of(model), SIZE)
+        own = {
+            "id": servo_id,
+            "return_delay_time": RETURN_DELAY,
+            "temperature_limit": model.temperature_limit,
+            "max_voltage_limit": model.max_voltage,
+            "min_voltage_limit": model.min_voltage,
+            "model_number": model.number,
+            "firmware_minor": firmware,
+            "max_velocity_limit": round(
+                model.no_load_rpm / 60.0 * model.steps_per_turn / SPEED_UNIT_STEPS_S
+            ),
+        }
+        for name, value in own.items():
+            if name in self.registers:
+                self.registers[name] = self.registers[name]._replace(initial=value)
+        writable = [r for r in self.registers.values() if r.access == "rw"]
+        self._writable = {r.address + i for r in writable for i in range(r.size)}
+        self._kept = bytearray(SIZE)
+        last_baud = len(SCS_BAUD_RATES if scs else BAUD_RATES) - 1
+        self._highest = {5: HIGHEST_ID, 6: last_baud, 33: 3}
+        self._lock_at = self.registers["lock"].address
+        self.restore(eeprom=True)
+        self.restore(eeprom=False)
+
+    def set_permanently(self, name: str, value: int) -> None:
+        """Set a register, in the EEPROM as well."""
+        self.set(name, value)
+        register = self.registers[name]
+        place = slice(register.address, register.address + register.size)
+        self._kept[place] = self.bytes[place]
+
+    def power_up(self) -> None:
+        """Set the start values of the RAM, and the permanent values of the EEPROM."""
+        self.bytes[:EEPROM_END] = self._kept[:EEPROM_END]
+        super().power_up()
+        if "torque_limit" in self.registers:
+            self.set("torque_limit", self.get("max_torque"))
+
+    def read(self, address: int, length: int) -> bytes:
+        """Return bytes as they are on the wire; addresses without a register are 0."""
+        return bytes(self.bytes[address : min(SIZE, address + length)]).ljust(length, b"\0")
+
+    def write(self, address: int, data: bytes) -> list[int]:
+        """Write the writable bytes; return their addresses."""
+        keeps, written = not self.bytes[self._lock_at], list[int]()
+        for at, byte in enumerate(data, address):
+            if at in self._writable and byte <= self._highest.get(at, 0xFF):
+                self.bytes[at] = byte
+                if keeps and at < EEPROM_END:
+                    self._kept[at] = byte
+                written.append(at)
+        return written
 
 
 class FeetechServo(EmulatedServo):
     """One Feetech servo on the chain.
 
-    The spec's ``firmware`` is the number after 3. Its ``quirks`` are those of Dynamixel servos and
-    are ignored, as are ``overload_share`` and ``overload_s`` of its physics: here they are
-    registers.
+    The spec's ``firmware`` is the number after 3; ``overload_share`` and ``overload_s`` of its
+    physics are ignored: here they are registers.
 
     Raises:
         ValueError: the model is unknown, or the spec's physics cannot exist.
     """
 
     restart_ms = 800
-    error_bits: ClassVar = {"overload": OVERLOAD, "encoder": ANGLE, "overheating": HEAT}
+    error_bits: ClassVar = {name: bit for bit, name in STATUS_ERRORS.items()}
     model: FeetechModel
     memory: FeetechMemory
-    drive: FeetechDrive
 
     def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = create_shaft) -> None:
-        self.model, self.table = model_and_table(spec.model)
-        self.baud_rates = self.table.baud_rates
-        self.memory = FeetechMemory(self.model, spec.id, spec.firmware, self.table)
-        self.drive = FeetechDrive(self.memory, self.model, spec, make_shaft)
-        self._sensed = _SENSED[self.table.order]
-        self._around = 0, 0
-        self.apply_quirks(FeetechQuirks())
-        super().__init__(spec, now_ms)
+        models = {**MODELS, **SCS_MODELS}
+        if spec.model not in models:
+            raise ValueError(f"model {spec.model!r}: Feetech servos are {', '.join(models)}")
+        model = models[spec.model]
+        self._scs = spec.model in SCS_MODELS
+        order: Order = "big" if self._scs else "little"
+        self._goals, self._sensed = _GOALS[order], _SENSED[order]
+        self.baud_rates = SCS_BAUD_RATES if self._scs else BAUD_RATES
+        turn = SCS_STEPS * 360.0 / SCS_TRAVEL_DEG[spec.model] if self._scs else TURN
+        self._top = model.no_load_rpm / 60.0 * TURN / 1000.0
+        self._current_full = model.stall_current_a * 1000.0 / CURRENT_UNIT_MA
+        memory = FeetechMemory(model, spec.id, spec.firmware)
+        super().__init__(spec, model, memory, now_ms, make_shaft, turn / TURN)
 
-    def _load_limits(self) -> tuple[float, ...]:
-        """Return its protection limits from its registers."""
-        get = self.memory.get
-        return (
-            get("overload_torque") / 100.0,
-            get("protection_time") * TIME_UNIT_S,
-            get("protection_current") * CURRENT_UNIT_A,
-            get("overcurrent_time") * TIME_UNIT_S,
-        )
-
-    def apply_quirks(self, quirks: FeetechQuirks) -> None:
-        """Use quirks from now on."""
-        self.quirks = quirks
-        self.mute_reboot = quirks.reboot == "mute"
-        self.drive.obey_goal_time(quirks.goal_time == "obey")
+    def _boot(self) -> None:
+        """Reset to power-on."""
+        self._goals_followed: tuple[int, ...] = ()
+        super()._boot()
 
     def _apply_settings(self) -> None:
         """Apply settings that have changed."""
         super()._apply_settings()
-        self.answers_groups = self.table.sync_read
-        self.drive.follow()
-        self._protect()
+        self.answers_groups = not self._scs
+        self._measure()
+        low, high = self.memory.get("min_position_limit"), self.memory.get("max_position_limit")
+        self._range = (min(low, high), max(low, high)) if low or high else (-0x7FFF, 0x7FFF)
 
-    def _protect_from(self, bits: int) -> None:
-        """Flag voltage and heat while they are wrong, other errors until they are reset."""
-        errors = self.errors & ~(HEAT | VOLTAGE) | bits
-        if errors != self.errors:
-            self.errors = errors
-            self._protect()
+    def answers_instruction(self, code: int) -> bool:
+        """Return whether it answers; it restarts without an answer."""
+        return code != REBOOT and super().answers_instruction(code)
 
-    def _protect(self) -> None:
-        """Apply Unload Conditions: an overload lowers the torque, other errors switch it off."""
-        drive = self.drive
-        self._pushed = self.shaft.u
-        wrong = self.errors & self.memory.get("unloading_condition")
-        if wrong & ~OVERLOAD and drive.torque:
-            self.memory.set("torque_enable", 0)
-            drive.switch(0, False)
-        drive.max_duty = self.memory.get("protective_torque") / 100.0 if wrong & OVERLOAD else 1.0
-        drive.apply_gains()
+    def _overload_limit(self) -> tuple[float, float]:
+        """Return it from its registers."""
+        get = self.memory.get
+        return get("overload_torque") / 100.0, get("protection_time") * TIME_UNIT_S
+
+    def _set_controller(self) -> None:
+        """Apply gains and torque limit."""
+        get = self.memory.get
+        most = 1.0 if self._scs else min(get("torque_limit") / TORQUE_FULL, 1.0)
+        if self.errors & OVERLOAD & get("unloading_condition"):
+            most = min(most, get("protective_torque") / 100.0)
+        loop = Loop(
+            p=P_SHARE * get("position_p_gain"),
+            i=I_SHARE * get("position_i_gain"),
+            d=D_SHARE * get("position_d_gain"),
+            u_max=most,
+        )
+        self.shaft.drive(loop if self.torque else DISABLED)
+
+    # --- motion
+
+    def _origin(self) -> tuple[int, int]:
+        return 1, 0 if self._scs else -self.memory.get("position_offset")
+
+    def _wrap_to_one_turn(self) -> None:
+        """Wrap the position into one turn; a potentiometer has less than one."""
+        super()._wrap_to_one_turn()
+        if self._scs:
+            self._shift = 0
+
+    def _follow(self) -> None:
+        """Follow the goal registers if they have changed."""
+        if not self.torque:
+            return
+        wanted = self._goals.unpack_from(self.memory.bytes, GOALS_AT)
+        if wanted == self._goals_followed:
+            return
+        self._goals_followed = wanted
+        ramp, goal, time_ms, speed = wanted
+        low, high = self._range
+        goal = max(low, min(high, signed(goal, 15)))
+        place = goal / self._scale - self._shift
+        cruise = min(abs(signed(speed, 15)) / self._scale / 1000.0 or self._top, self._top)
+        if time_ms:
+            cruise, ramp = min(abs(place - self.shaft.r) / time_ms, self._top), 0
+        self.shaft.lead_to(place, cruise, ramp * RAMP_UNIT)
+
+    def _switch(self, on: bool) -> None:
+        self._goals_followed = ()
+        super()._switch(on)
+
+    def _calibrate(self) -> None:
+        """Set the present position to the middle; the offset is stored permanently."""
+        if not self._scs:
+            offset = (round(self.shaft.x) - MIDDLE + TURN // 2) % TURN - TURN // 2
+            self.memory.set_permanently("position_offset", offset)
+            self._wrap_to_one_turn()
+            self._set_goal_here()
 
     # --- reading
 
@@ -147,23 +247,31 @@ class FeetechServo(EmulatedServo):
     def read(self, address: int, length: int) -> bytes:
         """Return bytes of the memory; addresses without a register are 0."""
         if address == SENSED_AT and length == SENSED_END - SENSED_AT:
-            return self._sensed.pack(
-                *self._read_live_words()
-            )  # a control loop reads them every tick
+            return self._sensed.pack(*self._live_words())  # a control loop reads them every tick
         if address < SENSED_END and address + length > SENSED_AT:
-            self._sensed.pack_into(self.memory.bytes, SENSED_AT, *self._read_live_words())
+            self._sensed.pack_into(self.memory.bytes, SENSED_AT, *self._live_words())
         return self.memory.read(address, length)
 
-    def _read_live_words(self) -> tuple[int, ...]:
+    def _live_words(self) -> tuple[int, ...]:
         """Return the registers with live values, 56 to 70."""
-        if self.stale_surroundings:
-            self.stale_surroundings = False
-            self._around = max(0, min(255, self.voltage_01v)), self.warmth_c
-        volts, warmth = self._around
-        position, speed, load, current, target, moving = self.drive.motion_words(self._ms)
-        pending = self._pending is not None
+        shaft, scale, into = self.shaft, self._scale, self.memory.bytes
+        at = round((shaft.x + self._shift) * scale)
+        if self._scs:
+            at = max(0, min(SCS_STEPS - 1, at))
+        elif self._range[0] >= 0:
+            at %= TURN
+        speed = round(shaft.v * scale * 1000.0)
+        goal = round((shaft.goal + self._shift) * scale) if self.torque else 0
+        moving = self.torque and shaft.led or not -1 <= speed <= 1
+        load, current = round(shaft.u * TORQUE_FULL), round(shaft.effort * self._current_full)
+        # Half of them have no sign: the word is the value.
         return (
-            position, speed, load, volts, warmth, pending, self.errors, moving, target, current,
+            at if at >= 0 else unsigned(at, 15),
+            speed if speed >= 0 else unsigned(speed, 15),
+            load if load >= 0 else unsigned(load, 10),
+            into[62], into[63], 0, self.errors, moving,
+            goal if goal >= 0 else unsigned(goal, 15),
+            current if current >= 0 else unsigned(current, 15),
         )  # fmt: skip
 
     # --- writing
@@ -175,81 +283,53 @@ class FeetechServo(EmulatedServo):
         if GOALS_AT <= address < end <= GOALS_END:
             # A shortcut for the only write of every tick.
             memory.bytes[address:end] = data
-            self._command(address < GOAL_END and end > GOAL_AT, goal)
-            drive = self.drive
-            if drive.torque and drive.mode == SERVO:
-                drive.followed = address, data
+            self._take_goal(goal)
+            if self.torque:
+                self.followed = address, data
             return 0
-        written: list[int] = []
-        memory.write(address, data, written.append)
+        written = memory.write(address, data)
         if not written:
             return 0
-        if written[0] < EEPROM_END or written[-1] >= FACTORY_AT:
-            self._apply_settings()
         if TORQUE_AT in written:
-            self._switch(memory.get("torque_enable"))
-        if written[0] < LIMIT_END and written[-1] >= GOALS_AT:
-            self.drive.apply_gains()
-            self._command(GOAL_AT in written, goal)
+            self._take_torque(memory.get("torque_enable"))
+        elif "position_offset" in memory.registers and 31 in written:
+            self._wrap_to_one_turn()
+        self._apply_settings()
+        if written[-1] >= GOALS_AT:
+            self._take_goal(goal)
         return 0
 
-    def _command(self, new_goal: bool, goal_before: bytearray) -> None:
-        """Follow new goals."""
-        drive, memory = self.drive, self.memory
-        if self.errors & OVERLOAD and memory.bytes[GOAL_AT:GOAL_END] != goal_before:
-            ends = self.quirks.overload_ends
-            ahead = self.memory.get("goal_position") - self.position_steps
-            if ends == "new-goal" or (ends == "goal-away" and ahead * self._pushed < 0.0):
-                self._end_overload()
-        if new_goal and not drive.torque and self.quirks.goal == "torque-on":
-            memory.set("torque_enable", 1)
-            self._switch(1)
-        drive.follow(new_goal)
-
-    def _switch(self, value: int) -> None:
-        """Switch the torque, or make the present position the centre."""
-        drive = self.drive
-        if value == SET_MIDDLE:
-            self.memory.set("torque_enable", int(drive.torque))
-            drive.calibrate(MIDDLE)
-            return
-        self._clear_error(CURRENT)
-        if value == 0 and self.quirks.overload_ends != "restart":
+    def _take_goal(self, goal_before: bytearray) -> None:
+        """Follow new goals; one ends an overload."""
+        if self.errors & OVERLOAD and self.memory.bytes[GOAL_AT:GOAL_END] != goal_before:
             self._end_overload()
-        unload = self.memory.get("unloading_condition")
-        if self.errors & unload & ~OVERLOAD:
-            self.memory.set("torque_enable", 0)
-            value = 0
-        drive.switch(value, self.quirks.torque_on == "present")
-        self._calm = False
+        self._follow()
+
+    def _take_torque(self, value: int) -> None:
+        """Switch the torque, or make the present position the middle."""
+        if value == SET_MIDDLE:
+            self.memory.set("torque_enable", int(self.torque))
+            self._calibrate()
+            return
+        if not value:
+            self._end_overload()
+        forbidden = self.errors & self.memory.get("unloading_condition") & ~OVERLOAD
+        self._switch(value == 1 and not forbidden)
 
     def _end_overload(self) -> None:
         if self.errors & OVERLOAD:
-            self._clear_error(OVERLOAD)
-            self._protect()
+            self.errors &= ~OVERLOAD
+            self._heavy_checks = 0
+            self._apply_settings()
 
-    def _clear_error(self, bit: int) -> None:
-        """Clear an error and reset the counts of its protection."""
-        self.errors &= ~bit
-        self.protection.restart()
+    # --- errors
 
-    # --- external events
-
-    def factory_reset(self, new_id: int | None = None) -> None:
-        """Restore the factory settings of the EEPROM, except the id, and restart."""
-        self.memory.factory_settings()
-        if new_id is not None:
-            self.memory.set_permanently("id", new_id)
-        self.restart()
-
-    def fail(self, error: str) -> str:
-        """Trigger the overload protection, overheat the motor or break the angle sensor."""
-        if error != "overheating":
-            return super().fail(error)
-        self.temperature_c = self.memory.get("temperature_limit") + TOO_HOT_C
-        return f"has {self.temperature_c:g} degC"
-
-    def reset_all(self) -> int:
-        """Restore factory settings, id 1."""
-        self.factory_reset(1)
-        return 0
+    def _protect_from(self, bits: int) -> None:
+        """Flag voltage and heat while they are wrong, other errors until they are reset."""
+        errors = self.errors & ~(HEAT | VOLTAGE) | bits
+        if errors != self.errors:
+            self.errors = errors
+            off = errors & self.memory.get("unloading_condition") & ~OVERLOAD
+            if off and self.torque:
+                self._switch(False)
+            self._apply_settings()

@@ -15,7 +15,7 @@ from gazerig.sim_mock.smart_servo.physics import (
     is_linear,
     mechanics_of,
 )
-from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
+from gazerig.sim_mock.smart_servo.profile import PositionProfile
 
 LEAST_WEIGHT = 1e-4
 """Smallest change of the weight that counts, so that a shaft at rest remains so."""
@@ -24,7 +24,7 @@ LEAST_WEIGHT = 1e-4
 class Shaft(ShaftMotion):
     """Position and speed of one output shaft, advanced in whole milliseconds."""
 
-    __slots__ = ("_held", "_low_high", "_set_load", "_weight")
+    __slots__ = ("_held", "_pace", "_low_high", "_set_load", "_weight")
 
     def __init__(self, model: Motor, physics: Physics, position_steps: float) -> None:
         self._built = mechanics_of(model, physics)
@@ -38,7 +38,7 @@ class Shaft(ShaftMotion):
         self._linear = False
         self._span_start = None
         self._weights = {}
-        self._held = False
+        self._held, self._pace = False, (0.0, 0.0)
         self.profile = PositionProfile(position_steps)
         self.place(position_steps)
 
@@ -102,11 +102,47 @@ class Shaft(ShaftMotion):
             self._integral = max(-loop.u_max, min(loop.u_max, self._integral))
             self.resume()
 
-    def start(self, profile: PositionProfile | SpeedProfile) -> None:
-        """Switch on with an empty integrator; ``profile``: the reference."""
-        self.profile = profile
+    def start(self) -> None:
+        """Switch on with an empty integrator."""
+        self.profile = PositionProfile(self.x)
         self._rv = self._integral = 0.0
         self.resume()
+
+    def lead_to(self, goal: float, cruise: float, ramp: float) -> None:
+        """Lead to a goal; an equal one changes nothing."""
+        profile = self.profile
+        if isinstance(profile, PositionProfile) and (
+            goal != profile.goal or (cruise, ramp) != self._pace
+        ):
+            self._pace = cruise, ramp
+            profile.plan_by_velocity(goal, cruise, ramp)
+            self.resume()
+
+    def hold(self) -> None:
+        """Stop at the present position."""
+        if isinstance(self.profile, PositionProfile):
+            self.profile.rest(self.x)
+        self.resume()
+
+    @property
+    def goal(self) -> float:
+        """Return the end of the profile."""
+        return self.profile.goal
+
+    @property
+    def led(self) -> bool:
+        """Return whether the profile has not reached its end."""
+        return self.profile.running
+
+    @property
+    def r(self) -> float:
+        """Return the profile's position."""
+        return self.profile.r
+
+    @property
+    def r_v(self) -> float:
+        """Return the profile's speed."""
+        return self.profile.v
 
     def disable(self) -> None:
         """Switch off: the motor has no current and does not brake."""

@@ -9,9 +9,9 @@ voltage, PWM a share of full PWM.
 
 from collections.abc import Sequence
 from math import inf, pi
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
-from gazerig.robot.model.assumed_servo import AMBIENT_C, GEAR_FRICTION, STALL_RISE_C
+from gazerig.robot.model.assumed_servo import AMBIENT_C, GEAR_FRICTION
 
 
 class Physics(NamedTuple):
@@ -35,14 +35,9 @@ class Physics(NamedTuple):
         ``Shaft.joint`` has it. Play inside the gear is omitted.
     supply_v: V; open-circuit voltage at the plug; None: the rated voltage of the model.
     supply_ohm: ohm; cable and connector, so that load lowers the voltage [A]; at most 1.
-    ambient_c: degC inside the head [A].
-    stall_rise_c: K; final rise above ambient at stall current [A].
-    thermal_s: s; time constant of warming and cooling [A].
+    temperature_c: degC of the motor [A].
     overload_share: share of the stall torque at the present voltage that counts as
         overload; overload_s: s; duration until it latches [A: in no data sheet].
-    brown_out_share: share of the rated voltage below which the servo restarts [A].
-    noise_current: units; largest noise of Present Current at rest [R: 1-3].
-    noise_velocity: units; largest noise of Present Velocity at rest.
     """
 
     rotor_s: float = 0.0373
@@ -58,41 +53,19 @@ class Physics(NamedTuple):
     play_deg: float = 0.25
     supply_v: float | None = None
     supply_ohm: float = 0.2
-    ambient_c: float = AMBIENT_C
-    stall_rise_c: float = STALL_RISE_C
-    thermal_s: float = 240.0
+    temperature_c: float = AMBIENT_C
     overload_share: float = 0.8
     overload_s: float = 2.0
-    brown_out_share: float = 0.5
-    noise_current: int = 2
-    noise_velocity: int = 3
-
-
-class Quirks(NamedTuple):
-    """Behaviour that differs between firmware versions, or is only reported.
-
-    goal_at_torque_on: True: torque on sets the goal to the present position; False: the old
-        goal stays and the joint snaps to it, as XL330 do [R].
-    wrap_at_torque_on: with a homing offset in position mode, torque on makes a position outside
-        one turn jump by a turn [R].
-    mute_reboot: a reboot instruction gets no status [R: XL430].
-    """
-
-    goal_at_torque_on: bool = False
-    wrap_at_torque_on: bool = False
-    mute_reboot: bool = False
 
 
 class ServoSpec(NamedTuple):
-    """Specification of one servo. The seed is that of its noise; None: its id."""
+    """Specification of one servo."""
 
     id: int
     model: str
     start_steps: float = 2048
     firmware: int = 53
-    physics: Physics | Sequence[float | None] = Physics()
-    quirks: Quirks | Sequence[bool] = Quirks()
-    seed: int | None = None
+    physics: Physics | Sequence[Any] = Physics()
 
 
 def check_physics(physics: Physics) -> Physics:
@@ -126,14 +99,9 @@ _RANGES: dict[str, tuple[float, float]] = {
     "play_deg": (0.0, 10.0),
     "supply_v": (0.0, 60.0),
     "supply_ohm": (0.0, 1.0),
-    "ambient_c": (-40.0, 100.0),
-    "stall_rise_c": (0.0, 1000.0),
-    "thermal_s": (1.0, 1e5),
+    "temperature_c": (-40.0, 200.0),
     "overload_share": (0.05, 1.0),
     "overload_s": (0.02, 1e4),
-    "brown_out_share": (0.0, 0.9),
-    "noise_current": (0, 20),
-    "noise_velocity": (0, 20),
 }
 
 

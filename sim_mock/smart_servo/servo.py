@@ -1,4 +1,4 @@
-"""Common base of emulated smart servos: registers and a motor that advance on demand.
+"""Common base of emulated smart servos: registers and a shaft that advance on demand.
 
 ``advance`` brings a servo up to a time; nothing runs in the background. A make of servo adds the
 effects of writing and reading its registers, and of errors.
@@ -6,37 +6,48 @@ effects of writing and reading its registers, and of errors.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar
 
-from gazerig.sim_mock.smart_servo.drive import Drive
-from gazerig.sim_mock.smart_servo.framing import PING, READ, REBOOT
+from gazerig.drivers.dynamixel.control_table import DynamixelModel
+from gazerig.drivers.feetech.memory_table import FeetechModel
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.physics import Motor, Physics, ServoSpec, check_physics
-from gazerig.sim_mock.smart_servo.protection import CHECK_MS, Limits, ServoProtection
-from gazerig.sim_mock.smart_servo.quirks import PAUSE_MS, long_pause
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
+from gazerig.sim_mock.smart_servo.physics import (
+    STEPS_PER_TURN,
+    Physics,
+    ServoSpec,
+    check_physics,
+)
+
+PING, READ, WRITE, REBOOT = 1, 2, 3, 8
+"""Codes of the instructions for one servo that are common to all makes."""
 
 RETURN_DELAY_UNIT_S = 2e-6
-
-
-class ServoModel(Motor, Protocol):
-    """Data of a servo model."""
-
-    @property
-    def name(self) -> str:
-        """Return its name in a rig file."""
-        ...
+CHECK_MS = 20
+"""Period of the protections, in the servo's own time: reading does not change their result."""
+LONGEST_MS = 10_000
+"""Only the end of a longer time without a packet is simulated."""
+TOO_HOT_C = 5.0
+"""Temperature above the limit of a motor that a fault has overheated."""
+VOLTAGE, HEAT, OVERLOAD = 1, 4, 32
+"""Bits of the errors of the protections, as in the registers of all makes."""
 
 
 class EmulatedServo(ABC):
     """One servo on the chain. Its clock counts the chain's whole milliseconds.
 
-    A make sets ``model``, ``memory``, ``drive`` and ``baud_rates`` before this class's constructor.
+    The registers' position is (side * shaft.x + shift) * scale. A make sets ``baud_rates`` before
+    this class's constructor.
 
     Attributes:
         id: its address.
         errors: bits of its faults, as in their register.
+        torque: whether it is switched on.
         baud_rates: bit/s by the value of their register.
-        on_address: called when id, baud rate or return delay have changed.
+        delay_s: its return delay.
+        followed: address and bytes of the last write of goals, while repeating it would change
+            nothing; None otherwise.
+        on_address: called when id or baud rate have changed.
 
     Raises:
         ValueError: the spec's physics cannot exist.
@@ -46,72 +57,74 @@ class EmulatedServo(ABC):
     """Time of a restart without answers, milliseconds."""
     unreadable = 0
     """Error number of a read of an undefined address."""
-    none_registered = 0
-    """Error number of an Action without a stored write."""
     read_level = 0
     answer_level = 1
     """Lowest Status Return Levels at which it answers reads, and all other instructions."""
-    mute_reboot = False
-    """Whether it restarts without an answer."""
     error_bits: ClassVar[Mapping[str, int]]
     """Bits of the errors that can be triggered, by name."""
-    model: ServoModel
-    memory: ServoMemory[Any]
-    drive: Drive
     baud_rates: tuple[int, ...]
-    id: int
     answers_groups = True
     """Whether it answers its part of a group read."""
-    stale_surroundings = True
-    """Whether voltage and temperature were measured again since their registers were read."""
-    shadow_id: int | None = None
-    """An id under which it executes writes to RAM and never answers."""
 
-    def __init__(self, spec: ServoSpec, now_ms: int) -> None:
-        self._physics = check_physics(Physics(*spec.physics))
-        self.firmware = spec.firmware
-        self.shaft = self.drive.shaft
-        self.protection = ServoProtection(self.model, self._physics, self._limits())
+    def __init__(
+        self,
+        spec: ServoSpec,
+        model: DynamixelModel | FeetechModel,
+        memory: ServoMemory,
+        now_ms: int,
+        make_shaft: ShaftMaker = create_shaft,
+        scale: float = 1.0,
+    ) -> None:
+        physics = check_physics(Physics(*spec.physics))
+        self.model, self.memory, self.firmware = model, memory, spec.firmware
+        self.physics, self._scale = physics, scale
+        own = physics._replace(
+            upright_steps=physics.upright_steps / scale,
+            stop_low_steps=physics.stop_low_steps / scale,
+            stop_high_steps=physics.stop_high_steps / scale,
+        )
+        self.shaft = make_shaft(spec.id, model, own, spec.start_steps / scale)
+        self._supply_v = model.rated_v if physics.supply_v is None else physics.supply_v
+        self._temperature_c = physics.temperature_c
         self.on_address: Callable[[], None] = lambda: None
-        self._address: object = None
+        self._address = 0, 0
         self._ms = self._booted_ms = self._deaf_until_ms = now_ms
         self._check_ms = now_ms + CHECK_MS
         self._boot()
 
     def _boot(self) -> None:
-        """Reset to power-on."""
+        """Reset to power-on: torque off, position within one turn."""
         self.memory.power_up()
-        self._pending: tuple[int, bytes] | None = None
-        self._watchdog_ms = 0
-        self._measure_surroundings()
-        self.errors = 0
-        self.protection.restart()
-        self.drive.boot()
+        self._watchdog_ms = self._heavy_checks = self.errors = 0
+        self.torque = False
+        self.followed: tuple[int, bytes] | None = None
+        self.shaft.disable()
+        self._wrap_to_one_turn()
+        self._measure()
         self._apply_settings()
 
     def _apply_settings(self) -> None:
         """Apply settings that have changed."""
         get = self.memory.get
-        self._calm = False
-        self.id = get("id")
-        self.status_level = get("status_return_level")
-        self.answers_groups = self.status_level >= self.read_level
-        self.protection.limits = self._limits()
-        self.drive.apply_settings()
-        address = self.id, self.baud, self.return_delay_s, self.shadow_id
-        if address != self._address:
-            self._address = address
+        self.followed = None
+        self.id, self._status_level = get("id"), get("status_return_level")
+        self.answers_groups = self._status_level >= self.read_level
+        self.delay_s = get("return_delay_time") * RETURN_DELAY_UNIT_S
+        share, seconds = self._overload_limit()
+        self._heavy_effort = share * self.shaft.supply - 1e-11
+        self._heavy_most = round(seconds * 1000.0 / CHECK_MS)
+        self._set_controller()
+        if self._address != (self.id, self.baud):
+            self._address = self.id, self.baud
             self.on_address()
 
-    def _limits(self) -> Limits:
-        """Return its protection limits from its registers."""
-        get = self.memory.get
-        return Limits(
-            get("temperature_limit"),
-            get("max_voltage_limit"),
-            get("min_voltage_limit"),
-            *self._load_limits(),
-        )
+    @abstractmethod
+    def _overload_limit(self) -> tuple[float, float]:
+        """Return the share of the stall torque that is an overload, and its duration in s."""
+
+    @abstractmethod
+    def _set_controller(self) -> None:
+        """Apply the registers of gains and limits to the shaft."""
 
     # --- time
 
@@ -120,60 +133,51 @@ class EmulatedServo(ABC):
 
         Return whether it receives bytes, which it does not do during a restart.
         """
-        ahead = now_ms - self._ms
-        if ahead > 0:
+        if now_ms > self._ms:
             if self._watchdog_ms and now_ms >= fed_ms + self._watchdog_ms and self.torque:
-                self._trip(max(0, fed_ms + self._watchdog_ms - self._ms))
-            if now_ms < self._check_ms:
-                if not self.shaft.quiet:
-                    self.shaft.run(now_ms - self._ms)
-                self._ms = now_ms
-            elif ahead < PAUSE_MS:
-                self._run_until(now_ms)
-            else:
-                self._move(now_ms)
+                self._run(max(self._ms, fed_ms + self._watchdog_ms))
+                self._watchdog_ms = 0
+                self._trip()
+            self._run(now_ms)
         return now_ms >= self._deaf_until_ms
 
-    def _move(self, until_ms: int) -> None:
-        """Advance; the middle of a long pause is skipped, so that answers are not delayed."""
-        pause_at_ms, pause_ms = long_pause(self._ms, until_ms, CHECK_MS)
-        self._run_until(pause_at_ms)
-        if pause_ms:
-            self.shaft.skip(pause_ms)
-            self._ms += pause_ms
-            self._check_ms += pause_ms - CHECK_MS
-            self._check(pause_ms // CHECK_MS)
-            self._run_until(until_ms)
-
-    def _run_until(self, until_ms: int) -> None:
-        """Advance, and check heat, load and voltage every 20 ms of its own time."""
+    def _run(self, until_ms: int) -> None:
+        """Advance the shaft, and check its load every 20 ms."""
         shaft = self.shaft
-        while self._ms < until_ms:
-            stop = min(until_ms, self._check_ms)
-            shaft.run(stop - self._ms)
-            self._ms = stop
-            if stop == self._check_ms:
-                self._check()
-                if self._calm and shaft.quiet and until_ms > self._check_ms:
-                    self._check_ms += (until_ms - self._check_ms) // CHECK_MS * CHECK_MS
+        if until_ms - self._ms > LONGEST_MS:
+            self._ms = until_ms - LONGEST_MS
+            self._check_ms = self._ms + CHECK_MS
+        while self._check_ms <= until_ms:
+            if not shaft.quiet:
+                shaft.run(self._check_ms - self._ms)
+            self._ms = self._check_ms
+            self._check_ms += CHECK_MS
+            self._check()
+        if not shaft.quiet:
+            shaft.run(until_ms - self._ms)
+        self._ms = until_ms
 
-    def _check(self, checks: int = 1) -> None:
-        """Apply the protections; restart if the voltage is too low."""
-        self._check_ms += CHECK_MS
-        shaft, protection = self.shaft, self.protection
-        before_c = protection.temperature_c
-        bits = protection.check(shaft.effort, shaft.volts, checks)
-        self._calm = protection.temperature_c == before_c and protection.is_steady
-        self._measure_surroundings()
+    def _check(self) -> None:
+        """Apply the protections. A heavy load is torque, not duty."""
+        effort = abs(self.shaft.effort)
+        self._heavy_checks += 1
+        if not effort or effort < self._heavy_effort:
+            self._heavy_checks = 0
+        bits = self._surroundings
+        if self._heavy_checks >= self._heavy_most:
+            bits |= OVERLOAD
         if bits or self.errors:
             self._protect_from(bits)
-        if protection.is_browned_out(shaft.volts):
-            self.restart()
 
-    def _measure_surroundings(self) -> None:
-        """Measure voltage and temperature, every 20 ms."""
-        self._measured = self.shaft.volts, self.protection.temperature_c
-        self.stale_surroundings = True
+    def _measure(self) -> None:
+        """Update the errors of voltage and temperature, and their registers."""
+        get = self.memory.get
+        volts_01 = round(self._supply_v * 10.0)
+        low, high = get("min_voltage_limit"), get("max_voltage_limit")
+        hot = self._temperature_c > get("temperature_limit")
+        self._surroundings = (not low <= volts_01 <= high) * VOLTAGE | hot * HEAT
+        self.memory.set("present_input_voltage", max(0, min(255, volts_01)))
+        self.memory.set("present_temperature", max(0, min(255, round(self._temperature_c))))
 
     def restart(self) -> None:
         """Restart by instruction or after a dip of the supply; it receives nothing meanwhile."""
@@ -181,27 +185,63 @@ class EmulatedServo(ABC):
         self._deaf_until_ms = self._ms + self.restart_ms
         self._boot()
 
-    def _trip(self, after_ms: int) -> None:
-        """Trip the bus watchdog, once, after a time from the servo's present time."""
-        self._move(self._ms + after_ms)
-        self._watchdog_ms = 0
+    def _trip(self) -> None:  # noqa: B027  # Feetech servos have no watchdog
+        """Stop as the bus watchdog does."""
 
     @abstractmethod
     def _protect_from(self, bits: int) -> None:
         """React to the present errors of its protections."""
 
+    # --- motion
+
+    @property
+    def position_steps(self) -> float:
+        """Return the true position of the shaft in the registers' unit, with fractions."""
+        return (self._side * self.shaft.x + self._shift) * self._scale
+
+    @property
+    def joint_steps(self) -> float:
+        """Return the position of the joint behind the play, in the registers' unit."""
+        return (self._side * self.shaft.joint + self._shift) * self._scale
+
+    def _wrap_to_one_turn(self) -> None:
+        """Wrap the position of the shaft into one turn, as power-on does."""
+        self._side, self._offset = self._origin()
+        turns = int(self._side * self.shaft.x // STEPS_PER_TURN)
+        self._shift = self._offset - turns * STEPS_PER_TURN
+
     @abstractmethod
-    def _load_limits(self) -> tuple[float, ...]:
-        """Return the overload's share and time, and the current's if it has them."""
+    def _origin(self) -> tuple[int, int]:
+        """Return the direction, 1 or -1, and the offset of the registers' position."""
+
+    def _set_goal_here(self) -> None:
+        """Set the goal position to the present position."""
+        self.followed = None
+        self.memory.set("goal_position", round(self.position_steps))
+
+    def _switch(self, on: bool) -> None:
+        """Switch the torque; a stored goal is followed immediately."""
+        was, self.torque = self.torque, on
+        if on and not was:
+            self.shaft.start()
+            self._heavy_checks = 0
+        elif was and not on:
+            self.shaft.disable()
+        self.memory.set("torque_enable", int(on))
+        self._apply_settings()
+        if on and not was:
+            self._follow()
+
+    @abstractmethod
+    def _follow(self) -> None:
+        """Follow the goal registers."""
 
     # --- instructions
 
     def answers_instruction(self, code: int) -> bool:
         """Return whether it answers an instruction that addresses it alone."""
-        if code == REBOOT and self.mute_reboot:
-            return False
         needed = 0 if code == PING else self.read_level if code == READ else self.answer_level
-        return self.status_level >= needed
+        return self._status_level >= needed
 
     def identity(self) -> bytes:
         """Return the parameters of the answer to a ping."""
@@ -215,22 +255,6 @@ class EmulatedServo(ABC):
     def write(self, address: int, data: bytes) -> int:
         """Write bytes as an instruction does; return the error number, 0 on success."""
 
-    def store_write(self, address: int, data: bytes) -> int:
-        """Store a write for Action; a later one replaces it. Return the error number."""
-        self._pending = (address, data)
-        self.memory.set("registered_instruction", 1)
-        return 0
-
-    def action(self) -> int:
-        """Execute the stored write; return the error number."""
-        if self._pending is None:
-            return self.none_registered
-        (address, data), self._pending = self._pending, None
-        self.memory.set("registered_instruction", 0)
-        return self.write(address, data)
-
-    # --- for the line
-
     @property
     @abstractmethod
     def error_flag(self) -> int:
@@ -240,11 +264,6 @@ class EmulatedServo(ABC):
     def baud(self) -> int:
         """Return the register's bit/s; a new one is valid after the status of its write."""
         return self.baud_rates[self.memory.get("baud_rate")]
-
-    @property
-    def return_delay_s(self) -> float:
-        """Return the register's pause before a status."""
-        return self.memory.get("return_delay_time") * RETURN_DELAY_UNIT_S
 
     def set_baud(self, baud: int) -> None:
         """Set its baud rate permanently.
@@ -260,16 +279,6 @@ class EmulatedServo(ABC):
 
     # --- external events
 
-    @property
-    def torque(self) -> bool:
-        """Return whether the torque is on."""
-        return self.drive.torque
-
-    @property
-    def position_steps(self) -> float:
-        """Return the true position of the shaft in the registers' unit, with fractions."""
-        return self.drive.position_steps
-
     def report(self) -> dict[str, object]:
         """Return its state for ``status``."""
         return {
@@ -279,38 +288,30 @@ class EmulatedServo(ABC):
             "goal": self.memory.get("goal_position"),
             "torque": int(self.torque),
             "error": self.errors,
-            "temperature_c": round(self.temperature_c),
-            "voltage_01v": self.voltage_01v,
+            "temperature_c": round(self._temperature_c),
+            "voltage_01v": round(self._supply_v * 10.0),
         }
 
-    @property
-    def voltage_01v(self) -> int:
-        """Return the last measured voltage at the servo, in 0.1 V."""
-        return round(self._measured[0] * self.model.rated_v * 10.0)
-
-    @property
-    def warmth_c(self) -> int:
-        """Return the last measured temperature of the motor, as registers contain it."""
-        return max(0, min(255, round(self._measured[1])))
-
-    def fail(self, error: str) -> str:
-        """Trigger an error by name, as the servo's own protection does; return its effect.
+    def fail(self, error: str) -> None:
+        """Trigger an error by name, as the servo's own protection does.
 
         Raises:
             ValueError: the error is unknown.
         """
         if error not in self.error_bits:
             raise ValueError(f"error {error!r}: expected {', '.join(self.error_bits)}")
+        if error == "overheating":
+            self.temperature_c = self.memory.get("temperature_limit") + TOO_HOT_C
         self._protect_from(self.errors | self.error_bits[error])
-        return f"protects itself: {error}"
 
-    @abstractmethod
-    def reset_all(self) -> int:
-        """Restore factory settings, id 1; return the error number, 0 on success."""
+    def reset_all(self) -> None:
+        """Restore factory settings, id 1, and restart."""
+        self.memory.restore(eeprom=True)
+        self.restart()
 
     def turn(self, steps: float) -> None:
         """Turn the joint by hand, in the registers' direction; under torque it resists."""
-        self.drive.turn(steps)
+        self.shaft.turn(self._side * steps / self._scale)
 
     def jam(self, stuck: bool = True) -> None:
         """Jam the joint at its position, or free it."""
@@ -322,32 +323,22 @@ class EmulatedServo(ABC):
 
     @property
     def supply_v(self) -> float:
-        """Return the open-circuit voltage; far too low, it makes the servo restart repeatedly."""
-        return self.shaft.supply * self.model.rated_v
+        """Return the supply voltage."""
+        return self._supply_v
 
     @supply_v.setter
     def supply_v(self, volts: float) -> None:
-        self._calm = False
-        self.shaft.feed(max(0.0, volts) / self.model.rated_v)
-        self._measure_surroundings()
+        self._supply_v = volts
+        self.shaft.feed(volts / self.model.rated_v)
+        self._measure()
+        self._apply_settings()
 
     @property
     def temperature_c(self) -> float:
-        """Return the temperature of the motor, which approaches that of load and surroundings."""
-        return self.protection.temperature_c
+        """Return the temperature of the motor."""
+        return self._temperature_c
 
     @temperature_c.setter
     def temperature_c(self, celsius: float) -> None:
-        self._calm = False
-        self.protection.temperature_c = celsius
-        self._measure_surroundings()
-
-    @property
-    def ambient_c(self) -> float:
-        """Return the temperature around the servo."""
-        return self.protection.ambient_c
-
-    @ambient_c.setter
-    def ambient_c(self, celsius: float) -> None:
-        self._calm = False
-        self.protection.ambient_c = celsius
+        self._temperature_c = celsius
+        self._measure()
