@@ -198,18 +198,12 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
         assert far.look_at_person(99).wait(100.0) == "refused"
         assert far.look_at(-1.0, 0.1, 0.3).wait(100.0) == "out of reach"
         assert far.look_at_person(far.people[0].id).wait(100.0) == "arrived"
-        with pytest.raises(gazerig.Refused, match="p_world_m"):
-            far.look_at(float("nan"), 0.0, 0.0)
-        with pytest.raises(gazerig.Refused, match="no behaviour"):
-            far.behave("dance")
         with pytest.raises(gazerig.Refused, match="0 to 180 deg"):
             far.set({"gaze.head.eye_only_range_deg": 1e9})
         assert far.set({"gaze.head.eye_only_range_deg": 11.0}) and far.get(
             "gaze.head.eye_only_range_deg"
         )
         assert far.menus() == head.menus()
-        here, there = head.joints, far.joints
-        assert here.keys() == there.keys()
         texts = [event.text for event in far.events(timeout_s=0.0)]
         assert any("controlled by the program" in text for text in texts)
         far.stop("a hand")
@@ -217,12 +211,6 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
         assert far.play("nod").wait(100.0) == "refused" and far.resume().refused
         head.sleep(2.1)
         assert not far.resume().refused
-        led = far.look_towards(10.0, 0.0)
-        assert led.active
-    order = mine  # disconnected: the control of the other program expires
-    for state in head.states(rate_hz=50.0):
-        if not state.controlled_by:
-            break
 
 
 def test_a_state_after_an_awaited_reply_is_as_new(

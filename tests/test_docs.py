@@ -7,11 +7,11 @@ from functools import cache
 from typing import Any
 
 import pytest
-from papers import COMMANDS, PAPERS, ROOT, blocks, spans
+from papers import PAPERS, ROOT, blocks, spans
 
 from gazerig.config.entries import parse
 from gazerig.config.load import ConfigError, shipped_names
-from gazerig.config.parameters import apply_changes, value_of
+from gazerig.config.parameters import value_of
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.track.track import Track
 from gazerig.params import Declaration, declarations
@@ -20,8 +20,6 @@ from gazerig.sim_mock.scenes import script
 
 # The documents describe every feature: without one of them, they cannot be compared with it.
 design = pytest.importorskip("gazerig.features.study.design")
-HOME = pytest.importorskip("gazerig.features.study.design").HOME
-WORLDS = pytest.importorskip("gazerig.features.world.room").HOME
 pytest.importorskip("gazerig.features.bringup")
 pytest.importorskip("gazerig.features.lab")
 
@@ -78,24 +76,6 @@ def test_keys_named_are_keys() -> None:
             key = re.match(r"([a-z_]+(?:\.[a-z_0-9]+)+)(: \S+)?$", span)
             if key and key[1].split(".")[0] in sections and not key[1].endswith((".py", ".yaml")):
                 assert is_key(key[1]), f"{paper.name}: {span}"
-
-
-def test_values_set_in_the_papers_are_allowed(desk_rig: Rig) -> None:
-    sets = [words.split()[2:] for words in COMMANDS if words.startswith("ctl set ")]
-    pairs = [
-        (key, float(value))
-        for words in sets
-        for key, value in zip(words[::2], words[1::2], strict=True)
-    ]
-    for block in blocks("python"):
-        found = re.findall(r'rig\.set_many\(\{"([\w.]+)": ([\d.]+)\}', block.text)
-        pairs += [(key, float(value)) for key, value in found]
-    assert len(pairs) >= 4
-    for key, value in pairs:
-        assert apply_changes(desk_rig, {key: value}) != desk_rig, key
-    for words in COMMANDS:
-        if words.startswith("get ") and "--" not in words:
-            assert is_key(words.split()[1]), words
 
 
 def test_yaml_shown_has_keys_that_there_are() -> None:

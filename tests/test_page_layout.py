@@ -1,13 +1,11 @@
 """The page in every state on a desk, a laptop and a phone: all in sight, nothing cut off."""
 
-import itertools
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 from browser import RARE_DRAWING, Browser, browsing
-from msgspec import structs
 from msgspec.structs import replace
 from page_feed import GREY, IN_TIME, PageFeed
 from page_layout import boxes, faults, value, violations
@@ -32,17 +30,12 @@ MINUTES_S = -300.0
 CLICK = ControlState(
     1, True, who="browser 1a2b", description="look at 0.9 0.1 0.25", since_s=MINUTES_S
 )
-HELD = structs.replace(
-    CLICK, kind="joint", description="neck_yaw at 17.2 deg", joints=("neck_yaw",)
-)
-STOP, HOLD = "STOP was pressed on the page (browser 1a2b)", "neck_pitch: no feedback for 120 ms"
+STOP = "STOP was pressed on the page (browser 1a2b)"
 LOST = "the servo bus is lost: /dev/ttyUSB0 is not there"
 CHANGES: dict[str, dict[str, Any]] = {
     "awake": {},
     "stopped": {"stopped": STOP, "level": "torque_off"},
-    "jogging": {"client_control": HELD},
     "led by a click": {"client_control": CLICK},
-    "hold": {"level": "hold", "reasons": (f"{HOLD}: all joints hold",)},
     "bus lost": {"level": "torque_off", "reasons": (LOST,), "critical_reasons": (LOST,)},
     "busy": {},
 }
@@ -113,28 +106,6 @@ def test_nothing_is_cut_off_covered_or_too_small(shown: Shown, state: str, size:
     # STOP is at its usual place, whatever else is shown.
     stop = boxes(shown.browser)["rig-stop"]
     assert stop is not None and stop[3] - stop[1] >= 44.0
-
-
-@pytest.mark.parametrize("size", ["laptop"], indirect=True)
-def test_what_is_not_new_is_grey_and_has_its_age(shown: Shown, size: str) -> None:
-    script = """['#stage', '#camera .picture'].map(name => {
-      const part = document.querySelector(name), age = part.querySelector('.age');
-      return [part.matches('.stale'), age.checkVisibility() ? age.textContent : ''];
-    })"""
-
-    def stale() -> bool:
-        (view, view_age), (picture, picture_age) = value(shown.browser, script)
-        words = view_age.startswith("as it was ") and view_age.endswith(" s ago")
-        return bool(view and words and picture and picture_age.endswith(" s old"))
-
-    wait_for(stale, "the age of what is shown")
-    greys = itertools.cycle(range(100, 140))
-
-    def fresh() -> bool:
-        shown.state("awake", np.full((400, 640, 3), next(greys), np.uint8))
-        return bool(value(shown.browser, script) == [[False, ""], [False, ""]])
-
-    wait_for(fresh, "the new view and picture")
 
 
 @pytest.mark.parametrize("size", ["desk", "laptop"], indirect=True)

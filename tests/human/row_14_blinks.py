@@ -1,15 +1,12 @@
-"""Blinks: at the published rates, about the onset of gaze shifts, no two alike.
+"""Blinks: at the published rates, about the onset of gaze shifts, half of them incomplete.
 
 People blink 17 times a minute at rest and 26 times in conversation (Bentivoglio 1997), gaze-evoked
 blinks included; those begin with eyes and head, not in one tick with them (Evinger 1994). Bands of
 the rates: three standard deviations of a count in three minutes. Half of all blinks are incomplete
-(Ousler et al. 2014), durations differ by tens of ms, and the eyes turn 1 to 5 deg down and towards
-the nose meanwhile (Collewijn et al. 1985; 1 to 2 deg, Riggs et al. 1987).
+(Ousler et al. 2014).
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
-from math import nan
 
 import numpy as np
 from human.measured_run import MeasuredRun, Runner
@@ -24,11 +21,6 @@ WANTED = {
     "in the tick of a saccade, %": (0.0, 5.0),
     "begin within 100 ms of a saccade of 2-4.5 deg, over chance": (0.0, 1.5),
     "incomplete, %": (35.0, 65.0),
-    "planned duration, SD, ms": (20.0, 80.0),
-    "depth of incomplete ones, SD": (0.05, 0.2),
-    "left less right lid, mean size of the largest difference": (0.01, 0.15),
-    "eyes down in a blink, median deg": (1.0, 5.0),
-    "eyes towards the nose in a blink, median deg": (0.2, 5.0),
 }
 
 
@@ -50,35 +42,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "in the tick of a saccade, %": 100.0 * together / max(1, len(onsets)),
         "begin within 100 ms of a saccade of 2-4.5 deg, over chance": _with_small(every),
         "incomplete, %": 100.0 * float((depths < _FULL).mean()),
-        **_shapes(every, depths),
-    }
-
-
-def _shapes(runs: Sequence[MeasuredRun], depths: np.ndarray) -> dict[str, float]:
-    """Return how durations, depths, both lids and the eyes differ within blinks."""
-    lasting, apart, down, nasal = [], [], [], []
-    for one in runs:
-        edges = np.flatnonzero(np.diff(one.blink.astype(int)))
-        for begin, end in pairwise(edges.tolist()):
-            if not one.blink[begin + 1]:
-                continue
-            lasting.append(one.t_s[end] - one.t_s[begin])
-            apart.append(np.abs(np.diff(one.lids_goal[begin:end], axis=1)).max())
-            span = slice(max(0, begin - 4), end + 4)
-            if (one.phase[span] == "saccade").any() or end + 4 >= len(one.t_s):
-                continue
-            # Of a rest: what the eyes do beyond the straight line from its beginning to its end.
-            eyes = one.eyes_deg[span]
-            line = np.linspace(0.0, 1.0, len(eyes))[:, None, None]
-            off = eyes - (eyes[0] + line * (eyes[-1] - eyes[0]))
-            down.append(-off[:, :, 1].mean(axis=1).min())
-            nasal.append((off[:, 1, 0] - off[:, 0, 0]).max() / 2.0)
-    return {
-        "planned duration, SD, ms": 1e3 * float(np.std(lasting)),
-        "depth of incomplete ones, SD": float(depths[depths < _FULL].std()),
-        "left less right lid, mean size of the largest difference": float(np.mean(apart)),
-        "eyes down in a blink, median deg": float(np.median(down)) if down else nan,
-        "eyes towards the nose in a blink, median deg": float(np.median(nasal)) if nasal else nan,
     }
 
 

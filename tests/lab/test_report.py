@@ -392,27 +392,6 @@ def test_the_run_is_told_as_the_models_know_it(ticks: list[Tick], gathered: Gaze
     assert all(f.duration_s > 0.03 for f in gathered.fixations)
 
 
-def test_an_independent_judge_finds_the_same_saccades(gathered: GazeTrace) -> None:
-    pymovements = pytest.importorskip("pymovements")
-    t = 1e3 * gathered.column("t")
-    ms = np.arange(int(t[0]) + 1, int(t[-1]))
-    gaze = [np.interp(ms, t, gathered.column(name)) for name in ("gaze_yaw", "gaze_pitch")]
-    screen = pymovements.Experiment(1920, 1080, 60, 34, 65, "center", 1000)
-    recording = pymovements.gaze.from_numpy(time=ms, position=np.stack(gaze), experiment=screen)
-    recording.pos2vel("savitzky_golay", window_length=21, degree=2)
-    recording.detect(
-        "microsaccades", minimum_duration=15, threshold=(30.0, 30.0), threshold_factor=1.0
-    )
-    theirs = recording.events.frame["onset"].to_numpy()
-    ours = np.array([1e3 * s.onset_s for s in gathered.saccades if s.amplitude_deg >= 1.0])
-    assert len(ours) > 80
-    apart = np.abs(theirs[None] - ours[:, None])
-    assert np.mean(apart.min(axis=1) <= 15.0) >= 0.95
-    assert np.mean(apart.min(axis=0) <= 15.0) >= 0.93
-    # and it is the onsets that agree
-    assert np.mean(np.abs(apart - 60.0).min(axis=1) <= 5.0) < 0.4
-
-
 def test_what_is_not_measured_or_stopped_makes_no_events(ticks: list[Tick]) -> None:
     missing = [
         structs.replace(tick, joints=structs.replace(tick.joints, missing=("left_eye_pan",)))

@@ -1,20 +1,14 @@
 """Sweeps: the same table whatever the number of processes, resumed, and no process left behind."""
 
 import csv
-import json
-import signal
-import subprocess
-import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from branch import Branch, gazerig
 from command_line import Invoked, invoked
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -51,8 +45,6 @@ EYES_ALONE = "gaze.head.eye_only_range_deg"
 LOW, HIGH = "joints.neck_roll.min_deg", "joints.neck_roll.max_deg"
 QUICK = ("--seconds", "1", "--bus", "ideal", "--jobs", "1")
 OPTIONS = RunOptions(mock=True, fast=True, scene="visitor", seconds=1.0, bus="ideal")
-PATIENCE_S = 120.0
-"""How long another process may take on a machine that is busy."""
 
 
 def swept(out: Path, *words: str) -> Invoked:
@@ -160,52 +152,6 @@ def _zombie(pid: int) -> bool:
 
 
 # ---- the end from outside
-
-
-@contextmanager
-def begun(out: Path) -> Iterator[Branch]:
-    """Start a sweep and wait for its first run."""
-    words = ("sweep", "--out", str(out), *QUICK, "--set", f"{EYES_ALONE}=1:80:80", "--seeds", "50")
-    pipe = subprocess.PIPE
-    process = Branch(gazerig(*words), stderr=pipe, text=True)
-    file = out / RUNS
-    try:
-        wait_for(lambda: file.exists() and file.read_bytes().count(b"\n") > 0)
-        yield process
-    finally:
-        process.kill()
-        process.wait()
-        assert process.stderr is not None
-        process.stderr.close()
-
-
-def wait_for(ready: object) -> None:
-    end = time.monotonic() + PATIENCE_S
-    assert callable(ready)
-    while not ready():
-        assert time.monotonic() < end, "it did not come"
-        time.sleep(0.02)
-
-
-def children(pid: int) -> list[int]:
-    tasks = Path(f"/proc/{pid}/task").glob("*/children")
-    return [int(child) for task in tasks for child in task.read_text().split()]
-
-
-@pytest.mark.slow
-def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    with begun(out) as process:
-        workers = children(process.pid)
-        assert len(workers) == 1
-        process.send_signal(signal.SIGINT)
-        _, text = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 130
-    assert f"runs are kept in {out}: the same command continues" in text and "interrupted" in text
-    assert not alive(workers)
-    lines = (out / RUNS).read_text(encoding="utf-8").splitlines()
-    assert lines and all(len(json.loads(line)) == 4 for line in lines)
-    assert not (out / "table.csv").exists()
 
 
 # ---- figures
