@@ -128,17 +128,6 @@ def test_at_every_end_no_servo_has_torque(kind: str, stopped: bool, tmp_path: Pa
     assert not [one for one in found if one.get("torque") or one.get("target")]
 
 
-@pytest.mark.parametrize("kind", SMART)
-def test_a_servo_that_does_not_answer_is_set_up_later(kind: str, tmp_path: Path) -> None:
-    with gazerig.open(rig_file(kind, tmp_path), fast=True) as head:
-        head.step(2.5)
-        it = Jaw(head)
-        it.emulate("lose 3 count 8")
-        it.open_wide(0.3)
-        it.open_wide(2.0)
-        assert it.now.torque is True and it.now.measured_deg == pytest.approx(6.0, abs=0.5)
-
-
 def test_the_policy() -> None:
     joints = LimpJoints((None, 1.0))
     assert not joints.step((0.0, 0.0), (True, True), 0.0, False)

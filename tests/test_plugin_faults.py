@@ -54,23 +54,11 @@ class Odd:
         return ()
 """
 CLOSED = """
-from time import sleep
-from numpy import zeros
-from gazerig.drivers.camera.source import Shot
-
 class Seeing:
     def open(self): pass
     def events(self): return ()
     def latest(self, now_s): return None
     def close(self): raise KeyError("no lens")
-
-class Frames(Seeing):
-    latest = None
-    number = 0
-    def take(self, now_s, stop):
-        self.number += 1
-        sleep(0.02)
-        return Shot(now_s(), self.number, zeros((120, 160, 3), "u1"))
 """
 
 
@@ -82,9 +70,8 @@ def odd(tmp_path: Path) -> Iterator[None]:
     install_example(tmp_path / "site")
     with on_path(tmp_path / "site") as site:
         modules = {f"odd_{name}": ODD for name in groups}
-        for name in ("Seeing", "Frames"):
-            parts["gazerig.camera"][name.lower()] = f"odd_{name}:{name}"
-            modules[f"odd_{name}"] = CLOSED
+        parts["gazerig.camera"]["seeing"] = "odd_seeing:Seeing"
+        modules["odd_seeing"] = CLOSED
         install(site, "odd", parts, modules)
         yield
 
@@ -153,32 +140,19 @@ def test_another_part_that_raises_ends_the_run(part: str, monkeypatch: pytest.Mo
 
 
 @pytest.mark.usefixtures("odd")
-@pytest.mark.parametrize(
-    ("camera", "ending", "told"),
-    [
-        ("seeing", "SIGINT", "SIGINT: parked, torque off"),
-        ("seeing", "unplug", "seconds: not parked, torque-off could not be sent (/tmp/"),
-    ],
-)
-def test_a_camera_that_fails_as_it_closes_hides_no_reason(
-    camera: str, ending: str, told: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_camera_that_fails_as_it_closes_hides_no_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     ticks = count()
 
-    def stopped(buses: PtyBuses) -> str | None:
-        if next(ticks) == 100 and ending == "unplug":
+    def stopped(buses: PtyBuses) -> None:
+        if next(ticks) == 50:
             buses.command("unplug")
-        return "SIGINT" if next(ticks) > 200 and ending == "SIGINT" else None
 
-    rig = apply_changes(load_rig("desk"), {"gaze.chooser": "odd"} if ending == "rule" else {})
     _, (*_, closed, ended), held = end_of_run(
-        rig, monkeypatch, stopped, camera=camera, fast=False, seconds=1.5
+        load_rig("desk"), monkeypatch, stopped, camera="seeing", fast=False, seconds=1.5
     )
-    assert (
-        closed == f"closing the camera: camera '{camera}' of odd 1.2 failed (KeyError: 'no lens')"
-    )
-    assert ended.startswith(f"stopped by {told}")
-    assert held == (ending == "unplug")  # its watchdog stops it
+    assert closed == "closing the camera: camera 'seeing' of odd 1.2 failed (KeyError: 'no lens')"
+    assert ended.startswith("stopped by seconds: not parked, torque-off could not be sent (/tmp/")
+    assert held  # its watchdog stops it
 
 
 def test_a_rule_that_returns_no_point_ends_the_run() -> None:
@@ -282,18 +256,13 @@ def bus_of(**methods: Any) -> MultiBus:
     return MultiBus([BusShare("b", bus, (0, 1), "bus 'b' of b 1", SERVOS)])
 
 
-@pytest.mark.parametrize("value", [nan, inf])
-@pytest.mark.parametrize("column", ["position_steps", "velocity_steps_s", "load", "at_s"])
+@pytest.mark.parametrize(("column", "value"), [("position_steps", nan), ("at_s", inf)])
 def test_a_reading_that_is_not_finite_is_a_lost_bus(column: str, value: float) -> None:
     bus = bus_of(read=lambda now_s: GOOD._replace(**{column: (1.0, value)}))
     with pytest.raises(BusLost, match=r"bus 'b' of b 1: no finite .* of jaw \(servo 2\)"):
         bus.read(1.0)
-
-
-@pytest.mark.parametrize("answer", [None, (1, 2), Feedback.create_missing(1)])
-def test_no_feedback_is_a_lost_bus(answer: object) -> None:
     with pytest.raises(BusLost, match="bus 'b' of b 1: read returned no feedback of 2 servos"):
-        bus_of(read=lambda now_s: answer).read(1.0)
+        bus_of(read=lambda now_s: None).read(1.0)
 
 
 def test_goals_are_clipped_and_every_bus_is_released() -> None:
