@@ -88,8 +88,8 @@ def test_there_and_back_rises_holds_and_falls_without_a_step() -> None:
     ("acts", "line", "rule"),
     [
         ("      - {at_s: 1, do: punch, to: head}\n", 10, "without a room a person can only walk"),
-        ("      - {at_s: 1, do: walk, to: moon}\n", 10, "none has no place 'moon'; it has here"),
-        ("      - {at_s: 1, do: look_at, to: bob}\n", 10, "not a person and not a place"),
+        ("      - {at_s: 1, do: walk, to: moon}\n", 10, "the script has no place 'moon'; it has here"),
+        ("      - {at_s: 1, do: look_at, to: bob}\n", 10, "has no person or place 'bob'"),
         ("      - {at_s: 1, do: walk, to: there}\n", 9, "the round ends at there"),
         ("      - {at_s: 1, do: glance, yaw_deg: 9}\n", 9, "a glance of (9.0, 0.0) deg"),
         ("      - {at_s: 19, do: wave}\n", 10, "ends at 21.6 s, the round at 20 s"),

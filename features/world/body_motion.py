@@ -183,7 +183,6 @@ class BodyMotion:
         body, base, round_s = self.body, self.base, self.script.round_s
         chest = self.hips_m + (0.0, 0.0, body.shoulder_m - body.hip_m)
         lean = motions.lean_rad(self.t_s, acts, at, chest, body)
-        lean = lean - motions.hit_rad(self.t_s, self.acts)
         lean = lean + _SIT_LEAN_RAD * 4.0 * base.seated * (1.0 - base.seated)
         lean = lean + _RECLINE_RAD * base.seated + (0.10 if self.person.gloves else 0.02)
         lean = lean + 0.008 * periodic(self.t_s, round_s, (0.25,), self.phases[4:5].tolist())

@@ -123,7 +123,7 @@ def eyes_in_head(R_head: Floats, eyes_m: Floats, look: LookAngles) -> tuple[Floa
 
 
 def head_gestures(t_s: Floats, acts: Sequence[TimedAct], round_s: float) -> tuple[Floats, Floats]:
-    """Return yaw and pitch that nods, shakes, hits, speech and life add to a head."""
+    """Return yaw and pitch that nods, shakes, speech and life add to a head."""
     yaw = radians(0.5) * periodic(t_s, round_s, (0.31, 0.83), (0.4, 2.0))
     pitch = radians(0.5) * periodic(t_s, round_s, (0.27, 0.71), (1.4, 0.3))
     for one in acts:
@@ -135,9 +135,6 @@ def head_gestures(t_s: Floats, acts: Sequence[TimedAct], round_s: float) -> tupl
             pitch = pitch - radians(11.0) * swell**0.5 * np.sin(2 * np.pi * 1.7 * gone_s)
         elif one.act.do == "shake":
             yaw = yaw + radians(14.0) * swell**0.5 * np.sin(2 * np.pi * 1.6 * gone_s)
-        elif one.act.do == "be_hit":
-            back = there_and_back(t_s, one.start_s, 0.09, 0.03, lasts_s - 0.12)
-            pitch, yaw = pitch + radians(20.0) * back, yaw + radians(10.0) * back
         elif one.act.do == "speak":
             held = there_and_back(t_s, one.start_s, 0.3, max(lasts_s - 0.6, 0.0), 0.3)
             pitch = pitch + radians(1.6) * held * np.sin(2 * np.pi * 0.9 * gone_s)

@@ -10,7 +10,7 @@ import numpy as np
 
 from gazerig.features.world.measures import Measures
 from gazerig.features.world.rotations import axes_along, limit_angle, unit
-from gazerig.features.world.time_profiles import blend, smooth_bump, smooth_rise, there_and_back
+from gazerig.features.world.time_profiles import blend, smooth_rise, there_and_back
 from gazerig.gaze.types import Floats
 from gazerig.sim_mock.scenes.timeline import TimedAct
 
@@ -286,15 +286,6 @@ def lean_rad(
             total += 0.10 * act_share(one, t_s)
         elif one.act.do == "open_guard":
             total -= 0.04 * act_share(one, t_s)
-    return total
-
-
-def hit_rad(t_s: Floats, acts: Sequence[TimedAct]) -> Floats:
-    """Return the backward lean of the chest due to blows (n,)."""
-    total = np.zeros_like(t_s)
-    for one in acts:
-        if one.act.do == "be_hit":
-            total += 0.10 * smooth_bump((t_s - one.start_s) / (one.end_s - one.start_s))
     return total
 
 

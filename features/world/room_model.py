@@ -21,13 +21,16 @@ _GLOWS: dict[Colour | str, float] = {"window": 0.7, _CEILING: 0.42, (250, 232, 1
 _TABLE_BELOW_M = 0.20
 """Height of the neck base on its plinth above the table's top."""
 
+_AMBIENT, _WINDOW, _LAMP = 0.5, 0.44, 0.30
+"""Levels of the light; none casts shadows, which cost time."""
+
 
 def add_room(spec: Any, script: SceneScript) -> None:
     """Add the room of a script to a specification, with its light and the stand of the rig."""
     room = _Room(spec, -script.neck_height_m)
     {"living-room": _living_room, "gym": _gym, "hall": _hall}[script.room](room)
     _stand(room, script.room)
-    _light(spec, script)
+    _light(spec)
 
 
 class _Room:
@@ -265,21 +268,20 @@ def _hall(room: _Room) -> None:
         room.panel((1.0, side * (half * 0.7 - 0.03), 1.7), -side * 0.5 * pi, (0.9, 1.1), "shapes")
 
 
-def _light(spec: Any, script: SceneScript) -> None:
+def _light(spec: Any) -> None:
     """Light the room: ambient light, and light from the window and the ceiling."""
-    light = script.light
     spec.visual.headlight.active = 1
-    spec.visual.headlight.ambient = [light.ambient] * 3
+    spec.visual.headlight.ambient = [_AMBIENT] * 3
     spec.visual.headlight.diffuse = [0.0] * 3
     spec.visual.headlight.specular = [0.0] * 3
     lights = [
-        # name, position, direction, level of red, green and blue, specular, shadows
-        ("window", [-0.6, -2.2, 1.3], [0.62, 0.62, -0.48], light.window, 0.98, 0.93, 0.15, light.shadows),
-        ("lamp", [0.5, 0.8, 1.5], [0.35, -0.45, -0.82], light.lamp, 0.97, 0.90, 0.05, False),
+        # name, position, direction, level of red, green and blue, specular
+        ("window", [-0.6, -2.2, 1.3], [0.62, 0.62, -0.48], _WINDOW, 0.98, 0.93, 0.15),
+        ("lamp", [0.5, 0.8, 1.5], [0.35, -0.45, -0.82], _LAMP, 0.97, 0.90, 0.05),
     ]  # fmt: skip
-    for name, pos, direction, level, green, blue, specular, shadows in lights:
+    for name, pos, direction, level, green, blue, specular in lights:
         spec.worldbody.add_light(
             name=f"room/{name}", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=pos,
             dir=direction, ambient=[0.0] * 3, diffuse=[level, green * level, blue * level],
-            specular=[specular] * 3, castshadow=shadows,
+            specular=[specular] * 3, castshadow=False,
         )  # fmt: skip

@@ -14,15 +14,7 @@ from typing import NamedTuple
 from gazerig.gaze.angles import add, sub, wrap
 from gazerig.gaze.types import Angles2, Vec3
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing, min_jerk, there_and_back
-from gazerig.sim_mock.scenes.script import (
-    BASE,
-    HEAD,
-    Act,
-    Fault,
-    PersonScript,
-    SceneScript,
-    ThingScript,
-)
+from gazerig.sim_mock.scenes.script import BASE, HEAD, Act, Fault, SceneScript, ThingScript
 from gazerig.sim_mock.scenes.timeline import (
     HALF_FIELD_RAD,
     LASTS_S,
@@ -58,8 +50,13 @@ _OUT_BACK_S = {
 _FREES_M = {"face": (0.05, 0.04, -0.32), "chest": (0.0, 0.10, 0.15)}
 """Displacement of both fists in an open guard; y is to the fist's own side."""
 _PERSON_ACTS = ("walk", "step", "look_at", "glance", "speak", "wave")
-_BOXER_ACTS = (*_PERSON_ACTS, "punch", "feint", "open_guard")
-_THING_ACTS = {"pinwheel": ("spin",), "hand": ("reach",)}
+_ACTS: dict[str, tuple[str, ...]] = {
+    "person": _PERSON_ACTS,
+    "boxer": (*_PERSON_ACTS, "punch", "feint", "open_guard"),
+    "pinwheel": ("spin",),
+    "hand": ("reach",),
+}
+"""What people and things can do without a room."""
 
 
 class _Change(NamedTuple):
@@ -81,22 +78,8 @@ class FacesScene:
         self._script = script
         self._acts = {name: _acts_of(script, name, seed) for name in script.people}
         self._acts |= {name: _acts_of_thing(one) for name, one in script.things.items()}
-        self._steps = {
-            name: [
-                _Change(one.start_s, one.end_s, self.place(one.act.to), one.act.do == "walk")
-                for one in self._acts[name]
-                if one.act.do in ("walk", "step")
-            ]
-            for name in script.people
-        }
-        self._glances = {
-            name: [
-                _Change(one.start_s, one.end_s, (one.act.yaw_deg, one.act.pitch_deg))
-                for one in self._acts[name]
-                if one.act.do == "glance"
-            ]
-            for name in script.people
-        }
+        self._steps = {name: self._changes(name, ("walk", "step")) for name in script.people}
+        self._glances = {name: self._changes(name, ("glance",)) for name in script.people}
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return all people in the script's order, who may be outside every field of view."""
@@ -115,31 +98,18 @@ class FacesScene:
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return the fists, then the script's things; a hand is included while it reaches."""
         phase_s = t_s % self.round_s
-        found = [
-            Thing(
-                2 * n + k, "hand", self.hand(name, side, t_s), _FIST_M,
-                *self._fist_turn(name, side, phase_s), person=number,
-            )
-            for n, (number, name) in enumerate(self._iterate_boxers())
-            for k, side in enumerate(_SIDES)
-        ]  # fmt: skip
-        first = 2 * len(list(self._iterate_boxers()))
-        for number, (name, thing) in enumerate(self._script.things.items(), first):
+        found: list[Thing] = []
+        for number, (name, person) in enumerate(self._script.people.items()):
+            for side in _SIDES if person.gloves else ():
+                fist, turn = self.hand(name, side, t_s), self._fist_turn(name, side, phase_s)
+                found.append(Thing(len(found), "hand", fist, _FIST_M, *turn, person=number))
+        for id_, (name, thing) in enumerate(self._script.things.items(), len(found)):
             acts = self._acts[name]
-            if thing.kind == "hand":
-                if any(one.start_s <= phase_s < one.end_s for one in acts):
-                    found.append(Thing(number, "hand", self.hand(name, thing.side, t_s), _FIST_M))
-                continue
-            speed, turned = 0.0, 0.0
-            for one in acts:
-                lasts_s = one.end_s - one.start_s
-                share = min(1.0, max(0.0, (phase_s - one.start_s) / lasts_s))
-                # A gust: the speed is a sine squared in time, the angle its integral.
-                speed += _SPIN_RAD_S * sin(pi * share) ** 2
-                turned += _SPIN_RAD_S * lasts_s * (0.5 * share - sin(2 * pi * share) / (4 * pi))
-            found.append(
-                Thing(number, thing.kind, self.place(thing.at), _PINWHEEL_M, speed, turned)
-            )
+            if thing.kind == "pinwheel":
+                turn = _spin_of(acts, phase_s)
+                found.append(Thing(id_, thing.kind, self.place(thing.at), _PINWHEEL_M, *turn))
+            elif any(one.start_s <= phase_s < one.end_s for one in acts):
+                found.append(Thing(id_, "hand", self.hand(name, thing.side, t_s), _FIST_M))
         return tuple(found)
 
     def events(self) -> tuple[Event, ...]:
@@ -187,10 +157,20 @@ class FacesScene:
         """Return whether a point is in the field of view of a camera that points ahead."""
         return abs(atan2(p_m[1] - HEAD_M[1], p_m[0] - HEAD_M[0])) < HALF_FIELD_RAD
 
-    def _iterate_boxers(self) -> Iterator[tuple[int, str]]:
-        for number, (name, person) in enumerate(self._script.people.items()):
-            if person.gloves:
-                yield number, name
+    def _changes(self, name: str, kinds: tuple[str, ...]) -> list[_Change]:
+        """Return the moves of a face, or its glances in degrees."""
+        return [
+            _Change(
+                one.start_s,
+                one.end_s,
+                (one.act.yaw_deg, one.act.pitch_deg)
+                if one.act.do == "glance"
+                else self.place(one.act.to),
+                one.act.do == "walk",
+            )
+            for one in self._acts[name]
+            if one.act.do in kinds
+        ]
 
     def _position_without_sway(self, name: str, phase_s: float) -> Vec3:
         """Return the place of a face without sway."""
@@ -301,6 +281,18 @@ def _acts_of_thing(thing: ThingScript) -> tuple[TimedAct, ...]:
     )
 
 
+def _spin_of(acts: Sequence[TimedAct], phase_s: float) -> tuple[float, float]:
+    """Return speed and angle of a pinwheel in gusts."""
+    speed, turned = 0.0, 0.0
+    for one in acts:
+        lasts_s = one.end_s - one.start_s
+        share = min(1.0, max(0.0, (phase_s - one.start_s) / lasts_s))
+        # The speed of a gust is a sine squared in time, the angle its integral.
+        speed += _SPIN_RAD_S * sin(pi * share) ** 2
+        turned += _SPIN_RAD_S * lasts_s * (0.5 * share - sin(2 * pi * share) / (4 * pi))
+    return speed, turned
+
+
 def _position_after_moves(
     at: tuple[float, ...], moves: Sequence[_Change], phase_s: float
 ) -> tuple[float, ...]:
@@ -351,17 +343,12 @@ def faults(script: SceneScript) -> Iterator[Fault]:
     if script.room != "none":
         yield "room", "--scene cannot have any: use --world, or write room: none"
         return
-    found = list(name_faults(script, script.places, (HEAD, BASE)))
-    for name, thing in script.things.items():
-        found += _thing_faults(script, name, thing)
-    for name, person in script.people.items():
-        found += _person_faults(script, name, person)
+    found = [*name_faults(script, script.places, (HEAD, BASE)), *_act_faults(script)]
     yield from found
     if found:
         return
     for name, person in script.people.items():
-        acts = _acts_of(script, name, 0)
-        yield from overlap_faults(script, f"people.{name}", acts)
+        yield from overlap_faults(script, f"people.{name}", _acts_of(script, name, 0))
         at, looks_at, glance = person.start, person.looks_at, (0.0, 0.0)
         for act in person.acts:
             at = act.to if act.do in ("walk", "step") else at
@@ -377,39 +364,34 @@ def faults(script: SceneScript) -> Iterator[Fault]:
         yield from overlap_faults(script, f"things.{name}", _acts_of_thing(thing))
 
 
-def _person_faults(script: SceneScript, name: str, person: PersonScript) -> Iterator[Fault]:
-    known = _BOXER_ACTS if person.gloves else _PERSON_ACTS
-    before_s = 0.0
-    for i, act in enumerate(person.acts):
-        key = f"people.{name}.acts.{i}"
-        if act.do not in known:
-            yield f"{key}.do", f"without a room a person can only {', '.join(known)}"
-        elif act.do in ("walk", "step") and act.to not in script.places:
-            yield f"{key}.to", f"unknown place; known places: {', '.join(script.places)}"
-        elif act.do == "punch" and act.to != HEAD:
-            yield f"{key}.to", "without a room a punch goes to head"
-        elif (
-            act.do in _OUT_BACK_S and act.for_s is not None and act.for_s < sum(_OUT_BACK_S[act.do])
-        ):
-            yield f"{key}.for_s", f"{act.do} takes at least {sum(_OUT_BACK_S[act.do]):g} s"
-        if act.at_s < before_s:
-            yield f"{key}.at_s", "acts are in the order of time"
-        before_s = act.at_s
-
-
-def _thing_faults(script: SceneScript, name: str, thing: ThingScript) -> Iterator[Fault]:
-    key = f"things.{name}"
-    if thing.kind not in _THING_ACTS:
-        yield f"{key}.kind", f"without a room there are {', '.join(_THING_ACTS)}"
-        return
-    if thing.at not in script.places:
-        yield f"{key}.at", f"no place {thing.at!r}; there are {', '.join(script.places)}"
-    for i, act in enumerate(thing.acts):
-        if act.do not in _THING_ACTS[thing.kind]:
-            yield (
-                f"{key}.acts.{i}.do",
-                f"a {thing.kind} can only {', '.join(_THING_ACTS[thing.kind])}",
-            )
-        for place in (*act.via, *([act.to] if act.do == "reach" else ())):
+def _act_faults(script: SceneScript) -> Iterator[Fault]:
+    """Yield the acts that people and things cannot do without a room."""
+    owners = [
+        *((f"people.{name}", "boxer" if person.gloves else "person", person.acts)
+          for name, person in script.people.items()),
+        *((f"things.{name}", thing.kind, thing.acts) for name, thing in script.things.items()),
+    ]  # fmt: skip
+    for owner, kind, acts in owners:
+        if kind not in _ACTS:
+            yield f"{owner}.kind", "without a room there are pinwheel, hand"
+            continue
+        before_s = 0.0
+        for i, act in enumerate(acts):
+            key, least_s = f"{owner}.acts.{i}", sum(_OUT_BACK_S.get(act.do, ()))
+            if act.do not in _ACTS[kind]:
+                yield f"{key}.do", f"without a room a {kind} can only {', '.join(_ACTS[kind])}"
+            elif act.do == "step" and not act.to:
+                yield f"{key}.to", "without a room a step needs a place"
+            elif act.do == "punch" and act.to != HEAD:
+                yield f"{key}.to", "without a room a punch goes to head"
+            elif act.for_s is not None and act.for_s < least_s:
+                yield f"{key}.for_s", f"{act.do} takes at least {least_s:g} s"
+            if act.at_s < before_s:
+                yield f"{key}.at_s", "acts are in the order of time"
+            before_s = act.at_s
+    for name, thing in script.things.items():
+        reached = [place for act in thing.acts if act.do == "reach" for place in (*act.via, act.to)]
+        for place in (thing.at, *reached):
             if place not in script.places:
-                yield f"{key}.acts.{i}", f"no place {place!r}; there are {', '.join(script.places)}"
+                known = ", ".join(script.places)
+                yield f"things.{name}", f"no place {place!r}; there are {known}"

@@ -8,8 +8,8 @@ Place frame: the world's, with the neck base of the (first) head above its origi
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
 from gazerig.params import Bounds
 from gazerig.robot.model.commands import TalkOrder
@@ -23,20 +23,9 @@ class WorldCameraParams:
     width_px: Annotated[int, Bounds(64, 1920), "width of a picture"] = 320
     height_px: Annotated[int, Bounds(48, 1200), "height of a picture"] = 240
     rate_hz: Annotated[float, Bounds(1, 120), "pictures per second"] = 30.0
-    latency_ms: Annotated[float, Bounds(0, 500), "delay from the exposure to the arrival of a picture; only in simulated time"] = 60.0
     depth: Annotated[bool, "whether distances are measured too, as by a stereo camera"] = False
-    depth_noise_1_m: Annotated[float, Bounds(0, 0.2), "error of a distance at 1 m, metres; it grows with its square"] = 0.004
-    exposure_ms: Annotated[float, Bounds(0, 100), "exposure time; a turning head blurs the picture"] = 8.0
-    noise_grey: Annotated[float, Bounds(0, 60), "standard deviation of the read-out noise, grey values"] = 3.0
-    shadow_px: Annotated[int, Bounds(0, 8192), "side of the shadow map; 0: no shadows"] = 512
     samples: Annotated[int, Bounds(0, 16), "samples per pixel against jagged edges; 0: one"] = 4
-    reflections: Annotated[bool, "whether shiny floors reflect the objects on them"] = False
     # fmt: on
-
-    def from_params(self, other: type) -> dict[str, Any]:
-        """Return the values of the fields that another dataclass of parameters also has."""
-        names = {field.name for field in fields(other)} & {field.name for field in fields(self)}
-        return {name: getattr(self, name) for name in names}
 
 
 Do = Literal[
@@ -49,7 +38,6 @@ Do = Literal[
     "speak",
     "nod",
     "shake",
-    "be_hit",
     "wave",
     "gesture",
     "point",
@@ -191,18 +179,6 @@ class AgentAct:
 
 
 @dataclass(frozen=True)
-class LightParams:
-    """Brightness of the room."""
-
-    # fmt: off
-    ambient: Annotated[float, Bounds(0, 1), "ambient light"] = 0.5
-    window: Annotated[float, Bounds(0, 2), "light from the window's side"] = 0.44
-    lamp: Annotated[float, Bounds(0, 2), "light of the lamp under the ceiling"] = 0.30
-    shadows: Annotated[bool, "whether the window's light casts shadows, which cost time"] = False
-    # fmt: on
-
-
-@dataclass(frozen=True)
 class SceneScript:
     """A room and the people in it for one round."""
 
@@ -215,7 +191,6 @@ class SceneScript:
     places: Annotated[Mapping[str, PlaceScript], "additional places besides the room's"] = field(default_factory=dict)
     things: Annotated[Mapping[str, ThingScript], "things, for example objects that people hand to each other"] = field(default_factory=dict)
     agent: Annotated[tuple[AgentAct, ...], "reports of the robot's simulated voice agent, in the order of time"] = ()
-    light: Annotated[LightParams, "brightness of the room"] = field(default_factory=LightParams)
     camera: Annotated[WorldCameraParams, "pictures of the robot's camera"] = field(default_factory=WorldCameraParams)
     expected: Annotated[tuple[ExpectedLook, ...] | None, "expected gaze over time; null: derived from the acts"] = None
     # fmt: on

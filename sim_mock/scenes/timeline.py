@@ -24,7 +24,6 @@ TRACKS: Mapping[str, tuple[str, ...]] = {
     "speak": ("mouth",),
     "nod": ("head",),
     "shake": ("head",),
-    "be_hit": ("head",),
     "glance": ("head",),
     "guard": ("guard",),
     "open_guard": _ARMS,
@@ -40,7 +39,6 @@ LASTS_S: Mapping[str, float] = {
     "speak": 3.0,
     "nod": 1.2,
     "shake": 1.2,
-    "be_hit": 0.7,
     "wave": 2.6,
     "gesture": 3.0,
     "point": 2.2,
@@ -101,86 +99,67 @@ def timed_acts(
 def name_faults(
     script: SceneScript, places: Collection[str], robot: tuple[str, ...] = (HEAD,)
 ) -> Iterator[Fault]:
-    """Find names of people, places and things that do not exist."""
-    seats, people = ", ".join(sorted(places)), ", ".join(script.people)
+    """Find names of people, places and things that do not exist, and reports in a wrong order."""
     targets = {*robot, *script.people, *places}
+
+    def require(
+        key: str, name: str, known: Collection[str], what: str = "place"
+    ) -> Iterator[Fault]:
+        if name not in known:
+            there = "the script" if script.room == "none" else script.room
+            yield key, f"{there} has no {what} {name!r}; it has {', '.join(sorted(known))}"
+
     for name, person in script.people.items():
         key = f"people.{name}"
         if not name.isidentifier() or name in robot:
             yield key, "a name has letters, digits and _, begins with a letter and is not head"
-        if person.start not in places:
-            yield f"{key}.start", f"{script.room} has no place {person.start!r}; it has {seats}"
-        if person.looks_at not in targets:
-            yield (
-                f"{key}.looks_at",
-                f"not a person and not a place; there are head, {people}, {seats}",
-            )
+        yield from require(f"{key}.start", person.start, places)
+        yield from require(f"{key}.looks_at", person.looks_at, targets, "person or place")
         for i, act in enumerate(person.acts):
-            for rule_key, rule in _act_faults(script, name, act, places, targets):
-                yield f"{key}.acts.{i}{rule_key}", rule
+            own = f"{key}.acts.{i}"
+            if act.do in NEEDS_TARGET and not act.to:
+                yield own, f"{act.do} needs `to`: whom or what"
+            elif act.do == "pass":
+                others = script.people.keys() - {name}
+                yield from require(f"{own}.to", act.to, others, "other person")
+                yield from require(f"{own}.thing", act.thing, script.things, "thing")
+            elif act.to and act.do in WALKS_TO_PLACES:
+                yield from require(f"{own}.to", act.to, places)
+            elif act.to:
+                yield from require(f"{own}.to", act.to, targets, "person or place")
+            for place in act.via:
+                yield from require(f"{own}.via", place, places)
     before_s = 0.0
     for i, report in enumerate(script.agent):
-        if report.person and report.person not in script.people:
-            yield f"agent.{i}.person", f"no person of the script; there are {people}"
+        if report.person:
+            yield from require(f"agent.{i}.person", report.person, script.people, "person")
         if not before_s <= report.at_s < script.round_s:
             yield f"agent.{i}.at_s", "reports are in the order of time, within the round"
         before_s = report.at_s
     for i, look in enumerate(script.expected or ()):
-        if look.at not in places:
-            yield f"expected.{i}.at", f"{script.room} has no place {look.at!r}; it has {seats}"
+        yield from require(f"expected.{i}.at", look.at, places)
         if not look.start_s < look.end_s <= script.round_s:
-            yield (
-                f"expected.{i}.end_s",
-                f"after start_s and within the round of {script.round_s:g} s",
-            )
-
-
-def _act_faults(
-    script: SceneScript, name: str, act: Act, places: Collection[str], targets: set[str]
-) -> Iterator[Fault]:
-    there = ", ".join(sorted(places))
-    if act.do in NEEDS_TARGET and not act.to:
-        yield "", f"{act.do} needs `to`: whom or what"
-    elif act.do in WALKS_TO_PLACES:
-        if act.to and act.to not in places:
-            yield ".to", f"{script.room} has no place {act.to!r}; it has {there}"
-    elif act.do == "pass":
-        if act.to not in script.people or act.to == name:
-            yield ".to", f"another person; there are {', '.join(script.people)}"
-        if act.thing not in script.things:
-            yield ".thing", f"none of the script's `things`: {', '.join(script.things) or 'none'}"
-    elif act.to and act.to not in targets:
-        yield (
-            ".to",
-            f"not a person and not a place; there are head, {', '.join(script.people)}, {there}",
-        )
-    for place in act.via:
-        if place not in places:
-            yield ".via", f"{script.room} has no place {place!r}; it has {there}"
+            yield f"expected.{i}.end_s", f"after start_s and within {script.round_s:g} s"
 
 
 def overlap_faults(script: SceneScript, key: str, acts: tuple[TimedAct, ...]) -> Iterator[Fault]:
     """Find simultaneous acts on one track, and acts that last beyond the round."""
     busy: dict[str, tuple[float, int]] = {}
     for i, one in enumerate(acts):
-        at, spare_s = f"{key}.acts.{i}.at_s", one.act.vary_s
-        if one.end_s + spare_s > script.round_s + 1e-9:
-            yield (
-                at,
-                f"{one.act.do} ends at {one.end_s + spare_s:.1f} s, the round at "
-                f"{script.round_s:g} s; begin earlier or make round_s longer",
-            )
+        at, begins_s = f"{key}.acts.{i}.at_s", one.act.at_s - one.act.vary_s
+        ends_s = one.end_s + one.act.vary_s
+        if ends_s > script.round_s + 1e-9:
+            yield at, f"{one.act.do} ends at {ends_s:.1f} s, the round at {script.round_s:g} s"
         for track in one.tracks:
             until_s, other = busy.get(track, (0.0, -1))
-            begins_s = one.act.at_s - spare_s
             if begins_s < until_s - 1e-9 and one.act.do != "look_at":
                 yield (
                     at,
-                    f"{one.act.do} begins while {acts[other].act.do} (acts.{other}) keeps the {track} "
-                    f"busy until {until_s:.1f} s; begin then",
+                    f"{acts[other].act.do} (acts.{other}) keeps the {track} busy until "
+                    f"{until_s:.1f} s; begin then",
                 )
             lasts_s = one.end_s - one.start_s
-            busy[track] = (max(until_s, one.act.at_s + spare_s + lasts_s), i)
+            busy[track] = (max(until_s, one.act.at_s + one.act.vary_s + lasts_s), i)
 
 
 class Players(Protocol):
@@ -238,7 +217,7 @@ def events_of(script: SceneScript, timelines: Timelines, players: Players) -> tu
 def _events_of_act(
     script: SceneScript, players: Players, name: str, one: TimedAct, boxes: bool
 ) -> Iterator[Event]:
-    """Yield the events of an act that is visible to the robot."""
+    """Yield the event of an act that is visible to the robot."""
     do, side, start_s, end_s = one.act.do, one.act.side, one.start_s, one.end_s
     middle_s = 0.5 * (start_s + end_s)
     if do == "reach":
@@ -247,7 +226,7 @@ def _events_of_act(
         inside = [t_s for t_s in times if players.is_before_head(players.hand(name, side, t_s))]
         if inside:
             hand = players.hand(name, side, middle_s)
-            yield Event("reach", "look", "hand", inside[0], inside[-1], hand, 0.25)
+            yield Event(do, "look", "hand", inside[0], inside[-1], hand, 0.25)
     elif do == "wave":
         yield Event(do, "look", "hand", start_s, end_s, players.hand(name, side, middle_s), 0.5)
     elif do == "punch":
@@ -255,17 +234,15 @@ def _events_of_act(
         ends = (players.hand(name, side, t_s) for t_s in (start_s, due_s))
         x, y, z = (0.5 * (a + b) for a, b in zip(*ends, strict=True))
         yield Event(do, "look", "hand", start_s, end_s, (x, y, z), 0.5, due_s)
-    elif do == "speak":
-        yield Event("speak", "look", "face", start_s, end_s, players.face(name, middle_s), 0.5)
-    elif boxes and do in ("step", "open_guard", "feint"):
+    elif do == "speak" or (boxes and do == "step"):
+        within_m = 0.5 if do == "speak" else 0.6
+        yield Event(do, "look", "face", start_s, end_s, players.face(name, middle_s), within_m)
+    elif boxes and do == "feint":
+        until_s = min(start_s + _RETURN_S, script.round_s)
         face = players.face(name, middle_s)
-        if do == "step":
-            yield Event("step", "look", "face", start_s, end_s, face, 0.6)
-        elif do == "feint":
-            until_s = min(start_s + _RETURN_S, script.round_s)
-            yield Event("return", "return", "face", start_s, until_s, face, 0.6)
-        else:
-            out_s, back_s = (0.5 * one_s for one_s in players.reach_times_s(one))
-            yield Event(
-                "attack", "look", "attack_target", start_s + out_s, end_s - back_s, face, 0.6
-            )
+        yield Event("return", "return", "face", start_s, until_s, face, 0.6)
+    elif boxes and do == "open_guard":
+        out_s, back_s = (0.5 * one_s for one_s in players.reach_times_s(one))
+        face = players.face(name, middle_s)
+        target = "attack_target"
+        yield Event("attack", "look", target, start_s + out_s, end_s - back_s, face, 0.6)

@@ -21,7 +21,6 @@ CASES: dict[str, tuple[Act, ...]] = {
     "speak": (Act(AT_S, "speak"),),
     "nod": (Act(AT_S, "nod"),),
     "shake": (Act(AT_S, "shake"),),
-    "be_hit": (Act(AT_S, "be_hit"),),
     "wave": (Act(AT_S, "wave"),),
     "gesture": (Act(AT_S, "gesture"),),
     "point": (Act(AT_S, "point", "head"),),
@@ -33,7 +32,7 @@ CASES: dict[str, tuple[Act, ...]] = {
     "feint": (Act(AT_S, "feint"),),
     "open_guard": (Act(AT_S, "open_guard"),),
 }
-HEAD_ACTS = ("nod", "shake", "be_hit", "look_at")
+HEAD_ACTS = ("nod", "shake", "look_at")
 ARM_ACTS = ("wave", "point", "reach", "push", "punch", "feint")
 
 

@@ -112,6 +112,8 @@ def no_pictures_message(error: NoRenderer) -> str:
     return f"{error}; detections are computed instead, without pictures"
 
 
+_LATENCY_MS = 60.0
+"""Delay from the exposure of a picture to its arrival in simulated time."""
 HEAD_LINK = "head"
 """Link of a rig that carries its camera, and is invisible to it."""
 _LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -158,11 +160,12 @@ class RenderedWorld(NamedTuple):
 
         asked = self.params
         params = PixelCameraParams(
-            **{
-                **asked.from_params(PixelCameraParams),
-                "latency_ms": asked.latency_ms if simulated else 0.0,
-                "horizontal_field_deg": self.camera.horizontal_field_deg,
-            }
+            width_px=asked.width_px,
+            height_px=asked.height_px,
+            horizontal_field_deg=self.camera.horizontal_field_deg,
+            rate_hz=asked.rate_hz,
+            latency_ms=_LATENCY_MS if simulated else 0.0,
+            depth=asked.depth,
         )
         field_rad = radians(self.camera.horizontal_field_deg)
         size_px = asked.width_px, asked.height_px
@@ -211,7 +214,7 @@ def world_view(
     return WorldPicture(
         model.mj,
         place,
-        RendererParams(**params.from_params(RendererParams)),
+        RendererParams(samples=params.samples),
         hidden,
         rig.R_world_base,
         rig.p_world_base_m,
