@@ -16,7 +16,6 @@ from present import present
 from typer.testing import CliRunner
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.maestro.commands import GET_POSITION, MaestroCodec
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.cli import emulate as command
 from gazerig.robot.cli.emulate import app
@@ -109,16 +108,6 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
     assert not os.path.lexists(link)
 
 
-def test_it_stays_without_standard_input_and_ends_on_sigterm(tmp_path):
-    link = tmp_path / "servos"
-    with open(os.devnull) as nothing:
-        emulator = Emulator("desk", "--firmware", "45", "--link", str(link), stdin=nothing)
-    port = connect(link)
-    assert PacketHandler(2.0).read1ByteTxRx(port, 9, 6) == (45, COMM_SUCCESS, 0)
-    port.closePort()
-    assert emulator.end(signal.SIGTERM) == 0
-
-
 def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
     emulator = Emulator("--servos", "1:sts3215", "--baud", "500000", stderr=subprocess.PIPE)
     for _ in range(2):
@@ -130,18 +119,6 @@ def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
     assert emulator.end() == 0
     with present(emulator.process.stderr) as reported:
         assert reported.read() == "a client sends at 1000000 bit/s; the servos listen at 500000\n"
-
-
-def test_a_rig_of_hobby_servos_is_a_board_that_sends_no_pulses_yet():
-    emulator = Emulator("maker")
-    assert emulator.ready == {"path": emulator.path, "baud": None}
-    # The rig's board requires a check byte: it does not answer packets without one.
-    plain, checked = (MaestroCodec(crc).command(GET_POSITION, 0) for crc in (False, True))
-    assert asked(emulator.path, plain + bytes(1), 2, 115_200) == b""
-    status = emulator.type("status")
-    assert status["errors"] == ["crc"] and {servo["target"] for servo in status["servos"]} == {0}
-    assert asked(emulator.path, checked, 2, 115_200) == bytes(2)
-    assert emulator.end() == 0
 
 
 MIXED = {
@@ -170,10 +147,8 @@ def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monke
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ((), "name a rig, or its servos: --servos 1-6:xl330-m077"),
         (("--servos", "1:sts3215,2:xl330-m077"), "start a second `gazerig emulate`"),
         (("--maestro", "7"), "--maestro 7: a board has 6, 12, 18, 24 channels"),
-        (("nobody",), "available: desk"),
         (("--servos", "1:xl330-m077", "--baud", "12"), "--baud 12: servos of this kind know 9600"),
         (("--servos", "1:xl330-m077", "--link", "README.md"), "another file has this name"),
     ],
@@ -197,7 +172,6 @@ def test_bad_input_is_one_clear_line(options, says, monkeypatch):
     ("text", "says"),
     [
         ("1:xl330-m077,", "not IDS:MODEL"),
-        ("250-253:xl330-m077", "from 0 to 252"),
         ("1:sts3215,7:xc330-m288", "the servos before it are of kind feetech"),
         ("1:xl331", "unknown model; known models: xl330-m077"),
         ("1-3:xl330-m077,2:xc330-m288", "id 2 is taken"),

@@ -94,20 +94,6 @@ def test_jump_looks_at_every_picture_in_order(camera, film):
     assert (camera.frames, camera.frames_with_face) == (26, 8)
 
 
-def test_time_that_stands_or_runs_back_brings_nothing_new(camera):
-    newest = camera.latest(0.5)
-    assert camera.latest(0.5) is newest
-    assert camera.latest(0.1) is newest
-
-
-def test_unopened_film_and_impossible_delay_are_refused(film, detector):
-    with pytest.raises(CameraError, match="not open"):
-        FilmCamera(film, detector, delay_s=0.0).latest(0.0)
-    for delay_s in (-0.01, float("nan")):
-        with pytest.raises(ValueError, match="delay"):
-            FilmCamera(film, detector, delay_s=delay_s)
-
-
 def test_recording_in_simulated_time_gives_depth_and_lens_and_what_moves(tmp_path):
     writer = RecordingWriter(tmp_path / "r.mcap", {})
     lens, blob = Intrinsics(20.0, 20.0, 8.0, 6.0), MovingBlob(1, "thing", (0.0, 0.0, 2.0), 0.1)

@@ -1,6 +1,5 @@
 """Servos without bytes as an option: which options go with it, how they move, runs done again."""
 
-import json
 from math import exp
 from pathlib import Path
 
@@ -62,7 +61,6 @@ def test_without_torque_they_stand_still():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--mock", "--bus", "perfect"), "--bus perfect: unknown; available: emulated, ideal"),
         (("--bus", "ideal"), "--bus ideal needs --mock"),
         (("--mock", "--bus", "ideal", "--port", "/dev/x"), "--bus ideal and --port exclude"),
     ],
@@ -72,14 +70,6 @@ def test_options_that_make_no_sense_are_refused_in_one_line(words, said):
     assert done.exit_code == 2
     lines = done.stderr.strip().splitlines()
     assert len(lines) == 1 and said in lines[0]
-
-
-def test_a_run_on_hobby_servos():
-    words = ("--mock", "--fast", "--bus", "ideal", "--no-page", "--seconds", "2", "--summary", "-")
-    done = CliRunner().invoke(app, ["run", "maker", *words])
-    assert done.exit_code == 0, done.stderr
-    figures = json.loads(done.stdout)
-    assert figures["ticks"] > 390 and figures["bus"] == {"tx_bytes": 0, "rx_bytes": 0, "errors": {}}
 
 
 def test_a_head_in_real_time_needs_no_emulator(monkeypatch):

@@ -102,11 +102,6 @@ def test_whoever_is_behind_or_in_the_lens_is_not_drawn() -> None:
         assert (drawn(scene) == empty).all()
 
 
-def test_the_nearer_covers_the_farther() -> None:
-    near, far = Thing(1, "thing", (1.0, 0.0, 0.0), 0.1), Thing(2, "thing", (2.0, 0.0, 0.0), 0.15)
-    assert (drawn(Still(moving=(near, far))) == drawn(Still(moving=(near,)))).all()
-
-
 def test_the_wall_turns_with_the_camera_and_has_no_seam_in_view() -> None:
     """A turn of 10 deg moves what is in the middle by as much as the lens says."""
     here, aside = drawn(Still(), 175.0), drawn(Still(), 185.0)

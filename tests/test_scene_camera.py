@@ -87,16 +87,3 @@ def test_a_hand_is_seen_while_a_part_of_it_is_in_the_picture(
     aside = Thing(0, "hand", (0.5, 0.5 * np.tan(np.radians(aside_deg)), 0.0), radius_m)
     made = camera(Still((aside,)), horizontal_field_deg=69.0)
     assert len(seen_at(made, 0.2).blobs) == 1 + seen  # and the person's own hand
-
-
-def test_depth_is_noisy_along_the_line_of_view_alone() -> None:
-    ball = Thing(0, "thing", (1.0, 0.2, 0.0), 0.05)
-    made = camera(Still((ball,)), depth_noise_mm=5.0)
-    places = []
-    for now_s in np.arange(0.0, 0.45 / 30.0 * 400, 1.0 / 30.0).tolist():
-        found = made.latest(now_s)
-        if found is not None:
-            places.append(found.blobs[-1].p_camera_m)
-    p = np.array(places)
-    assert 0.003 < np.linalg.norm(p, axis=1).std() < 0.007
-    assert (p[:, 0] / p[:, 2]).std() < 1e-9

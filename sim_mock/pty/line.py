@@ -92,8 +92,6 @@ class TerminalLine:
     def serve(self, ready: Collection[int], now_s: float) -> None:
         """Process all that is due; ``ready``: the files that are readable since ``now_s``."""
         terminal = self.terminal
-        if terminal.clients in ready:
-            terminal.count_clients()
         if terminal.master in ready:
             data = terminal.read()
             self.heard = self.heard or bool(data)
@@ -102,6 +100,8 @@ class TerminalLine:
             terminal.write(self.line.send(data, baud or 1, now_s))
             if data and self.device.check_baud and baud != self._warned:
                 self._warn_of_baud(baud)
+        if terminal.clients in ready:  # after the last client's bytes, whose answers it drops
+            terminal.count_clients()
         if self.line.is_busy:
             data = self.line.take_arrived()
             if terminal.is_plugged:
