@@ -19,13 +19,6 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
 
 
-class BoardLine(Exchange, Protocol):
-    """The line to the board: byte and error counts, and late answers."""
-
-    port: BusPort
-    lateness: HostLateness
-
-
 class ChannelStatus(NamedTuple):
     """Status of a channel and of its board.
 
@@ -37,9 +30,10 @@ class ChannelStatus(NamedTuple):
     errors: tuple[str, ...] = ()
 
 
-class Board(Stoppable, Protocol):
+class Board(Stoppable, Exchange, Protocol):
     """One board, or several on one line; all methods may raise BusLost.
 
+    port, lateness: its port, and the counter of late answers
     name: name for messages
     remedy: remedy if channels output other pulses than commanded
     longest_ramp_s: longest time for which the driver's ramps advance while nothing is sent; inf:
@@ -50,10 +44,8 @@ class Board(Stoppable, Protocol):
     remedy: str
     longest_ramp_s: float
     timing: BusTiming
-
-    @property
-    def line(self) -> BoardLine:
-        """Return the line to the board."""
+    port: BusPort
+    lateness: HostLateness
 
     @property
     def params(self) -> HobbyBoardParams:

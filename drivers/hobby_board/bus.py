@@ -46,7 +46,7 @@ class HobbyBoardBus(PortBus):
     _supervisor: BoardSupervisor
 
     def __init__(self, board: Board, setups: Sequence[ServoConfig]) -> None:
-        self._board, self._line, self._port = board, board.line, board.line.port
+        self._board, self._line, self._port = board, board, board.port
         self._check_setups(setups)
         self._setups = self._target_setups = tuple(setups)
         self._ids = tuple(setup.id for setup in setups)

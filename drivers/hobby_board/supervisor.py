@@ -43,7 +43,7 @@ class BoardSupervisor:
     """
 
     def __init__(self, board: Board, channels: Sequence[Channel], log: EventLog) -> None:
-        self._board, self._line, self._log = board, board.line, log
+        self._board, self._log = board, log
         self._channels = tuple(channels)
         self.is_ramped_by_board = board.longest_ramp_s == inf
         self.engaged, self.may_send_goals = False, True
@@ -82,7 +82,7 @@ class BoardSupervisor:
             BusLost: the port is lost.
             ServoMissing: the board does not answer, or a channel does not accept its goal.
         """
-        board, port = self._board, self._line.port
+        board, port = self._board, self._board.port
         board.prepare(self._log)
         pulses = read_every_pulse(board, [channel.setup for channel in self._channels])
         for channel, pulse in zip(self._channels, pulses, strict=True):
@@ -122,12 +122,12 @@ class BoardSupervisor:
         Raises:
             BusLost: the port is lost.
         """
-        goal = channel.start(pulse_steps, self._line.port.now_s())
+        goal = channel.start(pulse_steps, self._board.port.now_s())
         found = None
         if self._board.send_limits([channel]):
             self._board.send_goals([channel])
             found = self._board.read_pulses((channel.id,))
-        channel.advance(self._line.port.now_s())
+        channel.advance(self._board.port.now_s())
         if found is None:
             return "does not answer"
         low, high = sorted((pulse_steps or goal, goal))
@@ -168,8 +168,8 @@ class BoardSupervisor:
         """
         silent_s = now_s - self._since_s
         if silent_s >= self._board.timing.give_up_s:
-            fault = f"{self._line.port.port_name}: the board has not answered for {silent_s:.1f} s"
-            raise BusLost(self._line.lateness.blame(fault, CHECK_SUPPLY, now_s, self._since_s))
+            fault = f"{self._board.port.port_name}: the board has not answered for {silent_s:.1f} s"
+            raise BusLost(self._board.lateness.blame(fault, CHECK_SUPPLY, now_s, self._since_s))
 
     def _record_miss(self, now_s: float) -> None:
         """Record a missing or damaged answer."""
@@ -181,7 +181,7 @@ class BoardSupervisor:
             self._wait_s = min(AGAIN_LAST_S, 2.0 * self._wait_s)
         if not self._is_silence_reported and now_s - self._since_s >= BLAME_S:
             self._is_silence_reported = True
-            self._log.add(self._line.lateness.blame(SILENT, CHECK_SUPPLY, now_s, self._since_s))
+            self._log.add(self._board.lateness.blame(SILENT, CHECK_SUPPLY, now_s, self._since_s))
 
     def _record_answer(self, now_s: float) -> None:
         """Record an answer."""
@@ -192,7 +192,7 @@ class BoardSupervisor:
             self._log.add(f"the board answers again after {silent_s:.1f} s")
         elif silent_s >= SILENCE_S:
             fault = f"the board did not answer for {silent_s:.1f} s"
-            self._log.add(self._line.lateness.blame(fault, CHECK_SUPPLY, now_s, self._since_s))
+            self._log.add(self._board.lateness.blame(fault, CHECK_SUPPLY, now_s, self._since_s))
         self._missed, self._due_s, self._is_silence_reported = 0, -inf, False
 
     def _check_status(self) -> bool:
@@ -201,7 +201,7 @@ class BoardSupervisor:
         found = self._board.read_status(channel)
         if found is None:
             return False
-        now_s = self._line.port.now_s()
+        now_s = self._board.port.now_s()
         for one in self._channels:
             one.advance(now_s)
         self._record_errors(found.errors, now_s)
@@ -226,7 +226,7 @@ class BoardSupervisor:
 
     def _record_errors(self, names: Sequence[str], now_s: float) -> None:
         for name in names:
-            self._line.errors[name] += 1
+            self._board.errors[name] += 1
             if now_s - self._errors_s.get(name, -inf) >= SAME_S:
                 self._log.add(f"the board reports: {name}")
             self._errors_s[name] = now_s
@@ -236,7 +236,7 @@ class BoardSupervisor:
         pulses = self._board.read_pulses([channel.id for channel in self._channels])
         if pulses is None:
             return False
-        now_s = self._line.port.now_s()
+        now_s = self._board.port.now_s()
         errors = tuple(dict.fromkeys(self._unhandled_errors))
         is_sure = self.may_send_goals and not errors
         self.may_send_goals, self._unhandled_errors = True, ()
@@ -249,7 +249,7 @@ class BoardSupervisor:
                 lost.append(channel)
             elif channel.held and not is_expected:
                 is_sure = False
-                self._line.errors["other pulse"] += 1
+                self._board.errors["other pulse"] += 1
                 if self.is_ramped_by_board and channel.stays_at(pulse):
                     fault = channel.difference_text(pulse)
                     self._stop([channel], fault, self._board.remedy)
@@ -266,7 +266,7 @@ class BoardSupervisor:
     def _record_lost(self, lost: Sequence[Channel], errors: Sequence[str], now_s: float) -> None:
         """Record that channels have lost their pulses and must be enabled again."""
         who = "the board" if len(lost) == len(self._channels) else ", ".join(c.label for c in lost)
-        self._line.errors["restarted"] += 1
+        self._board.errors["restarted"] += 1
         self._mark(lost)
         self._restarts = [at_s for at_s in self._restarts if now_s - at_s < WITHIN_S]
         self._restarts.append(now_s)
@@ -320,7 +320,7 @@ class BoardSupervisor:
 
 def _blame(board: Board, fault: str, remedy: str) -> str:
     """Return a fault with its remedy, or with this computer as its cause if it was late."""
-    return board.line.lateness.blame(fault, remedy, board.line.port.now_s())
+    return board.lateness.blame(fault, remedy, board.port.now_s())
 
 
 def read_every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, ...]:
@@ -334,7 +334,7 @@ def read_every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, 
         pulses = board.read_pulses([setup.id for setup in setups])
         if pulses is not None:
             return pulses
-    where = board.line.port.port_name
+    where = board.port.port_name
     for setup in setups:
         if board.read_pulses((setup.id,)) is None:
             fault = f"{where}: {setup.label('channel')} does not answer"

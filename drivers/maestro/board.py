@@ -32,7 +32,7 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
 
 
-class MaestroBoard:
+class MaestroBoard(MaestroLink):
     """One board; implements gazerig.drivers.hobby_board.board.Board."""
 
     name = "the board"
@@ -40,8 +40,8 @@ class MaestroBoard:
     longest_ramp_s = inf
 
     def __init__(self, port: BusPort, params: MaestroParams, timing: BusTiming = TIMING) -> None:
+        super().__init__(port, params, timing)
         self.params, self.timing = params, timing
-        self.line = MaestroLink(port, params, timing)
         self._errors_first = False
         self._unhandled_errors = 0
 
@@ -52,16 +52,16 @@ class MaestroBoard:
             BusLost: the port is lost.
             ServoMissing: it does not answer, or a channel is not a servo channel.
         """
-        where = self.line.port.port_name
-        register = self.line.read_errors()
+        where = self.port.port_name
+        register = self.read_errors()
         if register is None:
             remedy = (
                 "take the first of its two USB ports and set it to 'USB Dual Port' in Pololu's "
                 f"program; its CRC must be {'on' if self.params.crc else 'off'}"
             )
-            lateness, now_s = self.line.lateness, self.line.port.now_s()
-            raise ServoMissing(lateness.blame(f"{where}: no Maestro answers", remedy, now_s))
-        if not self.line.expects_crc():
+            fault = f"{where}: no Maestro answers"
+            raise ServoMissing(self.lateness.blame(fault, remedy, self.port.now_s()))
+        if not self.expects_crc():
             raise ServoMissing(
                 f"{where}: the board expects no CRC: switch Enable CRC on in Pololu's program, as "
                 "noise moves servos without it, or set crc to false"
@@ -80,26 +80,24 @@ class MaestroBoard:
 
     def prepare(self, log: EventLog) -> None:
         """Stop the board's own script if one runs, as it would also move servos."""
-        if self.line.is_script_running():
-            self.line.stop_script()
+        if self.is_script_running():
+            self.stop_script()
             log.add("the board was running its own script: stopped")
 
     def read_status(self, channel: Channel) -> ChannelStatus | None:
         """Read one channel's pulse and the error register; None without an answer."""
-        codec = self.line.codec
+        codec = self.codec
         position, errors = codec.command(GET_POSITION, channel.id), codec.command(GET_ERRORS)
         # The order alternates: on a line that repeats its last answer a pulse width takes the place
         # of the register, which is detected.
         self._errors_first = not self._errors_first
-        found = self.line.ask_words(
-            errors + position if self._errors_first else position + errors, 2
-        )
+        found = self.ask_words(errors + position if self._errors_first else position + errors, 2)
         if found is None:
             return None
         pulse, register = found[::-1] if self._errors_first else found
         if register >> len(ERRORS):
             # Such errors do not exist: it is a pulse width instead of the register, or noise.
-            self.line.errors["damaged"] += 1
+            self.errors["damaged"] += 1
             return None
         register, self._unhandled_errors = register | self._unhandled_errors, 0
         return ChannelStatus(pulse, name_errors(register))
@@ -109,7 +107,7 @@ class MaestroBoard:
 
         On an error it may have stopped all pulses, so no command that moves a servo may follow.
         """
-        packet, codec = b"", self.line.codec
+        packet, codec = b"", self.codec
         for channel in channels:
             speed = speed_units(channel.top_speed_steps_s)
             accel = accel_units(channel.setup.max_accel_steps_s2)
@@ -117,7 +115,7 @@ class MaestroBoard:
             channel.ramp.accel_steps_s2 = accel * ACCEL_STEPS_S2
             packet += codec.number(SET_SPEED, channel.id, speed)
             packet += codec.number(SET_ACCELERATION, channel.id, accel)
-        found = self.line.ask_words(packet + codec.command(GET_ERRORS), 1)
+        found = self.ask_words(packet + codec.command(GET_ERRORS), 1)
         if found is None:
             return False
         self._unhandled_errors |= found[0]
@@ -125,15 +123,7 @@ class MaestroBoard:
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
         """Send the goals of channels."""
-        self.line.send(self.line.codec.targets({one.id: one.goal_steps for one in channels}))
-
-    def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Return the confirmed present pulses of channels; None after a failure."""
-        return self.line.read_pulses(channels)
-
-    def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
-        """Stop pulses."""
-        self.line.stop(channels)
+        self.send(self.codec.targets({one.id: one.goal_steps for one in channels}))
 
 
 class MaestroBus(HobbyBoardBus):

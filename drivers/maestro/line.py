@@ -1,11 +1,6 @@
-"""Exchanges with one Maestro: bounded waits, drained lines, counts.
-
-Answers have no address and no checksum, so a late answer looks like any other. After a missing
-answer the line is drained before the next request.
-"""
+"""Exchanges with one Maestro."""
 
 import struct
-from collections import Counter
 from collections.abc import Sequence
 
 from gazerig.drivers.bus.timing import TIMING, BusTiming
@@ -20,8 +15,8 @@ from gazerig.drivers.maestro.commands import (
     MaestroCodec,
 )
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.process.host_lateness import HostLateness
-from gazerig.drivers.serial.port import BITS_PER_BYTE, QUIET_S, BusPort
+from gazerig.drivers.serial.plain_line import PlainLine
+from gazerig.drivers.serial.port import QUIET_S, BusPort
 
 AT_ONCE = 6
 """Largest number of requests in one write, as the board's receive buffer is small."""
@@ -33,53 +28,23 @@ ALIKE_STEPS, FASTEST_STEPS_S = 200, 40_000.0
 them."""
 
 
-class MaestroLink:
+class MaestroLink(PlainLine):
     """A port with one board; every method may raise BusLost.
 
     codec: encoder of the board's commands
-    tx_bytes, rx_bytes: counts since creation
-    errors: counts by kind
-    lateness: counter of answers after their time-outs
     """
 
     def __init__(self, port: BusPort, params: MaestroParams, timing: BusTiming = TIMING) -> None:
-        self.port = port
+        super().__init__(port, params.baud, timing.reply_timeout_s)
         self.codec = MaestroCodec(params.crc, params.channels)
-        self.tx_bytes = self.rx_bytes = 0
-        self.errors: Counter[str] = Counter()
-        self.lateness = HostLateness()
-        self._byte_s = BITS_PER_BYTE / params.baud
-        self._reply_timeout_s = timing.reply_timeout_s
-        self._late = False
-        self._owed_bytes = 0
-
-    def send(self, packet: bytes) -> None:
-        """Send commands that are not answered."""
-        self.port.write(packet)
-        self.tx_bytes += len(packet)
 
     def ask(self, packet: bytes, length: int) -> bytes | None:
         """Send requests and return their answers; None if they do not come in time."""
-        port = self.port
-        if self._late or self._owed_bytes:
-            # After a silence answers to earlier requests may come first.
-            dropped = port.drain()
-            if 0 < dropped <= self._owed_bytes:
-                self.lateness.record_late_answer(port.now_s())
-            if not self._late and not dropped:
-                self._owed_bytes = 0
-        wire_s = (len(packet) + length) * self._byte_s
-        deadline_s = port.now_s() + wire_s + self._reply_timeout_s
-        answer, _ = port.exchange(packet, length, deadline_s)
-        self.tx_bytes += len(packet)
-        self.rx_bytes += len(answer)
-        self._late = len(answer) < length
-        self._owed_bytes += length - len(answer)
-        if self._late:
-            self.lateness.record_wait(deadline_s, port.now_s())
-            self.errors["incomplete" if answer else "timeout"] += 1
-            return None
-        return answer
+        answer = self.exchange(packet, length)
+        if len(answer) == length:
+            return answer
+        self.record_missing(answer)
+        return None
 
     def ask_words(self, packet: bytes, count: int) -> tuple[int, ...] | None:
         """Send requests and return their answers as 16-bit words; None without a good answer."""
@@ -88,14 +53,9 @@ class MaestroLink:
             return None
         found = struct.unpack(f"<{count}H", answer)
         if max(found) > MOST:
-            self._record_damage()
+            self.record_damage()
             return None
         return found
-
-    def _record_damage(self) -> None:
-        """Record that bytes were changed, lost or added."""
-        self.errors["damaged"] += 1
-        self._late = True
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses."""
@@ -149,7 +109,7 @@ class MaestroLink:
         # Only for several channels, as it takes 3 ms: all are read only after an anomaly.
         over = len(channels) > 1 and self.port.read_until(1, self.port.now_s() + QUIET_S)
         if over or not alike:
-            self._record_damage()
+            self.record_damage()
             return None
         return second
 

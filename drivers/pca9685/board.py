@@ -48,7 +48,7 @@ PRESCALE_EVERY = 8
 """Number of status reads per read of the prescaler."""
 
 
-class Pca9685Board:
+class Pca9685Board(I2cLine):
     """The boards of one bus; implements gazerig.drivers.hobby_board.board.Board.
 
     Args:
@@ -61,8 +61,8 @@ class Pca9685Board:
     """Longest time for which a ramp advances after a pause."""
 
     def __init__(self, port: BusPort, params: Pca9685Params, timing: BusTiming = TIMING) -> None:
+        super().__init__(port, params.baud, timing.reply_timeout_s)
         self.params, self.timing = params, timing
-        self.line = I2cLine(port, params.baud, timing.reply_timeout_s)
         self.name = "board " + " and ".join(f"{address:#x}" for address in params.addresses)
         self._clock = params.clock
         self._status_reads = 0
@@ -86,7 +86,7 @@ class Pca9685Board:
             ServoMissing: a board does not answer, or another chip does.
         """
         for address in self._addresses([setup.id for setup in setups]):
-            check_board(self.line, address)
+            check_board(self, address)
         return read_every_pulse(self, setups)
 
     def prepare(self, log: EventLog) -> None:
@@ -100,12 +100,12 @@ class Pca9685Board:
             return modes == wanted
         mode1, _, prescale = modes
         if not mode1 & SILENT and prescale == self._clock.prescale:
-            return self.line.write_confirmed(
+            return self.write_confirmed(
                 write(address, MODE1, bytes((AWAKE,))),
                 write(address, MODE2, bytes((TOTEM_POLE,))),
             )
         # From any state: no pulses, sleep, prescaler, then wake.
-        asleep = self.line.write_confirmed(
+        asleep = self.write_confirmed(
             write(address, ALL_LED + BYTES - 1, bytes((FULL_OFF,))),
             write(address, MODE1, bytes((SLEEP | AUTO_INCREMENT,))),
             write(address, PRESCALE, bytes((self._clock.prescale,))),
@@ -114,17 +114,17 @@ class Pca9685Board:
         )
         if not asleep:
             return False
-        wait_until(self.line.port, self.line.port.now_s() + START_S)
+        wait_until(self.port, self.port.now_s() + START_S)
         # Channels that slept with pulses on would resume here; there are none now.
-        self.line.write_confirmed(write(address, MODE1, bytes((RESTART | AWAKE,))))
+        self.write_confirmed(write(address, MODE1, bytes((RESTART | AWAKE,))))
         return self._modes(address) == wanted
 
     def _modes(self, address: int) -> tuple[int, int, int] | None:
         """Read both modes and the prescaler, twice; None after a failure."""
         questions = [(read(address, at, 1), 1) for at in (MODE1, MODE2, PRESCALE)]
-        found = self.line.ask(questions * 2)
+        found = self.ask(questions * 2)
         if found is None or found[:3] != found[3:]:
-            self.line.errors["damaged"] += found is not None
+            self.errors["damaged"] += found is not None
             return None
         return found[0][0], found[1][0], found[2][0]
 
@@ -143,7 +143,7 @@ class Pca9685Board:
         ]
         self._status_reads += 1
         with_prescale = self._status_reads % PRESCALE_EVERY == 0
-        found = self.line.ask(questions if with_prescale else questions[:2])
+        found = self.ask(questions if with_prescale else questions[:2])
         if found is None:
             return None
         mode = found[0][0]
@@ -158,7 +158,7 @@ class Pca9685Board:
         first = self._pulses_once(channels)
         second = None if first is None else self._pulses_once(channels)
         if second is not None and first != second:
-            self.line.errors["damaged"] += 1
+            self.errors["damaged"] += 1
             return None
         return second
 
@@ -166,7 +166,7 @@ class Pca9685Board:
         pulses: dict[int, int] = {}
         for address in self._addresses(channels):
             own = [servo_id for servo_id in channels if self._place(servo_id)[0] == address]
-            modes = self.line.ask([(read(address, at, 1), 1) for at in (MODE1, PRESCALE)])
+            modes = self.ask([(read(address, at, 1), 1) for at in (MODE1, PRESCALE)])
             if modes is None:
                 return None
             mode, prescale = modes[0][0], modes[1][0]
@@ -180,7 +180,7 @@ class Pca9685Board:
                 for servo_id in own
                 for k in range(0, BYTES, size)
             ]
-            found = self.line.ask([(read(address, at, size), size) for at in places])
+            found = self.ask([(read(address, at, size), size) for at in places])
             if found is None:
                 return None
             outputs, grain = b"".join(found), self._clock._replace(prescale=prescale)
@@ -213,7 +213,7 @@ class Pca9685Board:
                 for run in adjacent_runs(sorted(outputs))
             ]
         )
-        self.line.send(packet)
+        self.send(packet)
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses, each by one register, in any state; on the last try all of a board."""
@@ -221,7 +221,7 @@ class Pca9685Board:
         if last_try:
             places += [(address, ALL_LED) for address in self._addresses(channels)]
         off = bytes((FULL_OFF,))
-        self.line.send(b"".join([write(address, at + BYTES - 1, off) for address, at in places]))
+        self.send(b"".join([write(address, at + BYTES - 1, off) for address, at in places]))
 
 
 class Pca9685Bus(HobbyBoardBus):
