@@ -101,7 +101,7 @@ class Channel:
         self.ramp = Ramp(0.0, 0.0)
         self._is_position_known = False
         self._at_s = -inf
-        self._moved_steps, self._other_steps = 0.0, 0
+        self._moved_steps = 0.0
         self.set_target(setup)
 
     def set_target(self, setup: ServoConfig) -> None:
@@ -140,7 +140,7 @@ class Channel:
             self.ramp.begin(pulse_steps or self.goal_steps)
         self.on, self.fault = True, ""
         self._at_s = now_s
-        self._moved_steps, self._other_steps = 0.0, 0
+        self._moved_steps = 0.0
         return self.goal_steps
 
     def record_hold(self, pulse_steps: int) -> None:
@@ -187,15 +187,7 @@ class Channel:
     def is_expected(self, pulse_steps: int) -> bool:
         """Return whether a pulse is the estimated one, or one shortly before."""
         room = FINE_STEPS + self._moved_steps
-        expected = pulse_steps > 0 and abs(pulse_steps - self.ramp.pulse_steps) <= room
-        if expected:
-            self._other_steps = 0
-        return expected
-
-    def stays_at(self, pulse_steps: int) -> bool:
-        """Record a pulse that is not expected; return whether the last such pulse was the same."""
-        before, self._other_steps = self._other_steps, pulse_steps
-        return before == pulse_steps
+        return pulse_steps > 0 and abs(pulse_steps - self.ramp.pulse_steps) <= room
 
     def adopt_pulse(self, pulse_steps: int) -> None:
         """Adopt the pulse width that the board reports, if the board ramps it."""

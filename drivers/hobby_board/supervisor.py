@@ -27,9 +27,8 @@ MOST_TRIES = 100
 SAME_S = 1.0
 """Shortest time between two reports of the same error."""
 
-IN_A_ROW, AGAIN_FIRST_S, AGAIN_LAST_S = 3, 0.0625, 0.5
-"""A board is asked less often after so many missing answers, as each costs a read its time-out: the
-interval is doubled from the first to the last value."""
+IN_A_ROW, AGAIN_S = 3, 0.25
+"""A board is asked less often after so many missing answers, as each costs a read its time-out."""
 
 SILENT, CHECK_SUPPLY = "the board does not answer", "check its power and the cable"
 
@@ -49,12 +48,11 @@ class BoardSupervisor:
         self.engaged, self.may_send_goals = False, True
         self.pending: list[Channel] = []
         self._channel_index = -1
-        self._unhandled_errors: tuple[str, ...] = ()
         self._restarts: list[float] = []
         self._failed_tries = 0
         self._errors_s: dict[str, float] = {}
         self._missed, self._is_silence_reported = 0, False
-        self._since_s, self._due_s, self._wait_s = 0.0, -inf, AGAIN_FIRST_S
+        self._since_s, self._due_s = 0.0, -inf
 
     def stop_supervision(self) -> None:
         """Stop supervision."""
@@ -65,9 +63,7 @@ class BoardSupervisor:
 
     def mark_all_for_recovery(self) -> None:
         """Mark every channel to be enabled again."""
-        self.may_send_goals = False
-        if self.engaged:
-            self._mark([channel for channel in self._channels if channel.held])
+        self._mark([channel for channel in self._channels if channel.held])
 
     def recent_errors(self, now_s: float) -> tuple[str, ...]:
         """Return the errors that the board has reported recently."""
@@ -103,7 +99,6 @@ class BoardSupervisor:
                 text = f"{port.port_name}: {channel.label} {fault}"
                 raise ServoMissing(_blame(board, text, board.remedy))
         self.engaged = self.may_send_goals = True
-        self._unhandled_errors = ()
         self._restarts.clear()
         self.pending.clear()
 
@@ -174,11 +169,10 @@ class BoardSupervisor:
     def _record_miss(self, now_s: float) -> None:
         """Record a missing or damaged answer."""
         if not self._missed:
-            self._since_s, self._wait_s = now_s, AGAIN_FIRST_S
+            self._since_s = now_s
         self._missed += 1
         if self._missed >= IN_A_ROW:
-            self._due_s = now_s + self._wait_s
-            self._wait_s = min(AGAIN_LAST_S, 2.0 * self._wait_s)
+            self._due_s = now_s + AGAIN_S
         if not self._is_silence_reported and now_s - self._since_s >= BLAME_S:
             self._is_silence_reported = True
             self._log.add(self._board.lateness.blame(SILENT, CHECK_SUPPLY, now_s, self._since_s))
@@ -188,9 +182,7 @@ class BoardSupervisor:
         if not self._missed:
             return
         silent_s = now_s - self._since_s
-        if self._is_silence_reported:
-            self._log.add(f"the board answers again after {silent_s:.1f} s")
-        elif silent_s >= SILENCE_S:
+        if self._is_silence_reported or silent_s >= SILENCE_S:
             fault = f"the board did not answer for {silent_s:.1f} s"
             self._log.add(self._board.lateness.blame(fault, CHECK_SUPPLY, now_s, self._since_s))
         self._missed, self._due_s, self._is_silence_reported = 0, -inf, False
@@ -201,21 +193,22 @@ class BoardSupervisor:
         found = self._board.read_status(channel)
         if found is None:
             return False
+        pulse, errors = found
         now_s = self._board.port.now_s()
         for one in self._channels:
             one.advance(now_s)
-        self._record_errors(found.errors, now_s)
-        if not self.engaged:
-            channel.adopt_pulse(found.pulse_steps)
-            self.may_send_goals = True
-            return True
-        self._unhandled_errors = (*self._unhandled_errors, *found.errors)
-        odd = channel.held and not channel.is_expected(found.pulse_steps)
-        if self._unhandled_errors or not self.may_send_goals or odd:
-            if not self._check_all():
+        self._record_errors(errors, now_s)
+        if not channel.held:
+            if not self.engaged:
+                channel.adopt_pulse(pulse)
+        elif errors or not channel.is_expected(pulse):
+            confirmed = self._board.read_pulses((channel.id,))
+            if confirmed is None:
                 return False
-        elif channel.held:
-            channel.adopt_pulse(found.pulse_steps)
+            self._handle_trouble(channel, confirmed[0], errors)
+        else:
+            channel.adopt_pulse(pulse)
+            self.may_send_goals = True
         if self.pending:
             self._rearm_next()
         for one in self._channels:
@@ -224,6 +217,30 @@ class BoardSupervisor:
                 self.may_send_goals = self._board.send_limits([one])
         return True
 
+    def _handle_trouble(self, channel: Channel, pulse: int, errors: Sequence[str]) -> None:
+        """Handle an error, or a channel's pulse that was not expected; both may concern all."""
+        now_s = self._board.port.now_s()
+        channel.advance(now_s)
+        held = [one for one in self._channels if one.held]
+        is_corrected = pulse > 0 and not self.is_ramped_by_board  # by the next goals
+        if is_corrected or channel.is_expected(pulse):
+            self._board.errors["other pulse"] += not channel.is_expected(pulse)
+            self.may_send_goals = self._board.send_limits(held)
+            return
+        self._board.errors["restarted"] += 1
+        self._mark(held)
+        text, remedy = "the board restarted", "check its supply, cable and ground"
+        if errors:
+            text = f"the board was sent home by an error ({' and '.join(errors)})"
+        elif pulse:
+            text, remedy = f"{channel.label} {channel.difference_text(pulse)}", self._board.remedy
+        self._restarts = [at_s for at_s in self._restarts if now_s - at_s < WITHIN_S]
+        self._restarts.append(now_s)
+        if len(self._restarts) > MOST_RESTARTS:
+            self._stop(self.pending, f"{text} again and again", remedy)
+        else:
+            self._log.add(f"{text}: set up again")
+
     def _record_errors(self, names: Sequence[str], now_s: float) -> None:
         for name in names:
             self._board.errors[name] += 1
@@ -231,56 +248,11 @@ class BoardSupervisor:
                 self._log.add(f"the board reports: {name}")
             self._errors_s[name] = now_s
 
-    def _check_all(self) -> bool:
-        """Compare every channel's pulse with the expected one; return whether they were read."""
-        pulses = self._board.read_pulses([channel.id for channel in self._channels])
-        if pulses is None:
-            return False
-        now_s = self._board.port.now_s()
-        errors = tuple(dict.fromkeys(self._unhandled_errors))
-        is_sure = self.may_send_goals and not errors
-        self.may_send_goals, self._unhandled_errors = True, ()
-        lost = list[Channel]()
-        for channel, pulse in zip(self._channels, pulses, strict=True):
-            channel.advance(now_s)
-            is_expected = channel.is_expected(pulse)
-            channel.adopt_pulse(pulse)
-            if channel.held and not pulse:
-                lost.append(channel)
-            elif channel.held and not is_expected:
-                is_sure = False
-                self._board.errors["other pulse"] += 1
-                if self.is_ramped_by_board and channel.stays_at(pulse):
-                    fault = channel.difference_text(pulse)
-                    self._stop([channel], fault, self._board.remedy)
-        if lost:
-            self._record_lost(lost, errors, now_s)
-        held = [channel for channel in self._channels if channel.held]
-        if held and (lost or not is_sure):
-            # A restart loses the limits, and goals are sent only if these have arrived intact.
-            self.may_send_goals = self._board.send_limits(held)
-        return True
-
     # --- channels without pulses
 
-    def _record_lost(self, lost: Sequence[Channel], errors: Sequence[str], now_s: float) -> None:
-        """Record that channels have lost their pulses and must be enabled again."""
-        who = "the board" if len(lost) == len(self._channels) else ", ".join(c.label for c in lost)
-        self._board.errors["restarted"] += 1
-        self._mark(lost)
-        self._restarts = [at_s for at_s in self._restarts if now_s - at_s < WITHIN_S]
-        self._restarts.append(now_s)
-        if len(self._restarts) > MOST_RESTARTS:
-            named = f" ({' and '.join(errors)})" if errors else ""
-            fault = f"loses its pulses again and again{named}"
-            self._stop(self.pending, fault, "check its supply, cable and ground")
-        elif errors:
-            self._log.add(f"{who} was sent home by an error ({' and '.join(errors)}): set up again")
-        else:
-            self._log.add(f"{who} restarted: set up again")
-
     def _mark(self, channels: Sequence[Channel]) -> None:
-        self._failed_tries = 0
+        """Mark channels to be enabled again."""
+        self._failed_tries, self.may_send_goals = 0, True
         for channel in channels:
             channel.record_release()
             self.pending.append(channel)
@@ -311,11 +283,10 @@ class BoardSupervisor:
         """Stop the pulses of channels, which stay without, and name their fault."""
         self._board.stop([channel.id for channel in channels])
         text = _blame(self._board, fault, remedy)
+        self._log.add(f"{', '.join(channel.label for channel in channels)}: {text}")
         for channel in tuple(channels):
             channel.record_stop(text)
-            self._log.add(f"{channel.label} {text}")
-            if channel in self.pending:
-                self.pending.remove(channel)
+            self.pending.remove(channel)
 
 
 def _blame(board: Board, fault: str, remedy: str) -> str:
