@@ -44,16 +44,16 @@ class HobbyBoard(ABC):
         """Restart as after a dip of the supply."""
 
     @abstractmethod
-    def target_steps(self, channel: int) -> int:
-        """Return the commanded pulse of a channel, quarter microseconds; 0: none."""
-
-    @abstractmethod
     def pulse_steps(self, channel: int) -> int:
         """Return the present pulse of a channel, quarter microseconds; 0: none."""
 
-    @abstractmethod
+    def target_steps(self, channel: int) -> int:
+        """Return the commanded pulse of a channel, if it differs from the present one."""
+        return self.pulse_steps(channel)
+
     def step_outputs(self) -> bool:
-        """Advance the outputs by 10 ms; return whether they are at rest."""
+        """Advance outputs that have a ramp by 10 ms; return whether they are at rest."""
+        return True
 
     @abstractmethod
     def execute(self, data: bytes) -> Iterator[tuple[int, Piece | None]]:

@@ -28,13 +28,6 @@ def test_without_limits_the_pulse_jumps_and_the_shaft_follows_at_its_own_speed()
     assert (ramp.shaft_steps, ramp.shaft_steps_s) == (7000.0, 0.0)
 
 
-def test_a_speed_limit_is_kept():
-    ramp = Ramp(6000.0, 1e6)
-    ramp.speed_steps_s = 2000.0
-    assert moved(ramp, 8000.0, 0.5).pulse_steps == pytest.approx(7000.0)
-    assert moved(ramp, 8000.0, 0.6).pulse_steps == 8000.0
-
-
 def test_an_acceleration_limit_takes_as_long_as_a_trapezoid():
     ramp = Ramp(4000.0, 1e6)
     ramp.speed_steps_s, ramp.accel_steps_s2 = 4000.0, 5000.0

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from maestro_world import PROTOCOL, World, acceleration, speed, target
 
 from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.maestro.board import ERRORS, SIZES, build_board, crc7
+from gazerig.sim_mock.maestro.board import ERRORS, SIZES, crc7
 from gazerig.sim_mock.maestro.channel import EmulatedChannel
 
 
@@ -120,13 +120,6 @@ def test_a_channel_keeps_its_limits_and_always_arrives(orders):
     assert channel.position == channel.target and not channel.is_moving
 
 
-def test_servos_follow_the_pulses(world):
-    world.ask(target(0, 8000) + target(1, 4000))
-    places = world.after(0.5).board.positions_steps()
-    assert places[:2] == pytest.approx((8000, 4000), abs=20)
-    assert places[2:] == (6000.0,) * 10
-
-
 # --- faults
 
 
@@ -147,36 +140,6 @@ def test_errors_at_will_are_bits_of_the_register_and_end_all_pulses(world):
         assert (world.errors(), world.position()) == (1 << bit, 0)
     with pytest.raises(ValueError, match="'heat' is none of signal, overrun"):
         world.do("error heat")
-
-
-def test_servos_without_their_supply_are_limp_and_the_board_notices_nothing(world):
-    world.ask(target(0, 7000))
-    world.after(1.0).do("power off")
-    world.after(0.1).do("turn 0 -500")
-    assert world.after(1.0).board.positions_steps()[0] == pytest.approx(6490, abs=20)
-    assert (world.position(), world.errors()) == (7000, 0)
-    world.do("power on")
-    assert world.after(1.0).board.positions_steps()[0] == pytest.approx(7000, abs=20)
-
-
-def test_commands_are_lost_on_their_way(world):
-    world.do("lose-writes 1")
-    assert world.ask("A1") == bytes(2)
-    world.ask(target(0, 6000) + target(1, 6000))
-    assert world.positions()[:2] == [0, 6000]
-
-
-@pytest.mark.parametrize(
-    ("channels", "options", "says"),
-    [
-        (8, {}, "8 channels: a Maestro has 6, 12, 18, 24"),
-        (6, {"servos": [HobbySpec(6)]}, "different channels from 0 to 5"),
-        (6, {"servos": [(1,), (1,)]}, "different channels from 0 to 5"),
-    ],
-)
-def test_boards_that_do_not_exist(channels, options, says):
-    with pytest.raises(ValueError, match=says):
-        build_board(channels, lambda: 0.0, **options)
 
 
 @given(

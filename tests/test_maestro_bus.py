@@ -86,11 +86,6 @@ def test_setups_that_no_board_can_have(setup):
         World(setups=(setup,))
 
 
-def test_two_servos_on_one_channel():
-    with pytest.raises(ValueError, match="one servo only"):
-        World(setups=(SETUPS[0], SETUPS[0]))
-
-
 # --- torque on
 
 
@@ -122,12 +117,6 @@ def test_a_board_with_a_narrower_range_is_refused():
     with pytest.raises(ServoMissing, match="brow.*sent to 1900 us and gets 1750 us.*widen"):
         world.bus.enable_torque()
     assert world.positions(IDS) == [0, 0, 0]
-
-
-def test_no_answer_at_torque_on(world):
-    world.do("lose all")
-    with pytest.raises(ServoMissing, match=r"eyes \(channel 0\) does not answer"):
-        world.bus.enable_torque()
 
 
 def test_a_running_script_is_stopped(world):
@@ -272,12 +261,6 @@ def test_more_than_was_asked_for_is_damage():
     line = MaestroLink(port, MaestroParams())
     assert line.read_pulses((0, 1, 2)) is None
     assert line.read_pulses((0, 1, 2)) == (0, 0, 0)
-
-
-def test_the_board_is_not_asked_too_much_at_once():
-    port = ScriptedPort(*[bytes(12), bytes(6)] * 2)
-    assert MaestroLink(port, MaestroParams()).read_pulses(range(9)) == (0,) * 9
-    assert [len(packet) for packet in port.sent] == [12, 6] * 2
 
 
 # --- search

@@ -64,19 +64,11 @@ class Bridge(HobbyBoard):
         for chip in self.chips.values():
             chip.reset()
 
-    def target_steps(self, channel: int) -> int:
-        """Return the pulse of a channel, quarter microseconds; 0: none."""
-        return self.pulse_steps(channel)
-
     def pulse_steps(self, channel: int) -> int:
         """Return the true pulse of a channel, quarter microseconds; 0: none."""
         board, nth = divmod(channel, CHANNELS)
         width_s = tuple(self.chips.values())[board].width_s(nth)
         return round(width_s * 1e6 * US_STEPS)
-
-    def step_outputs(self) -> bool:
-        """Return True, as outputs change at once."""
-        return True
 
     def execute(self, data: bytes) -> Iterator[tuple[int, Piece | None]]:
         """Execute every complete command; an incomplete one waits for the rest."""
