@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from typing import ClassVar, Protocol
 
 from gazerig.drivers.bus.release_result import ReleaseResult
-from gazerig.drivers.errors import BusLost
+from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import BusHealth, ServoConfig
 
 CUT = "cut the servo power"
+
+AGAIN_S = 0.2
+"""Interval of attempts to open a lost port."""
 
 
 class Exchange(Protocol):
@@ -43,6 +45,9 @@ class PortBus(ABC):
 
     A bus creates its parts before any of these methods is called, and may replace them.
 
+    _give_up_s: longest loss of the port, seconds
+    _is_down: whether the port is lost
+    _release_due: whether torque must be switched off as soon as the port is open
     holding_text, unconfirmed_text: messages for a servo whose torque is not off, or that does not
         confirm it
     """
@@ -52,13 +57,14 @@ class PortBus(ABC):
 
     _port: BusPort
     _line: Exchange
-    _link: ReconnectingPort
     _log: EventLog
     _supervisor: BusSupervisor
     _setups: tuple[ServoConfig, ...]
     _target_setups: tuple[ServoConfig, ...]
-    _opened = False
-    _now_s = 0.0
+    _baud: int
+    _give_up_s: float
+    _opened = _is_down = _release_due = False
+    _now_s = _lost_s = _next_s = 0.0
 
     @abstractmethod
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
@@ -83,6 +89,10 @@ class PortBus(ABC):
     @abstractmethod
     def _cannot_release(self) -> str:
         """Return the text about servos whose torque cannot be switched off."""
+
+    @abstractmethod
+    def _reset_after_reconnect(self) -> None:
+        """Reset the state after the port was opened again: every servo must be checked."""
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Store setups, with the same ids and models, for the next time torque is switched on.
@@ -117,8 +127,8 @@ class PortBus(ABC):
         self._supervisor.stop_supervision()
         if not self._opened:
             return
-        if self._link.down and not self._link.reopen_now():
-            self._link.record_failed_release()
+        if self._is_down and not self._reopen():
+            self._release_due = True
             raise BusLost(self._cannot_release())
         self._switch_all_off()
 
@@ -129,15 +139,43 @@ class PortBus(ABC):
         self._port.closePort()
 
     def _reopen_if_needed(self, now_s: float) -> bool:
-        """Reopen the port if needed; return whether it is open and no torque release is pending."""
+        """Reopen the port if needed; return whether it is open and no torque release is pending.
+
+        Raises:
+            BusLost: it has been lost for longer than ``_give_up_s``.
+        """
         self._now_s = now_s
-        if self._link.down and not self._link.try_reopen(now_s):
-            return False
-        if self._link.release_due:
+        if self._is_down:
+            gone_s = now_s - self._lost_s
+            if now_s >= self._next_s:
+                self._next_s = now_s + AGAIN_S
+                if self._reopen():
+                    name = self._port.port_name
+                    where = getattr(self._port, "opened_as", name)
+                    renamed = f" as {where}" if where != name else ""
+                    self._log.add(f"port back after {gone_s:.1f} s{renamed}")
+            if self._is_down and gone_s >= self._give_up_s:
+                raise BusLost(
+                    f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
+                )
+        if self._release_due and not self._is_down:
             try:
                 self._switch_all_off()
             except BusLost:
                 return False
+        return not self._is_down
+
+    def _reopen(self) -> bool:
+        """Try to open the port; return whether it is open."""
+        try:
+            if not self._port.setBaudRate(self._baud):
+                return False
+            self._port.clearPort()
+        except (PortError, BusLost):
+            self._port.closePort()
+            return False
+        self._is_down = False
+        self._reset_after_reconnect()
         return True
 
     def _switch_all_off(self) -> None:
@@ -146,9 +184,11 @@ class PortBus(ABC):
             released = self._switch_off()
         except BusLost as lost:
             self._record_loss(lost)
-            self._link.record_failed_release()
+            self._release_due = True
             raise BusLost(self._cannot_release()) from lost
-        self._link.record_release()
+        if self._release_due:
+            self._log.add("torque switched off, as requested while the port was gone")
+        self._release_due = False
         self._line.errors["refused"] += len(released.holding_ids)
         for ids, what in (
             (released.holding_ids, self.holding_text),
@@ -158,4 +198,7 @@ class PortBus(ABC):
                 self._log.add(f"{self._servo_label(servo_id)}: {what}: {CUT}")
 
     def _record_loss(self, lost: BusLost) -> None:
-        self._link.record_loss(lost, self._now_s)
+        """Record that the port is lost."""
+        self._is_down, self._lost_s, self._next_s = True, self._now_s, self._now_s + AGAIN_S
+        self._port.closePort()
+        self._log.add(f"port lost: {lost}")

@@ -23,7 +23,6 @@ from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
 from gazerig.drivers.hobby_board.supervisor import BoardSupervisor
-from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import Feedback, ServoConfig
 
 UNMEASURED = "hobby servos report no positions: those shown are their goals"
@@ -54,6 +53,7 @@ class HobbyBoardBus(PortBus):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
         self._log = EventLog()
         self._nothing = Feedback.create_missing(len(self._ids))
+        self._baud, self._give_up_s = board.params.baud, board.timing.give_up_s
         self._reported = False
         self._create_parts()
 
@@ -62,13 +62,7 @@ class HobbyBoardBus(PortBus):
         self._setups = self._target_setups
         self._channels = tuple(Channel(setup, self._board.longest_ramp_s) for setup in self._setups)
         self._supervisor = BoardSupervisor(self._board, self._channels, self._log)
-        self._link = ReconnectingPort(
-            self._port,
-            self._board.params.baud,
-            self._board.timing.give_up_s,
-            self._log,
-            self._supervisor.mark_all_for_recovery,
-        )
+        self._is_down = self._release_due = False
         self._limp = set[Channel]()
 
     # --- public interface
@@ -105,8 +99,7 @@ class HobbyBoardBus(PortBus):
             BusLost: port or board have been lost for longer than ``give_up_s``.
         """
         self._now_s = now_s
-        link = self._link
-        if (link.down or link.release_due) and not self._reopen_if_needed(now_s):
+        if (self._is_down or self._release_due) and not self._reopen_if_needed(now_s):
             return self._nothing
         try:
             answered = self._supervisor.check(now_s)
@@ -166,9 +159,9 @@ class HobbyBoardBus(PortBus):
             self.disable_torque()
             raise
         except BusLost:
-            self._link.record_failed_release()  # some channels may already have pulses
+            self._release_due = True  # some channels may already have pulses
             raise
-        self._link.release_due = False
+        self._release_due = False
         self._limp.clear()
         return tuple(channel.goal_steps for channel in self._channels)
 
@@ -178,7 +171,7 @@ class HobbyBoardBus(PortBus):
         Their first pulse is the last one before: a joint that was moved by hand returns there at
         the servo's own speed, as its position is not known. A channel that does not stop, is held.
         """
-        if not self._supervisor.engaged or self._link.down:
+        if not self._supervisor.engaged or self._is_down:
             return
         wanted = [self._channels[i] for i in servos]
         off = [channel for channel in wanted if channel.held]
@@ -214,7 +207,7 @@ class HobbyBoardBus(PortBus):
         goals = [*map(int, clip_goals(goals_steps, lowest, highest))]
         held = [channel for channel in self._channels if channel.held]
         supervisor = self._supervisor
-        if not supervisor.engaged or self._link.down or not held:
+        if not supervisor.engaged or self._is_down or not held:
             return
         now_s = self._port.now_s()
         try:
@@ -257,3 +250,6 @@ class HobbyBoardBus(PortBus):
             f"{self._port.port_name} is gone: pulses could not be stopped; the board keeps its "
             f"last ones while it has power: {CUT} to free them"
         )
+
+    def _reset_after_reconnect(self) -> None:
+        self._supervisor.mark_all_for_recovery()

@@ -12,7 +12,6 @@ from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.servo_bus.discovery import find
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.faults import CHECK_SUPPLY, SilenceLog
@@ -71,7 +70,7 @@ class SmartServoBus(PortBus):
         self._check_setups(setups)
         self._port = port
         self._setups = self._target_setups = tuple(setups)
-        self._baud, self._timing = baud, timing
+        self._baud, self._give_up_s = baud, timing.give_up_s
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._lowest = tuple(setup.min_steps for setup in setups)
@@ -99,9 +98,7 @@ class SmartServoBus(PortBus):
         """
         line, log = self._line, self._log
         by_id = self._by_id = {setup.id: setup for setup in self._setups}
-        self._link = ReconnectingPort(
-            self._port, self._baud, self._timing.give_up_s, log, self._reset_after_reconnect
-        )
+        self._is_down = self._release_due = False
         self._poll_list = PollList(self._ids)
         self._silence = SilenceLog(by_id, log, line.lateness)
         plan = self._plan = self._family.read_plan(self._setups, firmware)
@@ -253,8 +250,7 @@ class SmartServoBus(PortBus):
             BusLost: port or servos have been lost for longer than ``give_up_s``.
         """
         self._now_s = now_s
-        link = self._link
-        if (link.down or link.release_due) and not self._reopen_if_needed(now_s):
+        if (self._is_down or self._release_due) and not self._reopen_if_needed(now_s):
             return self._nothing
         line, reader, feedback = self._line, self._reader, self._feedback
         supervisor = self._supervisor
@@ -278,7 +274,7 @@ class SmartServoBus(PortBus):
             return self._nothing
         if self._poll_list.is_troubled:
             silent_s = self._silence.silent_for_s(now_s)
-            if silent_s >= self._timing.give_up_s:
+            if silent_s >= self._give_up_s:
                 fault = f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s"
                 raise BusLost(line.lateness.blame(fault, CHECK_SUPPLY, now_s, now_s - silent_s))
         return feedback.now
@@ -304,9 +300,9 @@ class SmartServoBus(PortBus):
             self.disable_torque()
             raise
         except BusLost:
-            self._link.record_failed_release()  # some servos may already have torque
+            self._release_due = True  # some servos may already have torque
             raise
-        self._link.release_due = False
+        self._release_due = False
         return goals
 
     def set_limp(self, servos: Collection[int]) -> None:
@@ -314,7 +310,7 @@ class SmartServoBus(PortBus):
 
         They hold their present position. One that refuses is set up again by later reads.
         """
-        if not self._supervisor.engaged or self._link.down:
+        if not self._supervisor.engaged or self._is_down:
             return
         try:
             self._supervisor.set_limp({self._ids[i] for i in servos})
@@ -332,7 +328,7 @@ class SmartServoBus(PortBus):
         """
         goals = clip_goals(goals_steps, self._lowest, self._highest)
         supervisor, line = self._supervisor, self._line
-        if not supervisor.engaged or self._link.down or line.starved:
+        if not supervisor.engaged or self._is_down or line.starved:
             return
         withheld, speeds = supervisor.withheld_ids(self._now_s), supervisor.speeds
         try:

@@ -13,7 +13,6 @@ from gazerig.drivers.bus.servo_models import ServoModelInfo
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import Feedback, ServoConfig
 from gazerig.params import Bounds, Choices
 from gazerig_lx16a import protocol as p
@@ -77,6 +76,7 @@ class Lx16aBus(PortBus):
 
     def __init__(self, port: BusPort, setups: Sequence[ServoConfig], params: Lx16aParams) -> None:
         self._port, self._params = port, params
+        self._baud, self._give_up_s = p.BAUD, params.give_up_s
         self._line, self._log = Line(port, params.reply_timeout_ms / 1e3), EventLog()
         self._supervisor, self.engaged = self, False
         self._setups = self._target_setups = tuple(setups)
@@ -85,9 +85,7 @@ class Lx16aBus(PortBus):
 
     def _reset(self) -> None:
         count = len(self._setups)
-        self._link = ReconnectingPort(
-            self._port, p.BAUD, self._params.give_up_s, self._log, self._check_all
-        )
+        self._is_down = self._release_due = False
         self._sure = Plausibility([FASTEST_STEPS_S] * count)
         self._heard_s, self._due_s = [self._port.now_s()] * count, [-inf] * count
         self._last: list[tuple[int, float] | None] = [None] * count
@@ -136,7 +134,7 @@ class Lx16aBus(PortBus):
             self._record_loss(lost)
             return Feedback.create_missing(count)
         silent_s = now_s - max(self._heard_s)
-        if silent_s >= self._params.give_up_s:
+        if silent_s >= self._give_up_s:
             raise BusLost(
                 f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s: "
                 "check supply and cable"
@@ -210,9 +208,9 @@ class Lx16aBus(PortBus):
                     raise ServoMissing(f"{setup.label()} does not confirm its torque: {CUT}")
                 goals.append(min(max(steps, setup.min_steps), setup.max_steps))
         except BusLost:
-            self._link.record_failed_release()
+            self._release_due = True
             raise
-        self.engaged, self._link.release_due = True, False
+        self.engaged, self._release_due = True, False
         return tuple(goals)
 
     def write(self, goals_steps: Sequence[int]) -> None:
@@ -220,7 +218,7 @@ class Lx16aBus(PortBus):
             raise ValueError(f"{len(goals_steps)} goals for {len(self._setups)} servos")
         if any(goal != goal for goal in goals_steps):
             raise ValueError("a goal is not a number: every goal must be a whole number of steps")
-        if not self.engaged or self._link.down:
+        if not self.engaged or self._is_down:
             return
         out = b""
         for i, (goal, setup) in enumerate(zip(goals_steps, self._setups, strict=True)):
@@ -242,7 +240,7 @@ class Lx16aBus(PortBus):
             if not 0 <= setup.min_steps < setup.max_steps <= 1000:
                 raise ValueError(f"{setup.label()}: its range must lie in 0..1000 steps")
 
-    def _check_all(self) -> None:
+    def _reset_after_reconnect(self) -> None:
         self._check = [True] * len(self._setups)
         self._sure.forget()
 
