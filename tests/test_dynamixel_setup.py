@@ -2,16 +2,11 @@
 
 import pytest
 from fakes.dynamixels import Rig
-from feedback_rows import rows
-from present import present
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
-from gazerig.sim_mock.dynamixel.chain import build_dynamixel
-from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
 @pytest.fixture
@@ -72,39 +67,6 @@ def test_gains_strength_and_velocity_limit_are_set_where_they_differ_and_told(ri
     assert "servo 1 (xl330-m077) belongs to no joint: not used" in events
     bus.open()
     assert not any("->" in line for line in bus.events())
-
-
-@pytest.mark.parametrize(
-    ("firmwares", "indirect", "fast"),
-    [((53, 53), 224, True), ((46, 52), 208, True), ((45, 52), 208, False), ((46, 53), None, True)],
-)
-def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
-    firmwares, indirect, fast
-):
-    specs = [ServoSpec(i, "xl330-m077", 2000 + i, fw) for i, fw in enumerate(firmwares, 1)]
-    sent: list[bytes] = []
-    now_s = [0.0]
-    port = InProcessPort(build_dynamixel(specs, lambda: now_s[0]), sent.append)
-    setups = [ServoConfig(s.id, s.model, 0, 4095, 6000.0) for s in specs]
-    bus = SmartServoBus(DYNAMIXEL, port, setups)
-    bus.open()
-    bus.enable_torque()
-    spans = set()
-    for _ in range(60):
-        now_s[0] += 0.01
-        readings = rows(bus.read(now_s[0]))
-        read = next(p for p in reversed(sent) if p[7] == (0x8A if fast else 0x82))
-        spans.add((int.from_bytes(read[8:10], "little"), read[10]))
-        bus.write([2001, 2002])
-    if indirect is None:
-        assert (126, 10) in spans
-    else:
-        assert spans >= {(indirect, 13), (indirect + 1, 14)}
-    for k, reading in enumerate(readings):
-        assert abs(present(reading).position_steps - 2001 - k) <= 2
-        assert (present(reading).torque, present(reading).fault) == (True, "")
-        assert present(reading).voltage_v == pytest.approx(5.0, abs=0.3)
-        assert present(reading).temperature_c == 30
 
 
 def test_a_lost_setup_answer_is_asked_for_again(rig):

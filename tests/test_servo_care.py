@@ -181,6 +181,7 @@ def test_silent_servos_are_named_once_and_when_they_answer_again(sts, missing):
     for servo_id in missing:
         sts.command(f"lose {servo_id}")
     expected = [servo_id not in missing for servo_id in IDS]
+    sts.run(0.02, [2000] * 4)  # several silent ones leave the group one after the other
     assert [sts.heard() for _ in range(50)] == [expected] * 50
     assert sts.bus.events() == tuple(
         f"{NAMES[i - 1]} (servo {i}) does not answer: check servo power and cable" for i in missing
