@@ -306,6 +306,8 @@ def test_one_that_is_too_hot_keeps_no_other_without_torque_after_a_replug(sts):
         sts.chain.find_servo(servo_id).write(40, b"\x00")
     sts.run(2.0, [2100] * 4)
     assert [servo.torque for servo in sts.chain.servos] == [True, False, True, True]
+    # Some firmware switches torque on with a goal.
+    assert [list(p[7:-1:7]) for p in sts.sent if p[4:6] == b"\x83\x2a"][-1] == [1, 3, 4]
     assert sts.bus.faults() == ("jaw (servo 2): overheating",)
     sts.command("temperature 2 40")
     sts.run(2.0, [2100] * 4)
