@@ -315,10 +315,11 @@ def test_one_that_is_too_hot_keeps_no_other_without_torque_after_a_replug(sts):
 
 
 def test_a_joint_beyond_its_encoders_zero_is_not_led_the_wrong_way():
-    specs = [ServoSpec(1, "sts3215", 4090), ServoSpec(2, "sts3215", 700)]
+    specs = [ServoSpec(1, "sts3215", 200), ServoSpec(2, "sts3215", 700)]
     setups = [ServoConfig(i, "sts3215", 100, 1500, 3000.0, NAMES[i - 1]) for i in (1, 2)]
     rig = StsRig(specs, setups)
     rig.bus.open()
+    rig.command("turn 1 -206")
     with pytest.raises(ServoFault, match=r"eye \(servo 1\) is at 4090, beyond .*by hand"):
         rig.bus.enable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
