@@ -10,8 +10,8 @@ from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, find, load
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec
 from gazerig.sim_mock.smart_servo.head_weight import HeadWeight
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,11 +5,8 @@ from typing import NamedTuple
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.smart_servo.physics import STEPS_PER_TURN, Loop, Physics
 
-HOBBY_PHYSICS = Physics(
-    rotor_s=0.008, coulomb_share=0.04, viscous_share=0.0, play_deg=0.0, supply_ohm=0.0
-)
-"""A small motor that reaches full speed in 8 ms without a load; friction of cheap gears. The supply
-is a battery of unknown resistance."""
+HOBBY_PHYSICS = Physics(rotor_s=0.008, coulomb_share=0.04, viscous_share=0.0, play_deg=0.0)
+"""A small motor that reaches full speed in 8 ms without a load; friction of cheap gears."""
 
 DAMPING = 1.0
 """Share of the duty that its controller takes back at full speed, so that a load overshoots only a

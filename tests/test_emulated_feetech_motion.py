@@ -5,7 +5,7 @@ from servo_bench import WRITE, FeetechBench
 
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
-SMOOTH = Physics(coulomb_share=0.0, viscous_share=0.0, play_deg=0.0, supply_ohm=0.0)
+SMOOTH = Physics(coulomb_share=0.0, viscous_share=0.0, play_deg=0.0)
 STEADY_STEPS = 2
 """Friction keeps a servo with factory gains so far from its goal."""
 
@@ -129,15 +129,20 @@ def test_goals_end_at_the_angle_limits(bench, goal, at):
     assert bench.read(1, 42, 2) == goal
 
 
-def test_within_one_turn_it_reads_on_from_0_and_goes_the_long_way():
+def test_beyond_a_turn_it_counts_on_until_it_restarts():
     bench = one(start=4090.0)
-    bench.chain.faults.command("turn 1 20")
-    assert bench.position() == 14
+    bench.chain.faults.command("turn 1 278")
+    assert bench.position() == 4368
     bench.enable_torque(goal=4000)
-    bench.wait(0.2)
-    assert 14 < bench.position() < 1000
     bench.wait(1.5)
     assert bench.position() == pytest.approx(4000, abs=STEADY_STEPS)
+    bench.write(1, 40, 0)
+    bench.chain.faults.command("turn 1 -4100")
+    assert bench.read(1, 56, 2) == 0x8000 | 100
+    assert bench.position() == -100
+    bench.chain.faults.command("brown-out 1")
+    bench.wait(1.0)
+    assert bench.position() == 3996
 
 
 def test_the_offset_moves_the_origin(bench):

@@ -18,9 +18,8 @@ from gazerig.features.world.shaft import ShaftAxis, WorldHobbyServo, WorldShaft
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, PluginLine, ShaftMakers, build
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
-from gazerig.sim_mock.smart_servo.integration import whole_ms
-from gazerig.sim_mock.smart_servo.motor import Shaft, create_shaft
 from gazerig.sim_mock.smart_servo.physics import MS_S, Motor, Physics
+from gazerig.sim_mock.smart_servo.shaft import Shaft, create_shaft, whole_ms
 
 DEVICE_MS = 5
 """Period of the update of all devices, so that no watchdog trips late; their servos check heat and

@@ -21,7 +21,7 @@ from gazerig.sim_mock.faults.grammar import (
     word_choice,
 )
 from gazerig.sim_mock.pty.line import BusSettings
-from gazerig.sim_mock.smart_servo.integration import whole_ms
+from gazerig.sim_mock.smart_servo.shaft import whole_ms
 
 DIRECTIONS = {
     "forward": (1.0, 0.0, 0.0),

@@ -3,7 +3,7 @@
 Registers, modes, profiles and protections are those of the servo. Each millisecond its control
 loop computes a torque from the shaft's position. The part that depends on the speed at the end of
 the millisecond (D, part of P and the induced voltage of the motor) goes into MuJoCo's implicit
-step. So the equations are those of ``ShaftMotion``, with the world's inertia, gravity, contacts
+step. So the equations are those of ``Shaft``, with the world's inertia, gravity, contacts
 and stops. The axis of a shaft is its index in MuJoCo's arrays.
 """
 
@@ -18,8 +18,6 @@ from gazerig.features.world.model import RigIndices, shaft_rad_of
 from gazerig.features.world.rig_in_world import ServoInWorld
 from gazerig.sim_mock.hobby_motor import HOBBY_PHYSICS, hobby_motor
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
-from gazerig.sim_mock.smart_servo.integration import RESOLUTION, SLOWEST, SMOOTHING
-from gazerig.sim_mock.smart_servo.motor import Shaft
 from gazerig.sim_mock.smart_servo.physics import (
     DISABLED,
     MS_S,
@@ -29,7 +27,7 @@ from gazerig.sim_mock.smart_servo.physics import (
     Motor,
     Physics,
 )
-from gazerig.sim_mock.smart_servo.profile import PositionProfile
+from gazerig.sim_mock.smart_servo.shaft import RESOLUTION, SLOWEST, SMOOTHING, Shaft
 
 JAM_NM = 20.0
 """Dry friction of a jammed joint."""
@@ -220,15 +218,12 @@ class WorldShaft(Shaft):
     def resume(self) -> None:
         """Continue; the world moves the shaft."""
         self.quiet = True
-        self._since_ms = 0
 
     def place(self, position_steps: float) -> None:
         """Set the shaft to its position in the world; ignore the given position."""
         self.x = self.axis.position()
-        self.v = self._rv = self.u = self.effort = self._integral = 0.0
-        if isinstance(self.profile, PositionProfile):
-            self.profile.rest(self.x)
-        self.resume()
+        self.v = self.u = self.effort = 0.0
+        self.start()
 
     def turn(self, steps: float) -> None:
         """Turn the shaft by hand, up to its joint's stops; the controller keeps acting."""
@@ -245,10 +240,7 @@ class WorldShaft(Shaft):
 
     # --- from the servo
 
-    def run(self, ticks: int) -> None:
-        """Do nothing: the world moves its shafts."""
-
-    def skip(self, ticks: int) -> None:
+    def run(self, ms: int) -> None:
         """Do nothing: the world moves its shafts."""
 
     def drive(self, loop: Loop) -> None:
@@ -270,27 +262,23 @@ class WorldShaft(Shaft):
         """Run the control loop for one millisecond; return the effort of the motor in it."""
         if self._off:
             return LIMP
-        kp, _, kd, _, f1, f2, bias, most, torque_max, slew = self._loop
-        profile, rv = self.profile, self._rv
-        before = r = profile.r
-        if profile.running:
-            r = profile.advance(1)[0]
+        kp, _, kd, most, torque_max, slew = self._loop
+        rv, before = self._rv, self.r
+        r = self.lead(1)[0] if self.led else before
         if rv or r != before:
             rv += (r - before - rv) * SMOOTHING
             if -SLOWEST < rv < SLOWEST:
                 rv = 0.0
-        c = kp * self._error(r) + self._integral + bias
-        if rv and not profile.is_jump:
-            c += (kd + f1) * rv
-        if f2:
-            c += f2 * (rv - self._rv)
+        c = kp * self._error(r) + self._integral
+        if rv and self._cruise:
+            c += kd * rv
         self._rv = rv
         least = -most
         if slew != inf:
             u = self.u
             least, most = max(least, u - slew), min(most, u + slew)
         self._least, self._most, self._profiled = least, most, c
-        push = self._stall_nm * self.volts
+        push = self._stall_nm * self.supply
         gain = -push * (kp + kd) * SPEED_UNIT
         if torque_max != inf:
             # The torque is limited with the motor's induced torque in it.
@@ -312,7 +300,6 @@ class WorldShaft(Shaft):
         self.x = x
         self.v = v
         if self._off:
-            self.volts = self.supply
             return
         loop = self._loop
         least, most = self._least, self._most
@@ -320,22 +307,17 @@ class WorldShaft(Shaft):
         clipped = not least <= u <= most
         if clipped:
             u = most if u > most else least
-        volts = self.volts
+        volts = self.supply
         t = u * volts - v * self._built.rate
         torque_max = loop.torque_max
         if not -torque_max <= t <= torque_max:
             clipped = True
             t = torque_max if t > torque_max else -torque_max
             u = (t + v * self._built.rate) / volts if volts > 0.0 and torque_max > 0.0 else 0.0
-        if (loop.i or loop.vi) and not clipped:
-            i, error = self._integral, self.profile.r - self.x
-            if loop.vi:
-                i += loop.vi * (self._rv - v)
-            elif error > RESOLUTION or error < -RESOLUTION:
-                i += loop.i * error
+        error = self.r - self.x
+        if loop.i and not clipped and abs(error) > RESOLUTION:
+            i = self._integral + loop.i * error
             self._integral = min(max(i, -loop.u_max), loop.u_max)
-        power = u * t
-        self.volts = self.supply - self._built.sag * power if power > 0.0 else self.supply
         self.u, self.effort = u, t
 
 
@@ -398,11 +380,9 @@ class WorldHobbyServo(HobbyServo):
         if not steps:
             self.shaft.disable()
             return
-        profile = PositionProfile(self.shaft.x)
-        profile.rest(steps * self._unit)
         if not was:
             self.shaft.start()
-        self.shaft.profile = profile
+        self.shaft.lead_to(steps * self._unit, 0.0, 0.0)
         self.shaft.drive(self._loop)
 
     @property

@@ -21,7 +21,6 @@ from gazerig.sim_mock.devices import MaestroLine, Pca9685Line
 from gazerig.sim_mock.dynamixel.servo import POSITION, control_loop
 from gazerig.sim_mock.feetech.servo import D_SHARE, P_SHARE
 from gazerig.sim_mock.hobby_motor import HOBBY_PHYSICS, hobby_motor
-from gazerig.sim_mock.smart_servo.integration import SMOOTHING
 from gazerig.sim_mock.smart_servo.physics import (
     MS_S,
     STEPS_PER_RAD,
@@ -30,6 +29,7 @@ from gazerig.sim_mock.smart_servo.physics import (
     Physics,
     mechanics_of,
 )
+from gazerig.sim_mock.smart_servo.shaft import SMOOTHING
 
 
 def servo_drives(rig: Rig) -> dict[str, ServoDrive]:
@@ -92,16 +92,14 @@ def _shaft_drive(motor: Motor, physics: Physics, loop: Loop) -> ServoDrive:
     """Return the drive of a servo at its own shaft."""
     stall_nm, built = motor.stall_torque_nm, mechanics_of(motor, physics)
     top_rad_s = motor.no_load_rpm * pi / 30.0
-    # At full drive the current lowers the voltage of the supply.
-    sag = 1.0 + built.sag * loop.u_max**2
     return ServoDrive(
         armature_kg_m2=physics.rotor_s * stall_nm / top_rad_s,
         friction_nm=physics.coulomb_share * stall_nm,
         damping_nm_s=physics.viscous_share * stall_nm / top_rad_s,
         kp_nm_rad=stall_nm * loop.p * STEPS_PER_RAD,
         kv_nm_s=stall_nm * loop.d * STEPS_PER_RAD * MS_S,
-        force_nm=stall_nm * loop.u_max / sag,
-        back_emf_nm_s=stall_nm * built.rate * STEPS_PER_RAD * MS_S / sag,
+        force_nm=stall_nm * loop.u_max,
+        back_emf_nm_s=stall_nm * built.rate * STEPS_PER_RAD * MS_S,
         smoothing_s=-MS_S / log(1.0 - SMOOTHING),
         slew_nm_s=stall_nm * loop.slew / MS_S,
     )

@@ -31,9 +31,9 @@ from gazerig.drivers.dynamixel.control_table import (
     registers_of,
 )
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, ServoSpec
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
+from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
 
 INSTRUCTION_ERROR, DATA_RANGE, DATA_LENGTH, DATA_LIMIT, ACCESS = 2, 4, 5, 6, 7
 """Numbers of the status error byte (Protocol 2.0)."""
@@ -109,7 +109,7 @@ class ReadRange(NamedTuple):
     profiled: bool
 
 
-class DynamixelMemory(ServoMemory):
+class DynamixelMemory(ServoMemory[DynamixelRegister]):
     """One servo's control table.
 
     ranges: ranges that were read, valid until an indirect address changes
@@ -125,8 +125,16 @@ class DynamixelMemory(ServoMemory):
             b.data_base + i: b.address_base + 2 * i for b in blocks for i in range(b.entries)
         }
         self.ranges: dict[tuple[int, int], ReadRange] = {}
-        self.restore(eeprom=True)
-        self.restore(eeprom=False)
+        self.restore("eeprom")
+        self.restore("ram")
+
+    def decode(self, register: DynamixelRegister, data: bytes | bytearray) -> int:
+        """Return the value of a register's bytes."""
+        return int.from_bytes(data, "little", signed=register.signed)
+
+    def encode(self, register: DynamixelRegister, value: int) -> bytes:
+        """Return the value's bytes, in two's complement if it is negative."""
+        return (value & (1 << 8 * register.size) - 1).to_bytes(register.size, "little")
 
     def set(self, name: str, value: int) -> None:
         """Set a register regardless of its access."""
@@ -173,7 +181,7 @@ class DynamixelMemory(ServoMemory):
             end = at + register.size
             if places[at:end] != list(range(register.address, register.address + register.size)):
                 return DATA_LENGTH
-            value, low, high = register.decode(data[at:end]), register.low, register.high
+            value, low, high = self.decode(register, data[at:end]), register.low, register.high
             if (low is not None and value < low) or (high is not None and value > high):
                 return DATA_RANGE
             fields.append((register, value))

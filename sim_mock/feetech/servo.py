@@ -10,6 +10,11 @@ position (33 and, for SCS, both limits 0), phase (18), starting force and dead z
 without them friction keeps it up to 2 steps from its goal, as on a real servo), protection current
 (28), angular resolution (30), velocity gains (37, 39), LED (20), the factory's own (80-86).
 
+Position, goal and target are sign and magnitude. The encoder knows its place within a turn, 0 to
+4095 at power-on; from there the servo counts on, and subtracts the offset (31): a shaft that was
+turned on, or has an offset, is at 4368 or -100. Goals end at the angle limits (9, 11), within a
+turn, unless both are 0: then they may be turns away.
+
 SCS servos have the high byte of a word first and a potentiometer of 1024 steps over less than a
 turn. They answer no sync read and have no offset, torque limit or current.
 
@@ -35,15 +40,15 @@ from gazerig.drivers.feetech.memory_table import (
     STATUS_ERRORS,
     TORQUE_FULL,
     FeetechModel,
+    FeetechRegister,
     registers_of,
 )
 from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN as TURN
-from gazerig.drivers.feetech.scs import SCS_REGISTERS
 from gazerig.sim_mock.feetech.packets import signed, unsigned
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, ServoSpec
 from gazerig.sim_mock.smart_servo.servo import HEAT, OVERLOAD, REBOOT, VOLTAGE, EmulatedServo
+from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
 
 SCS_TRAVEL_DEG = {"scs0009": 300.0, "scs15": 200.0}
 """Travel of the potentiometer's 1024 steps."""
@@ -52,8 +57,6 @@ RETURN_DELAY = 250
 
 MIDDLE = 2048
 TIME_UNIT_S = 0.01
-SPEED_UNIT_STEPS_S = 50
-"""Unit of the register of the highest speed."""
 RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
 """Unit of Acceleration (41) in steps/ms2."""
 P_SHARE, I_SHARE, D_SHARE = 1 / 1600, 1 / 1.6e6, 1 / 64
@@ -70,36 +73,54 @@ _SENSED = {"little": struct.Struct("<HHHBBBBBHH"), "big": struct.Struct(">HHHBBB
 
 Order = Literal["little", "big"]
 
+_SCS_PLACES = {"protective_torque": 37, "protection_time": 38, "overload_torque": 39, "lock": 48}
+_SCS_LACKS = {
+    *("protection_current", "angular_resolution", "position_offset", "operating_mode"),
+    *("velocity_p_gain", "velocity_i_gain", "overcurrent_time", "torque_limit", "present_current"),
+}
+_SCS_STARTS = {"max_position_limit": SCS_STEPS - 1, "unloading_condition": HEAT | OVERLOAD}
 
-class FeetechMemory(ServoMemory):
+
+def _scs_registers(model: FeetechModel) -> tuple[FeetechRegister, ...]:
+    """Return the registers of an SCS servo: some of STS servos, of which four lie elsewhere."""
+    return tuple(
+        register._replace(
+            address=_SCS_PLACES.get(register.name, register.address),
+            initial=_SCS_STARTS.get(register.name, register.initial),
+            order="big",
+        )
+        for register in registers_of(model)
+        if register.name not in _SCS_LACKS and register.address < SENSED_END
+    )
+
+
+class FeetechMemory(ServoMemory[FeetechRegister]):
     """One servo's memory; ``bytes`` holds what is read; the permanent EEPROM is separate."""
 
     def __init__(self, model: FeetechModel, servo_id: int, firmware: int) -> None:
         scs = model.name in SCS_MODELS
-        super().__init__(SCS_REGISTERS.values() if scs else registers_of(model), SIZE)
-        own = {
-            "id": servo_id,
-            "return_delay_time": RETURN_DELAY,
-            "temperature_limit": model.temperature_limit,
-            "max_voltage_limit": model.max_voltage,
-            "min_voltage_limit": model.min_voltage,
-            "model_number": model.number,
-            "firmware_minor": firmware,
-            "max_velocity_limit": round(
-                model.no_load_rpm / 60.0 * model.steps_per_turn / SPEED_UNIT_STEPS_S
-            ),
-        }
+        super().__init__(_scs_registers(model) if scs else registers_of(model), SIZE)
+        own = {"id": servo_id, "return_delay_time": RETURN_DELAY, "firmware_minor": firmware}
         for name, value in own.items():
-            if name in self.registers:
-                self.registers[name] = self.registers[name]._replace(initial=value)
+            self.registers[name] = self.registers[name]._replace(initial=value)
         writable = [r for r in self.registers.values() if r.access == "rw"]
         self._writable = {r.address + i for r in writable for i in range(r.size)}
         self._kept = bytearray(SIZE)
         last_baud = len(SCS_BAUD_RATES if scs else BAUD_RATES) - 1
         self._highest = {5: HIGHEST_ID, 6: last_baud, 33: 3}
         self._lock_at = self.registers["lock"].address
-        self.restore(eeprom=True)
-        self.restore(eeprom=False)
+        self.restore("eeprom")
+        self.restore("ram")
+
+    def decode(self, register: FeetechRegister, data: bytes | bytearray) -> int:
+        """Return the value of a register's bytes."""
+        raw = int.from_bytes(data, register.order)
+        return raw if register.sign is None else signed(raw, register.sign)
+
+    def encode(self, register: FeetechRegister, value: int) -> bytes:
+        """Return sign and magnitude if the register has a sign."""
+        raw = value if register.sign is None else unsigned(value, register.sign)
+        return raw.to_bytes(register.size, register.order)
 
     def set_permanently(self, name: str, value: int) -> None:
         """Set a register, in the EEPROM as well."""
@@ -202,12 +223,6 @@ class FeetechServo(EmulatedServo):
     def _origin(self) -> tuple[int, int]:
         return 1, 0 if self._scs else -self.memory.get("position_offset")
 
-    def _wrap_to_one_turn(self) -> None:
-        """Wrap the position into one turn; a potentiometer has less than one."""
-        super()._wrap_to_one_turn()
-        if self._scs:
-            self._shift = 0
-
     def _follow(self) -> None:
         """Follow the goal registers if they have changed."""
         if not self.torque:
@@ -258,8 +273,6 @@ class FeetechServo(EmulatedServo):
         at = round((shaft.x + self._shift) * scale)
         if self._scs:
             at = max(0, min(SCS_STEPS - 1, at))
-        elif self._range[0] >= 0:
-            at %= TURN
         speed = round(shaft.v * scale * 1000.0)
         goal = round((shaft.goal + self._shift) * scale) if self.torque else 0
         moving = self.torque and shaft.led or not -1 <= speed <= 1

@@ -14,8 +14,6 @@ from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.replies import BROADCAST, Instruction, Piece, merge
 from gazerig.sim_mock.smart_servo.faults import CASES, ServoFaults
 from gazerig.sim_mock.smart_servo.head_weight import HeadWeight
-from gazerig.sim_mock.smart_servo.integration import whole_ms
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.servo import (
     LONGEST_MS,
@@ -25,6 +23,7 @@ from gazerig.sim_mock.smart_servo.servo import (
     WRITE,
     EmulatedServo,
 )
+from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft, whole_ms
 
 SYNC_READ, SYNC_WRITE = 0x82, 0x83
 

@@ -33,8 +33,7 @@ class Physics(NamedTuple):
     play_deg: deg; dead travel between output shaft and joint, 0.25 as in the data sheets of
         the X430. The encoder of X servos is at the output, so the registers show no play;
         ``Shaft.joint`` has it. Play inside the gear is omitted.
-    supply_v: V; open-circuit voltage at the plug; None: the rated voltage of the model.
-    supply_ohm: ohm; cable and connector, so that load lowers the voltage [A]; at most 1.
+    supply_v: V; None: the rated voltage of the model.
     temperature_c: degC of the motor [A].
     overload_share: share of the stall torque at the present voltage that counts as
         overload; overload_s: s; duration until it latches [A: in no data sheet].
@@ -52,7 +51,6 @@ class Physics(NamedTuple):
     stop_high_steps: float = inf
     play_deg: float = 0.25
     supply_v: float | None = None
-    supply_ohm: float = 0.2
     temperature_c: float = AMBIENT_C
     overload_share: float = 0.8
     overload_s: float = 2.0
@@ -98,7 +96,6 @@ _RANGES: dict[str, tuple[float, float]] = {
     "stop_high_steps": (-inf, inf),
     "play_deg": (0.0, 10.0),
     "supply_v": (0.0, 60.0),
-    "supply_ohm": (0.0, 1.0),
     "temperature_c": (-40.0, 200.0),
     "overload_share": (0.05, 1.0),
     "overload_s": (0.02, 1e4),
@@ -109,8 +106,6 @@ STEPS_PER_TURN = 4096
 """Resolution of the encoder on the shaft; registers of a make may have another one."""
 STEPS_PER_RAD = STEPS_PER_TURN / (2.0 * pi)
 MS_S = 0.001
-SAG_MOST = 0.5
-"""Largest drop of the supply voltage at stall, as a share; more would oscillate."""
 
 
 class Motor(Protocol):
@@ -137,22 +132,25 @@ class Motor(Protocol):
         ...
 
 
+class ServoModel(Motor, Protocol):
+    """Data of a servo model."""
+
+    @property
+    def name(self) -> str:
+        """Return its name in a rig file."""
+        ...
+
+
 class Loop(NamedTuple):
     """Controller gains and limits, in shares of full PWM per step, per step/ms and so on.
 
-    p, d, f1, f2: gains on position error, speed error, profile speed, profile acceleration
-    i: gain per ms on position error; vi: gain per ms on speed error (velocity mode)
-    bias: constant part, in modes without feedback
+    p, d: gains on position error and speed error; i: gain per ms on position error
     u_max: PWM limit; torque_max: torque (current) limit; slew: largest change of PWM per ms
     """
 
     p: float = 0.0
     i: float = 0.0
     d: float = 0.0
-    vi: float = 0.0
-    f1: float = 0.0
-    f2: float = 0.0
-    bias: float = 0.0
     u_max: float = 1.0
     torque_max: float = inf
     slew: float = inf
@@ -165,9 +163,7 @@ class Mechanics(NamedTuple):
     drag, free: divisor of a speed per 1 ms, with the motor's own braking and without
     dry: speed that dry friction removes in 1 ms
     rate: share of the rated voltage that the motor induces per step/ms
-    gravity: speed that the weight adds in 1 ms at its full lever; upright: position without lever;
-        turn: rad of the weight per step
-    play: half the dead travel; sag: share of the voltage that the supply loses at stall
+    play: half the dead travel
     """
 
     accel: float
@@ -175,11 +171,7 @@ class Mechanics(NamedTuple):
     free: float
     dry: float
     rate: float
-    gravity: float
-    upright: float
-    turn: float
     play: float
-    sag: float
 
 
 def mechanics_of(model: Motor, physics: Physics) -> Mechanics:
@@ -199,17 +191,8 @@ def mechanics_of(model: Motor, physics: Physics) -> Mechanics:
         free=1.0 + accel * viscous,
         dry=accel * physics.coulomb_share,
         rate=rate,
-        gravity=accel * physics.gravity_nm / stall_nm,
-        upright=physics.upright_steps,
-        turn=physics.gravity_turns / STEPS_PER_RAD,
         play=physics.play_deg * STEPS_PER_TURN / 720.0,
-        sag=min(SAG_MOST, physics.supply_ohm * model.stall_current_a / model.rated_v),
     )
 
 
 DISABLED = Loop(u_max=0.0, torque_max=0.0)
-
-
-def is_linear(loop: Loop) -> bool:
-    """Return whether five steps can be one: no integral terms, no torque limit."""
-    return loop.i == loop.vi == loop.f2 == loop.bias == 0.0 and loop.torque_max == inf

@@ -6,25 +6,26 @@ effects of writing and reading its registers, and of errors.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import ClassVar
+from math import sin
+from typing import Any, ClassVar
 
-from gazerig.drivers.dynamixel.control_table import DynamixelModel
-from gazerig.drivers.feetech.memory_table import FeetechModel
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import (
+    STEPS_PER_RAD,
     STEPS_PER_TURN,
     Physics,
+    ServoModel,
     ServoSpec,
     check_physics,
 )
+from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
 
 PING, READ, WRITE, REBOOT = 1, 2, 3, 8
 """Codes of the instructions for one servo that are common to all makes."""
 
 RETURN_DELAY_UNIT_S = 2e-6
 CHECK_MS = 20
-"""Period of the protections, in the servo's own time: reading does not change their result."""
+"""Period of weight and protections, in the servo's own time: reading does not change them."""
 LONGEST_MS = 10_000
 """Only the end of a longer time without a packet is simulated."""
 TOO_HOT_C = 5.0
@@ -69,8 +70,8 @@ class EmulatedServo(ABC):
     def __init__(
         self,
         spec: ServoSpec,
-        model: DynamixelModel | FeetechModel,
-        memory: ServoMemory,
+        model: ServoModel,
+        memory: ServoMemory[Any],
         now_ms: int,
         make_shaft: ShaftMaker = create_shaft,
         scale: float = 1.0,
@@ -79,10 +80,12 @@ class EmulatedServo(ABC):
         self.model, self.memory, self.firmware = model, memory, spec.firmware
         self.physics, self._scale = physics, scale
         own = physics._replace(
-            upright_steps=physics.upright_steps / scale,
             stop_low_steps=physics.stop_low_steps / scale,
             stop_high_steps=physics.stop_high_steps / scale,
         )
+        self._gravity = physics.gravity_nm / model.stall_torque_nm
+        self._upright = physics.upright_steps / scale
+        self._weight_rad = physics.gravity_turns / STEPS_PER_RAD
         self.shaft = make_shaft(spec.id, model, own, spec.start_steps / scale)
         self._supply_v = model.rated_v if physics.supply_v is None else physics.supply_v
         self._temperature_c = physics.temperature_c
@@ -90,6 +93,7 @@ class EmulatedServo(ABC):
         self._address = 0, 0
         self._ms = self._booted_ms = self._deaf_until_ms = now_ms
         self._check_ms = now_ms + CHECK_MS
+        self._weigh()
         self._boot()
 
     def _boot(self) -> None:
@@ -158,7 +162,9 @@ class EmulatedServo(ABC):
         self._ms = until_ms
 
     def _check(self) -> None:
-        """Apply the protections. A heavy load is torque, not duty."""
+        """Apply weight and protections. A heavy load is torque, not duty."""
+        if self._gravity:
+            self._weigh()
         effort = abs(self.shaft.effort)
         self._heavy_checks += 1
         if not effort or effort < self._heavy_effort:
@@ -168,6 +174,11 @@ class EmulatedServo(ABC):
             bits |= OVERLOAD
         if bits or self.errors:
             self._protect_from(bits)
+
+    def _weigh(self) -> None:
+        """Apply the weight at the present position."""
+        angle = (self.shaft.x - self._upright) * self._weight_rad
+        self.shaft.set_weight(self._gravity * sin(angle))
 
     def _measure(self) -> None:
         """Update the errors of voltage and temperature, and their registers."""
@@ -306,7 +317,7 @@ class EmulatedServo(ABC):
 
     def reset_all(self) -> None:
         """Restore factory settings, id 1, and restart."""
-        self.memory.restore(eeprom=True)
+        self.memory.restore("eeprom")
         self.restart()
 
     def turn(self, steps: float) -> None:

@@ -16,8 +16,8 @@ from gazerig.robot.app.bus_wiring import servo_configs
 from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.app.servo_drives import servo_drives
 from gazerig.robot.description.mjcf import mjcf
-from gazerig.sim_mock.smart_servo.integration import SMOOTHING
 from gazerig.sim_mock.smart_servo.physics import STEPS_PER_TURN
+from gazerig.sim_mock.smart_servo.shaft import SMOOTHING
 
 MoveKind = Literal["profile", "jump", "stall"]
 SETTLED_MS = 1200
@@ -93,9 +93,9 @@ class Both:
         angles, torques = [], []
         for _ in range(move.lasts_ms):
             bench.pass_ms(1)
-            path = servo.shaft.profile
-            goal = joint.angle_rad(path.r / unit)
-            speed = 0.0 if path.is_jump or not self._path else (goal - self._path[-1][0]) * 1000.0
+            goal = joint.angle_rad(servo.shaft.r / unit)
+            jumps = not servo.shaft._cruise
+            speed = 0.0 if jumps or not self._path else (goal - self._path[-1][0]) * 1000.0
             self._path.append((goal, speed))
             angles.append(degrees(bench.world.joints_rad()[move.joint]))
             torques.append(float(bench.world._data.qfrc_actuator[at]))
@@ -103,7 +103,7 @@ class Both:
 
     def _set_up(self, servo: Any, config: Any, gains: tuple[int, ...]) -> None:
         """Set a servo up as a run does; in a jump without a profile."""
-        dynamixel = not servo.memory.has("goal_speed")
+        dynamixel = "goal_speed" not in servo.memory.registers
         if dynamixel:
             profile = ("profile_acceleration", "profile_velocity")
             for name, value in wanted_settings(config).items():

