@@ -71,8 +71,25 @@ class DynamixelChain(ServoChain[DynamixelServo]):
 
     def _answer_fast(self, rows: Sequence[GroupRead]) -> list[Piece]:
         """Return one packet of all answers; a missing block ends it."""
-        length = 1 + sum([4 + row[2] for row in rows])
-        before = head = HEAD.pack(HEADER, BROADCAST, length, STATUS)
+        head = HEAD.pack(HEADER, BROADCAST, 1 + sum([4 + row[2] for row in rows]), STATUS)
+        if self._wire.has_any or self._twins:
+            return self._answer_blocks(rows, head)
+        servos, pack, crc, before, parts = self._by_id, CRC.pack, 0, head, list[bytes]()
+        for servo_id, address, size in rows:
+            servo = servos.get(servo_id)
+            block = b"" if servo is None else self._block(servo, servo_id, address, size)
+            if not block:
+                break
+            part = before + block
+            crc = umts(part, crc)
+            parts.append(part)
+            before = pack(crc)
+        if not parts:
+            return []
+        return [Piece(rows[0][0], b"".join(parts) + before, servos[rows[0][0]].delay_s)]
+
+    def _answer_blocks(self, rows: Sequence[GroupRead], head: bytes) -> list[Piece]:
+        """Return the same packet in pieces that a fault can change."""
         pieces, crc, pack = list[Piece](), umts(head), CRC.pack
         for servo_id, address, size in rows:
             servo = self._by_id.get(servo_id)
@@ -80,12 +97,12 @@ class DynamixelChain(ServoChain[DynamixelServo]):
             if servo is None or not block or self._is_muted(servo_id):
                 break
             start, block = crc, block + pack(umts(block, crc))
-            for twin in self._twins.get(servo_id, ()) if self._twins else ():
+            for twin in self._twins.get(servo_id, ()):
                 other = self._block(twin, servo_id, address, size)
                 block = merge(block, other + pack(umts(other, start)))
             crc = umts(block, start)
-            pieces.append(Piece(servo_id, before + block, 0.0 if pieces else servo.delay_s))
-            before = b""
+            delay_s = 0.0 if pieces else servo.delay_s
+            pieces.append(Piece(servo_id, block if pieces else head + block, delay_s))
         return pieces
 
     def _block(self, servo: DynamixelServo, servo_id: int, address: int, size: int) -> bytes:

@@ -332,21 +332,24 @@ class ServoChain(ABC, Generic[S]):
         address, length = self.span.unpack_from(params)
         if (len(params) - start) % (1 + length):
             return
+        servos, now_ms, fed_ms, twins = self._by_id, self._now_ms, self._fed_ms, self._twins
         for at in range(start, len(params), 1 + length):
-            self._write_part(params[at], address, params[at + 1 : at + 1 + length])
+            servo, data = servos.get(params[at]), params[at + 1 : at + 1 + length]
+            if twins:
+                self._write_part(params[at], address, data)
+            elif (
+                servo is not None
+                and servo.followed != (address, data)
+                and servo.advance(now_ms, fed_ms)
+            ):
+                servo.write(address, data)
 
     def _write_part(self, servo_id: int, address: int, data: bytes) -> None:
         """Execute one servo's part of a group write."""
-        servo = self._by_id.get(servo_id)
-        if (
-            servo is not None
-            and servo.followed != (address, data)
-            and servo.advance(self._now_ms, self._fed_ms)
-        ):
-            servo.write(address, data)
-        for twin in self._twins.get(servo_id, ()) if self._twins else ():
-            if twin.advance(self._now_ms, self._fed_ms):
-                twin.write(address, data)
+        first = self._by_id.get(servo_id)
+        for servo in () if first is None else (first, *self._twins.get(servo_id, ())):
+            if servo.advance(self._now_ms, self._fed_ms):
+                servo.write(address, data)
 
 
 @lru_cache(maxsize=64)
