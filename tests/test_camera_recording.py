@@ -91,15 +91,6 @@ def test_what_the_camera_does_not_give_is_not_there(tmp_path):
     assert (found.depth_m, found.lens) == (None, None)
 
 
-def test_existing_file_is_kept_unless_told_otherwise(file):
-    before = file.read_bytes()
-    with pytest.raises(SetupError, match="already exists"):
-        RecordingWriter(file, {})
-    assert file.read_bytes() == before
-    write(file, [shot(0)], over=True)
-    assert len(Recording(file).times_s) == 1
-
-
 def test_a_frame_that_is_no_later_than_the_one_before_is_left_out(tmp_path):
     """A clock that was set back: frames are played by their times, which rise."""
     shots = [

@@ -9,7 +9,6 @@ import pytest
 from tuned_rig import Running, a_rig, a_rig_beside
 from typer.testing import CliRunner
 
-from gazerig.config.schema import load_rig
 from gazerig.robot.cli.tune import app
 from gazerig.robot.remote.client import RobotClient, connect_to_all
 
@@ -96,25 +95,6 @@ def test_what_is_wrong_is_refused_with_the_rule_and_exit_code_2(
     done = gazerig("ctl", "set", *words)
     assert done.returncode == 2 and rule in done.stderr and "Traceback" not in done.stderr
     assert done.stdout == "" and held(RATE) == 200.0
-
-
-def test_save_keeps_comments_and_the_old_file(rig: Running) -> None:
-    before = rig.path.read_text(encoding="utf-8")
-    gazerig("ctl", "character", "shy")
-    gazerig("ctl", "set", RATE, "150")
-    done = gazerig("ctl", "save")
-    assert f"{RATE}: 200.0 -> 150.0" in done.stdout and str(rig.path) in done.stderr
-    assert "character: (not in the file) -> shy" in done.stdout
-    assert load_rig(str(rig.path)).loop.rate_hz == 150.0
-    kept = [line for line in before.splitlines() if line.lstrip().startswith("#")]
-    assert all(line in rig.path.read_text(encoding="utf-8") for line in kept)
-    (backup,) = rig.path.parent.glob("my.yaml.bak-*")
-    assert backup.read_text(encoding="utf-8") == before and str(backup) in done.stderr
-    assert "nothing to save" in gazerig("ctl", "save").stderr
-    backup.unlink()
-    gazerig("ctl", "character", "none")
-    gazerig("ctl", "set", RATE, "200")
-    gazerig("ctl", "save")
 
 
 def test_revert_tells_what_it_takes_back() -> None:

@@ -74,16 +74,6 @@ def test_joints_of_a_urdf_have_limits_and_followers() -> None:
     assert robot.actuated_joint_names == ["eyes_pan", "eyes_tilt"]
 
 
-def test_files_that_are_there_are_kept_unless_forced(tmp_path: Path) -> None:
-    mine = tmp_path / "minimal.glb"
-    mine.write_text("mine")
-    done = invoked("describe", "minimal", str(tmp_path), "--glb")
-    assert done.code == 2 and "--force" in done.err and "minimal.glb" in done.err
-    assert mine.read_text() == "mine"
-    assert invoked("describe", "minimal", str(tmp_path), "--glb", "--force").code == 0
-    assert mine.read_bytes()[:4] == b"glTF"
-
-
 def _glb(rig: Rig) -> bytes:
     from gazerig.robot.description.gltf import gltf
 
