@@ -194,6 +194,15 @@ def test_ages_of_joints_and_picture_are_swept_densely(joint: int) -> None:
         assert verdict.command_rad[joint] == (0.0 if moved else 0.0001)
 
 
+def test_a_neck_without_pictures_holds_whatever_is_wished() -> None:
+    for wish in (0.0001, 0.5):
+        for age_s, held in ((1.499, False), (1.501, True)):
+            verdict = ready().check((wish,) * 9, measured(DT), age_s, DT)
+            assert (verdict.command_rad[6] == 0.0) == held
+            assert (verdict.applied("neck_yaw").reason == "stale frame") == held
+            assert verdict.command_rad[0] > 0.0
+
+
 def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish() -> None:
     guard = Guard(GuardParams(soft_start_speed_deg_s=60.0), LIMITS, GAZE_JOINTS)
     guard.reset(0.0, (0.5,) * 9)
