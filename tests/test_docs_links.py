@@ -30,15 +30,3 @@ def test_links_lead_somewhere() -> None:
                 continue  # to a feature that was deleted
             assert file.exists(), f"{paper.name}: {link}"
             assert not anchor or anchor in slugs(file), f"{paper.name}: {link}"
-
-
-def test_the_contents_list_every_page_once() -> None:
-    contents = (ROOT / "docs/README.md").read_text(encoding="utf-8")
-    listed = re.findall(r"^- \[.+?\]\((\S+?)\)", contents, re.MULTILINE)
-    pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
-    pages = {page for page in pages if not page.startswith("decisions/00")} - {"README.md"}
-    pages.add(GENERATED.name)
-    here = [page for page in listed if not page.startswith("../")]
-    assert len(set(listed)) == len(listed)
-    assert pages <= set(here)
-    assert all(page in pages or page.split("/")[0] in GONE for page in here)

@@ -268,18 +268,6 @@ def test_a_wink_shuts_one_lid_and_opens_it_again(side: Side) -> None:
     assert model.blinks == 0 and not trace[:, 2].any()
 
 
-def test_a_late_or_repeated_wink_makes_no_jump() -> None:
-    model = lids(blinks_per_min=0.0)
-    model.step(5.0, 0.0, None)
-    model.wink("left", 4.9)
-    left = [AWAKE]
-    for k in range(1, 200):
-        if k % 5 == 0:
-            model.wink("left", 5.0 + k * DT)
-        left.append(model.step(5.0 + k * DT, 0.0, None)[0])
-    assert np.abs(np.diff(left)).max() <= 1.875 * AWAKE * DT / 0.075 + 1e-9
-
-
 def test_no_blink_spoils_a_wink() -> None:
     model, right = lids(1, law="nakamoto"), []
     first = onsets(lids(1, law="nakamoto"), 20.0)[0]

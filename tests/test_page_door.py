@@ -1,6 +1,5 @@
 """Only allowed visitors enter: no other origin, no one without the token, no one by the back."""
 
-import asyncio
 import json
 import os
 import socket
@@ -23,7 +22,6 @@ from websockets.sync.client import ClientConnection
 
 from gazerig.robot.dashboard.door.auth_proxy import MOST_LINES
 from gazerig.robot.dashboard.door.browsers import MOST as MOST_CONNECTIONS
-from gazerig.robot.dashboard.door.browsers import TabLimits
 from gazerig.robot.dashboard.door.viser_server import FROM_BROWSER_BYTES
 from gazerig.robot.dashboard.requests.outbox import add_client
 from gazerig.robot.remote.excess import TokenBucket
@@ -405,18 +403,6 @@ def test_no_path_leads_out_of_the_pages_own_files(near: Rig, path: str) -> None:
 
 
 # --- Limits of a browser of the page, and a stop without an answer
-
-
-def test_a_place_is_left_by_the_browser_with_the_most() -> None:
-    async def crowd() -> list[str]:
-        places, left = TabLimits(3), []
-        with ExitStack() as stack:
-            for name in ("a", "b", "b", "c", "d"):
-                leave = stack.enter_context(places.occupy(name))
-                left.append((name, leave))
-            return [name for name, leave in left if leave.is_set()]
-
-    assert asyncio.run(crowd()) == ["a", "b"] or asyncio.run(crowd()) == ["b", "a"]
 
 
 def test_a_rate_lets_a_burst_pass_and_then_so_many_a_second() -> None:

@@ -615,14 +615,6 @@ def test_a_client_of_another_version_is_told_so_once_and_may_stop(
     rig.resume(confirmed=True)
 
 
-def test_answers_that_nobody_reads_count_as_waiting() -> None:
-    ahead = server_module.RequestsAhead()
-    for _ in range(server_module.MOST_AHEAD):
-        assert not ahead.is_full
-        ahead.add_answer({"refused": "not a line of JSON"})
-    assert ahead.is_full
-
-
 def test_a_stop_does_not_wait_for_another_thread_of_its_program(
     rig: RobotClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,10 +3,9 @@
 import runpy
 import shlex
 from pathlib import Path
-from typing import Any
 
 import pytest
-from command_line import figures, invoked
+from command_line import invoked
 from features_there import skip_without
 from tutorial import commands, steps, write_files
 
@@ -80,10 +79,3 @@ def head(folder: Path, step: int) -> str:
     """Return the path of the head as it is after a step."""
     write_files(folder, step)
     return str(folder / "myhead.yaml")
-
-
-def test_eyes_alone_look_at_the_visitor(folder: Path) -> None:
-    found: dict[str, Any] = figures(head(folder, 2), "--seconds", "6")
-    # In the rest of the time it has not begun, or looks away from the face, as people do.
-    assert found["target_share"]["face"] > 0.75 and found["saccades"] > 8
-    assert found["blinks"] >= 0 and not found["joint_faults"]

@@ -136,28 +136,6 @@ def test_ctrl_c_while_calibrating_lets_go_and_writes_nothing(
     assert not status(served.command, 1)["torque"] and rig.read_bytes() == before
 
 
-# --- what is under calibrate, in every spelling
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        # Without arguments: the shipped rig, which is never written.
-        ((), "desk.yaml"),
-        (("board", "b.pdf", "--square", "60"), "does not fit on a4"),
-        (
-            ("camera", "desk", "--mock", "--dry-run", "--ruler", "0"),
-            "the print scale must be 0.2 to 5",
-        ),
-    ],
-)
-def test_what_is_refused_is_said_with_and_without_the_word_joints(
-    words: tuple[str, ...], says: str
-) -> None:
-    done = calibrate(*words)
-    assert done.code == 2 and says in done.out + done.err
-
-
 # --- a camera
 
 
