@@ -54,17 +54,6 @@ class Bench:
         """Return a register's address as in a packet."""
         return self.span_of(name)[: self.words]
 
-    def read_of(self, name, servo_id=1):
-        """Build the reading of a register."""
-        return self.instruction(servo_id, READ, self.span_of(name))
-
-    def intact(self, data):
-        """Return whether bytes are sound statuses."""
-        try:
-            return bool(self.packets(data))
-        except (AssertionError, IndexError):
-            return False
-
     def ask(self, servo_id, code, *params, baud=None):
         """Send an instruction; gives the statuses."""
         return self.packets(self.chain.receive(self.instruction(servo_id, code, *params), baud))
@@ -96,16 +85,6 @@ class Bench:
         """Read a register by the name that the driver has for it."""
         [(_, _, data)] = self.ask(servo_id, READ, self.span_of(name))
         return self.registers[name].decode(data)
-
-    def put_all(self, name, values):
-        """Write a register of some servos, by their ids, with one sync write; gives answers."""
-        register = self.registers[name]
-        rows = b"".join(bytes((i,)) + register.encode(value) for i, value in values.items())
-        return self.ask(ALL, SYNC_WRITE, self.span_of(name), rows)
-
-    def goals(self):
-        """Return the goal positions in the servos, by the emulator's own account."""
-        return [servo.memory.get("goal_position") for servo in self.chain.servos]
 
     def everything(self):
         """Return all that a control loop may read, as bytes."""

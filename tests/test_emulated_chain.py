@@ -78,42 +78,12 @@ def test_two_instructions_in_one_piece_are_both_answered_where_they_end(make):
 # --- groups
 
 
-def test_a_group_answers_in_the_order_asked(make):
-    bench, register = bench_of(make, (1, 2, 3)), make.registers["present_position"]
-    said = bench.ask(ALL, SYNC_READ, bench.span_of("present_position"), 3, 1, 2)
-    assert [(i, register.decode(data)) for i, _, data in said] == [(3, 3000), (1, 1000), (2, 2000)]
-
-
 def test_a_silent_one_silences_those_behind_it(make):
     bench = bench_of(make, (1, 2, 3))
     assert [piece.servo_id for piece in answered(bench, 1, 8, 2, 3)] == [1]
 
 
-# --- who listens
-
-
-def test_servos_with_one_id_mix_their_answers_and_all_obey(make):
-    bench = bench_of(make)
-    for count in (2, 3):
-        assert bench.chain.faults.command("collide 1") == "two servos have id 1 now"
-        assert pings(bench, 1)
-        assert not bench.intact(bench.chain.receive(bench.read_of("present_position")))
-        bench.put_all("goal_position", {1: 1500 + count})
-        assert bench.goals() == [1500 + count] * count
-
-
-# --- what servos suffer
-
-
-def test_a_brown_out_is_deafness_then_a_servo_without_torque(make):
-    bench = bench_of(make)
-    bench.put("torque_enable", 1)
-    assert bench.chain[1].torque
-    bench.chain.faults.command("brown-out 1")
-    assert not pings(bench, 1)
-    bench.now_s = 1.0
-    assert pings(bench, 1)
-    assert not bench.chain[1].torque
+# --- status
 
 
 def test_status_tells_everything_as_json(make):
@@ -132,12 +102,6 @@ def test_status_tells_everything_as_json(make):
     bench.chain.faults.command("overload 1")
     reported = json.loads(bench.chain.faults.command("status"))
     assert reported["servos"][0]["error"] == 0x20
-
-
-def test_the_echo_comes_first(make):
-    bench, ping = bench_of(make), make.instruction(1, PING)
-    bench.chain.faults.command("echo")
-    assert bench.chain.receive(ping).startswith(ping)
 
 
 # --- two clocks, one result

@@ -118,29 +118,7 @@ def test_unknown_instruction():
     assert bench.chain.receive(instruction(0xFE, 0x77)) == b""
 
 
-def test_old_firmware_knows_no_fast_read():
-    bench = DynamixelBench((1, "xl330-m288", 2048, 45))
-    wanted = struct.pack("<HH", 132, 4) + bytes((1,))
-    assert bench.chain.receive(instruction(0xFE, 0x8A, wanted)) == b""
-    assert len(bench.chain.receive(instruction(0xFE, 0x82, wanted))) == 15
-
-
 # --- bus watchdog
-
-
-def test_the_watchdog_stops_motion_and_refuses_goals_until_cleared():
-    bench = DynamixelBench((1, "xl330-m288", 1000), (2, "xl330-m288"))
-    bench.enable_torque(1, 3000)
-    bench.write(1, 98, 5, 1)
-    bench.now_s = 0.1
-    (at_trip, _) = bench.chain.positions_steps()
-    bench.now_s = 0.5
-    assert bench.read(1, 98, 1) == 255
-    assert abs(bench.chain.positions_steps()[0] - at_trip) < 100
-    assert 1000 < at_trip < 2900
-    assert [bench.write(1, address, 1000, 4) for address in (104, 116)] == [4, 4]
-    assert bench.write(1, 98, 0, 1) == 0
-    assert bench.write(1, 116, 1000, 4) == 0
 
 
 def test_any_packet_feeds_the_watchdog():

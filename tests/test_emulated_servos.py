@@ -6,7 +6,6 @@ from servo_bench import (
     MAKES,
     PING,
     REBOOT,
-    SYNC_WRITE,
     WRITE,
     DynamixelBench,
 )
@@ -30,11 +29,6 @@ def ids(said):
 
 
 # --- who is there
-
-
-def test_a_ping_to_all_is_answered_in_the_order_of_ids(make):
-    bench = make(*[(i, make.model, 0.0) for i in (7, 1, 3)])
-    assert ids(bench.ask(ALL, PING)) == [1, 3, 7]
 
 
 def test_only_a_client_at_the_servos_baud_rate_is_heard(make):
@@ -70,26 +64,6 @@ def test_the_return_delay_stands_in_front_of_the_answer(bench):
     assert reply.pieces[0].delay_s == pytest.approx(20e-6)
 
 
-def test_a_lower_status_return_level_answers_reads_and_pings_only(bench):
-    level = bench.get("status_return_level")
-    assert bench.put("status_return_level", level - 1) == 0
-    assert bench.put("goal_position", 257) == -1
-    assert bench.get("goal_position") == 257
-    assert len(bench.ask(1, PING)) == 1
-
-
-# --- groups
-
-
-@pytest.mark.parametrize("cut", [1, -1])
-def test_a_sync_write_that_does_not_add_up_does_nothing(make, cut):
-    bench = three(make)
-    before = bench.goals()
-    rows = bench.span_of("goal_position") + bytes((1, 1, 1, 2, 1, 1))
-    assert bench.ask(ALL, SYNC_WRITE, rows[:cut]) == []
-    assert bench.goals() == before
-
-
 # --- restarts
 
 
@@ -105,15 +79,3 @@ def test_a_reboot_is_deafness_then_as_at_power_on(make):
     bench.wait(0.02)
     assert bench.get("torque_enable") == 0
     assert bench.get("position_p_gain") == bench.get("position_p_gain", 2) != 99
-
-
-# --- motion
-
-
-def test_the_goal_waits_for_the_torque_and_is_followed_then(bench):
-    bench.put("goal_position", 2300)
-    bench.wait(0.5)
-    assert (bench.position(), bench.get("moving")) == (2048, 0)
-    bench.put("torque_enable", 1)
-    bench.wait(1.0)
-    assert bench.position() == pytest.approx(2300, abs=12)
