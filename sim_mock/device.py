@@ -23,7 +23,7 @@ class DeviceFaults(Protocol):
     wire: ActiveFaults
 
     def is_on(self, kind: str) -> bool:
-        """Return whether echo, unplug, deny or block is active."""
+        """Return whether echo or unplug is active."""
         ...
 
     def command(self, text: str) -> str:
@@ -56,14 +56,6 @@ class Device(Protocol):
 
     def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
         """Process received bytes and return the answer to each instruction in them."""
-        ...
-
-    def choose_behaviour(self, case: str, value: str) -> None:
-        """Choose the device's behaviour where documents and devices differ.
-
-        Raises:
-            ValueError: the case or value is unknown.
-        """
         ...
 
     def positions_steps(self) -> tuple[float, ...]:

@@ -69,14 +69,6 @@ class HobbyBoard(ABC):
         """Return whether a client at this baud rate is understood: every one is."""
         return True
 
-    def choose_behaviour(self, case: str, value: str) -> None:
-        """Refuse a case, as a board has none.
-
-        Raises:
-            ValueError: always.
-        """
-        raise ValueError(f"set {case!r}: unknown; a board of hobby servos has no cases")
-
     def find_servo(self, channel: int) -> HobbyServo:
         """Return the servo of a channel, advanced to the present time."""
         self.advance()

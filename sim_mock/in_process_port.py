@@ -22,8 +22,6 @@ KNOWN_BAUDS = frozenset((*DYNAMIXEL_BAUDS, *FEETECH_BAUDS))
 """Rates of servos, in addition to the SDK's rates of adapters."""
 
 BITS_PER_BYTE = 10
-WRITE_S = 0.25
-"""Time-out of a write to an adapter that accepts no bytes."""
 
 
 class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
@@ -43,12 +41,11 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         name: str = "emulated servos",
         sleep_until: Callable[[float], None] | None = None,
         wire_time: bool = False,
-        turnaround_s: float = 0.0,
     ) -> None:
         super().__init__(name)
         self.chain = chain
         self.faults = chain.faults
-        self.line = ServoLine(chain, wire_time, turnaround_s)
+        self.line = ServoLine(chain, wire_time)
         self.now_s = chain.now_s
         self._tap = tap
         self._sleep_until = sleep_until
@@ -62,14 +59,11 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Send bytes; answers wait to be read.
 
         Raises:
-            BusLost: unplugged, or the adapter accepts no bytes.
+            BusLost: unplugged.
         """
         self._fetch_arrived()
         if self._tap is not None:
             self._tap(data)
-        if self.faults.wire.has_any and self.faults.is_on("block"):
-            self._wait(self.now_s() + WRITE_S)
-            raise BusLost(f"{self.port_name} accepts no bytes: replug the adapter")
         self._waiting += self.line.send(data, self.baudrate)
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
@@ -95,7 +89,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             The received bytes, and the time at which the request had been sent.
 
         Raises:
-            BusLost: unplugged, or the adapter accepts no bytes.
+            BusLost: unplugged.
         """
         self.drain()
         self.write(request)
@@ -137,11 +131,10 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Open at a baud rate.
 
         Raises:
-            PortError: unplugged, or opening is forbidden.
+            PortError: unplugged.
         """
-        for fault, code in (("unplug", errno.ENOENT), ("deny", errno.EACCES)):
-            if self.faults.is_on(fault):
-                raise PortError(f"cannot open {self.port_name}: {os.strerror(code)}")
+        if self.faults.is_on("unplug"):
+            raise PortError(f"cannot open {self.port_name}: {os.strerror(errno.ENOENT)}")
         self.is_open = True
         self.is_using = False
         self.baudrate = cflag_baud

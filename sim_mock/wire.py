@@ -1,16 +1,15 @@
 """Timing of the line between the host and an emulated device. Pure arithmetic.
 
 With wire time a byte takes 10 bits at the client's baud rate in either direction, every status
-leaves after its servo's return delay (a fast reply only after the first servo's) and a turnaround
-of the electronics, and the order of bytes is kept. A Maestro, with a wire for each direction,
-receives while it sends, but also sends one answer after another. The adapter delivers bytes when
-the line falls silent, and at least every millisecond, like one with a latency timer of 1 ms.
-Without wire time all bytes arrive immediately, except for delays by faults. An instruction takes
-effect when its bytes are put on the line, not after its last bit.
+leaves after its servo's return delay (a fast reply only after the first servo's), and the order of
+bytes is kept. A Maestro, with a wire for each direction, receives while it sends, but also sends
+one answer after another. A servo's bytes are delivered together. Without wire time all bytes
+arrive immediately, except for delays by faults. An instruction takes effect when its bytes are put
+on the line, not after its last bit.
 
 Source of the formula: ROBOTIS e-Manual (8N1; return delay of the X series); the same frame
-of 10 bits in Feetech's and Pololu's manuals. The turnaround, reported as 20..50 us for
-Dynamixel servos, is 0 by default.
+of 10 bits in Feetech's and Pololu's manuals. The turnaround of the electronics, reported as
+20..50 us for Dynamixel servos, is omitted.
 """
 
 from collections import deque
@@ -18,9 +17,6 @@ from collections import deque
 from gazerig.sim_mock.device import Device, DeviceReply
 
 BITS_PER_BYTE = 10
-PACK_S = 0.001
-HEAD = b"\xff\xff"
-"""First bytes of a status; later blocks of a fast reply and a Maestro's answers have none."""
 
 
 class ServoLine:
@@ -28,14 +24,11 @@ class ServoLine:
 
     Args:
         wire_time: whether bytes take time on the line and return delays apply.
-        turnaround_s: time between the end of an instruction or of the previous status and the start
-            of a status, in addition to the return delay.
     """
 
-    def __init__(self, device: Device, wire_time: bool = False, turnaround_s: float = 0.0) -> None:
+    def __init__(self, device: Device, wire_time: bool = False) -> None:
         self.device = device
         self.wire_time = wire_time
-        self.turnaround_s = turnaround_s
         self._late: deque[tuple[float, bytes]] = deque()
         self._host_free_s = self._line_free_s = 0.0
 
@@ -101,19 +94,7 @@ class ServoLine:
         at_s = max(self._line_free_s, now_s)
         for reply in replies:
             at_s = max(at_s, start_s + reply.end * byte_s)
-            packed, packed_from_s = b"", at_s
-            bare = not any(piece.data.startswith(HEAD) for piece in reply.pieces)
             for piece in reply.pieces:
-                pause_s = piece.delay_s + piece.late_s
-                if bare or piece.data.startswith(HEAD):
-                    pause_s += self.turnaround_s
-                    bare = False
-                if packed and (pause_s > 0.0 or at_s - packed_from_s >= PACK_S):
-                    self._late.append((at_s, packed))
-                    packed = b""
-                at_s += pause_s
-                packed_from_s = packed_from_s if packed else at_s
-                packed += piece.data
-                at_s += len(piece.data) * byte_s
-            self._late.append((at_s, packed))
+                at_s += piece.delay_s + piece.late_s + len(piece.data) * byte_s
+                self._late.append((at_s, piece.data))
         self._line_free_s = at_s

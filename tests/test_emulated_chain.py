@@ -54,7 +54,7 @@ def test_a_torn_instruction_is_forgotten_after_the_gap(make):
     bench.now_s = 0.002
     assert bench.chain.receive(ping[5:]) == b""
     assert pings(bench, 1)
-    bench.chain.choose_behaviour("packet-gap-ms", "50")
+    bench.chain.packet_gap_s = 0.05
     bench.chain.receive(ping[:5])
     bench.now_s = 0.04
     assert len(bench.chain.receive(ping[5:])) == make.pong

@@ -10,8 +10,6 @@ from servo_bench import (
     DynamixelBench,
 )
 
-from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
-
 BAUD = 1_000_000
 
 
@@ -46,8 +44,6 @@ def test_only_a_client_at_the_servos_baud_rate_is_heard(make):
 def test_what_cannot_be_built(make):
     with pytest.raises(ValueError, match=f"baud 1234: {make.model} supports [0-9]+, "):
         make(baud=1234)
-    with pytest.raises(ValueError, match="load_nm"):
-        make(ServoSpec(1, make.model, 0.0, physics=Physics(load_nm=1e9)))
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
-from gazerig.sim_mock.maestro.board import build_board
 from gazerig.sim_mock.wire import ServoLine
 
 
@@ -29,12 +28,12 @@ PING = instruction(1, 1)
 class Wire:
     """Nine servos on a line with wire time, and a clock that is set by hand."""
 
-    def __init__(self, return_delay=0, **options):
+    def __init__(self, return_delay=0):
         self.now_s = 0.0
         self.chain = build_dynamixel([(i, "xl330-m077", 2048) for i in IDS], lambda: self.now_s)
         self.chain.receive(instruction(0xFE, 3, struct.pack("<HB", 9, return_delay)))
         self.chain.refresh()
-        self.line = ServoLine(self.chain, wire_time=True, **options)
+        self.line = ServoLine(self.chain, wire_time=True)
 
     def answers(self, data, baud=1_000_000):
         """Send bytes; give (time, bytes) of all that arrives."""
@@ -84,29 +83,3 @@ def test_nothing_overtakes_and_nothing_is_lost(sendings, delay):
         last_s = wire.now_s = max(due_s, wire.now_s)
         got += wire.line.take_arrived()
     assert got == expected
-
-
-# --- the other kinds
-
-
-class Device:
-    """Any device on a line with wire time, and a clock that is set by hand."""
-
-    def __init__(self, build, turnaround_s=0.0):
-        self.now_s = 0.0
-        self.device = build(lambda: self.now_s)
-        self.line = ServoLine(self.device, True, turnaround_s)
-
-    answers = Wire.answers
-
-
-@pytest.mark.parametrize("baud", [9600, 115_200])
-def test_a_boards_bare_answers_wait_for_its_turnaround_too(baud):
-    wire = Device(lambda now_s: build_board(6, now_s), 100e-6)
-    errors, place = bytes((0xA1,)), bytes((0x90, 3))
-    first, second = wire.answers(errors + place, baud)  # type: ignore[misc]
-    byte_s = 10 / baud
-    assert first[0] == pytest.approx(byte_s + 100e-6 + 2 * byte_s)
-    begun = max(first[0], 3 * byte_s)
-    assert second[0] == pytest.approx(begun + 100e-6 + 2 * byte_s)
-    assert (len(first[1]), len(second[1])) == (2, 2)

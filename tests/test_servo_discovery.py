@@ -31,7 +31,8 @@ class Bench:
             chain = self.chain = build_dynamixel(specs, lambda: self.now_s)
             for servo in chain.servos:
                 servo.memory.set("baud_rate", BAUD_RATES.index(baud))
-            chain.choose_behaviour("baud", "heed")
+            chain.check_baud = True
+            chain.refresh()
             chain.refresh()
             self.port = InProcessPort(chain, sleep_until=self.sleep_until)
             self.names = [FoundServo(i, 1190, 53, baud, XL) for i in ids]

@@ -60,7 +60,6 @@ COMMANDS = CommandTable(
             "push a part of the head, such as head, at its origin; the servos give way",
         ),
     },
-    {},
     "a body of the rig",
 )
 """Fault commands of a world."""

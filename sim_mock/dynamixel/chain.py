@@ -22,12 +22,11 @@ from gazerig.sim_mock.replies import BROADCAST, Instruction, Piece, merge
 from gazerig.sim_mock.smart_servo.chain import (
     FAST_BULK_READ,
     FAST_SYNC_READ,
-    GroupRead,
     ServoChain,
     build_chain,
-    sync_rows,
 )
 from gazerig.sim_mock.smart_servo.faults import commands_of
+from gazerig.sim_mock.smart_servo.servo import READ
 
 BULK_READ, BULK_WRITE = 0x92, 0x93
 MIN_WATCHDOG_MS = 20
@@ -55,10 +54,13 @@ class DynamixelChain(ServoChain[DynamixelServo]):
     def _execute_group(self, code: int, params: bytes) -> list[Piece]:
         """Execute an instruction to all servos."""
         if code == FAST_SYNC_READ:
-            return self._answer_fast(sync_rows(self.span, params))
+            return self._answer_fast(self._reads(params))
         if code in (BULK_READ, FAST_BULK_READ) and len(params) % _ROW.size == 0:
-            rows = tuple(_ROW.iter_unpack(params))
-            return self._answer_rows(rows) if code == BULK_READ else self._answer_fast(rows)
+            reads = [
+                (params[at], params[at + 1 : at + _ROW.size])
+                for at in range(0, len(params), _ROW.size)
+            ]
+            return self._answer_reads(reads) if code == BULK_READ else self._answer_fast(reads)
         if code == BULK_WRITE:
             at = 0
             while len(params) - at > _ROW.size:
@@ -69,48 +71,39 @@ class DynamixelChain(ServoChain[DynamixelServo]):
             return []
         return super()._execute_group(code, params)
 
-    def _answer_fast(self, rows: Sequence[GroupRead]) -> list[Piece]:
-        """Return one packet of all answers; a missing block ends it."""
-        head = HEAD.pack(HEADER, BROADCAST, 1 + sum([4 + row[2] for row in rows]), STATUS)
-        if self._wire.has_any or self._twins:
-            return self._answer_blocks(rows, head)
-        servos, pack, crc, before, parts = self._by_id, CRC.pack, 0, head, list[bytes]()
-        for servo_id, address, size in rows:
-            servo = servos.get(servo_id)
-            block = b"" if servo is None else self._block(servo, servo_id, address, size)
-            if not block:
-                break
-            part = before + block
-            crc = umts(part, crc)
-            parts.append(part)
-            before = pack(crc)
-        if not parts:
-            return []
-        return [Piece(rows[0][0], b"".join(parts) + before, servos[rows[0][0]].delay_s)]
+    def _answer_fast(self, reads: Sequence[tuple[int, bytes]]) -> list[Piece]:
+        """Return one packet of all answers in their pieces; a missing block ends it.
 
-    def _answer_blocks(self, rows: Sequence[GroupRead], head: bytes) -> list[Piece]:
-        """Return the same packet in pieces that a fault can change."""
-        pieces, crc, pack = list[Piece](), umts(head), CRC.pack
-        for servo_id, address, size in rows:
+        The CRC of a block counts for the next piece, as its sender continues from it.
+        """
+        length = 1 + sum([4 + self.span.unpack(span)[1] for _, span in reads])
+        before, crc, pack = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0, CRC.pack
+        pieces, twins = list[Piece](), self._twins
+        for servo_id, span in reads:
             servo = self._by_id.get(servo_id)
-            block = b"" if servo is None else self._block(servo, servo_id, address, size)
+            block = b"" if servo is None else self._block(servo, servo_id, span)
             if servo is None or not block or self._is_muted(servo_id):
                 break
-            start, block = crc, block + pack(umts(block, crc))
-            for twin in self._twins.get(servo_id, ()):
-                other = self._block(twin, servo_id, address, size)
-                block = merge(block, other + pack(umts(other, start)))
-            crc = umts(block, start)
-            delay_s = 0.0 if pieces else servo.delay_s
-            pieces.append(Piece(servo_id, block if pieces else head + block, delay_s))
+            data, start = before + block, crc
+            crc = umts(data, start)
+            after = pack(crc)
+            for twin in twins.get(servo_id, ()) if twins else ():
+                other = before + self._block(twin, servo_id, span)
+                data, after = merge(data, other), merge(after, pack(umts(other, start)))
+                crc = umts(data, start)
+            pieces.append(Piece(servo_id, data, 0.0 if pieces else servo.delay_s))
+            before = after
+        if pieces:
+            pieces[-1] = pieces[-1]._replace(data=pieces[-1].data + before)
         return pieces
 
-    def _block(self, servo: DynamixelServo, servo_id: int, address: int, size: int) -> bytes:
+    def _block(self, servo: DynamixelServo, servo_id: int, span: bytes) -> bytes:
         """Return a servo's part of a fast read; it fills the part of a refused read with zeros."""
         if not servo.advance(self._now_ms, self._fed_ms):
             return b""
-        if not servo.fast_reads or not servo.answers_groups:
+        if not servo.fast_reads or not servo.answers_instruction(READ):
             return b""
+        address, size = self.span.unpack(span)
         data, error = servo.read(address, size), servo.error_flag
         if data is None:
             data, error = bytes(size), error | ACCESS

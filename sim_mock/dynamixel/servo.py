@@ -201,11 +201,7 @@ def _window_registers(blocks: Iterable[IndirectBlock]) -> Iterator[DynamixelRegi
 
 
 class DynamixelServo(EmulatedServo):
-    """One Dynamixel servo on the chain.
-
-    Raises:
-        ValueError: the spec's physics cannot exist.
-    """
+    """One Dynamixel servo on the chain."""
 
     restart_ms = 400
     unreadable = ACCESS
@@ -257,7 +253,7 @@ class DynamixelServo(EmulatedServo):
 
     def identity(self) -> bytes:
         """Return model number and firmware."""
-        return _IDENTITY.pack(self.model.number, self.firmware)
+        return _IDENTITY.pack(self.model.number, self.spec.firmware)
 
     # --- motion
 

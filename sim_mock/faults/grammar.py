@@ -32,12 +32,10 @@ class Verb(NamedTuple):
 class CommandTable(NamedTuple):
     """All fault commands of one kind of device.
 
-    cases: the cases of ``set``, and their values as they are typed
     ids: meaning of the word ID, e.g. "a servo's id"
     """
 
     verbs: Mapping[str, Verb]
-    cases: Mapping[str, str]
     ids: str
 
     def obey(self, faults: object, text: str) -> str:
@@ -82,10 +80,7 @@ class CommandTable(NamedTuple):
         if name is not None and name in self.verbs:
             return f"{self.usage(name)}: {self.verbs[name].description}"
         lines = [f"{self.usage(verb):46} {self.verbs[verb].description}" for verb in self.verbs]
-        lines.append(
-            f"ID is {self.ids} or all; a fault lasts until clear, or as given by [..]; values of set"
-        )
-        lines += [f"  {case} {values}" for case, values in self.cases.items()]
+        lines.append(f"ID is {self.ids} or all; a fault lasts until clear, or as given by [..]")
         return "\n".join(lines)
 
 
@@ -152,16 +147,6 @@ def word_choice(*values: str) -> Callable[[str], str]:
 def on_off(text: str) -> bool:
     """Parse on or off."""
     return word_choice("on", "off")(text) == "on"
-
-
-def hex_bytes(text: str) -> bytes | None:
-    """Parse bytes written as FFFF00; None for random ones."""
-    if text == "random":
-        return None
-    try:
-        return bytes.fromhex(text)
-    except ValueError:
-        raise ValueError(f"{text!r} is neither random nor bytes in hex such as FFFF00") from None
 
 
 def any_word(text: str) -> str:

@@ -27,7 +27,7 @@ class HobbyFaults(LineFaults):
     noun = "channel"
 
     def __init__(self, board: "HobbyBoard", commands: CommandTable, seed: int) -> None:
-        super().__init__(board, commands, seed, b"")
+        super().__init__(board, commands, seed)
         self.board = board
 
     def brown_out(self) -> str:
@@ -105,5 +105,5 @@ def hobby_commands(highest: int, writes: str, own: Mapping[str, Verb]) -> Comman
                      "turn the servo by hand; with pulses it returns"),
         **closing_verbs(one),
     }
-    return CommandTable(verbs, {}, "a channel")
+    return CommandTable(verbs, "a channel")
 # fmt: on

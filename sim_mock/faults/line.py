@@ -29,10 +29,6 @@ class FaultTarget(Protocol):
         """
         ...
 
-    def choose_behaviour(self, case: str, value: str) -> None:
-        """Choose the device's behaviour where documents and devices differ."""
-        ...
-
 
 class LineFaults(ABC):
     """Faults of a line and the device at its end; a device adds its own."""
@@ -40,9 +36,7 @@ class LineFaults(ABC):
     noun = "servo"
     """Name of the object of an id, for messages."""
 
-    def __init__(
-        self, chain: FaultTarget, commands: CommandTable, seed: int, header: bytes = b""
-    ) -> None:
+    def __init__(self, chain: FaultTarget, commands: CommandTable, seed: int) -> None:
         self._chain = chain
         self.commands = commands
         self.wire = ActiveFaults(seed)
@@ -93,23 +87,11 @@ class LineFaults(ABC):
         span += "" if seconds is None else f" for {seconds:g} s"
         return text + (span or " until cleared")
 
-    def switch(self, kind: str, on: bool, text: str, seconds: float | None = None) -> str:
-        """Start or end a fault of the whole line; return a description of the effect."""
-        self.wire.remove(kind)
-        if on:
-            return self.begin(kind, None, text, None, seconds)
-        return f"no longer: {text}"
-
     # --- all
 
     def is_on(self, kind: str) -> bool:
-        """Return whether echo, unplug, deny or block is active."""
+        """Return whether echo or unplug is active."""
         return self.wire.is_on(kind, self._chain.now_s())
-
-    def choose_behaviour(self, case: str, value: str) -> str:
-        """Choose the servos' behaviour where documents and devices differ."""
-        self._chain.choose_behaviour(case, value)
-        return f"{case} is {value}"
 
     def clear(self, servo_id: int | None = None) -> str:
         """End every fault of the line (or of one servo's answers); faults of servos stay."""

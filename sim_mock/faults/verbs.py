@@ -9,7 +9,6 @@ from gazerig.sim_mock.faults.grammar import (
     TIME,
     Argument,
     Verb,
-    any_word,
     count,
     id_or_all,
     integer_parser,
@@ -23,12 +22,26 @@ _TIMES = Argument("N", count, True)
 Do = Callable[..., str]
 
 
+def line_command(kind: str, text: str) -> Do:
+    """Return a command that starts a fault of the whole line; ``text``: its reply."""
+
+    def run_command(
+        faults: LineFaults,
+        *numbers: float,
+        count: int | None = None,
+        seconds: float | None = None,
+    ) -> str:
+        return faults.begin(kind, None, text.format(*numbers), count, seconds, numbers)
+
+    return run_command
+
+
 def answer_command(kind: str, text: str) -> Do:
     """Return a command that disturbs the answers of one servo or all; ``text``: its reply."""
 
     def run_command(
         faults: LineFaults,
-        servo_id: int | None = None,
+        servo_id: int | None,
         *numbers: float,
         count: int | None = None,
         seconds: float | None = None,
@@ -54,18 +67,10 @@ def switch_command(kind: str, text: str) -> Do:
     """Return a command that switches a fault of the whole line on or off."""
 
     def run_command(faults: LineFaults, on: bool = True, seconds: float | None = None) -> str:
-        return faults.switch(kind, on, text, seconds)
+        faults.wire.remove(kind)
+        return faults.begin(kind, None, text, None, seconds) if on else f"no longer: {text}"
 
     return run_command
-
-
-def _static(faults: LineFaults, percent: float, seconds: float | None = None) -> str:
-    text = f"noise hits {percent:g} % of all bytes, both directions"
-    return faults.begin("static", None, text, None, seconds, (percent,))
-
-
-def _plug(faults: LineFaults) -> str:
-    return faults.switch("unplug", False, "unplugged")
 
 
 # fmt: off
@@ -82,7 +87,8 @@ def line_verbs(one: Argument) -> dict[str, Verb]:
         "corrupt": Verb(answer_command("corrupt", "a bit flips in answers of {label}"),
                         (target, Argument("BIT", integer_parser(0, 8191, "a bit"), True)),
                         "a bit flips, a random one by default", BOTH),
-        "static": Verb(_static, (Argument("PERCENT", number_parser(0.0, 100.0, "a percentage")),),
+        "static": Verb(line_command("static", "noise hits {:g} % of all bytes, both directions"),
+                       (Argument("PERCENT", number_parser(0.0, 100.0, "a percentage")),),
                        "noise hits this share of all bytes, both directions", TIME),
     }
 
@@ -98,19 +104,14 @@ def adapter_verbs() -> dict[str, Verb]:
         "echo": Verb(switch_command("echo", "the line echoes the host"), (SWITCH,),
                      "the host receives its own bytes", TIME),
         "unplug": Verb(switch_command("unplug", "unplugged"), (), "pull the adapter out", TIME),
-        "plug": Verb(_plug, (), "reconnect the adapter under its name"),
-        "deny": Verb(switch_command("deny", "opening is forbidden"), (SWITCH,),
-                     "opening the port is forbidden", TIME),
-        "block": Verb(switch_command("block", "the adapter accepts no bytes"), (SWITCH,),
-                      "the adapter accepts no bytes", TIME),
+        "plug": Verb(lambda faults: switch_command("unplug", "unplugged")(faults, False), (),
+                     "reconnect the adapter under its name"),
     }
 
 
 def closing_verbs(one: Argument) -> dict[str, Verb]:
     """Return the commands of every device, which are last in its help."""
     return {
-        "set": Verb(LineFaults.choose_behaviour, (Argument("CASE", any_word), Argument("VALUE", any_word)),
-                    "choose a behaviour of the device: see below"),
         "status": Verb(LineFaults.status, (), "all servos and faults as JSON"),
         "clear": Verb(LineFaults.clear, (one._replace(optional=True),),
                       "end faults of answers and line; effects on servos stay"),

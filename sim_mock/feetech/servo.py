@@ -5,10 +5,11 @@ exist, is answered like any other and changes nothing. While Lock is 1, a write 
 lasts until power-off; only writes while it is 0 are permanent. An overload lowers the torque until
 the next new goal; other errors in Unloading Condition switch it off.
 
-The registers' places are those of the driver's table. Of them have no effect: modes other than
-position (33 and, for SCS, both limits 0), phase (18), starting force and dead zones (24, 26, 27;
-without them friction keeps it up to 2 steps from its goal, as on a real servo), protection current
-(28), angular resolution (30), velocity gains (37, 39), LED (20), the factory's own (80-86).
+The registers' places are those of the driver's table. Of them have no effect: goal time (44),
+modes other than position (33 and, for SCS, both limits 0), phase (18), starting force and dead
+zones (24, 26, 27; without them friction keeps it up to 2 steps from its goal, as on a real servo),
+protection current (28), angular resolution (30), velocity gains (37, 39), LED (20), the factory's
+own (80-86).
 
 Position, goal and target are sign and magnitude. The encoder knows its place within a turn, 0 to
 4095 at power-on; from there the servo counts on, and subtracts the offset (31): a shaft that was
@@ -159,7 +160,7 @@ class FeetechServo(EmulatedServo):
     physics are ignored: here they are registers.
 
     Raises:
-        ValueError: the model is unknown, or the spec's physics cannot exist.
+        ValueError: the model is unknown.
     """
 
     restart_ms = 800
@@ -173,6 +174,7 @@ class FeetechServo(EmulatedServo):
             raise ValueError(f"model {spec.model!r}: Feetech servos are {', '.join(models)}")
         model = models[spec.model]
         self._scs = spec.model in SCS_MODELS
+        self.answers_groups = not self._scs
         order: Order = "big" if self._scs else "little"
         self._goals, self._sensed = _GOALS[order], _SENSED[order]
         self.baud_rates = SCS_BAUD_RATES if self._scs else BAUD_RATES
@@ -190,7 +192,6 @@ class FeetechServo(EmulatedServo):
     def _apply_settings(self) -> None:
         """Apply settings that have changed."""
         super()._apply_settings()
-        self.answers_groups = not self._scs
         self._measure()
         low, high = self.memory.get("min_position_limit"), self.memory.get("max_position_limit")
         self._range = (min(low, high), max(low, high)) if low or high else (-0x7FFF, 0x7FFF)
@@ -231,13 +232,11 @@ class FeetechServo(EmulatedServo):
         if wanted == self._goals_followed:
             return
         self._goals_followed = wanted
-        ramp, goal, time_ms, speed = wanted
+        ramp, goal, _, speed = wanted
         low, high = self._range
         goal = max(low, min(high, signed(goal, 15)))
         place = goal / self._scale - self._shift
         cruise = min(abs(signed(speed, 15)) / self._scale / 1000.0 or self._top, self._top)
-        if time_ms:
-            cruise, ramp = min(abs(place - self.shaft.r) / time_ms, self._top), 0
         self.shaft.lead_to(place, cruise, ramp * RAMP_UNIT)
 
     def _switch(self, on: bool) -> None:

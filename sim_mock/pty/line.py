@@ -9,9 +9,10 @@ from pathlib import Path
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.pty.terminal import Terminal
+from gazerig.sim_mock.smart_servo.chain import ServoChain
 from gazerig.sim_mock.wire import ServoLine
 
-_CHAINS, _PACKET_GAP_MS = ("dynamixel", "feetech"), "50"
+_PACKET_GAP_S = 0.05
 """1.5 ms on a real line; here the host's scheduler may split a packet for longer."""
 IDLE_S = 0.5
 LOOK_S = 0.005
@@ -59,12 +60,11 @@ class TerminalLine:
         self.settings = settings
         self._now_s, self._say, self._warn = now_s, say, warn
         self.device = device or build(settings.device, now_s)
-        if settings.device.kind in _CHAINS:
-            self.device.choose_behaviour("packet-gap-ms", _PACKET_GAP_MS)
+        if isinstance(self.device, ServoChain):
+            self.device.packet_gap_s = _PACKET_GAP_S
         self.line = ServoLine(self.device, settings.wire_time)
         link = None if settings.link is None else Path(os.path.abspath(settings.link))
         self.terminal = Terminal(link)
-        self._held = self._forbidden = False
         self._warned: int | None = None
         self.heard = False
         """Whether a client has sent anything yet."""
@@ -136,16 +136,9 @@ class TerminalLine:
         if faults.is_on("unplug"):
             terminal.unplug()
             self.line.forget()
-            self._held = self._forbidden = False
             return
         if not terminal.is_plugged:
             before = terminal.path
             terminal.plug()
             if terminal.path != before:
                 self._say(self._message({"path": terminal.path}))
-        if faults.is_on("block") != self._held:
-            self._held = not self._held
-            terminal.hold(self._held)
-        if faults.is_on("deny") != self._forbidden:
-            self._forbidden = not self._forbidden
-            terminal.forbid(self._forbidden)

@@ -109,14 +109,6 @@ class Terminal:
             termios.tcflush(self._slave, termios.TCIFLUSH)
             fcntl.ioctl(self._slave, termios.TIOCNXCL)
 
-    def hold(self, held: bool) -> None:
-        """Stop or resume reading the client's bytes, as an adapter with a full buffer does."""
-        termios.tcflow(self._slave, termios.TCOOFF if held else termios.TCOON)
-
-    def forbid(self, forbidden: bool) -> None:
-        """Forbid or allow opening; the superuser can open it in any case."""
-        os.chmod(self._slave, 0 if forbidden else 0o620)
-
 
 def _create_link(link: Path, target: str) -> None:
     """Create a link; a dangling link, or one to a terminal, is replaced."""

@@ -6,13 +6,12 @@ The servos after a silent one in a group read never answer, as logic analysers s
 import struct
 from abc import ABC
 from collections.abc import Callable, Iterable
-from functools import lru_cache
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.replies import BROADCAST, Instruction, Piece, merge
-from gazerig.sim_mock.smart_servo.faults import CASES, ServoFaults
+from gazerig.sim_mock.smart_servo.faults import ServoFaults
 from gazerig.sim_mock.smart_servo.head_weight import HeadWeight
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.servo import (
@@ -28,15 +27,13 @@ from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft, whole_m
 SYNC_READ, SYNC_WRITE = 0x82, 0x83
 
 PACKET_GAP_S = 0.0015
-"""Time after which an unfinished packet is dropped [A]."""
+"""Pause in a packet that real servos tolerate [A]."""
 
 WEIGH_MS = 10
 """Time for which the torques of the head's weight are constant."""
 TWIN_AWAY_STEPS = 257
 """Distance of a second servo with a taken id from the first, so that they differ."""
 
-GroupRead = tuple[int, int, int]
-"""Id, address, length of one servo's part of a group read."""
 Result = tuple[int, bytes]
 """Error number and parameters of an answer."""
 
@@ -60,6 +57,9 @@ class ServoChain(ABC, Generic[S]):
         check_baud: whether only clients at a servo's baud rate get answers, instead of all.
         seed: seed of the random numbers of faults.
         weight: weight of the head on the servos; None: each has its own load.
+
+    Attributes:
+        packet_gap_s: time after which an unfinished packet is dropped.
     """
 
     servo_type: type[S]
@@ -89,7 +89,7 @@ class ServoChain(ABC, Generic[S]):
         self._wire = self.faults.wire
         self._now_s = now_s()
         self._now_ms = self._fed_ms = self._weighed_ms = whole_ms(self._now_s)
-        self._gap_s, self._unfinished, self._arrived_s = PACKET_GAP_S, b"", self._now_s
+        self.packet_gap_s, self._unfinished, self._arrived_s = PACKET_GAP_S, b"", self._now_s
         self._known: dict[bytes, list[Instruction]] = {}
         self._client_baud: int | None = None
         self.refresh()
@@ -165,30 +165,14 @@ class ServoChain(ABC, Generic[S]):
 
     def add_duplicate(self, servo_id: int) -> None:
         """Add a second servo with a taken id to the bus, slightly turned from the first."""
-        first, now_ms = self.find_servo(servo_id), whole_ms(self.now_s())
+        first, make = self.find_servo(servo_id), cast(Any, self.servo_type)
         start = (first.position_steps + TWIN_AWAY_STEPS) % 4096
-        make: Any = self.servo_type
-        twin: S = make(ServoSpec(servo_id, first.model.name, start, first.firmware), now_ms)
+        twin: S = make(first.spec._replace(start_steps=start), whole_ms(self.now_s()))
         for name in ("return_delay_time", "baud_rate"):
             twin.memory.set_permanently(name, first.memory.get(name))
         twin.set_baud(first.baud)
         self.servos = (*self.servos, twin)
         self.refresh()
-
-    def choose_behaviour(self, case: str, value: str) -> None:
-        """Choose whether servos check the baud rate, or how long they wait for half a packet.
-
-        Raises:
-            ValueError: the case or value is unknown.
-        """
-        if case == "packet-gap-ms":
-            self._gap_s = float(value) / 1000.0
-        elif case == "baud" and value in ("heed", "any"):
-            self.check_baud = value == "heed"
-            self.refresh()
-        else:
-            known = ", ".join(f"{name} {values}" for name, values in CASES.items())
-            raise ValueError(f"set {case} {value}: unknown; expected {known}")
 
     # --- bytes
 
@@ -224,7 +208,7 @@ class ServoChain(ABC, Generic[S]):
         """Return the instructions that these bytes complete; they arrive now."""
         if not self._unfinished and data in self._known:
             return self._known[data]
-        before = len(self._unfinished) if now_s - self._arrived_s < self._gap_s else 0
+        before = len(self._unfinished) if now_s - self._arrived_s < self.packet_gap_s else 0
         if before:
             data = self._unfinished + data
         self._arrived_s = now_s
@@ -250,7 +234,7 @@ class ServoChain(ABC, Generic[S]):
     def _execute_group(self, code: int, params: bytes) -> list[Piece]:
         """Execute an instruction to all servos."""
         if code == SYNC_READ:
-            return self._answer_rows(sync_rows(self.span, params))
+            return self._answer_reads(self._reads(params))
         if code == SYNC_WRITE:
             self._write_each(params)
             return []
@@ -270,29 +254,25 @@ class ServoChain(ABC, Generic[S]):
         if servo is None:
             return None
         packet, delay_s = b"", servo.delay_s
-        for one in (servo, *self._twins.get(servo_id, ())):
-            packet = merge(packet, self._answer(one, servo_id, code, params))
+        for one in (servo, *self._twins.get(servo_id, ())) if self._twins else (servo,):
+            if not one.advance(self._now_ms, self._fed_ms):
+                continue
+            # An answer is sent with the old settings.
+            answers, flag = one.answers_instruction(code), one.error_flag
+            said = self._carry_out(one, code, params)
+            if said is not None and answers:
+                own = self.status(servo_id, said[0] | flag, said[1])
+                packet = merge(packet, own) if packet else own
         return None if not packet or self._is_muted(servo_id) else Piece(servo_id, packet, delay_s)
-
-    def _answer(self, servo: S, servo_id: int, code: int, params: bytes) -> bytes:
-        """Execute an instruction on one servo; return its answer, empty if it is silent."""
-        if not servo.advance(self._now_ms, self._fed_ms):
-            return b""
-        # An answer is sent with the old settings.
-        answers, flag = servo.answers_instruction(code), servo.error_flag
-        said = self._carry_out(servo, code, params)
-        if said is None or not answers:
-            return b""
-        return self.status(servo_id, said[0] | flag, said[1])
 
     def _carry_out(self, servo: S, code: int, params: bytes) -> Result | None:
         """Execute an instruction on a servo; return its answer, None for silence."""
-        half = self.span.size // 2
-        if code == PING:
-            return 0, servo.identity()
         if code == READ and len(params) == self.span.size:
             data = servo.read(*self.span.unpack(params))
             return (servo.unreadable, b"") if data is None else (0, data)
+        if code == PING:
+            return 0, servo.identity()
+        half = self.span.size // 2
         if code == WRITE and len(params) >= half:
             return servo.write(int.from_bytes(params[:half], "little"), params[half:]), b""
         if code == REBOOT:
@@ -302,26 +282,19 @@ class ServoChain(ABC, Generic[S]):
 
     # --- groups
 
-    def _part(self, servo: S, servo_id: int, length: int, address: int) -> bytes:
-        """Return one servo's status in a group read; empty if it is silent."""
-        if not servo.advance(self._now_ms, self._fed_ms) or not servo.answers_groups:
-            return b""
-        data, flag = servo.read(address, length), servo.error_flag
-        if data is None:
-            return self.status(servo_id, flag | servo.unreadable, b"")
-        return self.status(servo_id, flag, data)
+    def _reads(self, params: bytes) -> list[tuple[int, bytes]]:
+        """Return the ids of a sync read, and the parameters of a read of each servo."""
+        size = self.span.size
+        return [(servo_id, params[:size]) for servo_id in params[size:]]
 
-    def _answer_rows(self, rows: Iterable[GroupRead]) -> list[Piece]:
+    def _answer_reads(self, reads: Iterable[tuple[int, bytes]]) -> list[Piece]:
         """Answer a group read with one status per servo, up to the first silent one."""
         pieces = list[Piece]()
-        for servo_id, address, length in rows:
-            servo = self._by_id.get(servo_id)
-            packet = b"" if servo is None else self._part(servo, servo_id, length, address)
-            for twin in self._twins.get(servo_id, ()) if self._twins else ():
-                packet = merge(packet, self._part(twin, servo_id, length, address))
-            if servo is None or not packet or self._is_muted(servo_id):
+        for servo_id, params in reads:
+            answer = self._answer_all(servo_id, READ, params)
+            if answer is None or not self._by_id[servo_id].answers_groups:
                 break
-            pieces.append(Piece(servo_id, packet, servo.delay_s))
+            pieces.append(answer)
         return pieces
 
     def _write_each(self, params: bytes) -> None:
@@ -350,15 +323,6 @@ class ServoChain(ABC, Generic[S]):
         for servo in () if first is None else (first, *self._twins.get(servo_id, ())):
             if servo.advance(self._now_ms, self._fed_ms):
                 servo.write(address, data)
-
-
-@lru_cache(maxsize=64)
-def sync_rows(span: struct.Struct, params: bytes) -> tuple[GroupRead, ...]:
-    """Parse the parameters of a sync read; cached, because a control loop repeats them."""
-    if len(params) <= span.size:
-        return ()
-    address, length = span.unpack_from(params)
-    return tuple((servo_id, address, length) for servo_id in params[span.size :])
 
 
 C = TypeVar("C", bound=ServoChain[Any])

@@ -15,9 +15,6 @@ from gazerig.sim_mock.faults.line import FaultTarget, LineFaults
 from gazerig.sim_mock.faults.verbs import Do, adapter_verbs, closing_verbs, line_verbs
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
-CASES = {"baud": "heed|any", "packet-gap-ms": "MS"}
-"""Cases of ``set``, and their values."""
-
 
 class Chain(FaultTarget, Protocol):
     """Interface of a chain to its faults."""
@@ -111,5 +108,5 @@ def commands_of(highest_id: int, reset: str) -> CommandTable:
         "turn": Verb(_servo_command(EmulatedServo.turn, "{label} was turned by {:g} steps"),
                      (some, steps), "turn the joint by hand"),
         **closing_verbs(one),
-    }, CASES, "a servo's id")
+    }, "a servo's id")
 # fmt: on

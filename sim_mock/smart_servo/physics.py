@@ -66,42 +66,6 @@ class ServoSpec(NamedTuple):
     physics: Physics | Sequence[Any] = Physics()
 
 
-def check_physics(physics: Physics) -> Physics:
-    """Return the physics if it can exist.
-
-    Raises:
-        ValueError: a number is out of its range, named with the range.
-    """
-    for name, (low, high) in _RANGES.items():
-        value = getattr(physics, name)
-        if value is not None and not low <= value <= high:
-            raise ValueError(f"servo physics: {name} is {value}, not in {low}..{high}")
-    if not physics.stop_low_steps <= physics.stop_high_steps:
-        raise ValueError("servo physics: stop_low_steps is above stop_high_steps")
-    if physics.coulomb_share + physics.viscous_share > 0.9:
-        raise ValueError("servo physics: both frictions together exceed 0.9 of the torque")
-    return physics
-
-
-_RANGES: dict[str, tuple[float, float]] = {
-    "rotor_s": (0.001, 10.0),
-    "load_kg_m2": (0.0, 10.0),
-    "coulomb_share": (0.0, 0.9),
-    "viscous_share": (0.0, 0.9),
-    "load_nm": (-100.0, 100.0),
-    "gravity_nm": (-100.0, 100.0),
-    "upright_steps": (-1e7, 1e7),
-    "gravity_turns": (-100.0, 100.0),
-    "stop_low_steps": (-inf, inf),
-    "stop_high_steps": (-inf, inf),
-    "play_deg": (0.0, 10.0),
-    "supply_v": (0.0, 60.0),
-    "temperature_c": (-40.0, 200.0),
-    "overload_share": (0.05, 1.0),
-    "overload_s": (0.02, 1e4),
-}
-
-
 STEPS_PER_TURN = 4096
 """Resolution of the encoder on the shaft; registers of a make may have another one."""
 STEPS_PER_RAD = STEPS_PER_TURN / (2.0 * pi)

@@ -16,7 +16,6 @@ from gazerig.sim_mock.smart_servo.physics import (
     Physics,
     ServoModel,
     ServoSpec,
-    check_physics,
 )
 from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
 
@@ -49,9 +48,6 @@ class EmulatedServo(ABC):
         followed: address and bytes of the last write of goals, while repeating it would change
             nothing; None otherwise.
         on_address: called when id or baud rate have changed.
-
-    Raises:
-        ValueError: the spec's physics cannot exist.
     """
 
     restart_ms: int
@@ -76,8 +72,8 @@ class EmulatedServo(ABC):
         make_shaft: ShaftMaker = create_shaft,
         scale: float = 1.0,
     ) -> None:
-        physics = check_physics(Physics(*spec.physics))
-        self.model, self.memory, self.firmware = model, memory, spec.firmware
+        physics = Physics(*spec.physics)
+        self.spec, self.model, self.memory = spec, model, memory
         self.physics, self._scale = physics, scale
         own = physics._replace(
             stop_low_steps=physics.stop_low_steps / scale,
@@ -112,7 +108,6 @@ class EmulatedServo(ABC):
         get = self.memory.get
         self.followed = None
         self.id, self._status_level = get("id"), get("status_return_level")
-        self.answers_groups = self._status_level >= self.read_level
         self.delay_s = get("return_delay_time") * RETURN_DELAY_UNIT_S
         share, seconds = self._overload_limit()
         self._heavy_effort = share * self.shaft.supply - 1e-11

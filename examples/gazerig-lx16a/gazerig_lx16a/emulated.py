@@ -73,9 +73,6 @@ class Lx16aChain:
     def understands_baud(self, client_baud: int) -> bool:
         return True
 
-    def choose_behaviour(self, case: str, value: str) -> None:
-        raise ValueError(f"these servos have no case {case!r}")
-
     def positions_steps(self) -> tuple[float, ...]:
         return tuple(self.find_servo(servo_id).place for servo_id in self.servos)
 
@@ -119,7 +116,7 @@ _ID = Argument("ID", integer_parser(0, 253, "a servo id"))
 COMMANDS = CommandTable(
     {**line_verbs(_ID), **adapter_verbs(), "brown-out": Verb(_restart, (_ID,), "restart"),
      "lose-writes": loss_verb("lose_writes", "moves"),
-     **closing_verbs(_ID)}, {}, "a servo's id",
+     **closing_verbs(_ID)}, "a servo's id",
 )  # fmt: skip
 
 
