@@ -12,14 +12,9 @@ from collections.abc import Callable
 
 from dynamixel_sdk import PortHandler
 
-from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.wire import ServoLine
-
-KNOWN_BAUDS = frozenset((*DYNAMIXEL_BAUDS, *FEETECH_BAUDS))
-"""Rates of servos, in addition to the SDK's rates of adapters."""
 
 BITS_PER_BYTE = 10
 
@@ -123,9 +118,8 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     # --- methods for the SDK
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open at a baud rate; return False if neither adapters nor devices support it."""
-        known = baudrate in KNOWN_BAUDS or self.getCFlagBaud(baudrate) > 0
-        return known and self.setupPort(baudrate)
+        """Open at a baud rate."""
+        return self.setupPort(baudrate)
 
     def setupPort(self, cflag_baud: int) -> bool:
         """Open at a baud rate.

@@ -172,31 +172,11 @@ def test_the_emulators_commands_are_those_of_its_page() -> None:
     reported = set(re.findall(r"`([a-z-]+)(?: [^`]*)?`", page.split("## Fault commands")[1]))
     for commands in (DYNAMIXEL, FEETECH, MAESTRO):
         assert not set(commands.verbs) - reported
-        assert not set(commands.cases) - reported
     verbs = {verb for commands in (DYNAMIXEL, FEETECH, MAESTRO) for verb in commands.verbs}
     rows = page.split("| command | what it does |")[1].split("\n\n")[0].splitlines()
     for row in rows[2:]:
         for verb in re.findall(r"`([a-z-]+)", row.split("|")[1]):
             assert verb in verbs, verb
-
-
-@pytest.mark.parametrize(
-    ("title", "device"),
-    [
-        ("## Where documents", DYNAMIXEL),
-        ("Feetech STS servos:", FEETECH),
-    ],
-    ids=["dynamixel", "feetech"],
-)
-def test_the_emulators_cases_are_those_of_its_page(title: str, device: Any) -> None:
-    table = EMULATOR.read_text(encoding="utf-8").split(title)[1].split("\n\n")[1]
-    assert table.startswith("| case |")
-    for row in table.splitlines()[2:]:
-        cells = row.split("|")
-        cases = [device.cases[case] for case in re.findall(r"`([a-z-]+)`", cells[1])]
-        reported = set(re.findall(r"`([a-z-]+)`", cells[2].split(":")[0]))
-        allowed = {value for case in cases for value in case.split("|") if value.islower()}
-        assert not reported or reported == allowed, row
 
 
 # ---- Python

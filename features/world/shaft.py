@@ -209,10 +209,6 @@ class WorldShaft(Shaft):
         """Return the position of the joint behind the play, in steps."""
         return self.axis.joint_position()
 
-    @joint.setter
-    def joint(self, steps: float) -> None:
-        """Do nothing: the world moves the joint."""
-
     # --- from outside
 
     def resume(self) -> None:
@@ -278,7 +274,7 @@ class WorldShaft(Shaft):
             u = self.u
             least, most = max(least, u - slew), min(most, u + slew)
         self._least, self._most, self._profiled = least, most, c
-        push = self._stall_nm * self.supply
+        push = self._stall_nm
         gain = -push * (kp + kd) * SPEED_UNIT
         if torque_max != inf:
             # The torque is limited with the motor's induced torque in it.
@@ -307,13 +303,12 @@ class WorldShaft(Shaft):
         clipped = not least <= u <= most
         if clipped:
             u = most if u > most else least
-        volts = self.supply
-        t = u * volts - v * self._built.rate
+        t = u - v * self._built.rate
         torque_max = loop.torque_max
         if not -torque_max <= t <= torque_max:
             clipped = True
             t = torque_max if t > torque_max else -torque_max
-            u = (t + v * self._built.rate) / volts if volts > 0.0 and torque_max > 0.0 else 0.0
+            u = t + v * self._built.rate if torque_max > 0.0 else 0.0
         error = self.r - self.x
         if loop.i and not clipped and abs(error) > RESOLUTION:
             i = self._integral + loop.i * error

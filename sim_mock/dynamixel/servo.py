@@ -5,7 +5,8 @@ with a position: 3, 4 (more than a turn) and 5 (with a limit of the current). Th
 set, then it does not move. Gains are divided as the ROBOTIS e-Manual documents (P 128, D 16, I
 65536). Their units are not documented. Assumed here: positions in steps, speeds in steps/ms, sums
 per ms; the output is in units of PWM (885 are 100 %). Registers without any effect: feed-forward,
-velocity gains, startup configuration, secondary id, moving threshold, LED.
+velocity gains, startup configuration, secondary id, LED; moving status, PWM and the profile's
+state read 0.
 """
 
 import struct
@@ -41,13 +42,9 @@ ALERT = 0x80
 
 SENSED, SENSED_AT = struct.Struct("<hii"), 126
 """Current, velocity, position: a control loop reads them every tick."""
-MOTION, MOTION_AT = struct.Struct("<HBBh"), 120
-"""Tick, moving, moving status, PWM."""
-REFERENCE, REFERENCE_AT = struct.Struct("<ii"), 136
-"""Velocity and position of the profile."""
-SENSED_SPAN = SENSED_AT, REFERENCE_AT
-PROFILED = (MOTION_AT, SENSED_AT), (REFERENCE_AT, REFERENCE_AT + REFERENCE.size)
-"""Addresses of the state of the profile, which a control loop rarely reads."""
+MOTION, MOTION_AT = struct.Struct("<HB"), 120
+"""Tick and moving."""
+SENSED_SPAN, MOTION_SPAN = (SENSED_AT, 136), (MOTION_AT, 123)
 
 GOAL_AT, GOAL_END, WATCHDOG_AT = 116, 120, 98
 WATCHDOG_UNIT_MS, TRIPPED = 20, 255
@@ -65,11 +62,6 @@ PWM_SLOPE_V_MS = 0.001977, 0.003955
 MULTI_TURN_STEPS = 1_048_575
 HOMING_ACTS_STEPS = 1024
 """Part of the homing offset that counts in position mode."""
-ARRIVED, RUNNING = 1, 2
-"""Bits of Moving Status (123)."""
-IN_POSITION_STEPS = 12
-"""Threshold of in position; the maker does not document it."""
-
 _SPEED_UNIT = VELOCITY_UNIT_STEPS_S / 1000.0
 _RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
 _IDENTITY = struct.Struct("<HB")
@@ -101,15 +93,15 @@ class ReadRange(NamedTuple):
     """A range of addresses, resolved through the indirect windows.
 
     fetch: returns the bytes of all real addresses, in runs of neighbours
-    sensed, profiled: whether it contains sensor values, or the state of the profile
+    sensed, moving: whether it contains sensor values, or tick and moving
     """
 
     fetch: Callable[[bytearray], Iterable[bytearray]]
     sensed: bool
-    profiled: bool
+    moving: bool
 
 
-class DynamixelMemory(ServoMemory[DynamixelRegister]):
+class DynamixelMemory(ServoMemory):
     """One servo's control table.
 
     ranges: ranges that were read, valid until an indirect address changes
@@ -118,15 +110,13 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
     def __init__(self, model: DynamixelModel, firmware: int) -> None:
         blocks = indirect_blocks(model, firmware)
         registers = (*registers_of(model), *_window_registers(blocks))
+        self.ranges: dict[tuple[int, int], ReadRange] = {}
         super().__init__(registers, max(r.address + r.size for r in registers))
         self.by_address = {register.address: register for register in registers}
         self._defined = {r.address + i for r in registers for i in range(r.size)}
         self._pointers = {
             b.data_base + i: b.address_base + 2 * i for b in blocks for i in range(b.entries)
         }
-        self.ranges: dict[tuple[int, int], ReadRange] = {}
-        self.restore("eeprom")
-        self.restore("ram")
 
     def decode(self, register: DynamixelRegister, data: bytes | bytearray) -> int:
         """Return the value of a register's bytes."""
@@ -159,13 +149,13 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
             else:
                 runs.append([real, real + 1])
 
-        def touches(*spans: tuple[int, int]) -> bool:
-            return any(low < end and high > at for low, high in runs for at, end in spans)
+        def touches(span: tuple[int, int]) -> bool:
+            return any(low < span[1] and high > span[0] for low, high in runs)
 
         # With a single slice, itemgetter would return the bytes themselves.
         slices = [slice(low, high) for low, high in runs]
         found = ReadRange(
-            itemgetter(*slices, slice(0, 0)), touches(SENSED_SPAN), touches(*PROFILED)
+            itemgetter(*slices, slice(0, 0)), touches(SENSED_SPAN), touches(MOTION_SPAN)
         )
         self.ranges[address, length] = found
         return found
@@ -282,29 +272,18 @@ class DynamixelServo(EmulatedServo):
         found = memory.ranges.get((address, length)) or memory.range(address, length)
         if found is None:
             return None
-        fetch, sensed, profiled = found
+        fetch, sensed, moving = found
         into = memory.bytes
         if sensed:
             SENSED.pack_into(
                 into, SENSED_AT, round(side * shaft.effort * self._current_full),
                 round(side * shaft.v / _SPEED_UNIT), round(side * shaft.x + self._shift),
             )  # fmt: skip
-        if profiled:
-            self._refresh_profile(into)
+        if moving:
+            fast = abs(shaft.v / _SPEED_UNIT) > memory.get("moving_threshold")
+            tick = self._ms - self._booted_ms & 0x7FFF
+            MOTION.pack_into(into, MOTION_AT, tick, fast or (self._follows and shaft.led))
         return b"".join(fetch(into))
-
-    def _refresh_profile(self, into: bytearray) -> None:
-        """Update the registers of the profile's state."""
-        shaft, side = self.shaft, self._side
-        running = self._follows and shaft.led
-        away = abs(self.memory.get("goal_position") - round(self.position_steps))
-        arrived = self._follows and not running and away <= IN_POSITION_STEPS
-        moving = running or abs(shaft.v / _SPEED_UNIT) > self.memory.get("moving_threshold")
-        tick = self._ms - self._booted_ms & 0x7FFF
-        status, pwm = running * RUNNING | arrived * ARRIVED, round(side * shaft.u * PWM_FULL)
-        MOTION.pack_into(into, MOTION_AT, tick, moving, status, pwm)
-        speed, place = round(side * shaft.r_v / _SPEED_UNIT), round(side * shaft.r + self._shift)
-        REFERENCE.pack_into(into, REFERENCE_AT, speed, place)
 
     # --- writing
 

@@ -7,27 +7,12 @@ every servo.
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import Protocol
+from typing import Any
 
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NO_DEVICE, ActiveFaults, LineFault
 from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.replies import Piece
-
-
-class FaultTarget(Protocol):
-    """Interface of a device to its faults."""
-
-    now_s: Callable[[], float]
-
-    def find_servo(self, servo_id: int) -> object:
-        """Return the servo or channel with this id, advanced to the present time.
-
-        Raises:
-            KeyError: the id does not exist; the message lists the existing ones.
-        """
-        ...
 
 
 class LineFaults(ABC):
@@ -36,8 +21,8 @@ class LineFaults(ABC):
     noun = "servo"
     """Name of the object of an id, for messages."""
 
-    def __init__(self, chain: FaultTarget, commands: CommandTable, seed: int) -> None:
-        self._chain = chain
+    def __init__(self, chain: Any, commands: CommandTable, seed: int) -> None:
+        self.chain = chain
         self.commands = commands
         self.wire = ActiveFaults(seed)
 
@@ -80,8 +65,8 @@ class LineFaults(ABC):
             KeyError: the servo does not exist.
         """
         if servo_id is not None:
-            self._chain.find_servo(servo_id)
-        until_s = None if seconds is None else self._chain.now_s() + seconds
+            self.chain.find_servo(servo_id)
+        until_s = None if seconds is None else self.chain.now_s() + seconds
         self.wire.add(LineFault(kind, servo_id, numbers, count, until_s))
         span = "" if count is None else f" {count} times"
         span += "" if seconds is None else f" for {seconds:g} s"
@@ -91,7 +76,7 @@ class LineFaults(ABC):
 
     def is_on(self, kind: str) -> bool:
         """Return whether echo or unplug is active."""
-        return self.wire.is_on(kind, self._chain.now_s())
+        return self.wire.is_on(kind, self.chain.now_s())
 
     def clear(self, servo_id: int | None = None) -> str:
         """End every fault of the line (or of one servo's answers); faults of servos stay."""
@@ -101,7 +86,7 @@ class LineFaults(ABC):
         """Return all servos and the active faults as one line of JSON."""
         faults = [
             f"{fault.kind} {'all' if fault.servo_id is None else fault.servo_id}"
-            for fault in self.wire.active_faults(self._chain.now_s())
+            for fault in self.wire.active_faults(self.chain.now_s())
         ]
         return json.dumps({"servos": self.reports(), **self.board_status(), "faults": faults})
 

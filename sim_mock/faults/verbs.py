@@ -22,20 +22,6 @@ _TIMES = Argument("N", count, True)
 Do = Callable[..., str]
 
 
-def line_command(kind: str, text: str) -> Do:
-    """Return a command that starts a fault of the whole line; ``text``: its reply."""
-
-    def run_command(
-        faults: LineFaults,
-        *numbers: float,
-        count: int | None = None,
-        seconds: float | None = None,
-    ) -> str:
-        return faults.begin(kind, None, text.format(*numbers), count, seconds, numbers)
-
-    return run_command
-
-
 def answer_command(kind: str, text: str) -> Do:
     """Return a command that disturbs the answers of one servo or all; ``text``: its reply."""
 
@@ -73,6 +59,9 @@ def switch_command(kind: str, text: str) -> Do:
     return run_command
 
 
+_static = answer_command("static", "noise hits {:g} % of all bytes, both directions")
+
+
 # fmt: off
 def line_verbs(one: Argument) -> dict[str, Verb]:
     """Return the commands of any line; ``one`` parses an id."""
@@ -87,7 +76,7 @@ def line_verbs(one: Argument) -> dict[str, Verb]:
         "corrupt": Verb(answer_command("corrupt", "a bit flips in answers of {label}"),
                         (target, Argument("BIT", integer_parser(0, 8191, "a bit"), True)),
                         "a bit flips, a random one by default", BOTH),
-        "static": Verb(line_command("static", "noise hits {:g} % of all bytes, both directions"),
+        "static": Verb(lambda faults, percent, **ends: _static(faults, None, percent, **ends),
                        (Argument("PERCENT", number_parser(0.0, 100.0, "a percentage")),),
                        "noise hits this share of all bytes, both directions", TIME),
     }

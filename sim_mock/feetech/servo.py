@@ -95,23 +95,23 @@ def _scs_registers(model: FeetechModel) -> tuple[FeetechRegister, ...]:
     )
 
 
-class FeetechMemory(ServoMemory[FeetechRegister]):
+class FeetechMemory(ServoMemory):
     """One servo's memory; ``bytes`` holds what is read; the permanent EEPROM is separate."""
 
     def __init__(self, model: FeetechModel, servo_id: int, firmware: int) -> None:
         scs = model.name in SCS_MODELS
-        super().__init__(_scs_registers(model) if scs else registers_of(model), SIZE)
         own = {"id": servo_id, "return_delay_time": RETURN_DELAY, "firmware_minor": firmware}
-        for name, value in own.items():
-            self.registers[name] = self.registers[name]._replace(initial=value)
-        writable = [r for r in self.registers.values() if r.access == "rw"]
-        self._writable = {r.address + i for r in writable for i in range(r.size)}
+        registers = [
+            register._replace(initial=own.get(register.name, register.initial))
+            for register in (_scs_registers(model) if scs else registers_of(model))
+        ]
         self._kept = bytearray(SIZE)
+        super().__init__(registers, SIZE)
+        writable = [r for r in registers if r.access == "rw"]
+        self._writable = {r.address + i for r in writable for i in range(r.size)}
         last_baud = len(SCS_BAUD_RATES if scs else BAUD_RATES) - 1
         self._highest = {5: HIGHEST_ID, 6: last_baud, 33: 3}
         self._lock_at = self.registers["lock"].address
-        self.restore("eeprom")
-        self.restore("ram")
 
     def decode(self, register: FeetechRegister, data: bytes | bytearray) -> int:
         """Return the value of a register's bytes."""

@@ -4,7 +4,7 @@ Joints on other chains count as at 0, and linkages as linear.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from gazerig.robot.model.weight import MovingBody, weight_nm
 from gazerig.sim_mock.smart_servo.physics import STEPS_PER_RAD
@@ -27,15 +27,6 @@ class HeadWeight(NamedTuple):
     bodies: Sequence[MovingBody]
     shafts: Sequence[TurnedJoints]
 
-    @classmethod
-    def of_data(cls, data: Any) -> "HeadWeight":
-        """Return it from JSON data."""
-        bodies, shafts = data
-        return cls(
-            tuple(MovingBody(*map(_tuples, one)) for one in bodies),
-            tuple(TurnedJoints(*map(_tuples, one)) for one in shafts),
-        )
-
     def loads_nm(self, steps: Sequence[float]) -> list[float]:
         """Return the torque on each shaft at these positions of all."""
         angles: dict[str, float] = {}
@@ -47,7 +38,3 @@ class HeadWeight(NamedTuple):
             STEPS_PER_RAD * sum(rate * torques.get(joint, 0.0) for joint, rate in one.rad_per_step)
             for one in self.shafts
         ]
-
-
-def _tuples(value: Any) -> Any:
-    return tuple(map(_tuples, value)) if isinstance(value, list) else value

@@ -2,52 +2,23 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from typing import Generic, Protocol, TypeVar
+from typing import Any
 
 
-class RegisterPlace(Protocol):
-    """An entry of a make's data sheet."""
-
-    @property
-    def name(self) -> str:
-        """Return its name."""
-        ...
-
-    @property
-    def address(self) -> int:
-        """Return its first address."""
-        ...
-
-    @property
-    def size(self) -> int:
-        """Return its number of bytes."""
-        ...
-
-    @property
-    def initial(self) -> int | None:
-        """Return its start value, None if the servo decides."""
-        ...
-
-    @property
-    def area(self) -> str:
-        """Return "eeprom" or "ram"."""
-        ...
-
-
-R = TypeVar("R", bound=RegisterPlace)
-
-
-class ServoMemory(ABC, Generic[R]):
+class ServoMemory(ABC):
     """One servo's registers.
 
     Args:
-        registers: its registers.
+        registers: entries of its make's data sheet, with name, address, size, initial value and
+            area.
         size: number of bytes.
     """
 
-    def __init__(self, registers: Iterable[R], size: int) -> None:
+    def __init__(self, registers: Iterable[Any], size: int) -> None:
         self.registers = {register.name: register for register in registers}
         self.bytes = bytearray(size)
+        self.restore("eeprom")
+        self.restore("ram")
 
     def get(self, name: str) -> int:
         """Return a register's value."""
@@ -76,9 +47,9 @@ class ServoMemory(ABC, Generic[R]):
         self.restore("ram")
 
     @abstractmethod
-    def decode(self, register: R, data: bytes | bytearray) -> int:
+    def decode(self, register: Any, data: bytes | bytearray) -> int:
         """Return the value of a register's bytes."""
 
     @abstractmethod
-    def encode(self, register: R, value: int) -> bytes:
+    def encode(self, register: Any, value: int) -> bytes:
         """Return a register's bytes for a value."""

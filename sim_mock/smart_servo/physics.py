@@ -7,9 +7,8 @@ steps (4096 per turn) and times milliseconds; torque is a share of the stall tor
 voltage, PWM a share of full PWM.
 """
 
-from collections.abc import Sequence
 from math import inf, pi
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from gazerig.robot.model.assumed_servo import AMBIENT_C, GEAR_FRICTION
 
@@ -32,8 +31,9 @@ class Physics(NamedTuple):
     stop_low_steps, stop_high_steps: steps of the encoder; hard stops of the joint, no bounce.
     play_deg: deg; dead travel between output shaft and joint, 0.25 as in the data sheets of
         the X430. The encoder of X servos is at the output, so the registers show no play;
-        ``Shaft.joint`` has it. Play inside the gear is omitted.
-    supply_v: V; None: the rated voltage of the model.
+        a world has it. Play inside the gear is omitted.
+    supply_v: V, in its register; None: the rated voltage of the model. The torque is that of the
+        rated one.
     temperature_c: degC of the motor [A].
     overload_share: share of the stall torque at the present voltage that counts as
         overload; overload_s: s; duration until it latches [A: in no data sheet].
@@ -63,7 +63,7 @@ class ServoSpec(NamedTuple):
     model: str
     start_steps: float = 2048
     firmware: int = 53
-    physics: Physics | Sequence[Any] = Physics()
+    physics: Physics = Physics()
 
 
 STEPS_PER_TURN = 4096

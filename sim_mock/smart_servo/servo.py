@@ -7,13 +7,12 @@ effects of writing and reading its registers, and of errors.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from math import sin
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.physics import (
     STEPS_PER_RAD,
     STEPS_PER_TURN,
-    Physics,
     ServoModel,
     ServoSpec,
 )
@@ -67,12 +66,12 @@ class EmulatedServo(ABC):
         self,
         spec: ServoSpec,
         model: ServoModel,
-        memory: ServoMemory[Any],
+        memory: ServoMemory,
         now_ms: int,
         make_shaft: ShaftMaker = create_shaft,
         scale: float = 1.0,
     ) -> None:
-        physics = Physics(*spec.physics)
+        physics = spec.physics
         self.spec, self.model, self.memory = spec, model, memory
         self.physics, self._scale = physics, scale
         own = physics._replace(
@@ -110,7 +109,7 @@ class EmulatedServo(ABC):
         self.id, self._status_level = get("id"), get("status_return_level")
         self.delay_s = get("return_delay_time") * RETURN_DELAY_UNIT_S
         share, seconds = self._overload_limit()
-        self._heavy_effort = share * self.shaft.supply - 1e-11
+        self._heavy_effort = share - 1e-11
         self._heavy_most = round(seconds * 1000.0 / CHECK_MS)
         self._set_controller()
         if self._address != (self.id, self.baud):
@@ -210,11 +209,6 @@ class EmulatedServo(ABC):
         """Return the true position of the shaft in the registers' unit, with fractions."""
         return (self._side * self.shaft.x + self._shift) * self._scale
 
-    @property
-    def joint_steps(self) -> float:
-        """Return the position of the joint behind the play, in the registers' unit."""
-        return (self._side * self.shaft.joint + self._shift) * self._scale
-
     def _wrap_to_one_turn(self) -> None:
         """Wrap the position of the shaft into one turn, as power-on does."""
         self._side, self._offset = self._origin()
@@ -312,7 +306,7 @@ class EmulatedServo(ABC):
         if error not in self.error_bits:
             raise ValueError(f"error {error!r}: expected {', '.join(self.error_bits)}")
         if error == "overheating":
-            self.temperature_c = self.memory.get("temperature_limit") + TOO_HOT_C
+            self.set_temperature(self.memory.get("temperature_limit") + TOO_HOT_C)
         self._protect_from(self.errors | self.error_bits[error])
 
     def reset_all(self) -> None:
@@ -332,24 +326,12 @@ class EmulatedServo(ABC):
         """Apply a constant torque to the joint from now on, as a cable does."""
         self.shaft.set_load(load_nm / self.model.stall_torque_nm)
 
-    @property
-    def supply_v(self) -> float:
-        """Return the supply voltage."""
-        return self._supply_v
-
-    @supply_v.setter
-    def supply_v(self, volts: float) -> None:
+    def set_voltage(self, volts: float) -> None:
+        """Set the supply voltage."""
         self._supply_v = volts
-        self.shaft.feed(volts / self.model.rated_v)
         self._measure()
-        self._apply_settings()
 
-    @property
-    def temperature_c(self) -> float:
-        """Return the temperature of the motor."""
-        return self._temperature_c
-
-    @temperature_c.setter
-    def temperature_c(self, celsius: float) -> None:
+    def set_temperature(self, celsius: float) -> None:
+        """Set the temperature of the motor."""
         self._temperature_c = celsius
         self._measure()

@@ -1,15 +1,16 @@
-"""The shaft of an emulated servo: profile, controller, motor, friction, play and stops.
+"""The shaft of an emulated servo: profile, controller, motor, friction and stops.
 
 Units: steps of an encoder with 4096 per turn, milliseconds; torque is a share of the stall torque
-at the rated voltage, duty a share of full PWM. Steps of 1 ms are implicit: P and D act on position
-and speed at their end, because the real loop, much faster than 1 kHz, acts during the step. So no
-gain of the registers makes the numbers diverge, and readings do not change the motion.
+at the rated voltage, duty a share of full PWM. The encoder is at the output: play between shaft
+and joint shows only in a world, where the joint moves. Steps of 1 ms are implicit: P and D act on
+position and speed at their end, because the real loop, much faster than 1 kHz, acts during the
+step. So no gain of the registers makes the numbers diverge, and readings do not change the motion.
 """
 
 from collections.abc import Callable
 from math import inf, sqrt
 
-from gazerig.sim_mock.smart_servo.physics import DISABLED, MS_S, Loop, Motor, Physics, mechanics_of
+from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Motor, Physics, mechanics_of
 
 SMOOTHING = 0.25
 """Share of the profile's new speed that D adopts in 1 ms: any servo must smooth differences
@@ -34,9 +35,7 @@ class Shaft:
     present speed it accelerates to the cruise speed and brakes to stop at the goal.
 
     x, v: position in steps and speed in steps/ms, as the encoder would measure them, unrounded
-    joint: position of the joint behind the play
     u, effort: PWM and torque (proportional to current) as shares
-    supply: voltage as a share of the rated one
     goal, r, r_v: end of the profile, its position and its speed now
     led: whether the profile has not reached its end
     quiet: nothing will change until a write or a push by hand
@@ -45,17 +44,15 @@ class Shaft:
     __slots__ = (
         "_built", "_cruise", "_high", "_integral", "_load", "_loop", "_low", "_ramp", "_rv",
         "_set_load", "_stops", "_stuck", "_weight",
-        "effort", "goal", "joint", "led", "quiet", "r", "r_v", "supply", "u", "v", "x",
+        "effort", "goal", "led", "quiet", "r", "r_v", "u", "v", "x",
     )  # fmt: skip
 
-    joint: float
     _integral: float
 
     def __init__(self, model: Motor, physics: Physics, position_steps: float) -> None:
         self._built = mechanics_of(model, physics)
         self._set_load, self._weight = physics.load_nm / model.stall_torque_nm, 0.0
         self._stops = self._low, self._high = physics.stop_low_steps, physics.stop_high_steps
-        self.supply = (physics.supply_v or model.rated_v) / model.rated_v
         self._loop, self._stuck, self._cruise, self._ramp = DISABLED, False, 0.0, 0.0
         self._change_load()
         self.place(position_steps)
@@ -69,7 +66,7 @@ class Shaft:
     def place(self, position_steps: float) -> None:
         """Place the shaft at rest between its stops; profile and controller continue from there."""
         low, high = self._stops
-        self.x = self.joint = min(max(float(position_steps), low), high)
+        self.x = min(max(float(position_steps), low), high)
         self.v = self.u = self.effort = 0.0
         if self._stuck:
             self.jam(True)
@@ -78,8 +75,6 @@ class Shaft:
     def turn(self, steps: float) -> None:
         """Turn the shaft by hand, up to its stops; the controller remains active."""
         self.x = min(max(self.x + steps, self._low), self._high)
-        play = self._built.play
-        self.joint = min(max(self.joint, self.x - play), self.x + play)
         self.resume()
 
     def jam(self, stuck: bool) -> None:
@@ -101,11 +96,6 @@ class Shaft:
 
     def _change_load(self) -> None:
         self._load = self._built.accel * (self._set_load + self._weight)
-        self.resume()
-
-    def feed(self, supply: float) -> None:
-        """Set the voltage as a share of the rated one."""
-        self.supply = supply
         self.resume()
 
     # --- calls of the servo
@@ -188,20 +178,20 @@ class Shaft:
     def run(self, ms: int) -> None:
         """Advance by a number of milliseconds."""
         kp, ki, kd, most, torque_max, slew = self._loop
-        accel, drag, free, dry, rate, play = self._built
-        x, v, u, i, joint, rv = self.x, self.v, self.u, self._integral, self.joint, self._rv
-        low, high, supply, load, before = self._low, self._high, self.supply, self._load, self.r
+        accel, drag, free, dry, rate, _ = self._built
+        x, v, u, i, rv = self.x, self.v, self.u, self._integral, self._rv
+        low, high, load, before = self._low, self._high, self._load, self.r
         # Without a speed to follow, D only brakes.
         kr = kd if self._cruise else 0.0
-        k, push, limited = kp + kd, accel * supply, torque_max < inf
-        divisor, least, smoothing = drag + push * k, -most, SMOOTHING
-        was = x, u, i, joint
+        k, limited = kp + kd, torque_max < inf
+        divisor, least, smoothing = drag + accel * k, -most, SMOOTHING
+        was = x, u, i
         for r in self.lead(ms):
             rv += (r - before - rv) * smoothing
             before = r
             c = kp * (r - x) + kr * rv + i
             pull = v + load
-            w = pull + push * c
+            w = pull + accel * c
             # Dry friction stops what the torque of 1 ms cannot move.
             if w > dry:
                 v = (w - dry) / divisor
@@ -217,34 +207,26 @@ class Shaft:
                 elif u < earlier - slew:
                     u = earlier - slew
                 u = most if u > most else least if u < least else u
-                w = pull + push * u
+                w = pull + accel * u
                 v = (w - dry) / drag if w > dry else (w + dry) / drag if w < -dry else 0.0
-            if limited and abs(t := u * supply - v * rate) > torque_max:
+            if limited and abs(t := u - v * rate) > torque_max:
                 clipped = True
                 t = torque_max if t > 0.0 else -torque_max
                 w = pull + accel * t
                 v = (w - dry) / free if w > dry else (w + dry) / free if w < -dry else 0.0
-                u = (t + v * rate) / supply if supply and torque_max else 0.0
+                u = t + v * rate if torque_max else 0.0
             x += v
             if not low <= x <= high:
                 x, v = high if x > high else low, 0.0
                 u = min(max(c, earlier - slew, least), earlier + slew, most)
-                if limited and supply:
-                    u = min(max(u, -torque_max / supply), torque_max / supply)
+                u = min(max(u, -torque_max), torque_max)
             if ki and not clipped and abs(r - x) > RESOLUTION:
                 i = min(max(i + ki * (r - x), least), most)
-            if not -play <= x - joint <= play:
-                joint = x - play if x > joint else x + play
-        self.x, self.v, self.u, self._integral, self.joint = x, v, u, i, joint
+        self.x, self.v, self.u, self._integral = x, v, u, i
         self._rv = 0.0 if -SLOWEST < rv < SLOWEST else rv
-        effort = u * supply - v * rate
+        effort = u - v * rate
         self.effort = min(max(effort, -torque_max), torque_max)
-        self.quiet = not (v or self._rv or self.led) and was == (x, u, i, joint)
-
-    @property
-    def speed_steps_s(self) -> float:
-        """Return the speed of the shaft."""
-        return self.v / MS_S
+        self.quiet = not (v or self._rv or self.led) and was == (x, u, i)
 
 
 ShaftMaker = Callable[[int, Motor, Physics, float], Shaft]

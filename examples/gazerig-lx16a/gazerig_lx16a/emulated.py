@@ -99,7 +99,7 @@ class ChainFaults(LineFaults):
     """What befalls the line, and the servos themselves."""
 
     def reports(self) -> list[dict[str, object]]:
-        chain: Lx16aChain = self._chain  # type: ignore[assignment]
+        chain: Lx16aChain = self.chain
         servos = [chain.find_servo(servo_id) for servo_id in chain.servos]
         return [
             {"id": s.id, "position": s.place, "goal": round(s.target), "torque": s.torque}
@@ -108,7 +108,7 @@ class ChainFaults(LineFaults):
 
 
 def _restart(faults: ChainFaults, servo_id: int) -> str:
-    faults._chain.find_servo(servo_id).restart()  # type: ignore[attr-defined]
+    faults.chain.find_servo(servo_id).restart()
     return f"servo {servo_id} restarts"
 
 
