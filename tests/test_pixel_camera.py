@@ -30,7 +30,6 @@ from gazerig.sim_mock.cameras.optics import (
     Sensor,
     SensorParams,
     blur_along,
-    ideal_size_px,
     through_lens,
 )
 from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
@@ -251,7 +250,6 @@ def test_what_a_lens_bends_lands_where_the_programs_model_of_it_says(k1: float) 
         place = (light * columns).sum() / light.sum(), (light * rows).sum() / light.sum()
         assert place == pytest.approx(project([direction], lens)[0].tolist(), abs=0.75)
         assert (present(seen.depth_m) == 2.0).all()
-    assert (ideal_size_px(lens, size)[0] > size[0]) == (k1 < 0.0)
 
 
 def test_warmth_lies_where_the_gaze_has_been() -> None:

@@ -13,14 +13,13 @@ from typing import Annotated
 import numpy as np
 
 from gazerig.drivers.camera.capture_loop import Locate
-from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, FaceSigns, MovingBlob
-from gazerig.gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
+from gazerig.gaze.angles import add, dot, norm, rotate, rotate_back, rotation, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount
-from gazerig.sim_mock.cameras.frame_times import FrameTimes
+from gazerig.sim_mock.cameras.frame_times import FrameParams, FrameTimes
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 _FARTHEST_FACE_M = 4.0
@@ -36,14 +35,9 @@ _LANDMARKS_FACE_M: tuple[Vec3, ...] = tuple((x, y, z) for x, y, z in LANDMARKS_F
 
 
 @dataclass(frozen=True)
-class SceneCameraParams:
+class SceneCameraParams(FrameParams):
     """Quality of the camera and its detector."""
 
-    width_px: Annotated[int, Bounds(32, 4096)] = 640
-    height_px: Annotated[int, Bounds(32, 4096)] = 400
-    horizontal_field_deg: Annotated[float, Bounds(10, 150)] = 69.0
-    rate_hz: Annotated[float, Bounds(1, 240)] = 30.0
-    latency_ms: Annotated[float, Bounds(0, 1000)] = 60.0
     landmark_noise_px: Annotated[float, Bounds(0, 20)] = 0.5
     depth_noise_mm: Annotated[float, Bounds(0, 500)] = 5.0
     missed_share: Annotated[float, Bounds(0, 1)] = 0.03
@@ -78,10 +72,8 @@ class SceneCamera:
         self._head_pose = head_pose
         self._rng = rng
         self._locate = locate
-        self._times = FrameTimes(params.rate_hz, params.latency_ms, begins_s)
-        self._lens = intrinsics_of_view(
-            radians(params.horizontal_field_deg), params.width_px, params.height_px
-        )
+        self._times = FrameTimes(params, begins_s)
+        self._lens = params.lens
 
     @property
     def start_s(self) -> float | None:
@@ -134,13 +126,14 @@ class SceneCamera:
         turned_away = dot(unit(to_camera), outwards) < _COS_TURNED_AWAY
         if missed or turned_away or norm(to_camera) > _FARTHEST_FACE_M:
             return None
-        points = _landmarks_in_camera(R, p, R_world_face, place)
+        points = [
+            rotate_back(R, sub(add(place, rotate(R_world_face, one)), p))
+            for one in _LANDMARKS_FACE_M
+        ]
         if min([z for _, _, z in points]) < 0.1:
             return None
-        lens = self._lens
-        fx, fy, cx, cy = lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px
-        pixels = [(x / z * fx + cx, y / z * fy + cy) for x, y, z in points]
-        size = fx * _FACE_BOX_M / points[2][2]
+        pixels = [self._pixel(point) for point in points]
+        size = self._lens.fx_px * _FACE_BOX_M / points[2][2]
         x, y = pixels[2]
         box = (x - size / 2, y - size / 2, size, size)
         if not self._is_inside(x, y, size / 2):
@@ -155,32 +148,19 @@ class SceneCamera:
         point = rotate_back(R, sub(thing.p_world_m, p))
         if point[2] < 0.1:
             return ()
-        x, y, z = point
-        lens = self._lens
-        x, y = (x / z * lens.fx_px + lens.cx_px, y / z * lens.fy_px + lens.cy_px)
-        seen_px = thing.radius_m / z * lens.fx_px - _LEAST_SEEN_PX
-        if not self._is_inside(x, y, -max(0.0, seen_px)):
+        seen_px = thing.radius_m / point[2] * self._lens.fx_px - _LEAST_SEEN_PX
+        if not self._is_inside(*self._pixel(point), -max(0.0, seen_px)):
             return ()
         place = scale(point, 1.0 + noise / norm(point))
         return (MovingBlob(thing.id, thing.kind, place, thing.radius_m, thing.spin_rad_s),)
 
+    def _pixel(self, point: Vec3) -> tuple[float, float]:
+        x, y, z = point
+        return (
+            x / z * self._lens.fx_px + self._lens.cx_px,
+            y / z * self._lens.fy_px + self._lens.cy_px,
+        )
+
     def _is_inside(self, x: float, y: float, margin: float) -> bool:
         par = self._params
         return margin <= x <= par.width_px - margin and margin <= y <= par.height_px - margin
-
-
-def _landmarks_in_camera(R: Mat3, p: Vec3, R_world_face: Mat3, p_world_face_m: Vec3) -> list[Vec3]:
-    """Return the landmarks of a face in the axes of a camera.
-
-    R, p: rotation and position of the camera in the world
-    """
-    (a, b, c), (d, e, f), (g, h, i) = R_world_face
-    (k, l, m), (n, o, q), (r, s, t) = R  # noqa: E741
-    (face_x, face_y, face_z), (from_x, from_y, from_z) = p_world_face_m, p
-    found = []
-    for x, y, z in _LANDMARKS_FACE_M:
-        u = face_x + (a * x + b * y + c * z) - from_x
-        v = face_y + (d * x + e * y + f * z) - from_y
-        w = face_z + (g * x + h * y + i * z) - from_z
-        found.append((k * u + n * v + r * w, l * u + o * v + s * w, m * u + q * v + t * w))
-    return found

@@ -1,17 +1,36 @@
 """When a simulated camera exposes its frames, and when their detections arrive."""
 
 from collections import deque
-from math import inf
+from dataclasses import dataclass
+from math import inf, radians
+from typing import Annotated
 
+from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.types import Detections
+from gazerig.params import Bounds
+
+
+@dataclass(frozen=True)
+class FrameParams:
+    """Size, field and times of a simulated camera's frames."""
+
+    width_px: Annotated[int, Bounds(32, 4096)] = 640
+    height_px: Annotated[int, Bounds(32, 4096)] = 400
+    horizontal_field_deg: Annotated[float, Bounds(10, 150)] = 69.0
+    rate_hz: Annotated[float, Bounds(1, 240)] = 30.0
+    latency_ms: Annotated[float, Bounds(0, 1000)] = 60.0
+
+    @property
+    def lens(self) -> Intrinsics:
+        """Return the ideal lens of this field."""
+        return intrinsics_of_view(radians(self.horizontal_field_deg), self.width_px, self.height_px)
 
 
 class FrameTimes:
     """Frames at a constant rate that arrive after a constant latency.
 
     Args:
-        rate_hz: frames per second.
-        latency_ms: delay from a frame to its detections.
+        params: rate and latency.
         begins_s: start of the scene; None: at the first frame.
 
     Attributes:
@@ -19,8 +38,8 @@ class FrameTimes:
         number: number of the newest frame, from 1.
     """
 
-    def __init__(self, rate_hz: float, latency_ms: float, begins_s: float | None) -> None:
-        self._rate_hz, self._latency_s = rate_hz, latency_ms / 1e3
+    def __init__(self, params: FrameParams, begins_s: float | None) -> None:
+        self._rate_hz, self._latency_s = params.rate_hz, params.latency_ms / 1e3
         self._begins_s = begins_s
         self.start_s: float | None = None
         self.restart()

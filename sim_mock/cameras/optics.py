@@ -7,7 +7,7 @@ by the camera's turn, and adds noise.
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, hypot
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -75,27 +75,17 @@ class Sensor:
         return piece.reshape(shape)
 
 
-class CameraTurn(NamedTuple):
-    """A camera's rotation in the world at an instant and before, and the time between them.
+def smear_px(R: Mat3, R_before: Mat3, share: float, lens: Intrinsics) -> tuple[float, float]:
+    """Return how far the centre of the frame moves during an exposure.
 
-    R, R_before: optical axes
-    span_s: 0 if the rotation before is unknown
+    Args:
+        R: the camera's rotation in the world, optical axes.
+        R_before: the rotation before.
+        share: exposure time, as a multiple of the time between the rotations.
+        lens: its lens.
     """
-
-    R: Mat3
-    R_before: Mat3
-    span_s: float
-
-    def smear_px(self, exposure_s: float, lens: Intrinsics) -> tuple[float, float]:
-        """Return how far the centre of the frame moves during an exposure."""
-        if self.span_s <= 0.0:
-            return 0.0, 0.0
-        ahead = np.array(self.R_before).T @ np.array(self.R)[:, 2]
-        share = exposure_s / self.span_s
-        return (
-            float(-ahead[0] / ahead[2]) * lens.fx_px * share,
-            float(-ahead[1] / ahead[2]) * lens.fy_px * share,
-        )
+    x, y, z = (np.array(R_before).T @ np.array(R)[:, 2]).tolist()
+    return -x / z * lens.fx_px * share, -y / z * lens.fy_px * share
 
 
 def through_lens(view: SceneView, seen_by: PinholeView, *, depth: bool = False) -> Rendered:
@@ -113,11 +103,6 @@ def through_lens(view: SceneView, seen_by: PinholeView, *, depth: bool = False) 
     # Distances are not interpolated: a mean of two objects' distances is at neither.
     metres = cv2.remap(drawn.depth_m, columns, lines, cv2.INTER_NEAREST, borderMode=edge)
     return Rendered(image, metres.astype(np.float32, copy=False))
-
-
-def ideal_size_px(lens: Intrinsics, size_px: tuple[int, int]) -> tuple[int, int]:
-    """Return width and height of the ideal picture that a picture through a lens needs."""
-    return _ideal_lens_and_map(lens, size_px)[1] if lens.has_distortion else size_px
 
 
 @lru_cache(maxsize=8)

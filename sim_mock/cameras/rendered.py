@@ -7,25 +7,23 @@ turn during the exposure; a depth frame has the noise of stereo and holes at edg
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import radians
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.capture_loop import Locate
-from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBlob
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.scene_view import PinholeView, SceneView
-from gazerig.sim_mock.cameras.frame_times import FrameTimes
+from gazerig.sim_mock.cameras.frame_times import FrameParams, FrameTimes
 from gazerig.sim_mock.cameras.optics import (
-    CameraTurn,
     Sensor,
     SensorParams,
     blur_along,
+    smear_px,
     through_lens,
 )
 
@@ -47,14 +45,9 @@ FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
 
 
 @dataclass(frozen=True)
-class PixelCameraParams(SensorParams):
+class PixelCameraParams(SensorParams, FrameParams):
     """Quality of the camera."""
 
-    width_px: Annotated[int, Bounds(32, 4096)] = 640
-    height_px: Annotated[int, Bounds(32, 4096)] = 400
-    horizontal_field_deg: Annotated[float, Bounds(10, 150)] = 69.0
-    rate_hz: Annotated[float, Bounds(1, 240)] = 30.0
-    latency_ms: Annotated[float, Bounds(0, 1000)] = 60.0
     depth: Annotated[bool, "whether distances are measured too"] = False
 
 
@@ -94,9 +87,9 @@ class PixelCamera:
         self._detector = detector
         self._find_motion = find_motion
         self._locate = locate
-        self._times = FrameTimes(params.rate_hz, params.latency_ms, begins_s)
+        self._times = FrameTimes(params, begins_s)
         self._size_px = params.width_px, params.height_px
-        self.lens = lens or intrinsics_of_view(radians(params.horizontal_field_deg), *self._size_px)
+        self.lens = lens or params.lens
         self._sensor = Sensor(params, rng)
         self._before: tuple[float, Mat3] | None = None
 
@@ -128,11 +121,11 @@ class PixelCamera:
 
     def _expose(self, now_s: float, scene_s: float, R: Mat3, p_m: Vec3) -> Exposure:
         before_s, R_before = self._before or (now_s, R)
-        turn = CameraTurn(R, R_before, now_s - before_s)
         seen_by = PinholeView(scene_s, self.lens, self._size_px, R, p_m)
         seen = through_lens(self._view, seen_by, depth=self._params.depth)
-        smear_px = turn.smear_px(self._params.exposure_ms / 1e3, self.lens)
-        image = self._sensor.image(blur_along(seen.image, smear_px))
+        share = self._params.exposure_ms / 1e3 / max(now_s - before_s, 1e-9)
+        way_px = smear_px(R, R_before, share, self.lens)
+        image = self._sensor.image(blur_along(seen.image, way_px))
         image.setflags(write=False)  # like the frames of real cameras
         depth = None if seen.depth_m is None else self._sensor.stereo(seen.depth_m)
         return Exposure(now_s, image, depth, R)
