@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Sequence
 
-from gazerig.drivers.types import Feedback, ServoConfig
+from gazerig.drivers.types import ServoConfig
 from gazerig.features.world.shaft import LIMP, SPEED_UNIT, Effort, ShaftAxis
-from gazerig.sim_mock.ideal.bus import LAG_S, WARM_C, IdealBus
+from gazerig.sim_mock.ideal.bus import LAG_S, IdealBus, Steps
 from gazerig.sim_mock.smart_servo.physics import MS_S
 
 ROTOR_KG_M2 = 2e-4
@@ -69,34 +69,16 @@ class WorldIdealBus(IdealBus):
     ) -> None:
         self._shafts = tuple(shafts)
         super().__init__(configs, [one.place_steps for one in shafts], measured, now_s)
-        self._feedback_of = tuple(measured)
 
-    def positions_steps(self) -> tuple[float, ...]:
+    @property
+    def has_torque(self) -> bool:
+        """Return whether the shafts follow goals."""
+        return self._shafts[0].goal is not None
+
+    def positions_steps(self) -> Steps:
         """Return the true positions now, in the order of the servos."""
         self._now_s()
         return tuple([one.place_steps for one in self._shafts])
-
-    def read(self, now_s: float) -> Feedback:
-        """Return the positions, rounded to steps, and the speeds."""
-        steps, count = self.positions_steps(), len(self._shafts)
-        return Feedback(
-            tuple([float(round(at)) for at in steps]),
-            tuple([one.speed_steps_s for one in self._shafts]),
-            (0.0,) * count,
-            (now_s,) * count,
-            tuple([WARM_C if one else None for one in self._feedback_of]),
-            (None,) * count,
-            tuple([one.goal is not None for one in self._shafts]),
-            ("",) * count,
-            self._feedback_of,
-            (False,) * count,
-            (),
-        )
-
-    def write(self, goals_steps: Sequence[int]) -> None:
-        """Follow goals within the limits; with torque off they have no effect."""
-        if self._shafts[0].goal is not None:
-            self._follow(goals_steps)
 
     def disable_torque(self) -> None:
         """Switch off the torque of the shafts."""
@@ -104,9 +86,12 @@ class WorldIdealBus(IdealBus):
         for one in self._shafts:
             one.goal = None
 
+    def _measure(self, now_s: float) -> tuple[Steps, Steps]:
+        """Return positions and speeds."""
+        return self.positions_steps(), tuple([one.speed_steps_s for one in self._shafts])
+
     def _follow(self, goals_steps: Sequence[int]) -> tuple[int, ...]:
         """Move the shafts from their positions to goals; return the goals within the limits."""
-        self._now_s()
         goals = super()._follow(goals_steps)
         for one, goal in zip(self._shafts, goals, strict=True):
             one.goal = goal

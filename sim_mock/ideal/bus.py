@@ -18,15 +18,17 @@ WARM_C = 30.0
 _TO_WHOLE = repeat(1.5 * 2.0**52)
 """Rounds as ``round`` does when added and subtracted: such large floats have no fraction."""
 
+Steps = tuple[float, ...]
+
 
 class _Motion(NamedTuple):
     """Positions of the shafts at a time, in steps, and the goals that they follow since."""
 
     at_s: float
-    from_steps: tuple[float, ...]
+    from_steps: Steps
     goals_steps: tuple[int, ...] | None
 
-    def steps(self, now_s: float) -> tuple[float, ...]:
+    def steps(self, now_s: float) -> Steps:
         """Return the positions now; without goals the torque is off and the shafts do not move."""
         goals = self.goals_steps
         if goals is None or now_s <= self.at_s:
@@ -50,16 +52,17 @@ class IdealBus:
         # One value, replaced as a whole, because the camera may read it from another thread.
         self._motion = _Motion(now_s(), tuple(map(float, start_steps)), None)
         self._read = self._motion.at_s, self._motion.from_steps
-        self._reached = self._motion, *self._read  # positions at the last read
         self._events: tuple[str, ...] = ()
         self._measured = tuple(measured)
-        count = len(self._measured)
-        self._zeros, self._none = (0.0,) * count, (None,) * count
-        self._no, self._yes, self._no_faults = (False,) * count, (True,) * count, ("",) * count
         self._warm = tuple([WARM_C if one else None for one in self._measured])
         self.retune(configs)
 
-    def positions_steps(self) -> tuple[float, ...]:
+    @property
+    def has_torque(self) -> bool:
+        """Return whether the shafts follow goals."""
+        return self._motion.goals_steps is not None
+
+    def positions_steps(self) -> Steps:
         """Return the true positions now, in the order of the servos."""
         return self._motion.steps(self._now_s())
 
@@ -71,22 +74,14 @@ class IdealBus:
         """Do nothing: there is no port."""
 
     def read(self, now_s: float) -> Feedback:
-        """Return the positions, rounded to steps, and the mean speeds since the last read."""
-        motion = self._motion
-        steps = motion.steps(now_s)
-        (last_s, last), self._read = self._read, (now_s, steps)
-        self._reached = motion, now_s, steps
-        passed_s = now_s - last_s
-        speeds = self._zeros
-        if passed_s > 0.0:
-            speeds = tuple(map(truediv, map(sub, steps, last), repeat(passed_s)))
-        torque = self._no if motion.goals_steps is None else self._yes
-        return tuple.__new__(
-            Feedback,
-            (
-                tuple(map(sub, map(add, steps, _TO_WHOLE), _TO_WHOLE)), speeds, self._zeros, (now_s,) * len(steps),
-                self._warm, self._none, torque, self._no_faults, self._measured, self._no, (),
-            ),
+        """Return the positions, rounded to steps, and the speeds."""
+        steps, speeds = self._measure(now_s)
+        count = len(steps)
+        zeros, no = (0.0,) * count, (False,) * count
+        return Feedback(
+            tuple(map(sub, map(add, steps, _TO_WHOLE), _TO_WHOLE)), speeds, zeros,
+            (now_s,) * count, self._warm, (None,) * count, (self.has_torque,) * count,
+            ("",) * count, self._measured, no, (),
         )  # fmt: skip
 
     def enable_torque(self) -> tuple[int, ...]:
@@ -95,7 +90,7 @@ class IdealBus:
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Follow these goals, within the limits; with torque off they change nothing."""
-        if self._motion.goals_steps is not None:
+        if self.has_torque:
             self._follow(goals_steps)
 
     def disable_torque(self) -> None:
@@ -121,6 +116,15 @@ class IdealBus:
         """Report that no byte was sent."""
         return BusHealth(0, 0, {})
 
+    def _measure(self, now_s: float) -> tuple[Steps, Steps]:
+        """Return positions and mean speeds since the last call."""
+        steps, (last_s, last) = self._motion.steps(now_s), self._read
+        self._read = now_s, steps
+        passed_s = now_s - last_s
+        if passed_s <= 0.0:
+            return steps, (0.0,) * len(steps)
+        return steps, tuple(map(truediv, map(sub, steps, last), repeat(passed_s)))
+
     def _follow(self, goals_steps: Sequence[int]) -> tuple[int, ...]:
         """Start a motion to goals; return the goals within the limits."""
         goals, low, high = tuple(goals_steps), self._lowest, self._highest
@@ -128,9 +132,6 @@ class IdealBus:
             raise ValueError(f"{len(goals)} goals for {len(low)} servos")
         if True in map(lt, goals, low) or True in map(gt, goals, high):
             goals = tuple(map(min, map(max, goals, low), high))
-        now_s, motion = self._now_s(), self._motion
-        of, at_s, steps = self._reached
-        if of is not motion or at_s != now_s:
-            steps = motion.steps(now_s)
-        self._motion = tuple.__new__(_Motion, (now_s, steps, goals))
+        now_s = self._now_s()
+        self._motion = _Motion(now_s, self._motion.steps(now_s), goals)
         return goals
