@@ -6,10 +6,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from gazerig.config.schema import load_rig
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app import session
-from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.cli.main import app
@@ -70,17 +68,6 @@ def test_options_that_make_no_sense_are_refused_in_one_line(words, said):
     assert done.exit_code == 2
     lines = done.stderr.strip().splitlines()
     assert len(lines) == 1 and said in lines[0]
-
-
-def test_a_head_in_real_time_needs_no_emulator(monkeypatch):
-    monkeypatch.setattr("gazerig.robot.app.run_bus.PtyBuses", None)
-    made = assemble(load_rig("desk"), RunOptions(mock=True, bus="ideal", scene="visitor"))
-    try:
-        assert isinstance(made.robot.body.bus, IdealBus)
-        made.robot.start(made.clock)
-        made.robot.stop()
-    finally:
-        made.close()
 
 
 @pytest.fixture
