@@ -84,6 +84,17 @@ def test_a_pulse_must_be_near_the_estimate_as_soon_as_a_board_that_is_behind_has
     assert channel.is_expected(6604) and not channel.is_expected(6300)
 
 
+def test_plans_begin_at_the_pulse_of_a_channel_that_was_enabled_again_or_is_outside():
+    channel = held()
+    channel.ramp.shaft_steps = 5000
+    channel.record_rearm()
+    assert channel.ramp.shaft_steps == 6000
+    assert channel.pop_rearmed() and not channel.pop_rearmed()
+    channel.start(7800, 1.0)
+    assert channel.pop_rearmed() and channel.pop_rearmed()
+    assert channel.top_speed_steps_s == pytest.approx(1333, abs=1)
+
+
 @pytest.mark.parametrize(("rest", "place"), [(None, 6000), (5000, 5000), (9000, 7600), (0, 4400)])
 def test_where_a_servo_without_pulses_is_taken_to_be(rest, place):
     channel = Channel(SETUP._replace(rest_steps=rest))

@@ -9,7 +9,8 @@ from stand_in import StandIn
 
 from gazerig.drivers.bus.timing import BusTiming
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
+from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.maestro.board import MaestroBoard, MaestroBus, MaestroParams
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.probe import probe
 from gazerig.sim_mock.hobby_servo import HobbySpec
@@ -198,6 +199,16 @@ def test_a_channel_that_ends_at_the_boards_own_range_is_named_and_all_stop():
         )
 
 
+@pytest.mark.parametrize("bit", [3, 9])
+def test_a_hit_bit_is_not_taken_for_the_pulse_of_a_channel_that_gives_none(held, bit):
+    held.do("error script-stack")
+    held.do(f"corrupt 1 {bit} for 1")
+    assert held.run(0.9, GOALS)[-1].missing == (1,)
+    assert held.positions(IDS)[::2] == [GOALS[0], GOALS[2]]
+    feedback = held.run(1.0, GOALS)[-1]
+    assert feedback.missing == () and all(feedback.torque)
+
+
 def test_nothing_is_sent_to_a_board_that_may_have_restarted(held):
     held.do("lose all")
     held.run(TICK_S)
@@ -261,6 +272,12 @@ def test_more_than_was_asked_for_is_damage():
     line = MaestroLink(port, MaestroParams())
     assert line.read_pulses((0, 1, 2)) is None
     assert line.read_pulses((0, 1, 2)) == (0, 0, 0)
+
+
+def test_a_pulse_in_the_place_of_the_error_register_is_damage():
+    board = MaestroBoard(ScriptedPort(PULSE * 2), MaestroParams())
+    assert board.read_status(Channel(SETUPS[0])) is None
+    assert board.errors == {"damaged": 1}
 
 
 # --- search

@@ -127,6 +127,16 @@ def test_after_a_pause_nothing_leaps(world):
     assert 0 <= world.widths()[0] - before <= SPEED_STEPS_S * 0.06 + GRAIN
 
 
+def test_while_the_board_is_silent_the_last_pulses_are_sent_again(world):
+    world.held().run(0.5, [5000] * 3)
+    before = world.widths()
+    world.command("lose all")
+    world.run(0.01)
+    poke(world, LED0, *pulse_registers(400))  # as a damaged write
+    world.bus.write([7000] * 3)
+    assert world.widths() == before
+
+
 # --- what goes wrong
 
 

@@ -6,7 +6,7 @@ intermediate pulses.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from gazerig.drivers.bus.port_bus import Exchange
 from gazerig.drivers.bus.timing import BusTiming
@@ -46,6 +46,9 @@ class Board(Stoppable, Exchange, Protocol):
     timing: BusTiming
     port: BusPort
     lateness: HostLateness
+
+    def __init__(self, port: BusPort, params: Any, timing: BusTiming) -> None:
+        """Use a port, which is not opened yet."""
 
     @property
     def params(self) -> HobbyBoardParams:

@@ -13,16 +13,20 @@ unless the guardian process stops the pulses (gazerig.robot.guardian).
 
 from collections.abc import Collection, Sequence
 from math import inf, nan
+from typing import ClassVar
 
 from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.port_bus import CUT, PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
+from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
 from gazerig.drivers.hobby_board.supervisor import BoardSupervisor
+from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import Feedback, ServoConfig
 
 UNMEASURED = "hobby servos report no positions: those shown are their goals"
@@ -31,21 +35,33 @@ UNMEASURED = "hobby servos report no positions: those shown are their goals"
 class HobbyBoardBus(PortBus):
     """The channels of one board; implements gazerig.drivers.types.ServoBus.
 
+    board_class: class of the board that sends the pulses
+
     Args:
-        board: Board that sends the pulses.
+        port: gazerig.drivers.serial.port.BlockingPort, or a port with its methods.
         setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
             are quarter microseconds.
+        params: Parameters of the board.
+        timing: Times of the bus.
 
     Raises:
         ValueError: a servo has a channel or a pulse width that the board does not have.
     """
 
+    board_class: ClassVar[type[Board]]
     holding_text = "pulses still on"
     unconfirmed_text = "end of pulses not confirmed"
     _supervisor: BoardSupervisor
 
-    def __init__(self, board: Board, setups: Sequence[ServoConfig]) -> None:
-        self._board, self._line, self._port = board, board, board.port
+    def __init__(
+        self,
+        port: BusPort,
+        setups: Sequence[ServoConfig],
+        params: HobbyBoardParams,
+        timing: BusTiming = TIMING,
+    ) -> None:
+        self._port = port
+        self._board = self._line = self.board_class(port, params, timing)
         self._check_setups(setups)
         self._setups = self._target_setups = tuple(setups)
         self._ids = tuple(setup.id for setup in setups)
@@ -53,7 +69,7 @@ class HobbyBoardBus(PortBus):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
         self._log = EventLog()
         self._nothing = Feedback.create_missing(len(self._ids))
-        self._baud, self._give_up_s = board.params.baud, board.timing.give_up_s
+        self._baud, self._give_up_s = params.baud, timing.give_up_s
         self._reported = False
         self._create_parts()
 
@@ -75,9 +91,9 @@ class HobbyBoardBus(PortBus):
             ServoMissing: the board or a channel does not answer.
         """
         self._create_parts()
-        baud = self._board.params.baud
-        if not self._port.setBaudRate(baud):
-            raise PortError(f"{self._port.port_name} cannot run at {baud} bit/s: choose 115200")
+        if not self._port.setBaudRate(self._baud):
+            where = self._port.port_name
+            raise PortError(f"{where} cannot run at {self._baud} bit/s: choose 115200")
         try:
             self._port.clearPort()
             pulses = self._board.find(self._setups, self._log)

@@ -21,7 +21,7 @@ from gazerig.drivers.types import ServoConfig
 MOST_RESTARTS, WITHIN_S = 3, 10.0
 """A board that loses its pulses more often than this within this time stays without."""
 
-MOST_TRIES = 100
+MOST_TRIES = 300
 """Failed attempts to enable a channel again after which it stays without pulses."""
 
 SAME_S = 1.0
@@ -276,6 +276,7 @@ class BoardSupervisor:
             self._failed_tries = 0
             return
         self._failed_tries += 1
+        self.pending.append(self.pending.pop(0))
         if self._failed_tries >= MOST_TRIES:
             self._stop([channel], fault, self._board.remedy)
 

@@ -127,24 +127,6 @@ class MaestroBoard(MaestroLink):
 
 
 class MaestroBus(HobbyBoardBus):
-    """The channels of one Maestro; implements gazerig.drivers.types.ServoBus.
+    """The channels of one Maestro; see HobbyBoardBus for its arguments."""
 
-    Args:
-        port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
-        setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
-            are quarter microseconds.
-        params: Communication parameters.
-        timing: Times of the bus.
-
-    Raises:
-        ValueError: a servo has a channel or a pulse width that the board does not have.
-    """
-
-    def __init__(
-        self,
-        port: BusPort,
-        setups: Sequence[ServoConfig],
-        params: MaestroParams,
-        timing: BusTiming = TIMING,
-    ) -> None:
-        super().__init__(MaestroBoard(port, params, timing), setups)
+    board_class = MaestroBoard

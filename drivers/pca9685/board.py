@@ -225,24 +225,6 @@ class Pca9685Board(I2cLine):
 
 
 class Pca9685Bus(HobbyBoardBus):
-    """The channels of the boards on one I2C bus; implements gazerig.drivers.types.ServoBus.
+    """The channels of the boards on one I2C bus; see HobbyBoardBus for its arguments."""
 
-    Args:
-        port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge.
-        setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
-            are quarter microseconds.
-        params: Addresses and clock of the boards.
-        timing: Times of the bus.
-
-    Raises:
-        ValueError: a servo has a channel or a pulse width that the boards do not have.
-    """
-
-    def __init__(
-        self,
-        port: BusPort,
-        setups: Sequence[ServoConfig],
-        params: Pca9685Params,
-        timing: BusTiming = TIMING,
-    ) -> None:
-        super().__init__(Pca9685Board(port, params, timing), setups)
+    board_class = Pca9685Board
