@@ -7,7 +7,6 @@ reactions to errors. Source: Pololu Maestro User's Guide (0J40), section 5; [A] 
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
 
 from gazerig.sim_mock.faults.active import NO_DEVICE
 from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, word_choice
@@ -56,57 +55,6 @@ RESTART_S = 0.1
 """Time from a dip of the supply until it receives again [A]."""
 
 
-class ParsedCommand(NamedTuple):
-    """One command, or the name of an error in the bytes; ``end``: its end among the bytes fed."""
-
-    end: int
-    code: int = 0
-    data: bytes = b""
-    error: str = ""
-
-
-class CommandParser:
-    """Stores the received bytes of an incomplete command.
-
-    mini: whether the board has more than six channels, and the command for several targets
-    crc: whether a check byte is expected after every command
-    """
-
-    def __init__(self, mini: bool, crc: bool) -> None:
-        self._mini, self._crc = mini, crc
-        self._packet = bytearray()
-
-    def forget(self) -> None:
-        """Drop an unfinished command."""
-        self._packet.clear()
-
-    def feed(self, data: bytes) -> Iterator[ParsedCommand]:
-        """Yield the commands that bytes complete, fed one by one."""
-        for end, byte in enumerate(data, 1):
-            packet = self._packet
-            if bool(packet) == (byte >= 0x80):
-                yield ParsedCommand(end, error="protocol")  # an unfinished command, or none
-                packet.clear()
-                if byte < 0x80:
-                    continue
-            packet.append(byte)
-            code = packet[0]
-            if code not in DATA_BYTES or (code == SET_TARGETS and not self._mini):
-                packet.clear()
-                yield ParsedCommand(end, error="protocol")
-                continue
-            size = 1 + DATA_BYTES[code]
-            if code == SET_TARGETS and len(packet) > 1:
-                size += 2 * packet[1]
-            if len(packet) == size + self._crc:
-                command, check = bytes(packet[:size]), packet[size:]
-                packet.clear()
-                if check and check[0] != crc7(command):
-                    yield ParsedCommand(end, error="crc")
-                else:
-                    yield ParsedCommand(end, code, command[1:])
-
-
 def crc7(data: bytes) -> int:
     """Return the checksum of a command: CRC-7 with the polynomial 91 hex, lowest bit first."""
     rest = 0
@@ -131,7 +79,8 @@ class EmulatedMaestro(HobbyBoard):
         self.channels = [EmulatedChannel(s.spec.min_steps, s.spec.max_steps) for s in servos]
         self.errors = 0
         self.is_script_running = False
-        self._parser = CommandParser(len(servos) > SIZES[0], crc)
+        self._crc = crc
+        self._unread = b""
         self._awake_s = now_s()
 
     def fail(self, error: str) -> None:
@@ -152,7 +101,7 @@ class EmulatedMaestro(HobbyBoard):
         self.errors = 0
         for channel in self.channels:
             channel.restart()
-        self._parser.forget()
+        self._unread = b""
         self._awake_s = self.now_s() + RESTART_S
 
     def target_steps(self, channel: int) -> int:
@@ -173,11 +122,32 @@ class EmulatedMaestro(HobbyBoard):
         """Execute the commands in bytes; yield the end of each command, and its answer."""
         if self.now_s() < self._awake_s - 1e-9:
             return
-        for end, code, content, error in self._parser.feed(data):
-            if error:
-                self.fail(error)
-            elif code not in SETTERS or not self.is_struck("lose_writes"):
-                yield end, self._answer(code, content)
+        kept, at = len(self._unread), 0
+        text = self._unread + data
+        while at < len(text):
+            command = text[at : at + self._size(text[at:])]
+            begun = next((k for k, byte in enumerate(command) if k and byte >= 0x80), 0)
+            if begun or not command:
+                self.fail("protocol")  # an unfinished command, or none
+                at += begun or 1
+                continue
+            if len(command) < self._size(text[at:]):
+                break
+            at += len(command)
+            if self._crc and crc7(command[:-1]) != command[-1]:
+                self.fail("crc")
+            elif command[0] not in SETTERS or not self.is_struck("lose_writes"):
+                body = command[1:-1] if self._crc else command[1:]
+                yield at - kept, self._answer(command[0], body)
+        self._unread = text[at:]
+
+    def _size(self, text: bytes) -> int:
+        """Return the bytes of the command at the begin of a text, 0 for none."""
+        code = text[0]
+        if code not in DATA_BYTES or (code == SET_TARGETS and len(self.channels) <= SIZES[0]):
+            return 0
+        targets = text[1] if code == SET_TARGETS and len(text) > 1 else 0
+        return 1 + DATA_BYTES[code] + 2 * targets + self._crc
 
     def _answer(self, code: int, data: bytes) -> Piece | None:
         """Execute one command; an unknown channel is a protocol error [A]."""
