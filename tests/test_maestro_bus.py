@@ -199,6 +199,14 @@ def test_a_channel_that_ends_at_the_boards_own_range_is_named_and_all_stop():
         )
 
 
+def test_a_channel_that_cannot_be_enabled_again_is_named(held):
+    held.do("brown-out")
+    held.do("lose-writes 100000")
+    feedback = held.run(5.0, GOALS)[-1]
+    assert feedback.missing == () and not any(feedback.torque)
+    assert all("has no pulses: set its channel to Servo" in fault for fault in feedback.fault)
+
+
 @pytest.mark.parametrize("bit", [3, 9])
 def test_a_hit_bit_is_not_taken_for_the_pulse_of_a_channel_that_gives_none(held, bit):
     held.do("error script-stack")

@@ -173,9 +173,11 @@ class BoardSupervisor:
         self._missed += 1
         if self._missed >= IN_A_ROW:
             self._due_s = now_s + AGAIN_S
-        if not self._is_silence_reported and now_s - self._since_s >= BLAME_S:
+        lateness = self._board.lateness
+        patience_s = SILENCE_S if lateness.cause(now_s, self._since_s) else BLAME_S
+        if not self._is_silence_reported and now_s - self._since_s >= patience_s:
             self._is_silence_reported = True
-            self._log.add(self._board.lateness.blame(SILENT, CHECK_SUPPLY, now_s, self._since_s))
+            self._log.add(lateness.blame(SILENT, CHECK_SUPPLY, now_s, self._since_s))
 
     def _record_answer(self, now_s: float) -> None:
         """Record an answer."""

@@ -43,7 +43,6 @@ class MaestroBoard(MaestroLink):
         super().__init__(port, params, timing)
         self.params, self.timing = params, timing
         self._errors_first = False
-        self._unhandled_errors = 0
 
     def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
         """Find the board and return the pulses of these servos; nothing moves.
@@ -99,7 +98,6 @@ class MaestroBoard(MaestroLink):
             # Such errors do not exist: it is a pulse width instead of the register, or noise.
             self.errors["damaged"] += 1
             return None
-        register, self._unhandled_errors = register | self._unhandled_errors, 0
         return ChannelStatus(pulse, name_errors(register))
 
     def send_limits(self, channels: Sequence[Channel]) -> bool:
@@ -116,10 +114,7 @@ class MaestroBoard(MaestroLink):
             packet += codec.number(SET_SPEED, channel.id, speed)
             packet += codec.number(SET_ACCELERATION, channel.id, accel)
         found = self.ask_words(packet + codec.command(GET_ERRORS), 1)
-        if found is None:
-            return False
-        self._unhandled_errors |= found[0]
-        return not found[0]
+        return found is not None and not found[0]
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
         """Send the goals of channels."""
