@@ -1,84 +1,56 @@
-"""Patience, alternating views, back-off, health and names: the driver's small parts."""
+"""Patience, journal and names: the driver's small parts."""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.drivers.bus.servo_models import servo_label
-from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks
-from gazerig.drivers.dynamixel.read_plan import INDIRECT_MAP
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.event_log import MOST, EventLog, register_label
-from gazerig.drivers.servo_bus.transaction import REFILL, RESERVE_S, WINDOW, AdaptiveTimeout
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
 
-
-def test_patience_begins_long_and_becomes_twice_the_worst_delay():
-    timeout = AdaptiveTimeout(0.001, 0.02)
-    assert timeout.seconds == 0.02
-    for _ in range(WINDOW):
-        timeout.update(0.002)
-    assert timeout.seconds == 0.004
-    for _ in range(3 * WINDOW):
-        timeout.update(0.0001)
-    assert timeout.seconds == 0.001
-    for expected in (0.001, 0.001, 0.006, 0.006):
-        timeout.update(0.003)
-        assert timeout.seconds == expected
+LATE = bytes.fromhex("FFFFFD000107005500060426655D")
 
 
-def test_answers_after_the_end_lengthen_patience():
-    timeout = AdaptiveTimeout(0.001, 0.02)
-    for _ in range(2 * WINDOW):
-        timeout.update(0.0)
-    for expected in (0.001, 0.001, 0.002, 0.002, 0.002, 0.004):
-        timeout.record_late_answer()
-        assert timeout.seconds == expected or expected == 0.004
+class Line:
+    """A port whose answers come after ``late_s`` and their time on the wire."""
+
+    port_name = "line"
+
+    def __init__(self):
+        self.time_s, self.late_s, self.is_owed = 0.0, 0.0, False
+
+    def now_s(self):
+        return self.time_s
+
+    def exchange(self, request, length, deadline_s):
+        due_s = self.time_s + (len(request) + length) * 1e-5 + self.late_s
+        self.time_s = min(due_s, deadline_s)
+        return b"x" * length * (due_s <= deadline_s), 0.0
+
+    def read_until(self, length, deadline_s):
+        """Return a late answer to a ping, then nothing."""
+        self.is_owed = not self.is_owed
+        return LATE * self.is_owed
 
 
-@given(st.lists(st.floats(-1.0, 10.0), max_size=600))
-def test_patience_keeps_to_its_bounds(delays):
-    timeout = AdaptiveTimeout(0.001, 0.02)
-    for late_s in delays:
-        timeout.update(late_s)
-        assert 0.001 <= timeout.seconds <= 0.02
-
-
-def settled(least_s=0.001, most_s=0.02):
-    """A time-out of a bus that answers at once."""
-    timeout = AdaptiveTimeout(least_s, most_s)
-    for _ in range(2 * WINDOW):
-        timeout.update(0.0)
-    return timeout
-
-
-def test_the_reserve_covers_a_pause_and_a_success_costs_nothing_of_it():
-    timeout = settled()
-    assert timeout.reserve_timeout_s(5.0) == pytest.approx(0.001 + RESERVE_S)
-    timeout.update(0.009)
-    assert timeout.seconds == 0.001
-    assert timeout.reserve_timeout_s(5.0) == pytest.approx(0.001 + RESERVE_S)
-
-
-def test_waiting_in_vain_costs_one_hundredth_of_the_time_at_most():
-    timeout = settled()
-    now_s, waited_s = 100.0, 0.0
-    for _ in range(20_000):
-        now_s += 0.005
-        beyond_s = timeout.reserve_timeout_s(now_s) - timeout.seconds
-        now_s += beyond_s
-        waited_s += beyond_s
-        timeout.consume_reserve(beyond_s, now_s)
-    assert waited_s <= RESERVE_S + 1.02 * REFILL * (now_s - 100.0)
-    # Half a second later there is some of it again, and after a while all.
-    assert timeout.reserve_timeout_s(now_s + 0.5) == pytest.approx(0.001 + 0.5 * REFILL, rel=0.05)
-    assert timeout.reserve_timeout_s(now_s + 5.0) == pytest.approx(0.001 + RESERVE_S)
-
-
-def test_the_indirect_map_fits_every_window():
-    for name, firmware in (("xl330-m077", 46), ("xl330-m077", 53), ("xm430-w350", 45)):
-        block = indirect_blocks(MODELS[name], firmware)[0]
-        assert len(INDIRECT_MAP) <= block.entries
-        assert all(block.target_low <= address <= block.target_high for address in INDIRECT_MAP)
+@given(st.lists(st.floats(0.0, 0.1), max_size=300), st.floats(0.0, 0.0198))
+def test_patience_is_twice_the_worst_delay_within_its_bounds(delays, late_s):
+    port = Line()
+    line = Transactions(port, DYNAMIXEL, 0.001, 0.02, 1_000_000)  # type: ignore[arg-type]
+    assert line.timeout_s == 0.02
+    for port.late_s in delays:
+        line.exchange(b"ask", 6)
+        assert 0.001 <= line.timeout_s <= 0.02
+    port.late_s = late_s
+    for _ in range(20):
+        if not line.exchange(b"ask", 6)[0]:
+            line.drain()
+    assert line.exchange(b"ask", 6)[0]
+    for _ in range(1000):
+        line.exchange(b"ask", 6)
+    assert line.timeout_s == pytest.approx(min(0.02, max(0.001, 2.0 * late_s)), abs=1e-6)
 
 
 def test_the_journal_forgets_what_nobody_takes():

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.drivers.dynamixel.protocol import (
-    SyncWrite,
-    bytes_missing,
+    GoalWrite,
     instruction,
     parse_statuses,
     sync_read,
@@ -36,7 +35,7 @@ def test_instructions_are_the_protocols():
     assert sync_read((3, 7, 4), 132, 4, fast=True) == vector(
         "FF FF FD 00 FE 0A 00 8A 84 00 04 00 03 07 04 20 F2"
     )
-    assert SyncWrite((1, 2), 116, 4).packet((150, 170)) == vector(
+    assert GoalWrite((1, 2)).packet((150, 170)) == vector(
         "FF FF FD 00 FE 11 00 83 74 00 04 00 01 96 00 00 00 02 AA 00 00 00 82 87"
     )
 
@@ -45,7 +44,7 @@ def test_what_looks_like_a_header_is_stuffed():
     assert instruction(1, 3, b"\x68\x00\xff\xff\xfd\x00") == vector(
         "FF FF FD 00 01 0A 00 03 68 00 FF FF FD FD 00 E2 7A"
     )
-    packet = SyncWrite((1, 2), 116, 4).packet((-1, 0x00FDFFFF))
+    packet = GoalWrite((1, 2)).packet((-1, 0x00FDFFFF))
     assert b"\xff\xff\xfd\xfd" in packet
     assert int.from_bytes(packet[5:7], "little") == len(packet) - 7
 
@@ -75,18 +74,3 @@ def test_every_status_comes_back_as_it_was(rows):
     assert [(s.id, s.error, s.params, s.intact) for s in parse_statuses(raw)] == [
         (*r, True) for r in rows
     ]
-
-
-@given(
-    st.lists(
-        st.sampled_from([b"\x00" * 10, b"\xff\xff\xfd" * 3 + b"\x00"]), min_size=1, max_size=5
-    ),
-    st.integers(0, 100),
-)
-def test_bytes_missing_never_asks_for_too_much_and_gets_there(params, cut):
-    raw = b"".join(status(i, 0, p) for i, p in enumerate(params))
-    got = raw[: cut % (len(raw) + 1)]
-    while missing := bytes_missing(got, len(params), 10):
-        assert len(got) + missing <= len(raw)
-        got = raw[: len(got) + missing]
-    assert got == raw

@@ -11,12 +11,13 @@ from typing import Any
 
 import pytest
 from branch import Branch
-from dynamixel_sdk import COMM_SUCCESS, PacketHandler
 from present import present
 from typer.testing import CliRunner
 
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.cli import emulate as command
 from gazerig.robot.cli.emulate import app
 from gazerig.sim_mock.device_spec import line_of, parse_servos
@@ -80,7 +81,8 @@ def asked(path, data, length, baud=1_000_000):
 
 
 def ping(port, servo_id):
-    return PacketHandler(2.0).ping(port, servo_id)[:2]
+    """Return a servo's model number and firmware, None without an answer."""
+    return Registers(port, DYNAMIXEL, tries=1).identify(servo_id)
 
 
 def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
@@ -91,8 +93,8 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
     assert emulator.ready == {"path": str(link), "baud": 1_000_000}
     for _ in range(2):
         port = connect(link)
-        assert ping(port, 2) == (1190, COMM_SUCCESS)
-        assert ping(port, 7) == (1240, COMM_SUCCESS)
+        assert ping(port, 2).model_number == 1190
+        assert ping(port, 7).model_number == 1240
         port.closePort()
     reported = emulator.type("status")
     assert [servo["id"] for servo in reported["servos"]] == [1, 2, 7]
@@ -101,8 +103,8 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
     assert "'x' is not a servo id" in emulator.type("lose x")["error"]
     assert "lose ID" in emulator.type("help")["ok"]
     port = connect(link)
-    assert ping(port, 1)[1] != COMM_SUCCESS
-    assert ping(port, 1)[1] == COMM_SUCCESS
+    assert ping(port, 1) is None
+    assert ping(port, 1).model_number == 1190
     port.closePort()
     assert emulator.end(signal.SIGINT) == 0
     assert not os.path.lexists(link)
@@ -135,7 +137,7 @@ def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monke
     assert emulator.hear() == {"bus": "eyes", "path": f"{link}-eyes", "baud": 57_600}
     assert asked(link, STS_PING, 6) == STS_PONG
     port = connect(f"{link}-eyes", 57_600)
-    assert ping(port, 2) == (1190, COMM_SUCCESS)
+    assert ping(port, 2).model_number == 1190
     port.closePort()
     assert emulator.type("eyes: lose 2 count 1")["bus"] == "eyes"
     assert emulator.type("eyes:status")["faults"] == ["lose 2"]

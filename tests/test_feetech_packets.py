@@ -1,16 +1,20 @@
-"""Bytes of the STS protocol: vectors from the rule, and what is made of spoilt answers."""
+"""Packets and table of the STS servos: vectors from the rule, and spoilt answers."""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gazerig.drivers.feetech.memory_table import (
+    REGISTERS,
+    TABLE_END,
+    acceleration_units,
+    name_errors,
+    speed_units,
+)
 from gazerig.drivers.feetech.protocol import (
     PING,
-    REBOOT,
     GoalWrite,
-    Status,
-    all_intact,
-    bytes_missing,
+    answer_frame,
     checksum,
     instruction,
     parse_statuses,
@@ -19,13 +23,13 @@ from gazerig.drivers.feetech.protocol import (
     sync_write,
     write,
 )
+from gazerig.drivers.servo_bus.family import Status
 
 VECTORS = [
     (instruction(1, PING), "FF FF 01 02 01 FB"),
     (read(1, 56, 2), "FF FF 01 04 02 38 02 BE"),
     (write(1, 42, bytes((0x00, 0x08, 0, 0, 0xE8, 0x03))),
      "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5"),
-    (instruction(1, REBOOT), "FF FF 01 02 08 F4"),
     (sync_read((1, 2, 3), 56, 15), "FF FF FE 07 82 38 0F 01 02 03 2B"),
     (sync_write((1, 2), 40, 1, (b"\x01", b"\x01")), "FF FF FE 08 83 28 01 01 01 02 01 48"),
     (GoalWrite((1, 2)).packet((2048, 1000), (3000, 500)),
@@ -43,30 +47,20 @@ def status(servo_id, params, error=0):
     return b"\xff\xff" + body + bytes((checksum(body),))
 
 
-ids = st.integers(0, 253)
-params = st.binary(max_size=40)
+ids, params = st.integers(0, 253), st.binary(max_size=40)
 
 
 @given(st.lists(st.tuples(ids, params, st.integers(0, 255)), max_size=5), st.binary(max_size=3))
 def test_statuses_come_out_as_they_went_in(sent, noise):
     noise = noise.replace(b"\xff", b"\x00")
     raw = noise + b"".join(status(i, p, e) for i, p, e in sent)
-    found = [s._replace(offset=0) for s in parse_statuses(raw) if s.intact]
+    found = [s for s in parse_statuses(raw) if s.intact]
     wanted = [Status(i, e, p, True) for i, p, e in sent]
     # Data may look like a status inside or across others by chance: such are not believed.
     assert all(s in wanted for s in found)
     plain = not any(b"\xff" in p for _, p, _ in sent)
     if plain and all(checksum(status(i, p, e)[2:-1]) != 0xFF and e != 0xFF for i, p, e in sent):
         assert found == wanted
-
-
-@given(st.integers(0, 6 + 15 - 1), st.integers(0, 7), st.binary(min_size=15, max_size=15))
-def test_one_flipped_bit_is_always_found(at, bit, data):
-    raw = bytearray(status(3, data))
-    raw[at] ^= 1 << bit
-    assert not any(
-        s.intact and s.id == 3 and len(s.params) == 15 for s in parse_statuses(bytes(raw))
-    )
 
 
 @given(st.integers(0, 20), st.binary(min_size=15, max_size=15), st.binary(min_size=15, max_size=15))
@@ -86,35 +80,60 @@ def test_a_lost_byte_whose_sum_fits_the_next_header():
     assert [s.intact for s in parse_statuses(raw)] == [False, False]
 
 
-@given(st.integers(1, 4), st.integers(0, 20), st.integers(0, 200))
-def test_bytes_missing_is_exact_on_the_way(count, length, cut):
-    raw = b"".join(status(i + 1, bytes(length)) for i in range(count))
-    cut = min(cut, len(raw))
-    assert bytes_missing(raw[:cut], count, length) == len(raw) - cut
-
-
-@given(st.binary(max_size=200), st.integers(1, 5), st.integers(0, 31))
-def test_noise_never_raises_and_always_gets_an_end(raw, count, length):
+@given(st.binary(max_size=200))
+def test_noise_never_raises(raw):
     parse_statuses(raw)
-    assert 0 <= bytes_missing(raw, count, length) <= count * (length + 6)
 
 
 @given(st.lists(st.binary(min_size=4, max_size=253), min_size=1, max_size=9))
 def test_checksums_of_many_are_right_where_each_is(bodies):
-    right = [body + bytes([checksum(body)]) for body in bodies]
-    assert all_intact(right, ())
+    is_intact = answer_frame((1,), 10, False).is_intact
+    right = tuple(body + bytes([checksum(body)]) for body in bodies)
+    assert is_intact(right, ())
     for k, part in enumerate(right):
-        bad = [*right[:k], part[:-1] + bytes([part[-1] ^ 0x10]), *right[k + 1 :]]
-        assert not all_intact(bad, ())
+        damaged = part[:-1] + bytes([part[-1] ^ 0x10])
+        assert not is_intact((*right[:k], damaged, *right[k + 1 :]), ())
 
 
 @pytest.mark.parametrize("stray", [b"\xff", b"\xff\xff", b"\x00\xff"])
 def test_a_stray_ff_before_an_answer_makes_it_no_other_servos(stray: bytes) -> None:
     """FF FF FF 01 ...: the header is the last two of them, and 255 is no servo."""
-    answer = b"\xff\xff\x01\x02\x00\xfc"
-    (found,) = parse_statuses(stray + answer)
+    (found,) = parse_statuses(stray + b"\xff\xff\x01\x02\x00\xfc")
     assert found.id == 1 and found.intact
 
 
-def test_a_stray_ff_is_not_counted_as_part_of_the_answer_awaited() -> None:
-    assert bytes_missing(b"\xff\xff\xff\x01\x02", 1, 0) == 2
+# --- the table
+
+
+def test_registers_do_not_overlap_and_end_where_the_table_does():
+    at = 0
+    for register in REGISTERS.values():
+        assert register.address >= at
+        at = register.address + register.size
+    assert at == TABLE_END
+
+
+@given(st.sampled_from([r for r in REGISTERS.values() if r.sign is not None]), st.data())
+def test_signed_registers_there_and_back(register, data):
+    most = (1 << register.sign) - 1
+    value = data.draw(st.integers(-most, most))
+    assert register.decode(register.encode(value)) == value
+    for beyond in (most + 1, -most - 1):
+        with pytest.raises(ValueError, match="does not fit"):
+            register.encode(beyond)
+
+
+def test_values_of_registers_by_hand():
+    assert REGISTERS["position_offset"].encode(-1) == bytes((1, 8))
+    assert REGISTERS["present_load"].decode(bytes((0x2C, 0x05))) == -300
+    for value in (-1, 256):
+        with pytest.raises(ValueError, match=r"acceleration: .* does not fit into 1 byte"):
+            REGISTERS["acceleration"].encode(value)
+
+
+def test_names_of_errors_and_limits_that_are_never_none():
+    assert name_errors(0x21) == ("input voltage", "overload")
+    assert name_errors(0x40) == ("error bit 0x40",)
+    assert [speed_units(v) for v in (0.0, 0.4, 3000.9, 1e9)] == [1, 1, 3000, 32767]
+    accelerations = (None, 0.0, 250.0, 25_400.0, 25_401.0)
+    assert [acceleration_units(a) for a in accelerations] == [0, 1, 2, 254, 0]

@@ -314,16 +314,38 @@ def test_one_that_is_too_hot_keeps_no_other_without_torque_after_a_replug(sts):
     assert all(servo.torque for servo in sts.chain.servos) and sts.bus.faults() == ()
 
 
+def test_a_joint_that_was_turned_past_zero_returns_the_short_way():
+    """A servo counts on beyond its turn: -100 is left of zero, and no step of the turn."""
+    setups = [ServoConfig(1, "sts3215", 100, 1500, 3000.0, "eye")]
+    rig = StsRig([ServoSpec(1, "sts3215", 200)], setups)
+    rig.bus.open()
+    rig.command("turn 1 -300")
+    assert rig.bus.read(rig.now_s).position_steps == (-100,)
+    assert rig.bus.enable_torque() == (100,)
+    steps = []
+    for _ in range(100):
+        rig.now_s += 0.01
+        steps.append(rig.bus.read(rig.now_s).position_steps[0])
+        rig.bus.write([500])
+    assert min(steps) >= -101 and steps[-1] >= 94
+    assert steps[20] < 0  # slowly
+    assert rig.bus.faults() == ()
+
+
 def test_a_joint_beyond_its_encoders_zero_is_not_led_the_wrong_way():
-    specs = [ServoSpec(1, "sts3215", 200), ServoSpec(2, "sts3215", 700)]
+    specs = [ServoSpec(1, "sts3215", 4090), ServoSpec(2, "sts3215", 700)]
     setups = [ServoConfig(i, "sts3215", 100, 1500, 3000.0, NAMES[i - 1]) for i in (1, 2)]
     rig = StsRig(specs, setups)
     rig.bus.open()
-    rig.command("turn 1 -206")
-    with pytest.raises(ServoFault, match=r"eye \(servo 1\) is at 4090, beyond .*by hand"):
-        rig.bus.enable_torque()
+    # It counts on from where it started; only a restart makes it measure within one turn.
+    for place in (4090, 4290):
+        with pytest.raises(ServoFault, match=rf"eye \(servo 1\) is at {place}, beyond .*by hand"):
+            rig.bus.enable_torque()
+        rig.command("turn 1 200")
     assert not any(servo.torque for servo in rig.chain.servos)
-    rig.command("turn 1 200")
+    rig.command("turn 1 -200")
+    rig.command("brown-out 1")
+    rig.now_s += 2.0
     assert rig.bus.enable_torque() == (194, 700)
 
     def run(ticks):
@@ -334,13 +356,14 @@ def test_a_joint_beyond_its_encoders_zero_is_not_led_the_wrong_way():
         return readings
 
     run(20)
-    rig.command("brown-out 1")
     rig.command("turn 1 -700")
+    rig.command("brown-out 1")
     run(200)
     assert rig.bus.faults() == (f"eye (servo 1): {FAR_SIDE}",)
     assert [servo.torque for servo in rig.chain.servos] == [False, True]
     assert sum("is beyond" in line for line in rig.bus.events()) == 1
     rig.command("turn 1 600")
-    assert present(run(100)[0]).torque
+    rig.command("brown-out 1")
+    assert present(run(200)[0]).torque
     assert rig.bus.faults() == ()
     assert [servo.torque for servo in rig.chain.servos] == [True, True]

@@ -2,15 +2,16 @@
 
 The checksum of an answer misses some damage: a sum of one byte misses one in 256 damaged answers, a
 CRC of two bytes one in 65,536. Between two answers a joint moves no farther than its motor can turn
-it, so a position farther away is not returned as fresh. A joint that is at another position because
-it was pushed by hand, was restarted or is off by a turn reports that position repeatedly. It is
-believed after several answers.
+it, and while answers arrive damaged, no farther than it would by its speed so far. A position
+farther away is not returned as fresh. A joint that is at another position because it was pushed by
+hand, was restarted or is off by a turn reports that position repeatedly: it is believed after
+several answers.
 """
 
 from collections.abc import Sequence
-from math import isnan
+from math import isnan, nan
 from operator import sub
-from typing import Any
+from typing import NamedTuple
 
 SLACK_STEPS = 64
 """Difference allowed between two answers at any time interval: play and jitter."""
@@ -27,11 +28,19 @@ AGREEING = 3
 DISTURBED_S = 5.0
 """Time after a damaged answer during which the line counts as disturbed."""
 
-PAIR_STEPS = 4
-"""Distance allowed between two consecutive answers in addition to the motion of the motor."""
+NEAR_STEPS, NEAR_LATE_S = 4, 0.002
+"""Distance allowed on a disturbed line from the way at the speed so far, and jitter of times."""
 
-PAIR_LATE_S = 0.005
-"""Longest additional delay of the first of two consecutive answers."""
+HARDEST_STEPS_S2 = 150_000.0
+"""Highest acceleration of a joint: a small servo reaches full speed in 30 ms."""
+
+
+class _Place(NamedTuple):
+    """A position of a joint, its time, and the speed with which it was reached."""
+
+    steps: float
+    at_s: float
+    speed_steps_s: float = 0.0
 
 
 class Plausibility:
@@ -39,8 +48,6 @@ class Plausibility:
 
     Args:
         fastest_steps_s: No-load speed of each servo's motor.
-
-    damaged_s: time of the last damaged answer
     """
 
     def __init__(self, fastest_steps_s: Sequence[float]) -> None:
@@ -48,83 +55,83 @@ class Plausibility:
         self._pace = tuple(MARGIN * speed for speed in fastest_steps_s)
         self._free = tuple(SLACK_STEPS + LATE_S * pace for pace in self._pace)
         self._nearest = min(self._free, default=0.0)
-        self.damaged_s = float("-inf")
+        self.disturbed_until_s = float("-inf")
         self.forget()
 
     def forget(self) -> None:
         """Accept the next positions without a check, for example after a lost port."""
         count = len(self._fastest)
-        self._last: Sequence[Any] = [None] * count
-        self._at_s = [0.0] * count
-        self._odd: list[list[tuple[int, float]]] = [[] for _ in range(count)]
-        self._whole_s = float("nan")
+        self._places: list[_Place | None] = [None] * count
+        self._odd: list[list[_Place]] = [[] for _ in range(count)]
+        # Positions and time of the last whole answer and of the one before; nan: of none.
+        self._last: Sequence[int] = ()
+        self._before: Sequence[int] = ()
+        self._last_s = self._before_s = nan
+
+    def record_damaged(self, at_s: float) -> None:
+        """Record that an answer was damaged: for a while positions are checked more strictly."""
+        self.disturbed_until_s = at_s + DISTURBED_S
 
     def record(self, slot: int, position: int, at_s: float) -> None:
         """Record a position of a servo from another source than its cyclic answer."""
-        last = self._last = list(self._last)
-        if not isnan(self._whole_s):
-            self._at_s = [self._whole_s] * len(last)
-        last[slot], self._at_s[slot] = position, at_s
+        self._divide()
+        self._places[slot] = _Place(position, at_s)
         self._odd[slot].clear()
-        self._whole_s = float("nan")
 
     def are_plausible(self, positions: Sequence[int], at_s: float) -> bool:
         """Return whether all positions of one answer are plausible; only then are they recorded."""
-        # Fast path of every tick: servos last read together have one common time.
-        since_s = at_s - self._whole_s
-        if not since_s >= 0.0:  # nan if they were not read together
+        since_s = at_s - self._last_s
+        if since_s >= 0.0:  # nan if they were not read together
+            ways = tuple(map(sub, positions, self._last))
+            if max(ways) > self._nearest or min(ways) < -self._nearest:
+                for way, free, pace in zip(ways, self._free, self._pace, strict=True):
+                    if not -free - pace * since_s <= way <= free + pace * since_s:
+                        return False
+        elif not all(
+            self._is_near(i, place, steps, at_s)
+            for i, (place, steps) in enumerate(zip(self._places, positions, strict=True))
+        ):
             return False
-        ways = tuple(map(sub, positions, self._last))
-        if max(ways) > self._nearest or min(ways) < -self._nearest:
-            for way, free, pace in zip(ways, self._free, self._pace, strict=True):
-                if not -free - pace * since_s <= way <= free + pace * since_s:
-                    return False
-        self._last, self._whole_s = positions, at_s
+        self._before, self._before_s = self._last, self._last_s
+        self._last, self._last_s = positions, at_s
         return True
 
     def is_plausible(self, slot: int, position: int, at_s: float) -> bool:
         """Return whether one servo's position is plausible; call it once for every answer."""
-        last, odd = self._last[slot], self._odd[slot]
-        last_s = self._at_s[slot] if isnan(self._whole_s) else self._whole_s
-        if last is not None and not self._is_near(slot, last, last_s, position, at_s):
-            if odd and not self._is_near(slot, *odd[-1], position, at_s):
+        self._divide()
+        last, odd = self._places[slot], self._odd[slot]
+        speed_steps_s = 0.0
+        if not self._is_near(slot, last, position, at_s):
+            if odd and not self._is_near(slot, odd[-1], position, at_s):
                 odd.clear()
-            odd.append((position, at_s))
+            odd.append(_Place(position, at_s))
             if len(odd) < AGREEING:
                 return False
-        self.record(slot, position, at_s)
-        if all(at == at_s for at in self._at_s) and None not in self._last:
-            self._whole_s = at_s
+        elif last is not None and at_s > last.at_s:
+            speed_steps_s = (position - last.steps) / (at_s - last.at_s)
+        odd.clear()
+        self._places[slot] = _Place(position, at_s, speed_steps_s)
         return True
 
-    def _is_near(self, slot: int, before: int, before_s: float, now: int, now_s: float) -> bool:
-        since_s = max(0.0, now_s - before_s)
-        if self.is_disturbed(now_s):  # two servos with one id report the same wrong position twice
-            reach = PAIR_STEPS + self._fastest[slot] * (LATE_S + since_s)
-        else:
-            reach = self._free[slot] + self._pace[slot] * since_s
-        return abs(now - before) <= reach
+    def _divide(self) -> None:
+        """Turn the last whole answers into places of single servos."""
+        if isnan(self._last_s):
+            return
+        since_s = self._last_s - self._before_s
+        before = self._before if since_s > 0.0 else self._last
+        self._places = [
+            _Place(steps, self._last_s, (steps - past) / since_s if since_s > 0.0 else 0.0)
+            for steps, past in zip(self._last, before, strict=True)
+        ]
+        self._last_s = nan
 
-    # --- a line with recently damaged answers
-
-    def record_damaged(self, at_s: float) -> None:
-        """Record that an answer was damaged or not plausible."""
-        self.damaged_s = at_s
-
-    def is_disturbed(self, now_s: float) -> bool:
-        """Return whether an answer was damaged recently."""
-        return now_s - self.damaged_s <= DISTURBED_S
-
-    def agree(self, slot: int, way: int, since_s: float, speeds_steps_s: Sequence[float]) -> bool:
-        """Return whether two consecutive answers are plausible together.
-
-        Args:
-            slot: Index of the servo.
-            way: Steps from the first to the second.
-            since_s: Time from the first to the second.
-            speeds_steps_s: Speeds that both report.
-        """
-        fastest, room_s = self._fastest[slot], PAIR_LATE_S + max(0.0, since_s)
-        low = max(-fastest, min(0.0, *speeds_steps_s)) * room_s
-        high = min(fastest, max(0.0, *speeds_steps_s)) * room_s
-        return low - PAIR_STEPS <= way <= high + PAIR_STEPS
+    def _is_near(self, slot: int, place: _Place | None, position: float, at_s: float) -> bool:
+        if place is None:
+            return True
+        since_s = max(0.0, at_s - place.at_s)
+        way, reach = position - place.steps, self._free[slot] + self._pace[slot] * since_s
+        if at_s >= self.disturbed_until_s:
+            return abs(way) <= reach
+        ahead = since_s * place.speed_steps_s
+        room = NEAR_STEPS + NEAR_LATE_S * abs(place.speed_steps_s) + HARDEST_STEPS_S2 * since_s**2
+        return -min(reach, room - min(0.0, ahead)) <= way <= min(reach, room + max(0.0, ahead))

@@ -9,7 +9,8 @@ Source: ROBOTIS e-Manual, X series.
 from math import ceil
 from typing import Literal, NamedTuple
 
-Access = Literal["r", "rw"]
+from gazerig.drivers.servo_bus.family import Register as Register
+
 Family = Literal["x330", "x430"]
 
 STEPS_PER_TURN = 4096
@@ -34,9 +35,6 @@ EEPROM_END = 64
 FAST_READ_SINCE: dict[Family, int] = {"x330": 46, "x430": 45}
 """First firmware with Fast Sync Read and Fast Bulk Read."""
 
-BACKUP_SINCE: dict[Family, int] = {"x330": 46, "x430": 45}
-"""First firmware with Control Table Backup, Startup Configuration and torque on by goal update."""
-
 X330_WIDE_INDIRECT_SINCE = 53
 """First X330 firmware whose indirect data starts at 224 instead of 208."""
 
@@ -57,37 +55,6 @@ GAINS = (
     "position_i_gain",
     "position_p_gain",
 )
-
-
-class DynamixelRegister(NamedTuple):
-    """An entry of the control table.
-
-    initial: factory value of the EEPROM area, start value of the RAM area; None if the device
-        itself decides
-    low, high: range of valid values; None if the model or other registers decide
-    """
-
-    name: str
-    address: int
-    size: int
-    access: Access = "r"
-    initial: int | None = None
-    low: int | None = None
-    high: int | None = None
-    signed: bool = False
-
-    @property
-    def area(self) -> Literal["eeprom", "ram"]:
-        """Return the memory area of the register."""
-        return "eeprom" if self.address < EEPROM_END else "ram"
-
-    def encode(self, value: int) -> bytes:
-        """Return a value as bytes; a negative value of an unsigned register wraps."""
-        return (value & (1 << 8 * self.size) - 1).to_bytes(self.size, "little")
-
-    def decode(self, data: bytes) -> int:
-        """Return the value of bytes."""
-        return int.from_bytes(data, "little", signed=self.signed)
 
 
 class DynamixelModel(NamedTuple):
@@ -177,65 +144,67 @@ MODELS: dict[str, DynamixelModel] = {m.name: m for m in (
 )}
 
 _BASE = (
-    DynamixelRegister("model_number",            0, 2),
-    DynamixelRegister("model_information",       2, 4),
-    DynamixelRegister("firmware_version",        6, 1),
-    DynamixelRegister("id",                      7, 1, "rw", 1, 0, 252),
-    DynamixelRegister("baud_rate",               8, 1, "rw", 1, 0, 6),
-    DynamixelRegister("return_delay_time",       9, 1, "rw", 250, 0, 254),
-    DynamixelRegister("drive_mode",             10, 1, "rw", 0, 0, 13),
-    DynamixelRegister("operating_mode",         11, 1, "rw", 3, 0, 16),
-    DynamixelRegister("secondary_id",           12, 1, "rw", 255, 0, 255),
-    DynamixelRegister("protocol_type",          13, 1, "rw", 2, 1, 22),
-    DynamixelRegister("homing_offset",          20, 4, "rw", 0, -1_044_479, 1_044_479, True),
-    DynamixelRegister("moving_threshold",       24, 4, "rw", 10, 0, 1023),
-    DynamixelRegister("temperature_limit",      31, 1, "rw", None, 0, 100),
-    DynamixelRegister("max_voltage_limit",      32, 2, "rw"),
-    DynamixelRegister("min_voltage_limit",      34, 2, "rw"),
-    DynamixelRegister("pwm_limit",              36, 2, "rw", 885, 0, 885),
-    DynamixelRegister("current_limit",          38, 2, "rw"),
-    DynamixelRegister("velocity_limit",         44, 4, "rw"),
-    DynamixelRegister("max_position_limit",     48, 4, "rw", 4095, 0, 4095),
-    DynamixelRegister("min_position_limit",     52, 4, "rw", 0, 0, 4095),
-    DynamixelRegister("startup_configuration",  60, 1, "rw", 0, 0, 3),
-    DynamixelRegister("pwm_slope",              62, 1, "rw", 140, 1, 255),
-    DynamixelRegister("shutdown",               63, 1, "rw", None, 0, 63),
-    DynamixelRegister("torque_enable",          64, 1, "rw", 0, 0, 1),
-    DynamixelRegister("led",                    65, 1, "rw", 0, 0, 1),
-    DynamixelRegister("status_return_level",    68, 1, "rw", 2, 0, 2),
-    DynamixelRegister("registered_instruction", 69, 1, "r", 0),
-    DynamixelRegister("hardware_error_status",  70, 1, "r", 0),
-    DynamixelRegister("velocity_i_gain",        76, 2, "rw", None, 0, 16383),
-    DynamixelRegister("velocity_p_gain",        78, 2, "rw", None, 0, 16383),
-    DynamixelRegister("position_d_gain",        80, 2, "rw", None, 0, 16383),
-    DynamixelRegister("position_i_gain",        82, 2, "rw", None, 0, 16383),
-    DynamixelRegister("position_p_gain",        84, 2, "rw", None, 0, 16383),
-    DynamixelRegister("feedforward_2nd_gain",   88, 2, "rw", 0, 0, 16383),
-    DynamixelRegister("feedforward_1st_gain",   90, 2, "rw", 0, 0, 16383),
+    Register("model_number",            0, 2),
+    Register("model_information",       2, 4),
+    Register("firmware_version",        6, 1),
+    Register("id",                      7, 1, "rw", 1, 0, 252),
+    Register("baud_rate",               8, 1, "rw", 1, 0, 6),
+    Register("return_delay_time",       9, 1, "rw", 250, 0, 254),
+    Register("drive_mode",             10, 1, "rw", 0, 0, 13),
+    Register("operating_mode",         11, 1, "rw", 3, 0, 16),
+    Register("secondary_id",           12, 1, "rw", 255, 0, 255),
+    Register("protocol_type",          13, 1, "rw", 2, 1, 22),
+    Register("homing_offset",          20, 4, "rw", 0, -1_044_479, 1_044_479, True),
+    Register("moving_threshold",       24, 4, "rw", 10, 0, 1023),
+    Register("temperature_limit",      31, 1, "rw", None, 0, 100),
+    Register("max_voltage_limit",      32, 2, "rw"),
+    Register("min_voltage_limit",      34, 2, "rw"),
+    Register("pwm_limit",              36, 2, "rw", 885, 0, 885),
+    Register("current_limit",          38, 2, "rw"),
+    Register("velocity_limit",         44, 4, "rw"),
+    Register("max_position_limit",     48, 4, "rw", 4095, 0, 4095),
+    Register("min_position_limit",     52, 4, "rw", 0, 0, 4095),
+    Register("startup_configuration",  60, 1, "rw", 0, 0, 3),
+    Register("pwm_slope",              62, 1, "rw", 140, 1, 255),
+    Register("shutdown",               63, 1, "rw", None, 0, 63),
+    Register("torque_enable",          64, 1, "rw", 0, 0, 1),
+    Register("led",                    65, 1, "rw", 0, 0, 1),
+    Register("status_return_level",    68, 1, "rw", 2, 0, 2),
+    Register("registered_instruction", 69, 1, "r", 0),
+    Register("hardware_error_status",  70, 1, "r", 0),
+    Register("velocity_i_gain",        76, 2, "rw", None, 0, 16383),
+    Register("velocity_p_gain",        78, 2, "rw", None, 0, 16383),
+    Register("position_d_gain",        80, 2, "rw", None, 0, 16383),
+    Register("position_i_gain",        82, 2, "rw", None, 0, 16383),
+    Register("position_p_gain",        84, 2, "rw", None, 0, 16383),
+    Register("feedforward_2nd_gain",   88, 2, "rw", 0, 0, 16383),
+    Register("feedforward_1st_gain",   90, 2, "rw", 0, 0, 16383),
     # Range of written values: 0 off or clear, 1..127 armed. It reads 255 once tripped.
-    DynamixelRegister("bus_watchdog",           98, 1, "rw", 0, 0, 127),
-    DynamixelRegister("goal_pwm",              100, 2, "rw", None, None, None, True),
-    DynamixelRegister("goal_current",          102, 2, "rw", None, None, None, True),
-    DynamixelRegister("goal_velocity",         104, 4, "rw", None, None, None, True),
-    DynamixelRegister("profile_acceleration",  108, 4, "rw", 0, 0, 32767),
-    DynamixelRegister("profile_velocity",      112, 4, "rw", 0, 0, 32767),
-    DynamixelRegister("goal_position",         116, 4, "rw", None, None, None, True),
-    DynamixelRegister("realtime_tick",         120, 2),
-    DynamixelRegister("moving",                122, 1),
-    DynamixelRegister("moving_status",         123, 1),
-    DynamixelRegister("present_pwm",           124, 2, signed=True),
-    DynamixelRegister("present_current",       126, 2, signed=True),
-    DynamixelRegister("present_velocity",      128, 4, signed=True),
-    DynamixelRegister("present_position",      132, 4, signed=True),
-    DynamixelRegister("velocity_trajectory",   136, 4, signed=True),
-    DynamixelRegister("position_trajectory",   140, 4, signed=True),
-    DynamixelRegister("present_input_voltage", 144, 2),
-    DynamixelRegister("present_temperature",   146, 1),
-    DynamixelRegister("backup_ready",          147, 1),
+    Register("bus_watchdog",           98, 1, "rw", 0, 0, 127),
+    Register("goal_pwm",              100, 2, "rw", None, None, None, True),
+    Register("goal_current",          102, 2, "rw", None, None, None, True),
+    Register("goal_velocity",         104, 4, "rw", None, None, None, True),
+    Register("profile_acceleration",  108, 4, "rw", 0, 0, 32767),
+    Register("profile_velocity",      112, 4, "rw", 0, 0, 32767),
+    Register("goal_position",         116, 4, "rw", None, None, None, True),
+    Register("realtime_tick",         120, 2),
+    Register("moving",                122, 1),
+    Register("moving_status",         123, 1),
+    Register("present_pwm",           124, 2, signed=True),
+    Register("present_current",       126, 2, signed=True),
+    Register("present_velocity",      128, 4, signed=True),
+    Register("present_position",      132, 4, signed=True),
+    Register("velocity_trajectory",   136, 4, signed=True),
+    Register("position_trajectory",   140, 4, signed=True),
+    Register("present_input_voltage", 144, 2),
+    Register("present_temperature",   146, 1),
+    Register("backup_ready",          147, 1),
 )
 # fmt: on
 
-REGISTERS: dict[str, DynamixelRegister] = {r.name: r for r in _BASE}
+REGISTERS: dict[str, Register] = {
+    r.name: r._replace(area="eeprom") if r.address < EEPROM_END else r for r in _BASE
+}
 """Registers by name, with values common to all models; addresses are the same in every model."""
 
 
@@ -262,7 +231,7 @@ def indirect_blocks(model: DynamixelModel, firmware: int) -> tuple[IndirectBlock
     return (IndirectBlock(168, 208, 20, 64, 227),)
 
 
-def registers_of(model: DynamixelModel) -> tuple[DynamixelRegister, ...]:
+def registers_of(model: DynamixelModel) -> tuple[Register, ...]:
     """Return a model's registers with its initial values and ranges (no indirect windows)."""
     absent = {"pwm_slope"} if model.family == "x430" else set[str]()
     if model.current_limit is None:
@@ -288,7 +257,7 @@ def registers_of(model: DynamixelModel) -> tuple[DynamixelRegister, ...]:
         "velocity_limit": (0, 2047 if small else 1023),
     }
     fitted = []
-    for one in _BASE:
+    for one in REGISTERS.values():
         if one.name not in absent:
             low, high = ranges.get(one.name, (one.low, one.high))
             first = initial.get(one.name, one.initial)

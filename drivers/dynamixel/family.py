@@ -1,11 +1,11 @@
 """Dynamixel X servos (Protocol 2.0) as a family of the servo bus."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from gazerig.drivers.dynamixel import protocol
 from gazerig.drivers.dynamixel.control_table import (
     BAUD_RATES,
+    FAST_READ_SINCE,
     MODELS,
     PWM_FULL,
     REGISTERS,
@@ -16,8 +16,7 @@ from gazerig.drivers.dynamixel.control_table import (
     name_errors,
     speed_units,
 )
-from gazerig.drivers.dynamixel.read_plan import read_plan
-from gazerig.drivers.servo_bus.family import Arming, Family
+from gazerig.drivers.servo_bus.family import Arming, Family, Window
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
@@ -35,10 +34,7 @@ THOROUGH_S = 0.016 + 0.003 * 253
 """Time that the manufacturer's SDK allows for all ids: 3 ms each and the adaptor's latency."""
 
 
-def goal_packets(ids: Sequence[int]) -> protocol.SyncWrite:
-    """Return the builder of goal packets."""
-    goal = REGISTERS["goal_position"]
-    return protocol.SyncWrite(ids, goal.address, goal.size)
+_SENSED = ("effort", "velocity", "position")
 
 
 def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
@@ -69,21 +65,24 @@ DYNAMIXEL = Family(
     steps_per_turn=STEPS_PER_TURN,
     name_errors=name_errors,
     velocity_unit_steps_s=VELOCITY_UNIT_STEPS_S,
-    sign_bits={},
     speed_units=speed_units,
     acceleration_units=acceleration_units,
-    create_goal_packets=goal_packets,
+    create_goal_packets=protocol.GoalWrite,
     sync_read=True,
     baud_rates=BAUD_RATES,
     scan_rates=USUAL_RATES,
     factory_baud=57_600,
     highest_id=252,
     format_firmware=str,
-    read_plan=read_plan,
-    prompt_timeout_s=0.0007,
+    # Present Current, Velocity and Position (126..135).
+    window=Window(126, "<hii", _SENSED),
+    polled=(
+        ("torque_enable", "hardware_error_status"),
+        ("present_input_voltage", "present_temperature"),
+    ),
+    has_fast_read=lambda model, firmware: firmware >= FAST_READ_SINCE[MODELS[model].family],
+    prompt_timeout_s=0.002,
     effort_register="present_current",
-    armed_values=lambda setup: {},
-    weak_check=False,
     # In this order, as a new operating mode resets gains and profile.
     read_spans=(
         ("return_delay_time", "operating_mode"),

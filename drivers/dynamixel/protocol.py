@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 
 from fastcrc.crc16 import umts
 
-from gazerig.drivers.servo_bus.family import Identity, Status
+from gazerig.drivers.servo_bus.family import Frame, Identity, Status
 
 HEADER = b"\xff\xff\xfd\x00"
 RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
@@ -30,9 +30,6 @@ ERROR_NUMBER, ALERT = 0x7F, 0x80
 
 REFUSAL = ERROR_NUMBER
 
-ECHO_LENGTH = None
-"""An answer contains a byte that no instruction has, so an echo never looks like an answer."""
-
 LONGEST_STATUS = 256
 """Length of the longest expected answer; a larger length is noise."""
 
@@ -42,7 +39,6 @@ IDENTITY_LENGTH = _IDENTITY.size
 _HEAD = struct.Struct("<4sBHB")
 _SPAN = struct.Struct("<HH")
 _CRC = struct.Struct("<H")
-_VALUE = {1: "B", 2: "h", 4: "i"}
 
 
 def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
@@ -54,12 +50,11 @@ def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
 
 
 def ping(servo_id: int) -> bytes:
-    """Build a ping."""
+    """Build a ping; its answer contains model and firmware."""
     return instruction(servo_id, PING)
 
 
 identity_request = ping
-"""The answer to a ping contains model and firmware."""
 
 
 def parse_identity(status: Status) -> Identity | None:
@@ -91,20 +86,20 @@ def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes
     return instruction(BROADCAST, SYNC_WRITE, _SPAN.pack(address, size) + body)
 
 
-class SyncWrite:
-    """Builder of packets that write one register of a fixed set of servos."""
+class GoalWrite:
+    """Builder of packets that write the goals (116..119) of a fixed set of servos."""
 
-    def __init__(self, ids: Sequence[int], address: int, size: int) -> None:
-        self._params = _SPAN.pack(address, size)
-        self._rows = struct.Struct("<" + ("B" + _VALUE[size]) * len(ids))
+    def __init__(self, ids: Sequence[int]) -> None:
+        self._params = _SPAN.pack(116, 4)
+        self._rows = struct.Struct("<" + "Bi" * len(ids))
         length = 3 + _SPAN.size + self._rows.size
         self._head = _HEAD.pack(HEADER, BROADCAST, length, SYNC_WRITE) + self._params
         self._row = [number for servo_id in ids for number in (servo_id, 0)]
 
-    def packet(self, values: Sequence[int], speeds: Sequence[int] = ()) -> bytes:
-        """Build the packet with one value per servo; speeds are in the servos' own profiles."""
+    def packet(self, goals: Sequence[int], speeds: Sequence[int] = ()) -> bytes:
+        """Build the packet with one goal per servo; speeds are in the servos' own profiles."""
         row = self._row
-        row[1::2] = values
+        row[1::2] = goals
         body = self._rows.pack(*row)
         if RAW in body:
             return instruction(BROADCAST, SYNC_WRITE, self._params + body)
@@ -123,53 +118,57 @@ def parse_statuses(raw: bytes) -> list[Status]:
             continue
         intact = umts(raw[at : end - 2]) == _CRC.unpack_from(raw, end - 2)[0]
         params = raw[at + 9 : end - 2].replace(STUFFED, RAW)
-        found.append(Status(raw[at + 4], raw[at + 8], params, intact, at))
+        found.append(Status(raw[at + 4], raw[at + 8], params, intact))
         at = raw.find(HEADER, end if intact else at + len(HEADER))
     return found
 
 
-CHECK = "H"
-"""Struct code of the CRC."""
+def answer_frame(ids: Sequence[int], length: int, fast: bool) -> Frame:
+    """Return the frame of the answer to a sync read of ``length`` bytes, fast or not."""
+    count = len(ids)
+    if not fast:
+        heads = [_HEAD.pack(HEADER, i, length + 4, STATUS) + b"\x00" for i in ids]
+        return Frame(b"", heads, "H", f"{length + 9}s2x" * count, _are_intact)
+    front = _HEAD.pack(HEADER, BROADCAST, (length + 4) * count + 1, STATUS)
+    # Each part reaches from the previous CRC, or the begin, up to a servo's CRC.
+    parts = f"{len(front) + length + 2}s" + f"{length + 4}s" * (count - 1) + "2x"
+    return Frame(front, [bytes((0, i)) for i in ids], "H", parts, _are_chained)
 
 
-def status_head(servo_id: int, length: int) -> bytes:
-    """Return a status's bytes before its error byte; ``length``: number of params."""
-    return _HEAD.pack(HEADER, servo_id, length + 4, STATUS)
-
-
-CHECKED = (0, 2)
-"""Bytes at the beginning and at the end of a status that its CRC does not cover."""
-
-
-def all_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
-    """Return whether the CRCs of statuses match the parts that they cover."""
+def _are_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
     return tuple(map(umts, parts)) == checks
 
 
-def bytes_missing(raw: bytes, count: int, length: int) -> int:
-    """Return how many bytes of ``count`` statuses with ``length`` params have not arrived yet.
+def _are_chained(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
+    """Return whether all CRCs of a fast answer are correct, each continued from the previous one.
 
-    Stuffing makes a status longer; its own length field is used once it has arrived.
+    The last CRC alone is not enough: it is computed from the bytes on the line, so it is correct
+    even if two servos with one id corrupted each other's block.
     """
-    nominal = length + STATUS_OVERHEAD
-    seen, done = 0, 0
-    at = raw.find(HEADER)
-    while at >= 0:
-        end = _end(raw, at)
-        if end is not None and end <= len(raw):
-            seen, done = seen + 1, end
-        at = raw.find(HEADER, done if done > at else at + len(HEADER))
-    if seen >= count:
-        return 0
-    at = raw.rfind(HEADER, done)
-    end = _end(raw, at) if at >= 0 else None
-    begun = (
-        len(raw) - at
-        if at >= 0
-        else next((n for n in (3, 2, 1) if raw[done:].endswith(HEADER[:n])), 0)
-    )
-    rest = nominal - begun if begun < STATUS_OVERHEAD else 0
-    return (count - seen - 1) * nominal + (end - len(raw) if end is not None else rest)
+    return tuple(map(umts, parts, (0, *checks))) == checks
+
+
+def parse_fast(raw: bytes, ids: Sequence[int], length: int) -> list[Status]:
+    """Return the blocks of a fast answer.
+
+    Every block's CRC continues from the previous CRC as sent, so a damaged block does not
+    invalidate the next one; but a lost byte shifts all that follow.
+    """
+    block = length + 4
+    front = _HEAD.pack(HEADER, BROADCAST, block * len(ids) + 1, STATUS)
+    found, crc = list[Status](), umts(front)
+    at = raw.find(front) + len(front)
+    if at < len(front):
+        return []
+    for servo_id in ids:
+        part = raw[at : at + block]
+        if len(part) < block:
+            break
+        sent = int.from_bytes(part[-2:], "little")
+        intact = umts(part[:-2], crc) == sent and part[1] == servo_id
+        found.append(Status(servo_id, part[0], part[2:-2], intact))
+        crc, at = umts(part[-2:], sent), at + block
+    return found
 
 
 def _end(raw: bytes, at: int) -> int | None:

@@ -1,6 +1,5 @@
 """Feetech STS servos as a family of the servo bus."""
 
-from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
@@ -21,8 +20,7 @@ from gazerig.drivers.feetech.memory_table import (
 )
 from gazerig.drivers.feetech.protocol import MOST_GOALS, GoalWrite
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.family import Arming, Family
-from gazerig.drivers.servo_bus.read_plan import ReadPlan, ReadWindow, WindowSchedule
+from gazerig.drivers.servo_bus.family import Arming, Family, Window
 from gazerig.drivers.servo_bus.registers import Registers
 
 if TYPE_CHECKING:  # the guardian starts without numpy
@@ -55,60 +53,9 @@ def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
     return wanted
 
 
-SIGN_BITS = {"position": 15, "velocity": 15, "effort": 10}
-
-_SENSED = ("position", "velocity", "effort", "voltage", "temperature", "status")
-_ARMED = ("torque", "acceleration", "torque_limit")
-SENSED_AT, ARMED_AT = (REGISTERS[n].address for n in ("present_position", "torque_enable"))
-_END = REGISTERS["present_current"].address + REGISTERS["present_current"].size
-
-
-def window(address: int) -> ReadWindow:
-    """Return a window that ends at Present Current (69).
-
-    address: first address, at most 56; up to 40 the window includes torque and armed limits
-    """
-    armed = address <= ARMED_AT
-    pad = (ARMED_AT if armed else SENSED_AT) - address
-    layout = f"{pad}x" + ("BB6xH6x" if armed else "") + "HHHBBxB5x"
-    fields = (*_ARMED, *_SENSED) if armed else _SENSED
-    return ReadWindow(address, _END - address, layout, fields, "<", tuple(SIGN_BITS.items()))
-
-
-def read_plan(setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None) -> ReadPlan:
-    """Return the read plan: the values of every tick are adjacent in 56..70.
-
-    Torque and the armed limits precede them, so at intervals the read begins at 40 and includes
-    them.
-    """
-    return series_read_plan(window)
-
-
-def series_read_plan(window: Callable[[int], ReadWindow]) -> ReadPlan:
-    """Return the read plan of a series of servos, with torque in every eighth read.
-
-    window: creates a window from its address
-    """
-    armed, sensed = window(ARMED_AT), (window(SENSED_AT), window(SENSED_AT - 1))
-    usual = [armed, *sensed * 4][:8]
-    spare = [window(SENSED_AT - more) for more in range(2, 7)]
-    second = [window(SENSED_AT - more) for more in range(7, 11)]
-    # Windows for servos that are read alone: their lengths differ from each other and from those of
-    # group reads.
-    alone = [window(ARMED_AT - more) for more in range(1, 11)]
-    return ReadPlan(
-        WindowSchedule(usual, spare),
-        WindowSchedule(alone, alone),
-        WindowSchedule(second, second),
-        armed_window=armed,
-    )
-
-
-def armed_limits(setup: "ServoConfig") -> dict[str, int | None]:
-    """Return the values written before torque is switched on, in register units."""
-    limit = None if setup.strength is None else round(setup.strength * TORQUE_FULL)
-    acceleration = acceleration_units(setup.max_accel_steps_s2)
-    return {"acceleration": acceleration, "torque_limit": limit}
+SENSED = ("position", "velocity", "effort", "voltage", "temperature", "status")
+SIGNS = (15, 15, 10)
+"""Sign bits of Present Position, Velocity and Load."""
 
 
 FEETECH = Family(
@@ -119,7 +66,6 @@ FEETECH = Family(
     steps_per_turn=STEPS_PER_TURN,
     name_errors=name_errors,
     velocity_unit_steps_s=1.0,
-    sign_bits=SIGN_BITS,
     speed_units=speed_units,
     acceleration_units=acceleration_units,
     create_goal_packets=GoalWrite,
@@ -129,11 +75,12 @@ FEETECH = Family(
     factory_baud=1_000_000,
     highest_id=HIGHEST_ID,
     format_firmware=lambda firmware: f"{firmware // 100}.{firmware % 100}",
-    read_plan=read_plan,
-    prompt_timeout_s=0.001,
+    # Present Position to Status (56..65).
+    window=Window(56, "<HHHBBxB", SENSED, SIGNS),
+    polled=(("torque_enable", "torque_limit"),),
+    has_fast_read=lambda model, firmware: False,
+    prompt_timeout_s=0.002,
     effort_register="present_load",
-    armed_values=armed_limits,
-    weak_check=True,
     read_spans=(("return_delay_time", "operating_mode"), ("torque_limit", "lock")),
     wanted_settings=wanted_settings,
     # Only one bit of Phase is changed; the others keep their values.

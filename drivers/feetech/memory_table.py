@@ -8,11 +8,9 @@ comes first.
 Sources: Feetech memory table STS3215, and for missing entries the tables of public clients.
 """
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-from gazerig.drivers.servo_bus.read_plan import from_sign_magnitude
-
-Access = Literal["r", "rw"]
+from gazerig.drivers.servo_bus.family import Register as Register
 
 STEPS_PER_TURN = 4096
 ACCELERATION_UNIT_STEPS_S2 = 100.0
@@ -111,134 +109,83 @@ SCS_MODELS = {
 }
 
 
-class FeetechRegister(NamedTuple):
-    """An entry of the control table.
-
-    initial: factory value of the EEPROM area, start value of the RAM area; None if the device
-        itself decides
-    low, high: range of valid values; None without a range
-    sign: index of the sign bit; None if unsigned
-    order: byte order
-    """
-
-    name: str
-    address: int
-    size: int = 1
-    access: Access = "r"
-    initial: int | None = None
-    low: int | None = None
-    high: int | None = None
-    sign: int | None = None
-    order: Literal["little", "big"] = "little"
-
-    @property
-    def area(self) -> Literal["eeprom", "ram"]:
-        """Return the memory area of the register."""
-        return "eeprom" if self.address < EEPROM_END else "ram"
-
-    def encode(self, value: int) -> bytes:
-        """Return a value as bytes.
-
-        Raises:
-            ValueError: it does not fit.
-        """
-        raw = value if self.sign is None else to_sign_magnitude(value, self.sign)
-        if not 0 <= raw < 1 << 8 * self.size:
-            raise ValueError(f"{self.name}: {value} does not fit into {self.size} byte")
-        return raw.to_bytes(self.size, self.order)
-
-    def decode(self, data: bytes) -> int:
-        """Return the value of bytes."""
-        raw = int.from_bytes(data, self.order)
-        return raw if self.sign is None else from_sign_magnitude(raw, self.sign)
-
-
-def to_sign_magnitude(value: int, sign: int) -> int:
-    """Return a number as a magnitude with its sign in bit ``sign``.
-
-    Raises:
-        ValueError: the magnitude does not fit below that bit.
-    """
-    if abs(value) >= 1 << sign:
-        raise ValueError(f"{value} does not fit into {sign} bits and a sign")
-    return -value | 1 << sign if value < 0 else value
-
-
 # fmt: off
-_ALL: tuple[FeetechRegister, ...] = (
-    FeetechRegister("firmware_major",           0, 1, initial=3),
-    FeetechRegister("firmware_minor",           1, 1, initial=10),
-    FeetechRegister("endianness",               2, 1, initial=0),
-    FeetechRegister("model_number",             3, 2),
-    FeetechRegister("id",                       5, 1, "rw", 1, 0, HIGHEST_ID),
-    FeetechRegister("baud_rate",                6, 1, "rw", 0, 0, 7),
-    FeetechRegister("return_delay_time",        7, 1, "rw", 0, 0, 254),
+_ALL: tuple[Register, ...] = (
+    Register("firmware_major",           0, 1, initial=3),
+    Register("firmware_minor",           1, 1, initial=10),
+    Register("endianness",               2, 1, initial=0),
+    Register("model_number",             3, 2),
+    Register("id",                       5, 1, "rw", 1, 0, HIGHEST_ID),
+    Register("baud_rate",                6, 1, "rw", 0, 0, 7),
+    Register("return_delay_time",        7, 1, "rw", 0, 0, 254),
     # 0: only pings and reads are answered; 1: every instruction.
-    FeetechRegister("status_return_level",      8, 1, "rw", 1, 0, 1),
+    Register("status_return_level",      8, 1, "rw", 1, 0, 1),
     # Both 0: no limits and multi-turn.
-    FeetechRegister("min_position_limit",       9, 2, "rw", 0, 0, 4094),
-    FeetechRegister("max_position_limit",      11, 2, "rw", 4095, 0, 4095),
-    FeetechRegister("temperature_limit",       13, 1, "rw", 70, 0, 100),
-    FeetechRegister("max_voltage_limit",       14, 1, "rw", 80, 0, 254),
-    FeetechRegister("min_voltage_limit",       15, 1, "rw", 40, 0, 254),
+    Register("min_position_limit",       9, 2, "rw", 0, 0, 4094),
+    Register("max_position_limit",      11, 2, "rw", 4095, 0, 4095),
+    Register("temperature_limit",       13, 1, "rw", 70, 0, 100),
+    Register("max_voltage_limit",       14, 1, "rw", 80, 0, 254),
+    Register("min_voltage_limit",       15, 1, "rw", 40, 0, 254),
     # Copied to Torque Limit (48) at power-up.
-    FeetechRegister("max_torque",              16, 2, "rw", 1000, 0, TORQUE_FULL),
-    FeetechRegister("phase",                   18, 1, "rw", 12, 0, 254),
+    Register("max_torque",              16, 2, "rw", 1000, 0, TORQUE_FULL),
+    Register("phase",                   18, 1, "rw", 12, 0, 254),
     # Bits as in STATUS_ERRORS: errors that switch torque off, and errors that light the LED.
-    FeetechRegister("unloading_condition",     19, 1, "rw", 44, 0, 254),
-    FeetechRegister("led_alarm_condition",     20, 1, "rw", 47, 0, 254),
-    FeetechRegister("position_p_gain",         21, 1, "rw", 32, 0, 254),
-    FeetechRegister("position_d_gain",         22, 1, "rw", 32, 0, 254),
-    FeetechRegister("position_i_gain",         23, 1, "rw", 0, 0, 254),
-    FeetechRegister("minimum_startup_force",   24, 2, "rw", 16, 0, 1000),
-    FeetechRegister("cw_dead_zone",            26, 1, "rw", 1, 0, 32),
-    FeetechRegister("ccw_dead_zone",           27, 1, "rw", 1, 0, 32),
-    FeetechRegister("protection_current",      28, 2, "rw", 500, 0, 511),
-    FeetechRegister("angular_resolution",      30, 1, "rw", 1, 1, 3),
-    FeetechRegister("position_offset",         31, 2, "rw", 0, -2047, 2047, 11),
+    Register("unloading_condition",     19, 1, "rw", 44, 0, 254),
+    Register("led_alarm_condition",     20, 1, "rw", 47, 0, 254),
+    Register("position_p_gain",         21, 1, "rw", 32, 0, 254),
+    Register("position_d_gain",         22, 1, "rw", 32, 0, 254),
+    Register("position_i_gain",         23, 1, "rw", 0, 0, 254),
+    Register("minimum_startup_force",   24, 2, "rw", 16, 0, 1000),
+    Register("cw_dead_zone",            26, 1, "rw", 1, 0, 32),
+    Register("ccw_dead_zone",           27, 1, "rw", 1, 0, 32),
+    Register("protection_current",      28, 2, "rw", 500, 0, 511),
+    Register("angular_resolution",      30, 1, "rw", 1, 1, 3),
+    Register("position_offset",         31, 2, "rw", 0, -2047, 2047, sign=11),
     # 0 position, 1 speed, 2 open loop, 3 stepwise.
-    FeetechRegister("operating_mode",          33, 1, "rw", 0, 0, 3),
-    FeetechRegister("protective_torque",       34, 1, "rw", 20, 0, 100),
-    FeetechRegister("protection_time",         35, 1, "rw", 200, 0, 254),
-    FeetechRegister("overload_torque",         36, 1, "rw", 80, 0, 100),
-    FeetechRegister("velocity_p_gain",         37, 1, "rw", 10, 0, 100),
-    FeetechRegister("overcurrent_time",        38, 1, "rw", 200, 0, 254),
-    FeetechRegister("velocity_i_gain",         39, 1, "rw", 10, 0, 254),
-    FeetechRegister("torque_enable",           40, 1, "rw", 0, 0, SET_MIDDLE),
-    FeetechRegister("acceleration",            41, 1, "rw", 0, 0, HARDEST),
-    FeetechRegister("goal_position",           42, 2, "rw", None, -30719, 30719, 15),
-    FeetechRegister("goal_time",               44, 2, "rw", 0, 0, 1000),
-    FeetechRegister("goal_speed",              46, 2, "rw", 0, -FASTEST, FASTEST, 15),
-    FeetechRegister("torque_limit",            48, 2, "rw", None, 0, TORQUE_FULL),
-    FeetechRegister("lock",                    55, 1, "rw", 1, 0, 1),
-    FeetechRegister("present_position",        56, 2, sign=15),
-    FeetechRegister("present_velocity",        58, 2, sign=15),
-    FeetechRegister("present_load",            60, 2, sign=10),
-    FeetechRegister("present_input_voltage",   62, 1),
-    FeetechRegister("present_temperature",     63, 1),
-    FeetechRegister("registered_instruction",  64, 1),
-    FeetechRegister("status",                  65, 1),
-    FeetechRegister("moving",                  66, 1),
-    FeetechRegister("present_current",         69, 2, sign=15),
+    Register("operating_mode",          33, 1, "rw", 0, 0, 3),
+    Register("protective_torque",       34, 1, "rw", 20, 0, 100),
+    Register("protection_time",         35, 1, "rw", 200, 0, 254),
+    Register("overload_torque",         36, 1, "rw", 80, 0, 100),
+    Register("velocity_p_gain",         37, 1, "rw", 10, 0, 100),
+    Register("overcurrent_time",        38, 1, "rw", 200, 0, 254),
+    Register("velocity_i_gain",         39, 1, "rw", 10, 0, 254),
+    Register("torque_enable",           40, 1, "rw", 0, 0, SET_MIDDLE),
+    Register("acceleration",            41, 1, "rw", 0, 0, HARDEST),
+    Register("goal_position",           42, 2, "rw", None, -30719, 30719, sign=15),
+    Register("goal_time",               44, 2, "rw", 0, 0, 1000),
+    Register("goal_speed",              46, 2, "rw", 0, -FASTEST, FASTEST, sign=15),
+    Register("torque_limit",            48, 2, "rw", None, 0, TORQUE_FULL),
+    Register("lock",                    55, 1, "rw", 1, 0, 1),
+    Register("present_position",        56, 2, sign=15),
+    Register("present_velocity",        58, 2, sign=15),
+    Register("present_load",            60, 2, sign=10),
+    Register("present_input_voltage",   62, 1),
+    Register("present_temperature",     63, 1),
+    Register("registered_instruction",  64, 1),
+    Register("status",                  65, 1),
+    Register("moving",                  66, 1),
+    Register("present_current",         69, 2, sign=15),
     # Factory settings.
-    FeetechRegister("moving_threshold",        80, 1, initial=1),
-    FeetechRegister("dts",                     81, 1, initial=1),
-    FeetechRegister("velocity_unit_factor",    82, 1, initial=50),
-    FeetechRegister("hts",                     83, 1, initial=1),
-    FeetechRegister("max_velocity_limit",      84, 1, initial=80),
-    FeetechRegister("max_acceleration",        85, 1, initial=100),
-    FeetechRegister("acceleration_factor",     86, 1, initial=1),
+    Register("moving_threshold",        80, 1, initial=1),
+    Register("dts",                     81, 1, initial=1),
+    Register("velocity_unit_factor",    82, 1, initial=50),
+    Register("hts",                     83, 1, initial=1),
+    Register("max_velocity_limit",      84, 1, initial=80),
+    Register("max_acceleration",        85, 1, initial=100),
+    Register("acceleration_factor",     86, 1, initial=1),
 )
 # fmt: on
 
 TABLE_END = 87
 """First address after the table."""
 
-REGISTERS: dict[str, FeetechRegister] = {register.name: register for register in _ALL}
+REGISTERS: dict[str, Register] = {
+    r.name: r._replace(area="eeprom") if r.address < EEPROM_END else r for r in _ALL
+}
 """Registers by name, with values common to all models; addresses are the same in every model."""
 
 
-def registers_of(model: FeetechModel) -> tuple[FeetechRegister, ...]:
+def registers_of(model: FeetechModel) -> tuple[Register, ...]:
     """Return a model's registers with its initial values."""
     own = {
         "model_number": model.number,
@@ -248,8 +195,8 @@ def registers_of(model: FeetechModel) -> tuple[FeetechRegister, ...]:
         "torque_limit": REGISTERS["max_torque"].initial,
     }
     return tuple(
-        register._replace(initial=own[register.name]) if register.name in own else register
-        for register in _ALL
+        register._replace(initial=own[name]) if name in own else register
+        for name, register in REGISTERS.items()
     )
 
 

@@ -2,12 +2,8 @@
 
 instruction FF FF | id | length | instruction | params | checksum status FF FF | id | length | error
 | params | checksum length counts the bytes after it; checksum is the inverse of the sum from the id
-to the last param. A status has the form of an instruction: the echo of a ping looks like its
-answer. So no status is accepted by its form alone, and a read requests a length that differs from
-its own.
-
-The checksum is a sum of one byte: it sometimes matches if a byte is lost and the next header takes
-its place. Such a status overlaps the next one, so overlapping statuses are rejected.
+to the last param. A status has the form of an instruction, so the echo of a request may look like
+an answer.
 
 Source: Feetech, communication protocol of the SCS and STS series.
 """
@@ -17,11 +13,11 @@ from collections.abc import Iterable, Sequence
 from typing import Literal
 from zlib import adler32
 
-from gazerig.drivers.servo_bus.family import Identity, Status
+from gazerig.drivers.servo_bus.family import Frame, Identity, Status
 
 HEADER = b"\xff\xff"
 BROADCAST = 0xFE
-PING, READ, WRITE, REG_WRITE, ACTION, RESET, REBOOT = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x08
+PING, READ, WRITE = 0x01, 0x02, 0x03
 SYNC_READ, SYNC_WRITE = 0x82, 0x83
 
 STATUS_OVERHEAD = 6
@@ -32,9 +28,6 @@ REFUSAL = 0
 
 ALERT = 0xFF
 """Bits of the error byte that report a fault of the servo."""
-
-ECHO_LENGTH = 2
-"""A read request has two params, as an answer of two bytes has."""
 
 IDENTITY_LENGTH = 9
 """Registers 0..8: firmware, model, id, baud rate, return delay, status level."""
@@ -66,7 +59,7 @@ def checksum(body: bytes) -> int:
 
 
 def ping(servo_id: int) -> bytes:
-    """Build a ping; its echo looks like its answer."""
+    """Build a ping."""
     return instruction(servo_id, PING)
 
 
@@ -96,11 +89,6 @@ def read(servo_id: int, address: int, length: int) -> bytes:
 def write(servo_id: int, address: int, data: bytes) -> bytes:
     """Build a write to registers of one servo."""
     return instruction(servo_id, WRITE, bytes((address,)) + data)
-
-
-def reg_write(servo_id: int, address: int, data: bytes) -> bytes:
-    """Build a write to registers of one servo that takes effect at the next action."""
-    return instruction(servo_id, REG_WRITE, bytes((address,)) + data)
 
 
 def sync_read(ids: Sequence[int], address: int, length: int) -> bytes:
@@ -138,45 +126,36 @@ class GoalWrite:
 
 
 def parse_statuses(raw: bytes) -> list[Status]:
-    """Return every complete status packet in received bytes; skip noise, echoes and fragments.
+    """Return every complete status packet in received bytes; skip noise and fragments.
 
-    If two statuses with correct checksums overlap, both are returned as not intact.
+    The checksum sometimes matches if a byte is lost and the next header takes its place. Such a
+    status overlaps the next one, so overlapping statuses with correct checksums count as damaged.
     """
     found: list[tuple[int, int, Status]] = []
     at = _header(raw, 0)
     while at >= 0:
-        end = _end(raw, at)
-        if end is not None and end <= len(raw):
+        end = at + 4 + raw[at + 3] if len(raw) - at >= STATUS_OVERHEAD else len(raw) + 1
+        if end <= len(raw) and 2 <= raw[at + 3] <= LONGEST_STATUS:
             intact = checksum(raw[at + 2 : end - 1]) == raw[end - 1]
-            params = raw[at + 5 : end - 1]
-            found.append((at, end, Status(raw[at + 2], raw[at + 4], params, intact, at)))
+            found.append((at, end, Status(raw[at + 2], raw[at + 4], raw[at + 5 : end - 1], intact)))
         at = _header(raw, at + 1)
-    # Remove statuses found inside an intact one; mark overlapping intact ones as damaged.
-    right = [(at, end) for at, end, status in found if status.intact]
+    intact_spans = [(at, end) for at, end, status in found if status.intact]
     kept = []
     for at, end, status in found:
-        across = [span for span in right if span != (at, end) and span[0] < end and at < span[1]]
-        if not across:
+        if all(span == (at, end) or end <= span[0] or span[1] <= at for span in intact_spans):
             kept.append(status)
         elif status.intact:
             kept.append(status._replace(intact=False))
     return kept
 
 
-CHECK = "B"
-"""Struct code of the checksum."""
+def answer_frame(ids: Sequence[int], length: int, fast: bool) -> Frame:
+    """Return the frame of the answer to a sync read of ``length`` bytes; ``fast``: not known."""
+    heads = [HEADER + bytes((servo_id, length + 2, 0)) for servo_id in ids]
+    return Frame(b"", heads, "B", f"2x{length + 4}s" * len(ids), _are_intact)
 
 
-def status_head(servo_id: int, length: int) -> bytes:
-    """Return a status's bytes before its error byte; ``length``: number of params."""
-    return HEADER + bytes((servo_id, length + 2))
-
-
-CHECKED = (2, 0)
-"""Bytes at the beginning and at the end of a status that its checksum does not cover."""
-
-
-def all_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
+def _are_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
     """Return whether the checksums of statuses are correct, from the id to the checksum of each.
 
     A checksum is the inverse of the preceding sum, so they add up to 0xFF. The lower half of
@@ -185,34 +164,9 @@ def all_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
     return not any(map((0xFF).__and__, map(adler32, parts)))
 
 
-def bytes_missing(raw: bytes, count: int, length: int) -> int:
-    """Return how many bytes of ``count`` statuses with ``length`` params have not arrived yet."""
-    nominal = length + STATUS_OVERHEAD
-    seen, done = 0, 0
-    at = _header(raw, 0)
-    while at >= 0:
-        end = _end(raw, at)
-        if end is not None and end <= len(raw):
-            seen, done = seen + 1, end
-        at = _header(raw, done if done > at else at + 1)
-    if seen >= count:
-        return 0
-    at = _header(raw, done)
-    begun = len(raw) - at if at >= 0 else int(raw[done:].endswith(b"\xff"))
-    return (count - seen - 1) * nominal + max(1, nominal - begun)
-
-
 def _header(raw: bytes, start: int) -> int:
     """Return the position of the next header, the last FF FF of a row; -1 if there is none."""
     at = raw.find(HEADER, start)
     while 0 <= at < len(raw) - 2 and raw[at + 2] == 0xFF:
         at = raw.find(HEADER, at + 1)
     return at
-
-
-def _end(raw: bytes, at: int) -> int | None:
-    """Return the end of the status that starts at ``at``, None if no status does."""
-    if len(raw) - at < STATUS_OVERHEAD:
-        return None
-    length = raw[at + 3]
-    return at + 4 + length if 2 <= length <= LONGEST_STATUS else None

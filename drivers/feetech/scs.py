@@ -7,29 +7,19 @@ marked [A] are assumptions, as they are not documented. Sources: Feetech, SCSCL 
 (addresses); rustypot's table of the SCS0009.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from gazerig.drivers.feetech.family import (
-    ARMED_AT,
-    FEETECH,
-    SENSED_AT,
-    SIGN_BITS,
-    series_read_plan,
-    wanted_settings,
-)
+from gazerig.drivers.feetech.family import FEETECH, SENSED, SIGNS, wanted_settings
 from gazerig.drivers.feetech.memory_table import (
     REGISTERS,
     SCS_BAUD_RATES,
     SCS_MODELS,
     SCS_STEPS,
     TORQUE_FULL,
-    FeetechRegister,
 )
 from gazerig.drivers.feetech.protocol import GoalWrite
-from gazerig.drivers.servo_bus.family import Arming
-from gazerig.drivers.servo_bus.read_plan import ReadPlan, ReadWindow
+from gazerig.drivers.servo_bus.family import Register, Window
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
@@ -48,7 +38,7 @@ _OTHERWISE: dict[str, dict[str, Any]] = {
     "unloading_condition": {"initial": 0x24},  # [A]: overheating, overload
 }
 
-SCS_REGISTERS: dict[str, FeetechRegister] = {
+SCS_REGISTERS: dict[str, Register] = {
     name: register._replace(
         address=_ELSEWHERE.get(name, register.address), order="big", **_OTHERWISE.get(name, {})
     )
@@ -57,31 +47,11 @@ SCS_REGISTERS: dict[str, FeetechRegister] = {
 }
 """Registers by name."""
 
-_END = 67
-
 
 class ScsGoalWrite(GoalWrite):
     """Builder of goal packets, high byte first."""
 
     ORDER = ">"
-
-
-def window(address: int) -> ReadWindow:
-    """Return a window that ends at Moving (66).
-
-    address: first address, at most 56; up to 40 the window includes torque
-    """
-    armed = address <= ARMED_AT
-    pad = (ARMED_AT if armed else SENSED_AT) - address
-    layout = f"{pad}x" + ("B15x" if armed else "") + "HHHBBxBx"
-    fields = ("position", "velocity", "effort", "voltage", "temperature", "status")
-    columns = ("torque", *fields) if armed else fields
-    return ReadWindow(address, _END - address, layout, columns, ">", tuple(SIGN_BITS.items()))
-
-
-def read_plan(setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None) -> ReadPlan:
-    """Return the read plan: as for STS servos, but one by one."""
-    return series_read_plan(window)
 
 
 def scs_settings(setup: "ServoConfig") -> dict[str, int]:
@@ -103,12 +73,11 @@ FEETECH_SCS = replace(
     sync_read=False,
     baud_rates=SCS_BAUD_RATES,
     scan_rates=SCS_BAUD_RATES,
-    read_plan=read_plan,
-    armed_values=lambda setup: {},
+    window=Window(56, ">HHHBBxB", SENSED, SIGNS),
+    polled=(("torque_enable", "torque_enable"),),
     read_spans=(("return_delay_time", "position_i_gain"), ("lock", "lock")),
     wanted_settings=scs_settings,
     torque_faults=0x24,
     single_turn=False,
     duplicate_id_registers=("present_position", "moving"),
-    arming=Arming("acceleration", limits_speed=False),
 )

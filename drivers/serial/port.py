@@ -11,15 +11,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from dynamixel_sdk import PortHandler
 from serial import Serial, SerialException
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial.list_ports import is_i2c, open_failure_text, persistent_name
 
 BITS_PER_BYTE = 10
-SDK_MARGIN_S = 0.034
-"""Time that the SDK allows for two periods of a USB adapter's 16 ms latency timer."""
 
 QUIET_S = 0.003
 """Time without a byte after which a line is quiet: three periods of a 1 ms latency timer."""
@@ -27,15 +24,19 @@ QUIET_S = 0.003
 BABBLE_S = 0.06
 """Longest time to drain a line that never falls silent."""
 
-MORE_RATES = (38_400, 76_800, 128_000, 250_000)
-"""Bit/s that servos and adaptors support but that are not in the SDK's list."""
+RATES = (
+    *(9600, 19_200, 38_400, 57_600, 76_800, 115_200, 128_000, 230_400, 250_000, 460_800, 500_000),
+    *(576_000, 921_600, 1_000_000, 1_152_000, 2_000_000, 2_500_000, 3_000_000, 3_500_000),
+    *(4_000_000, 4_500_000),
+)
+"""Bit/s of servos and adaptors."""
 
 WRITE_S = 0.05
 """Longest time to pass a packet to the adapter."""
 
 
 class BusPort(Protocol):
-    """Port interface of the driver; for setup it is also the SDK's PortHandler."""
+    """Port interface of the drivers."""
 
     port_name: str
 
@@ -72,13 +73,6 @@ class BusPort(Protocol):
             BusLost: the port is lost.
         """
 
-    def getBytesAvailable(self) -> int:
-        """Return the number of received bytes.
-
-        Raises:
-            BusLost: the port is lost.
-        """
-
     def clearPort(self) -> None:
         """Discard received bytes, without waiting.
 
@@ -94,7 +88,7 @@ class BusPort(Protocol):
         """
 
 
-class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
+class BlockingPort:
     """A real serial port.
 
     Args:
@@ -114,18 +108,15 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         on_traffic: Callable[[], None] | None = None,
         by_id: Path | None = None,
     ) -> None:
-        super().__init__(port_name)
-        self.opened_as = port_name
+        self.port_name = self.opened_as = port_name
+        self.baudrate = 0
         self._lasting: str | None = None
         self._by_id = by_id
         self._exclusive = exclusive
         self._on_traffic = on_traffic
-        self.ser: Serial | None = None
+        self._serial: Serial | None = None
         self._fd = -1
         self._poll: Callable[[int], object] = _raise_closed
-        self._deadline_s = 0.0
-
-    # --- methods for the control loop
 
     now_s = staticmethod(time.monotonic)
     """Host monotonic seconds."""
@@ -138,25 +129,28 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """
         if self._on_traffic is not None:
             self._on_traffic()
-        deadline_s = 0.0
-        while True:
+        try:
+            sent = os.write(self._fd, data)
+        except BlockingIOError:
+            sent = 0
+        except OSError as error:
+            raise self._lost(error) from error
+        if sent < len(data):
+            self._write_rest(data[sent:])
+
+    def _write_rest(self, data: bytes) -> None:
+        """Send bytes as soon as there is space for them."""
+        deadline_s = time.monotonic() + WRITE_S
+        while data:
             try:
-                sent = os.write(self._fd, data)
+                left_s = max(0.0, deadline_s - time.monotonic())
+                if not select.select((), (self._fd,), (), left_s)[1]:
+                    raise self._lost("it accepts no more bytes")
+                data = data[os.write(self._fd, data) :]
             except BlockingIOError:
-                sent = 0
-            except OSError as error:
-                raise self._lost(error) from error
-            if sent == len(data):
-                return
-            data = data[sent:]
-            deadline_s = deadline_s or time.monotonic() + WRITE_S
-            # Sleep until a byte can be sent.
-            try:
-                ready = select.select((), (self._fd,), (), max(0.0, deadline_s - time.monotonic()))
+                continue
             except (OSError, ValueError) as error:
                 raise self._lost(error) from error
-            if not ready[1]:
-                raise self._lost("it accepts no more bytes")
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return up to ``length`` bytes, those received before the deadline.
@@ -166,12 +160,26 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """
         if self._on_traffic is not None:
             self._on_traffic()
-        return self._read_rest(b"", length, deadline_s)
+        return self._read(b"", length, deadline_s)
 
-    def _read_rest(self, got: bytes, length: int, deadline_s: float) -> bytes:
-        """Read until there are ``length`` bytes, or the deadline."""
-        while len(got) < length and self._wait(deadline_s):
-            more = self._read_available(length - len(got))
+    def _read(self, got: bytes, length: int, deadline_s: float) -> bytes:
+        """Read until there are ``length`` bytes, or the deadline.
+
+        The last wait is rounded up to the milliseconds of poll(), which also finds the bytes that
+        arrived while this process did not run.
+        """
+        while len(got) < length:
+            left_s = deadline_s - time.monotonic()
+            try:
+                if not self._poll(int(1e3 * left_s) + 1 if left_s > 0.0 else 0):
+                    break
+                more = os.read(self._fd, length - len(got))
+            except BlockingIOError:
+                continue  # no bytes after all
+            except (OSError, ValueError) as error:
+                raise self._lost(error) from error
+            if not more:
+                raise self._lost("it hung up")
             got = got + more if got else more
         if not got and not os.path.exists(self.opened_as):
             raise self._lost("it was unplugged")
@@ -191,32 +199,29 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """
         if self._on_traffic is not None:
             self._on_traffic()
-        fd, sent, got = self._fd, 0, b""
+        fd, poll = self._fd, self._poll
         try:
             # A poll takes a quarter of the time of a flush, which is rarely needed.
-            if self._poll(0):
+            if poll(0):
                 termios.tcflush(fd, termios.TCIFLUSH)
             sent = os.write(fd, request)
         except BlockingIOError:
-            pass  # no space
+            sent = 0
         except (OSError, ValueError, termios.error) as error:
             raise self._lost(error) from error
         if sent < len(request):
-            self.write(request[sent:])
-        sent_s = time.monotonic()
+            self._write_rest(request[sent:])
+        sent_s, got = time.monotonic(), b""
         try:
-            left_ms = int(1e3 * (deadline_s - sent_s))
-            if left_ms > 0 and self._poll(left_ms):
+            if sent_s < deadline_s and poll(int(1e3 * (deadline_s - sent_s)) + 1):
                 got = os.read(fd, length)
-                if not got:
-                    raise self._lost("it hung up")
+                if len(got) == length:
+                    return got, sent_s
         except BlockingIOError:
             pass  # no bytes after all
         except (OSError, ValueError) as error:
             raise self._lost(error) from error
-        if len(got) < length:
-            got = self._read_rest(got, length, deadline_s)
-        return got, sent_s
+        return self._read(got, length, deadline_s), sent_s
 
     def drain(self) -> int:
         """Discard bytes until none arrives for 3 ms; return their number.
@@ -224,41 +229,16 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         Raises:
             BusLost: the port is lost.
         """
-        end_s = time.monotonic() + BABBLE_S
-        dropped = 0
-        while (now_s := time.monotonic()) < end_s and self._wait(now_s + QUIET_S):
-            dropped += len(self._read_available(4096))
+        end_s, dropped = time.monotonic() + BABBLE_S, 0
+        while (now_s := time.monotonic()) < end_s:
+            more = self._read(b"", 1, now_s + QUIET_S)
+            if not more:
+                break
+            dropped += len(more) + len(self._read(b"", 4096, now_s))
         return dropped
 
-    def _wait(self, deadline_s: float) -> bool:
-        """Sleep until a byte arrives; return False at the deadline."""
-        try:
-            left_s = deadline_s - time.monotonic()
-            # poll() takes half as long as select(), but its unit is whole milliseconds.
-            if left_s >= 0.001 and self._poll(int(1e3 * left_s)):
-                return True
-            left_s = max(0.0, deadline_s - time.monotonic())
-            return bool(select.select((self._fd,), (), (), left_s)[0])
-        except (OSError, ValueError) as error:
-            raise self._lost(error) from error
-
-    def _read_available(self, length: int) -> bytes:
-        try:
-            data = os.read(self._fd, length)
-        except BlockingIOError:
-            return b""
-        except OSError as error:
-            raise self._lost(error) from error
-        if not data:
-            raise self._lost("it hung up")
-        return data
-
     def _lost(self, reason: object) -> BusLost:
-        """Return the error and clear the SDK's busy flag, so that a reopened port works."""
-        self.is_using = False
         return BusLost(f"{self.port_name} is gone ({reason}): check USB cable and servo power")
-
-    # --- methods for the SDK
 
     def setBaudRate(self, baudrate: int) -> bool:
         """Open at a baud rate; return False if the rate is not supported.
@@ -266,58 +246,50 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         Raises:
             PortError: absent, busy or not permitted.
         """
-        if baudrate not in MORE_RATES and self.getCFlagBaud(baudrate) <= 0:
+        if baudrate not in RATES:
             return False
-        self.baudrate = baudrate
-        return self.setupPort(baudrate)
-
-    def setupPort(self, cflag_baud: int) -> bool:
-        """Open at a baud rate.
-
-        Raises:
-            PortError: absent, busy or not permitted.
-        """
         self.closePort()
-        # A port that was open is found by its adaptor's serial number.
-        lasting, name = self._lasting, str(self.port_name)
-        if lasting is None:
-            where = name
-        elif os.path.exists(lasting):
-            same = os.path.realpath(lasting) == os.path.realpath(self.port_name)
-            where = name if same else lasting
-        else:
-            now = persistent_name(self.port_name, self._by_id)
-            if now not in (None, lasting):
-                raise PortError(
-                    f"{self.port_name} is another adaptor now ({now}): plug in {lasting}"
-                )
-            where = name
+        where = self._path()
         try:
-            self.ser = Serial(where, cflag_baud, timeout=0, exclusive=self._exclusive or None)
+            self._serial = Serial(where, baudrate, timeout=0, exclusive=self._exclusive or None)
         except (SerialException, OSError) as error:
             raise PortError(open_failure_text(self.port_name, error.errno)) from error
         except ValueError as error:  # pyserial: the adapter does not support this rate
             raise PortError(
-                f"{self.port_name} cannot run at {cflag_baud} bit/s: choose 115200 or 1000000"
+                f"{self.port_name} cannot run at {baudrate} bit/s: choose 115200 or 1000000"
             ) from error
         self.opened_as = os.path.realpath(where) if where != self.port_name else where
         self._lasting = persistent_name(where, self._by_id) or self._lasting
-        self._fd = self.ser.fileno()
+        self._fd = self._serial.fileno()
         poll = select.poll()
         poll.register(self._fd, select.POLLIN)
         self._poll = poll.poll
-        request_low_latency(self.ser)
-        self.is_open = True
-        self.is_using = False
-        self.tx_time_per_byte = 1000.0 * BITS_PER_BYTE / cflag_baud
+        request_low_latency(self._serial)
+        self.baudrate = baudrate
         return True
+
+    def _path(self) -> str:
+        """Return the path to open: a port that was open is found by its adaptor's serial number.
+
+        Raises:
+            PortError: another adaptor has the port's path now.
+        """
+        lasting = self._lasting
+        if lasting is None:
+            return self.port_name
+        if os.path.exists(lasting):
+            same = os.path.realpath(lasting) == os.path.realpath(self.port_name)
+            return self.port_name if same else lasting
+        now = persistent_name(self.port_name, self._by_id)
+        if now not in (None, lasting):
+            raise PortError(f"{self.port_name} is another adaptor now ({now}): plug in {lasting}")
+        return self.port_name
 
     def closePort(self) -> None:
         """Close; safe to call twice."""
-        if self.ser is not None:
-            self.ser.close()
-        self.ser, self._fd, self._poll = None, -1, _raise_closed
-        self.is_open = self.is_using = False
+        if self._serial is not None:
+            self._serial.close()
+        self._serial, self._fd, self._poll = None, -1, _raise_closed
 
     def clearPort(self) -> None:
         """Discard received bytes."""
@@ -325,38 +297,6 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             termios.tcflush(self._fd, termios.TCIFLUSH)
         except (OSError, ValueError, termios.error) as error:
             raise self._lost(error) from error
-
-    def getBytesAvailable(self) -> int:
-        """Return the number of received bytes; 0 if the port is closed."""
-        try:
-            return self.ser.in_waiting if self.ser is not None else 0
-        except OSError as error:
-            raise self._lost(error) from error
-
-    def readPort(self, length: int) -> bytes:
-        """Return ``length`` bytes, or those that arrived before the packet's deadline."""
-        return self.read_until(length, self._deadline_s)
-
-    def writePort(self, packet: bytes | list[int]) -> int:
-        """Send bytes; return their number."""
-        self.write(bytes(packet))
-        return len(packet)
-
-    def setPacketTimeout(self, packet_length: int) -> None:
-        """Set the packet's deadline from its length."""
-        self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + SDK_MARGIN_S * 1000.0)
-
-    def setPacketTimeoutMillis(self, msec: float) -> None:
-        """Set the packet's deadline."""
-        self._deadline_s = time.monotonic() + msec / 1000.0
-
-    def isPacketTimeout(self) -> bool:
-        """Return whether the packet's deadline has passed."""
-        return time.monotonic() >= self._deadline_s
-
-    def getCurrentTime(self) -> float:
-        """Return monotonic milliseconds."""
-        return time.monotonic() * 1000.0
 
 
 def _raise_closed(timeout_ms: int) -> object:

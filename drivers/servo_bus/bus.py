@@ -5,7 +5,6 @@ from collections.abc import Collection, Mapping, Sequence
 from math import ceil, inf
 
 from gazerig.drivers.bus.goal_limits import clip_goals
-from gazerig.drivers.bus.plausibility import DISTURBED_S
 from gazerig.drivers.bus.port_bus import CUT, PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.bus.timing import TIMING, BusTiming
@@ -18,17 +17,16 @@ from gazerig.drivers.servo_bus.faults import CHECK_SUPPLY, SilenceLog
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import PollList
 from gazerig.drivers.servo_bus.provisioning import Provisioning
-from gazerig.drivers.servo_bus.read_plan import Sample
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.supervisor import Supervisor
-from gazerig.drivers.servo_bus.sync_read import OWED_S, ServoReply, SyncReader
+from gazerig.drivers.servo_bus.sync_read import ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import Feedback, ServoConfig
 
 _WATCHDOG_S = 0.2
 """Silence after which servos with a watchdog stop by themselves."""
-POLL_S = 0.1
+POLL_S = 0.05
 """Interval of the reads of values that a group read does not cover; the servos take turns."""
 
 
@@ -64,7 +62,6 @@ class SmartServoBus(PortBus):
                 f"{len(setups)} servos are too many for one bus: {family.most_goals} at most"
             )
         self._family = family
-        self._wary = family.weak_check or not family.faults_latch
         unit_s = family.watchdog_unit_s
         self._watchdog = ceil(_WATCHDOG_S / unit_s) if unit_s else 0
         self._check_setups(setups)
@@ -86,129 +83,77 @@ class SmartServoBus(PortBus):
             baud,
             {setup.id: setup.label() for setup in setups},
         )
-        self._damaged = 0
-        self._unconfirmed: set[int] = set()
-        self._polled_s, self._turn = -inf, 0
-        self._assemble(None)
+        self._poll_at_s, self._turn = -inf, 0
+        self._corrupt, self._is_troubled = 0, False
+        self._assemble({})
 
-    def _assemble(self, firmware: Mapping[int, int] | None) -> None:
-        """Create the parts in their initial state, for the features of the servos' firmware.
-
-        firmware: firmware version by id, None before it is known
-        """
-        line, log = self._line, self._log
-        by_id = self._by_id = {setup.id: setup for setup in self._setups}
+    def _assemble(self, firmware: Mapping[int, int]) -> None:
+        """Create the parts in their initial state, for servos with this firmware, by id."""
+        line, log, family = self._line, self._log, self._family
+        self._by_id = {setup.id: setup for setup in self._setups}
         self._is_down = self._release_due = False
         self._poll_list = PollList(self._ids)
-        self._silence = SilenceLog(by_id, log, line.lateness)
-        plan = self._plan = self._family.read_plan(self._setups, firmware)
-        single = Registers(self._port, self._family, 1, self._line.lateness)
-        self._provisioning = Provisioning(line, single, self._setups, log, plan.indirect_block)
-        self._feedback = FeedbackColumns(self._family, self._setups)
-        self._reader = SyncReader(line, self._poll_list, plan)
+        self._silence = SilenceLog(self._by_id, log, line.lateness)
+        self._provisioning = Provisioning(
+            line, Registers(self._port, family, 1, line.lateness), self._setups, log
+        )
+        self._feedback = FeedbackColumns(family, self._setups)
+        is_fast = bool(firmware) and all(
+            family.has_fast_read(setup.model, firmware[setup.id]) for setup in self._setups
+        )
+        self._reader = SyncReader(line, self._poll_list, is_fast)
         self._supervisor = Supervisor(
-            line, by_id, self._provisioning, self._feedback, log, self._watchdog
+            line, self._by_id, self._provisioning, self._feedback, log, self._watchdog
         )
 
     # --- one reading
 
-    def _is_doubtful(self, now_s: float) -> bool:
-        """Return whether even an intact answer must be checked servo by servo."""
-        if self._family.weak_check:
-            corrupt = self._line.errors.get("corrupt", 0)
-            if corrupt != self._damaged or now_s - self._feedback.places.damaged_s <= DISTURBED_S:
-                return True
-            if now_s - self._reader.unanswered_s <= OWED_S:
-                return True
-        return False
-
-    def _apply_one_by_one(self, replies: dict[int, ServoReply], now_s: float) -> None:
-        """Apply an answer servo by servo, each with its errors."""
-        supervisor, feedback = self._supervisor, self._feedback
+    def _apply_one_by_one(self, replies: Mapping[int, ServoReply], now_s: float) -> None:
+        """Apply answers servo by servo, each with its errors."""
+        line, supervisor, feedback = self._line, self._supervisor, self._feedback
+        codec, poll_list = self._family.codec, self._poll_list
         feedback.begin()
-        answered = bool(replies)
-        if self._family.weak_check:
-            replies = self._confirm_doubtful(replies, now_s)
-        believed, dark = feedback.are_all_plausible(replies), not self._poll_list.group
-        for servo_id, one in replies.items():
-            slot = self._slot[servo_id]
-            garbled = servo_id in self._poll_list.garbling_ids
-            was_out = self._poll_list.record_answer(servo_id)
-            if one.sample.error & self._family.codec.REFUSAL:
-                self._check(servo_id, one.sample)
-                self._line.errors["refused"] += 1
-            elif was_out and (dark or garbled):
-                # The first answer after a long silence may be an old one. Two servos that answer
-                # together produce the AND of their bytes, checksums included, so far more than one
-                # in 65,536 pass.
+        if line.errors["corrupt"] != self._corrupt:
+            self._corrupt = line.errors["corrupt"]
+            feedback.places.record_damaged(now_s)
+        for servo_id, reply in replies.items():
+            if reply.is_refused:
+                line.errors["refused"] += 1
+            elif not feedback.apply_reply(self._slot[servo_id], reply):
+                line.errors["implausible"] += 1
                 continue
-            elif one.sample.is_blank:
-                self._check(servo_id, one.sample)
-            elif believed or feedback.is_plausible(slot, one):
-                self._check(servo_id, one.sample)
-                feedback.apply_reply(slot, one)
-            else:
-                self._line.errors["implausible"] += 1
-        supervisor.record_out_of_group(self._poll_list.out_ids, now_s)
-        self._silence.update(
-            {*self._poll_list.out_ids, *self._unconfirmed},
-            self._poll_list.garbling_ids | self._unconfirmed,
-            answered,
-            now_s,
-        )
-
-    def _check(self, servo_id: int, sample: Sample) -> None:
-        """Check one servo's answer for faults, lost torque and lost settings."""
-        codec, supervisor = self._family.codec, self._supervisor
-        supervisor.check_status(servo_id, sample.error & codec.ALERT | (sample.status or 0))
-        names = {"torque": "torque_enable"}
-        if sample.torque is not None:
-            names |= {"acceleration": "acceleration", "torque_limit": "torque_limit"}
-        known = {name: getattr(sample, field) for field, name in names.items()}
-        values = {name: value for name, value in known.items() if value is not None}
-        if sample.is_blank:
-            values = {"torque_enable": -1}
-        supervisor.check_polled(servo_id, values)
+            supervisor.check_status(servo_id, reply.error & codec.ALERT)
+        supervisor.record_out_of_group(poll_list.out_ids, now_s)
+        self._silence.update(poll_list.out_ids, poll_list.garbling_ids, bool(replies), now_s)
+        self._is_troubled = len(replies) < len(self._ids)
 
     def _poll(self, now_s: float) -> None:
-        """Read what a group read does not cover of one servo; the servos take turns."""
-        self._polled_s, self._turn = now_s, (self._turn + 1) % len(self._ids)
-        servo_id, slot = self._ids[self._turn], self._turn
+        """Read what a group read does not cover of one servo; servos and spans take turns."""
+        family, count = self._family, len(self._ids)
+        self._poll_at_s, self._turn = (
+            now_s + POLL_S,
+            (self._turn + 1) % (count * len(family.polled)),
+        )
+        span, slot = divmod(self._turn, count)
+        servo_id = self._ids[slot]
         if servo_id not in self._poll_list.group:
             return
-        for torque in self._line.ask((servo_id,), "torque_enable").values():
-            self._feedback.set_torque(slot, bool(torque))
-            self._supervisor.check_polled(servo_id, {"torque_enable": torque})
-        volts = self._line.ask((servo_id,), "present_input_voltage")
-        warm = self._line.ask((servo_id,), "present_temperature")
-        if volts and warm:
-            self._feedback.set_climate(slot, volts[servo_id], warm[servo_id])
-
-    def _confirm_doubtful(
-        self, replies: dict[int, ServoReply], now_s: float
-    ) -> dict[int, ServoReply]:
-        """Read servos with a doubtful answer once more; keep values on which both answers agree."""
-        places = self._feedback.places
-        damaged = self._line.errors.get("corrupt", 0)
-        if damaged != self._damaged or self._reader.stray_s == now_s:
-            self._damaged = damaged
-            places.record_damaged(now_s)
-        disturbed = places.is_disturbed(now_s)
-        doubtful = [i for i in replies if disturbed or self._reader.is_reply_pending(i, now_s)]
-        again = self._reader.reread(doubtful) if doubtful else {}
-        kept = {i: one for i, one in replies.items() if i not in doubtful}
-        for servo_id in doubtful:
-            self._poll_list.record_answer(servo_id)
-            second = again.get(servo_id)
-            slot, first = self._slot[servo_id], replies[servo_id]
-            both = second and self._feedback.confirm(slot, first, second)
-            if both:
-                kept[servo_id] = both
-            else:
-                self._line.errors["unconfirmed"] += 1
-                self._unconfirmed.add(servo_id)
-        self._unconfirmed -= {*kept, *self._poll_list.out_ids}
-        return kept
+        first, last = (family.registers[name] for name in family.polled[span])
+        size = last.address + last.size - first.address
+        data = self._line.ask_bytes((servo_id,), first.address, size).get(servo_id)
+        if data is None:
+            return
+        values = {
+            one.name: one.decode(data[at : at + one.size])
+            for one in family.registers.values()
+            if (at := one.address - first.address) >= 0 and at + one.size <= size
+        }
+        torque, volts = values.get("torque_enable"), values.get("present_input_voltage")
+        if torque is not None:
+            self._feedback.set_torque(slot, torque == 1)
+        if volts is not None:
+            self._feedback.set_climate(slot, volts, values["present_temperature"])
+        self._supervisor.check_polled(servo_id, values)
 
     # --- public interface
 
@@ -227,10 +172,8 @@ class SmartServoBus(PortBus):
             )
         registers = Registers(self._port, self._family, lateness=self._line.lateness)
         try:
-            firmware = find(self._line, registers, self._setups, self._log)
-            self._assemble(firmware)
-            block = self._plan.indirect_block
-            first = Provisioning(self._line, registers, self._setups, self._log, block)
+            self._assemble(find(self._line, registers, self._setups, self._log))
+            first = Provisioning(self._line, registers, self._setups, self._log)
             first.disable(self._ids)
             first.apply(self._ids)
             self._line.starved = False
@@ -257,18 +200,27 @@ class SmartServoBus(PortBus):
         try:
             if line.starved:
                 supervisor.recover_tripped(self._poll_list.group)
-            group = reader.next_group(now_s)
+            group, out = reader.group(now_s), len(self._ids) - len(self._poll_list.group)
             if group is None:
-                self._apply_one_by_one(reader.read_troubled(now_s), now_s)
+                self._apply_one_by_one(reader.read_each(now_s), now_s)
             else:
                 raw, at_s = line.exchange(group.request, group.reply_length)
-                doubtful = self._wary and self._is_doubtful(now_s)
-                if doubtful or not feedback.apply_whole(group, raw, at_s):
-                    self._apply_one_by_one(reader.verified_replies(group, raw, at_s, now_s), now_s)
-            if not self._plan.covers_torque and now_s - self._polled_s >= POLL_S:
-                self._poll(now_s)
-            if now_s >= supervisor.due_s:
-                supervisor.service(self._poll_list.group, now_s)
+                values = group.parse_whole(raw)
+                if (
+                    values is None
+                    or self._is_troubled
+                    or at_s < feedback.places.disturbed_until_s
+                    or not feedback.apply_whole(group, values, at_s)
+                ):
+                    self._apply_one_by_one(reader.sort_out(group, raw, at_s, now_s), now_s)
+            if len(feedback.now.missing) == out:
+                # All servos that were read have answered: there is time for other exchanges.
+                if out:
+                    reader.read_silent(now_s)
+                if now_s >= self._poll_at_s:
+                    self._poll(now_s)
+                if now_s >= supervisor.due_s:
+                    supervisor.service(self._poll_list.group, now_s)
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
@@ -296,6 +248,9 @@ class SmartServoBus(PortBus):
         try:
             self._apply_wanted()
             goals = self._supervisor.enable_torque()
+            for slot, goal in enumerate(goals):
+                if self._lowest[slot] < goal < self._highest[slot]:
+                    self._feedback.places.record(slot, goal, self._port.now_s())
         except (ServoMissing, ServoFault):
             self.disable_torque()
             raise
@@ -356,7 +311,6 @@ class SmartServoBus(PortBus):
         self._highest = tuple(setup.max_steps for setup in self._setups)
         self._by_id.update({setup.id: setup for setup in self._setups})
         self._provisioning.set_target(self._setups)
-        self._feedback.set_limits(self._setups)
 
     def faults(self) -> tuple[str, ...]:
         """Return the present faults, one line each, e.g. "neck_yaw (servo 7): overload"."""

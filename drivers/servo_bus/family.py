@@ -1,57 +1,68 @@
-"""Interface between the bus engine and a servo family: all differences in one value.
+"""A family of smart servos as data: registers, models, units, and the module of its packets.
 
-The engine (gazerig.drivers.servo_bus) does not depend on any particular family. A family consists
-of a protocol file (the codec), a table file and one ``Family`` built from both;
-docs/servo-families.md explains it field by field.
+The bus (gazerig.drivers.servo_bus) does not depend on any particular family; docs/servo-families.md
+explains how to add one.
 """
 
+import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from types import ModuleType
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.servo_bus.read_plan import ReadPlan
     from gazerig.drivers.types import ServoConfig
 
 
-class Status(NamedTuple):
-    """One status packet of a servo as it arrived.
+Area = Literal["eeprom", "ram"]
 
-    intact: whether its checksum is correct
-    offset: index of its first byte in the received bytes
+
+class Register(NamedTuple):
+    """An entry of a servo's control table.
+
+    initial: factory value in EEPROM, start value in RAM; None if the device itself decides
+    low, high: range of valid values; None if the model or other registers decide
+    signed: whether it is a two's complement
+    sign: index of a separate sign bit before a magnitude; None without one
+    order: byte order
+    area: memory of the register; EEPROM keeps values without power
     """
 
-    id: int
-    error: int
-    params: bytes
-    intact: bool
-    offset: int = 0
-
-
-class Register(Protocol):
-    """An entry of a servo's control table."""
-
-    @property
-    def name(self) -> str:
-        """Name in the table."""
-
-    @property
-    def address(self) -> int:
-        """Address of the first byte."""
-
-    @property
-    def size(self) -> int:
-        """Number of bytes."""
-
-    @property
-    def area(self) -> str:
-        """Its memory: "eeprom" or "ram"."""
+    name: str
+    address: int
+    size: int = 1
+    access: Literal["r", "rw"] = "r"
+    initial: int | None = None
+    low: int | None = None
+    high: int | None = None
+    signed: bool = False
+    sign: int | None = None
+    order: Literal["little", "big"] = "little"
+    area: Area = "ram"
 
     def encode(self, value: int) -> bytes:
-        """Return a value as bytes."""
+        """Return a value as bytes.
+
+        Raises:
+            ValueError: it does not fit.
+        """
+        bits = self.sign if self.sign is not None else 8 * self.size - self.signed
+        low = -(1 << bits) if self.signed else 0 if self.sign is None else 1 - (1 << bits)
+        if not low <= value < 1 << bits:
+            raise ValueError(f"{self.name}: {value} does not fit into {self.size} byte")
+        raw = -value | 1 << bits if self.sign is not None and value < 0 else value
+        return raw.to_bytes(self.size, self.order, signed=self.signed)
 
     def decode(self, data: bytes) -> int:
         """Return the value of bytes."""
+        raw = int.from_bytes(data, self.order, signed=self.signed)
+        return raw if self.sign is None else from_sign_magnitude(raw, self.sign)
+
+
+def from_sign_magnitude(raw: int, sign: int) -> int:
+    """Return the signed value of a magnitude whose sign is in bit ``sign``."""
+    magnitude = raw & (1 << sign) - 1
+    return -magnitude if raw >> sign & 1 else magnitude
 
 
 class Model(Protocol):
@@ -82,6 +93,15 @@ class Model(Protocol):
         """Rated voltage."""
 
 
+class Status(NamedTuple):
+    """One answer of a servo as it arrived; ``intact``: whether its checksum is correct."""
+
+    id: int
+    error: int
+    params: bytes
+    intact: bool
+
+
 class Identity(NamedTuple):
     """Model number and firmware version of a servo."""
 
@@ -89,75 +109,41 @@ class Identity(NamedTuple):
     firmware: int
 
 
-class Codec(Protocol):
-    """Encoder and decoder of packets; a module of functions."""
+class Window(NamedTuple):
+    """Bytes read from every servo: their address and meaning.
+
+    layout: struct codes of all bytes, with the byte order
+    fields: names of the numbers, in their order: position, velocity and effort, and in some
+        families voltage, temperature and status
+    signs: separate sign bits of position, velocity and effort; empty for two's complements
+    """
+
+    address: int
+    layout: str
+    fields: tuple[str, ...]
+    signs: tuple[int, ...] = ()
 
     @property
-    def STATUS_OVERHEAD(self) -> int:
-        """Bytes of an answer in addition to its params."""
+    def length(self) -> int:
+        """Return the number of bytes."""
+        return struct.calcsize(self.layout)
 
-    @property
-    def BROADCAST(self) -> int:
-        """Id that addresses all servos."""
 
-    @property
-    def REFUSAL(self) -> int:
-        """Bits of an answer's error byte that report a rejected instruction."""
+class Frame(NamedTuple):
+    """The bytes around the registers in an answer of several servos without errors.
 
-    @property
-    def ALERT(self) -> int:
-        """Bits of an answer's error byte that report a fault of the servo."""
+    front: bytes before those of the first servo
+    heads: bytes before each servo's registers, its error byte included
+    check: struct code of the checksum after each servo's registers
+    parts: struct codes of the parts that the checksums cover
+    is_intact: returns whether the checksums match, from the covered parts and the checksums
+    """
 
-    @property
-    def ECHO_LENGTH(self) -> int | None:
-        """Number of params of a read whose echo looks like an answer, None if none does."""
-
-    @property
-    def CHECK(self) -> str:
-        """Struct code of the checksum after an answer's params."""
-
-    def status_head(self, servo_id: int, length: int) -> bytes:
-        """Return an answer's bytes before its error byte; ``length``: number of params."""
-
-    @property
-    def CHECKED(self) -> tuple[int, int]:
-        """Bytes at the beginning and at the end of an answer that its checksum does not cover."""
-
-    def all_intact(self, parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
-        """Return whether the checksums of answers match the parts that they cover."""
-
-    @property
-    def IDENTITY_LENGTH(self) -> int:
-        """Number of params of an identity answer."""
-
-    def identity_request(self, servo_id: int) -> bytes:
-        """Build a request for a servo's identity."""
-
-    def parse_identity(self, status: Status) -> Identity | None:
-        """Return model and firmware from an answer, None if it does not contain them."""
-
-    def ping(self, servo_id: int) -> bytes:
-        """Build a ping."""
-
-    def read(self, servo_id: int, address: int, length: int) -> bytes:
-        """Build a request for registers of one servo."""
-
-    def write(self, servo_id: int, address: int, data: bytes) -> bytes:
-        """Build an instruction to write registers of one servo."""
-
-    def sync_read(self, ids: Sequence[int], address: int, length: int) -> bytes:
-        """Build a request for the same registers of several servos."""
-
-    def sync_write(
-        self, ids: Sequence[int], address: int, size: int, rows: Iterable[bytes]
-    ) -> bytes:
-        """Build an instruction to write the same registers of several servos."""
-
-    def parse_statuses(self, raw: bytes) -> list[Status]:
-        """Return every complete answer in received bytes; noise is skipped."""
-
-    def bytes_missing(self, raw: bytes, count: int, length: int) -> int:
-        """Return how many bytes of ``count`` answers have not arrived yet."""
+    front: bytes
+    heads: Sequence[bytes]
+    check: str
+    parts: str
+    is_intact: Callable[[tuple[bytes, ...], tuple[int, ...]], bool]
 
 
 class GoalPackets(Protocol):
@@ -178,13 +164,12 @@ class Arming(NamedTuple):
 class Family:
     """A family of smart servos.
 
-    Codec and table:
-        codec: encoder and decoder of packets
+    Packets and table:
+        codec: module of packets, with the functions of gazerig.drivers.dynamixel.protocol
         registers, models: registers and models by name
         steps_per_turn: steps per turn of the shaft
         name_errors: texts for the bits of ``error_register``
         velocity_unit_steps_s: unit of the present velocity
-        sign_bits: fields of a ``Sample`` with a separate sign bit, and that bit
         speed_units: converts steps/s to the unit of speed limits; at least 1
         acceleration_units: converts steps/s^2 to the unit of acceleration limits; None for no limit
         create_goal_packets: builds goal packets for some servos
@@ -196,14 +181,11 @@ class Family:
         format_firmware: formats a firmware number as the manufacturer does
 
     Reading:
-        read_plan: returns windows and packets for some servos and the firmware by id, None before
-            it is known
-        prompt_timeout_s: shortest time-out of an answer; from it to the longest it adapts to twice
-            the worst delay measured
+        window: registers read from all servos in every cycle; up to 7 bytes before them can be read
+        polled: first and last register of spans that are read from one servo after the other
+        has_fast_read: returns whether a model with a firmware has a fast sync read
+        prompt_timeout_s: shortest time-out of an answer in addition to its bytes on the wire
         effort_register: register of load or current
-        armed_values: fields of a ``Sample`` that show whether a servo is still armed, and their
-            expected values; None accepts any value
-        weak_check: whether the checksum of an answer misses some damage
 
     Settings:
         read_spans: first and last register of ranges that are read together
@@ -220,7 +202,7 @@ class Family:
         torque_faults: bits of transient faults that switch torque off
         watchdog_unit_s: unit of Bus Watchdog; None without a watchdog
         goal_speed: whether a goal includes its speed
-        single_turn: whether a servo beyond its encoder's zero would move in the wrong direction
+        single_turn: whether a servo measures its position within one turn when it starts
         broadcast_ping: whether servos answer a broadcast ping one after another; otherwise each id
             is read
         quiet_s, thorough_s: time-outs of a search: silence after a broadcast ping, or for each id
@@ -233,13 +215,12 @@ class Family:
     """
 
     name: str
-    codec: Codec
+    codec: ModuleType
     registers: Mapping[str, Register]
     models: Mapping[str, Model]
     steps_per_turn: int
     name_errors: Callable[[int], tuple[str, ...]]
     velocity_unit_steps_s: float
-    sign_bits: Mapping[str, int]
     speed_units: Callable[[float], int]
     acceleration_units: Callable[[float | None], int]
     create_goal_packets: Callable[[Sequence[int]], GoalPackets]
@@ -249,11 +230,11 @@ class Family:
     factory_baud: int
     highest_id: int
     format_firmware: Callable[[int], str]
-    read_plan: "Callable[[Sequence[ServoConfig], Mapping[int, int] | None], ReadPlan]"
+    window: Window
+    polled: tuple[tuple[str, str], ...]
+    has_fast_read: Callable[[str, int], bool]
     prompt_timeout_s: float
     effort_register: str
-    armed_values: Callable[["ServoConfig"], Mapping[str, int | None]]
-    weak_check: bool
     read_spans: tuple[tuple[str, str], ...]
     wanted_settings: Callable[["ServoConfig"], Mapping[str, int]]
     corrected_value: Callable[[str, int, int], int]
@@ -283,9 +264,11 @@ class Family:
     def request(self, ids: Sequence[int], address: int, length: int) -> bytes:
         """Return a request for the same registers of some servos; of one if each is read alone."""
         if self.sync_read:
-            return self.codec.sync_read(ids, address, length)
-        (servo_id,) = ids
-        return self.codec.read(servo_id, address, length)
+            packet: bytes = self.codec.sync_read(ids, address, length)
+        else:
+            (servo_id,) = ids
+            packet = self.codec.read(servo_id, address, length)
+        return packet
 
     def request_groups(self, ids: Sequence[int]) -> Iterable[tuple[int, ...]]:
         """Return the groups of servos that are read with one request."""

@@ -10,7 +10,6 @@ from typing import NamedTuple
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog, register_label
 from gazerig.drivers.servo_bus.family import Register
-from gazerig.drivers.servo_bus.read_plan import AddressMap
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import Transactions
@@ -34,7 +33,6 @@ class Provisioning:
         registers: Exchanges with single servos.
         setups: The servos.
         log: Records every write.
-        block: Addresses of their indirect blocks, None if there are none.
     """
 
     def __init__(
@@ -43,12 +41,10 @@ class Provisioning:
         registers: Registers,
         setups: Sequence[ServoConfig],
         log: EventLog,
-        block: AddressMap | None = None,
     ) -> None:
         self._line, self._family = line, line.family
         self._registers = registers
         self._log = log
-        self._block = block
         self.set_target(setups)
 
     def set_target(self, setups: Sequence[ServoConfig]) -> None:
@@ -85,19 +81,6 @@ class Provisioning:
             raise ServoMissing(
                 f"{self._port_name}: {named}: restart its power or correct the rig file"
             )
-        if self._block is not None:
-            block = self._block
-            for servo_id, data in self._addresses(ids, block).items():
-                if data != block.data:
-                    self._registers.write_bytes(servo_id, block.address, block.data)
-                    self._log.add(f"{self._setups[servo_id].label()}: Indirect Addresses set")
-            found = self._addresses(ids, block)
-            bad = [self._setups[i].label() for i, data in found.items() if data != block.data]
-            if bad:
-                raise ServoMissing(
-                    f"{self._port_name}: {', '.join(bad)} does not accept the indirect addresses: restart "
-                    "the servo power"
-                )
 
     def disable(self, ids: Sequence[int]) -> None:
         """Make servos answer every instruction, and switch torque and bus watchdog off.
@@ -162,11 +145,6 @@ class Provisioning:
         if not written and not self._registers.refusal:
             self._raise_missing((servo_id,), (), name)
         return written
-
-    def _addresses(self, ids: Sequence[int], block: AddressMap) -> dict[int, bytes]:
-        found = self._line.ask_bytes(ids, block.address, len(block.data))
-        self._raise_missing(ids, found, "indirect addresses")
-        return found
 
     def _raise_missing(self, ids: Iterable[int], found: Collection[int], what: str) -> None:
         missing = [self._setups[i].label() for i in ids if i not in found]

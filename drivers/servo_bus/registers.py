@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 from gazerig.drivers.servo_bus.family import Family, Identity, Register, Status
+from gazerig.drivers.servo_bus.transaction import ROOM, read_some
 
 TRIES = 3
 
@@ -14,7 +15,6 @@ REPLY_S = 0.04
 LATE_S = 0.15
 """Longest delay of an answer after its time-out."""
 
-ROOM = 4096
 LONGEST = 1024
 """Largest number of bytes read from a line that never falls silent."""
 
@@ -59,10 +59,9 @@ class Registers:
 
     def read_bytes(self, servo_id: int, address: int, length: int) -> bytes | None:
         """Return bytes of the table, None without a good answer."""
-        # If a request's echo looks like an answer, another length must be requested.
-        asked = length + (length == self._family.codec.ECHO_LENGTH)
-        status = self._exchange(servo_id, self._family.codec.read(servo_id, address, asked), asked)
-        return None if status is None else status.params[:length]
+        request = self._family.codec.read(servo_id, address, length)
+        status = self._exchange(servo_id, request, length)
+        return None if status is None else status.params
 
     def read_many(self, servo_id: int, names: Iterable[str]) -> dict[str, int | None]:
         """Return values by name; adjacent registers are read together.
@@ -200,18 +199,12 @@ def transact(
     port.write(request)
     byte_s = BITS_PER_BYTE / float(getattr(port, "baudrate", family.factory_baud))
     wire_s = (len(request) + length + codec.STATUS_OVERHEAD) * byte_s
-    # A refusal may be shorter than the answer.
-    shortest = 0 if codec.REFUSAL else length
-    deadline_s, raw, seen = port.now_s() + wire_s + timeout_s, b"", 0
-    while len(raw) < LONGEST:
-        more = port.read_until(codec.bytes_missing(raw, seen + 1, shortest) or 1, deadline_s)
+    deadline_s, raw = port.now_s() + wire_s + timeout_s, b""
+    while len(raw) < LONGEST and (more := read_some(port, deadline_s)):
         raw += more
-        found = codec.parse_statuses(raw)
-        seen = len(found)
-        for status in found:
+        # Some adapters return the request before the answer, which may look like one.
+        for status in codec.parse_statuses(raw.replace(request, b"", 1)):
             mine = status.intact and servo_id in (None, status.id)
             if mine and (len(status.params) == length or status.error & codec.REFUSAL):
                 return raw, status
-        if not more:
-            break
     return raw, None

@@ -46,7 +46,7 @@ ENTRY_S = 0.3
 """Time beyond that of its way after which a servo has moved into its limits, or never will."""
 
 AGAIN_AND_AGAIN = "restarts again and again: supply too weak"
-FAR_SIDE = "is beyond its encoder's zero: turn it into its range by hand"
+FAR_SIDE = "is beyond its encoder's zero: turn it into its range by hand, then restart its power"
 NOT_SET_UP = "cannot be set up again"
 BAD_LINE = "a second servo with its id, or a bad cable"
 

@@ -62,7 +62,8 @@ def enable(
             low, high = setups[servo_id].min_steps, setups[servo_id].max_steps
             raise ServoFault(
                 f"{line.label(servo_id)} is at {steps}, beyond its encoder's zero, and would move "
-                f"into {low}..{high} in the wrong direction: turn it into that range by hand"
+                f"into {low}..{high} in the wrong direction: turn it into that range by hand, then "
+                "restart its power"
             )
     goals = [min(max(present[i], setups[i].min_steps), setups[i].max_steps) for i in ids]
     own = [setups[i] for i in ids]

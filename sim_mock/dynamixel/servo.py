@@ -26,8 +26,8 @@ from gazerig.drivers.dynamixel.control_table import (
     PWM_FULL,
     VELOCITY_UNIT_STEPS_S,
     DynamixelModel,
-    DynamixelRegister,
     IndirectBlock,
+    Register,
     indirect_blocks,
     registers_of,
 )
@@ -118,11 +118,11 @@ class DynamixelMemory(ServoMemory):
             b.data_base + i: b.address_base + 2 * i for b in blocks for i in range(b.entries)
         }
 
-    def decode(self, register: DynamixelRegister, data: bytes | bytearray) -> int:
+    def decode(self, register: Register, data: bytes | bytearray) -> int:
         """Return the value of a register's bytes."""
         return int.from_bytes(data, "little", signed=register.signed)
 
-    def encode(self, register: DynamixelRegister, value: int) -> bytes:
+    def encode(self, register: Register, value: int) -> bytes:
         """Return the value's bytes, in two's complement if it is negative."""
         return (value & (1 << 8 * register.size) - 1).to_bytes(register.size, "little")
 
@@ -160,10 +160,10 @@ class DynamixelMemory(ServoMemory):
         self.ranges[address, length] = found
         return found
 
-    def fields(self, address: int, data: bytes) -> list[tuple[DynamixelRegister, int]] | int:
+    def fields(self, address: int, data: bytes) -> list[tuple[Register, int]] | int:
         """Split bytes to write into registers with their values, or return the error number."""
         places = [self.real(at) for at in range(address, address + len(data))]
-        fields, at = list[tuple[DynamixelRegister, int]](), 0
+        fields, at = list[tuple[Register, int]](), 0
         while at < len(data):
             register = self.by_address.get(places[at])
             if register is None or register.access == "r":
@@ -179,15 +179,15 @@ class DynamixelMemory(ServoMemory):
         return fields or DATA_LENGTH
 
 
-def _window_registers(blocks: Iterable[IndirectBlock]) -> Iterator[DynamixelRegister]:
+def _window_registers(blocks: Iterable[IndirectBlock]) -> Iterator[Register]:
     """Yield the registers of the indirect windows; each starts as its own data byte."""
     for block in blocks:
         for i in range(block.entries):
             at, data = block.address_base + 2 * i, block.data_base + i
-            yield DynamixelRegister(
+            yield Register(
                 f"indirect_address_{at}", at, 2, "rw", data, block.target_low, block.target_high
             )
-            yield DynamixelRegister(f"indirect_data_{data}", data, 1, "rw", 0, 0, 255)
+            yield Register(f"indirect_data_{data}", data, 1, "rw", 0, 0, 255)
 
 
 class DynamixelServo(EmulatedServo):
@@ -304,7 +304,7 @@ class DynamixelServo(EmulatedServo):
             self._apply_settings()
         return 0
 
-    def _refusal(self, register: DynamixelRegister, value: int) -> int:
+    def _refusal(self, register: Register, value: int) -> int:
         """Return the error number of a write that the servo's state forbids, 0 if it may be."""
         name = register.name
         if register.address < EEPROM_END:

@@ -41,7 +41,7 @@ from gazerig.drivers.feetech.memory_table import (
     STATUS_ERRORS,
     TORQUE_FULL,
     FeetechModel,
-    FeetechRegister,
+    Register,
     registers_of,
 )
 from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN as TURN
@@ -82,7 +82,7 @@ _SCS_LACKS = {
 _SCS_STARTS = {"max_position_limit": SCS_STEPS - 1, "unloading_condition": HEAT | OVERLOAD}
 
 
-def _scs_registers(model: FeetechModel) -> tuple[FeetechRegister, ...]:
+def _scs_registers(model: FeetechModel) -> tuple[Register, ...]:
     """Return the registers of an SCS servo: some of STS servos, of which four lie elsewhere."""
     return tuple(
         register._replace(
@@ -113,12 +113,12 @@ class FeetechMemory(ServoMemory):
         self._highest = {5: HIGHEST_ID, 6: last_baud, 33: 3}
         self._lock_at = self.registers["lock"].address
 
-    def decode(self, register: FeetechRegister, data: bytes | bytearray) -> int:
+    def decode(self, register: Register, data: bytes | bytearray) -> int:
         """Return the value of a register's bytes."""
         raw = int.from_bytes(data, register.order)
         return raw if register.sign is None else signed(raw, register.sign)
 
-    def encode(self, register: FeetechRegister, value: int) -> bytes:
+    def encode(self, register: Register, value: int) -> bytes:
         """Return sign and magnitude if the register has a sign."""
         raw = value if register.sign is None else unsigned(value, register.sign)
         return raw.to_bytes(register.size, register.order)

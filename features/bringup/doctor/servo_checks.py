@@ -138,10 +138,7 @@ def _startup(value: int) -> str:
 def _firmware_notes(model: str) -> tuple[tuple[int, Advice], ...]:
     series = dynamixel.MODELS[model].family
     slow = "firmware {found.firmware} has no fast sync read: the loop is slower"
-    moved = "firmware {found.firmware} keeps its indirect data elsewhere (208); that is known"
-    notes = ((dynamixel.FAST_READ_SINCE[series], Advice("warn", slow, f"update it with {WIZARD}")),)
-    wide = (dynamixel.X330_WIDE_INDIRECT_SINCE, Advice("note", moved))
-    return (*notes, wide) if series == "x330" else notes
+    return ((dynamixel.FAST_READ_SINCE[series], Advice("warn", slow, f"update it with {WIZARD}")),)
 
 
 _DYNAMIXEL = ServoChecks(

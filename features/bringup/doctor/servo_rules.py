@@ -12,7 +12,6 @@ from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.drivers.servo_bus.family import Model
-from gazerig.drivers.servo_bus.feedback import nearest_turn
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix
@@ -94,12 +93,8 @@ class ServoState:
 
     @property
     def position(self) -> int | None:
-        """Return its position as a run counts it, None if it was not read."""
-        steps, family = self.values.get("present_position"), self.checks.kind.family
-        if steps is None or not family.single_turn:
-            return steps
-        low, high = self.setup.min_steps, self.setup.max_steps
-        return nearest_turn(steps, low, high, family.steps_per_turn)
+        """Return its position, None if it was not read."""
+        return self.values.get("present_position")
 
     @property
     def model(self) -> Model:
