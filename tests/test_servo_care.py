@@ -284,6 +284,17 @@ def test_one_that_was_silent_gets_no_goals_until_it_holds_its_place_again(sts):
     assert sts.chain.positions_steps()[1] == pytest.approx(2600, abs=8)
 
 
+def test_a_limp_servo_that_restarts_stays_limp(sts):
+    sts.run(0.2, [2000] * 4)
+    sts.bus.set_limp({1})
+    sts.command("brown-out 2")
+    readings = sts.run(2.0, [2100] * 4)
+    assert [r.torque for r in readings] == [True, False, True, True]
+    assert [servo.torque for servo in sts.chain.servos] == [True, False, True, True]
+    sts.bus.set_limp(())
+    assert all(servo.torque for servo in sts.chain.servos)
+
+
 def test_overload_is_named_and_goes(sts):
     sts.run(0.5, [2000] * 4)
     sts.command("overload 2")
