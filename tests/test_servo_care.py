@@ -295,6 +295,24 @@ def test_a_limp_servo_that_restarts_stays_limp(sts):
     assert all(servo.torque for servo in sts.chain.servos)
 
 
+def test_eeprom_that_differs_is_corrected_under_way_without_torque(xl):
+    xl.bus.enable_torque()
+    xl.tick([2000] * 3)
+    xl.chain[2].memory.set("max_position_limit", 2500)
+    xl.chain.faults.command("lose 2 for 0.2")
+    for _ in range(150):
+        xl.tick([2000] * 3)
+    assert xl.chain[2].memory.get("max_position_limit") == 3000
+    assert xl.chain[2].torque and xl.bus.faults() == ()
+
+
+def test_settings_are_kept_without_power(sts):
+    """EEPROM is written with its lock open."""
+    sts.chain[2].restart()
+    names = ("min_position_limit", "max_position_limit", "return_delay_time")
+    assert [sts.chain[2].memory.get(name) for name in names] == [1000, 3000, 0]
+
+
 def test_overload_is_named_and_goes(sts):
     sts.run(0.5, [2000] * 4)
     sts.command("overload 2")
