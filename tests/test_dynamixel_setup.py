@@ -33,6 +33,9 @@ def test_open_writes_what_differs_says_so_and_then_nothing(rig):
     rig.sent.clear()
     rig.open()
     assert [packet for packet in rig.sent if packet[7] == 3] == [] == list(rig.bus.events())
+    servo.write(64, b"\x01")
+    rig.open()
+    assert not servo.torque
 
 
 def test_one_message_names_missing_unexpected_and_wrong_servos_by_joint(rig):
