@@ -102,7 +102,6 @@ DYNAMIXEL = Family(
     lock_register=None,
     error_register="hardware_error_status",
     faults_latch=True,
-    torque_faults=0,
     watchdog_unit_s=WATCHDOG_UNIT_S,
     goal_speed=False,
     single_turn=False,

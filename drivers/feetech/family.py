@@ -90,7 +90,6 @@ FEETECH = Family(
     lock_register="lock",
     error_register="status",
     faults_latch=False,
-    torque_faults=REGISTERS["unloading_condition"].initial or 0,
     watchdog_unit_s=None,
     goal_speed=True,
     single_turn=True,

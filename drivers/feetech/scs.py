@@ -77,7 +77,6 @@ FEETECH_SCS = replace(
     polled=(("torque_enable", "torque_enable"),),
     read_spans=(("return_delay_time", "position_i_gain"), ("lock", "lock")),
     wanted_settings=scs_settings,
-    torque_faults=0x24,
     single_turn=False,
     duplicate_id_registers=("present_position", "moving"),
 )

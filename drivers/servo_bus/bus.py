@@ -13,11 +13,11 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import find
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_bus.faults import CHECK_SUPPLY, SilenceLog
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import PollList
 from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.silence import CHECK_SUPPLY, SilenceLog
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 from gazerig.drivers.servo_bus.sync_read import ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import switch_off

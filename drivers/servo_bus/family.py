@@ -199,7 +199,6 @@ class Family:
         error_register: register of a servo's faults
         faults_latch: whether a fault stays until the servo is restarted; otherwise its bit comes
             and goes
-        torque_faults: bits of transient faults that switch torque off
         watchdog_unit_s: unit of Bus Watchdog; None without a watchdog
         goal_speed: whether a goal includes its speed
         single_turn: whether a servo measures its position within one turn when it starts
@@ -243,7 +242,6 @@ class Family:
     lock_register: str | None
     error_register: str
     faults_latch: bool
-    torque_faults: int
     watchdog_unit_s: float | None
     goal_speed: bool
     single_turn: bool

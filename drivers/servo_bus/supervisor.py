@@ -15,6 +15,7 @@ from gazerig.drivers.event_log import EventLog, RateLimitedLog
 from gazerig.drivers.process.host_lateness import LATE_COMPUTER
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.provisioning import Provisioning
+from gazerig.drivers.servo_bus.silence import BAD_LINE
 from gazerig.drivers.servo_bus.torque import (
     crosses_zero,
     enable,
@@ -48,7 +49,6 @@ ENTRY_S = 0.3
 AGAIN_AND_AGAIN = "restarts again and again: supply too weak"
 FAR_SIDE = "is beyond its encoder's zero: turn it into its range by hand, then restart its power"
 NOT_SET_UP = "cannot be set up again"
-BAD_LINE = "a second servo with its id, or a bad cable"
 
 
 class Supervisor:
