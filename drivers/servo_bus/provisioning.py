@@ -66,12 +66,12 @@ class Provisioning:
             BusLost: the port is lost.
         """
         for _ in range(self._family.correction_passes):
-            differences = self.differences(ids)
+            differences = self._differences(ids)
             if not differences:
                 break
             self._correct(differences)
         else:
-            differences = self.differences(ids)
+            differences = self._differences(ids)
         if differences:
             named = "; ".join(
                 f"{self._setups[servo_id].label()} does not accept "
@@ -91,15 +91,13 @@ class Provisioning:
         # A servo may be set to answer only reads; this write needs no answer and changes that.
         self._registers.write_all(ids, "status_return_level", self._family.answer_level)
         released = switch_off(self._line, ids)
-        left = {*released.holding_ids, *released.unconfirmed_ids}
-        self._raise_missing(ids, set(ids) - left, "torque_enable")
+        self._raise_missing(released.unconfirmed_ids, (), "torque_enable")
+        if released.holding_ids:
+            named = ", ".join(self._setups[i].label() for i in released.holding_ids)
+            raise ServoMissing(f"{self._port_name}: {named} keeps its torque: restart its power")
 
-    def differences(self, ids: Sequence[int]) -> list[Difference]:
-        """Read servos and return the registers with wrong values.
-
-        Raises:
-            ServoMissing: a servo does not answer.
-        """
+    def _differences(self, ids: Sequence[int]) -> list[Difference]:
+        """Read servos and return the registers with wrong values."""
         different, registers = list[Difference](), self._family.registers
         for first, last in self._family.read_spans:
             start, stop = registers[first].address, registers[last].address + registers[last].size
