@@ -78,20 +78,19 @@ class DynamixelChain(ServoChain[DynamixelServo]):
         """
         length = 1 + sum([4 + self.span.unpack(span)[1] for _, span in reads])
         before, crc, pack = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0, CRC.pack
-        pieces, twins = list[Piece](), self._twins
+        pieces = list[Piece]()
         for servo_id, span in reads:
-            servo = self._by_id.get(servo_id)
-            block = b"" if servo is None else self._block(servo, servo_id, span)
-            if servo is None or not block or self._is_muted(servo_id):
+            data, after, delay_s = b"", b"", 0.0
+            for servo in self._by_id.get(servo_id, ()):
+                block = self._block(servo, servo_id, span)
+                if block:
+                    own = before + block
+                    end, delay_s = pack(umts(own, crc)), servo.delay_s
+                    data, after = (merge(data, own), merge(after, end)) if data else (own, end)
+            if not data or self._is_muted(servo_id):
                 break
-            data, start = before + block, crc
-            crc = umts(data, start)
-            after = pack(crc)
-            for twin in twins.get(servo_id, ()) if twins else ():
-                other = before + self._block(twin, servo_id, span)
-                data, after = merge(data, other), merge(after, pack(umts(other, start)))
-                crc = umts(data, start)
-            pieces.append(Piece(servo_id, data, 0.0 if pieces else servo.delay_s))
+            crc = umts(data, crc)
+            pieces.append(Piece(servo_id, data, 0.0 if pieces else delay_s))
             before = after
         if pieces:
             pieces[-1] = pieces[-1]._replace(data=pieces[-1].data + before)

@@ -127,15 +127,11 @@ class ServoChain(ABC, Generic[S]):
 
     def refresh(self) -> None:
         """Read ids and baud rates again; needed after external changes."""
-        self._by_id: dict[int, S] = {}
-        self._twins: dict[int, list[S]] = {}
+        self._by_id: dict[int, list[S]] = {}
         for servo in self.servos:
             servo.on_address = self._mark_stale
             if not self.check_baud or self._client_baud in (None, servo.baud):
-                if servo.id in self._by_id:
-                    self._twins.setdefault(servo.id, []).append(servo)
-                else:
-                    self._by_id[servo.id] = servo
+                self._by_id.setdefault(servo.id, []).append(servo)
         self._stale = False
 
     def _mark_stale(self) -> None:
@@ -249,17 +245,17 @@ class ServoChain(ABC, Generic[S]):
 
     def _answer_all(self, servo_id: int, code: int, params: bytes) -> Piece | None:
         """Execute an instruction on all servos with an id."""
-        # Looked up first: the instruction may change the owner of this id.
-        servo = self._by_id.get(servo_id)
-        if servo is None:
-            return None
-        packet, delay_s = b"", servo.delay_s
-        for one in (servo, *self._twins.get(servo_id, ())) if self._twins else (servo,):
-            if not one.advance(self._now_ms, self._fed_ms):
+        # An answer is sent with the old settings.
+        packet, delay_s = b"", 0.0
+        for servo in self._by_id.get(servo_id, ()):
+            if not servo.advance(self._now_ms, self._fed_ms):
                 continue
-            # An answer is sent with the old settings.
-            answers, flag = one.answers_instruction(code), one.error_flag
-            said = self._carry_out(one, code, params)
+            answers, flag, delay_s = (
+                servo.answers_instruction(code),
+                servo.error_flag,
+                servo.delay_s,
+            )
+            said = self._carry_out(servo, code, params)
             if said is not None and answers:
                 own = self.status(servo_id, said[0] | flag, said[1])
                 packet = merge(packet, own) if packet else own
@@ -292,7 +288,7 @@ class ServoChain(ABC, Generic[S]):
         pieces = list[Piece]()
         for servo_id, params in reads:
             answer = self._answer_all(servo_id, READ, params)
-            if answer is None or not self._by_id[servo_id].answers_groups:
+            if answer is None or not self._by_id[servo_id][0].answers_groups:
                 break
             pieces.append(answer)
         return pieces
@@ -305,23 +301,13 @@ class ServoChain(ABC, Generic[S]):
         address, length = self.span.unpack_from(params)
         if (len(params) - start) % (1 + length):
             return
-        servos, now_ms, fed_ms, twins = self._by_id, self._now_ms, self._fed_ms, self._twins
         for at in range(start, len(params), 1 + length):
-            servo, data = servos.get(params[at]), params[at + 1 : at + 1 + length]
-            if twins:
-                self._write_part(params[at], address, data)
-            elif (
-                servo is not None
-                and servo.followed != (address, data)
-                and servo.advance(now_ms, fed_ms)
-            ):
-                servo.write(address, data)
+            self._write_part(params[at], address, params[at + 1 : at + 1 + length])
 
     def _write_part(self, servo_id: int, address: int, data: bytes) -> None:
-        """Execute one servo's part of a group write."""
-        first = self._by_id.get(servo_id)
-        for servo in () if first is None else (first, *self._twins.get(servo_id, ())):
-            if servo.advance(self._now_ms, self._fed_ms):
+        """Execute one servo's part of a group write, unless it already follows the same goals."""
+        for servo in self._by_id.get(servo_id, ()):
+            if servo.followed != (address, data) and servo.advance(self._now_ms, self._fed_ms):
                 servo.write(address, data)
 
 
