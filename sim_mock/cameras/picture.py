@@ -12,18 +12,19 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from gazerig.drivers.types import ImageArray
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Floats
 from gazerig.robot.description.mesh import Painted, cap, lathe, paint
-from gazerig.robot.description.person_shape import LOOKS, hand, head_parts, torso
+from gazerig.robot.description.person_shape import LOOKS, head_parts, open_right_hand, torso
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 _NEAREST_M = 0.06
 """Nothing nearer is drawn."""
-_FINENESS, _CHEST_M, _HAND_M = 0.4, 0.75, 0.1
+_FINENESS, _HAND_ROWS, _CHEST_M, _HAND_M = 0.4, 26, 0.75, 0.1
 _SLEEVE_M, _WRIST_M = 0.052, 0.028
 _UPPER_ARM_M, _FOREARM_M = 0.30, 0.29
 _SHOULDER_M = np.array((0.10, 0.19, -0.17))
@@ -32,6 +33,7 @@ _SPINE_M, _DARKER = -0.117, 0.85
 """Axis of the chest behind the nose, and brightness of the dark fields of a pattern."""
 _TO_LIGHT: Floats = np.array((-0.52, 0.48, 0.71))
 _AMBIENT, _DIRECT = 0.66, 0.46
+_SMALL_PX2, _OF_SMALL = 1.0, 4
 _SHIFT = 4
 """OpenCV draws polygons with a resolution of 1/16 pixel."""
 
@@ -51,10 +53,19 @@ _STEP_PX = 8
 """Distance of the pixels whose places on the wall are computed; between them they change evenly."""
 
 
-class _Solid(NamedTuple):
-    """A painted shape with its pose in the world; drawn from the farthest to the nearest."""
+class _Shape(NamedTuple):
+    """Triangles in one colour each: corners (n, 3), and of each normal and colour (m, 3), BGR."""
 
-    shape: Painted
+    vertices: Floats
+    faces: NDArray[np.uint32]
+    normals: Floats
+    colours: Floats
+
+
+class _Solid(NamedTuple):
+    """A shape with its pose in the world; drawn from the farthest to the nearest."""
+
+    shape: _Shape
     R: Floats
     p_m: Floats
     distance_m: float
@@ -87,7 +98,7 @@ def _person(person: ScenePerson, number: int, eye_m: Floats) -> list[_Solid]:
     R_head = np.array(rotation((*person.face_yaw_pitch_rad, 0.0)))
     to_eye = eye_m - place
     away_m = float(np.linalg.norm(to_eye))
-    solid, features = head_parts(number, _FINENESS)
+    solid, features = _head(number)
     # The chest is drawn before the head in any case: the neck is in its collar.
     chest = _Solid(_chest(number), _R_towards(to_eye), place, away_m + 0.01)
     found = [chest, _Solid(solid, R_head, place, away_m)]
@@ -97,25 +108,42 @@ def _person(person: ScenePerson, number: int, eye_m: Floats) -> list[_Solid]:
 
 
 @lru_cache(maxsize=8)
-def _chest(number: int) -> Painted:
+def _head(number: int) -> tuple[_Shape, _Shape]:
+    """Return skin and hair, and the features of the face on them."""
+    solid, features = head_parts(number, _FINENESS)
+    return _flat(solid), _flat(features)
+
+
+@lru_cache(maxsize=8)
+def _chest(number: int) -> _Shape:
     """Return a chest in a checked shirt."""
     return _pattern(torso(number, _CHEST_M), _SPINE_M, 7.0, 9.0)
 
 
 @lru_cache(maxsize=8)
-def _palm(number: int) -> Painted:
+def _palm(number: int) -> _Shape:
     """Return an open hand of radius 1."""
-    return _pattern(hand(number), 0.0, 5.0, 7.0)
+    return _pattern(open_right_hand(LOOKS[number % len(LOOKS)], _HAND_ROWS), 0.0, 5.0, 7.0)
 
 
-def _pattern(plain: Painted, axis_x_m: float, around: float, along: float) -> Painted:
+def _pattern(plain: Painted, axis_x_m: float, around: float, along: float) -> _Shape:
     """Return a shape with darker fields around and along an upright axis.
 
     Motion is visible only where the brightness changes.
     """
     x, y, z = plain.mesh.vertices.T
     field = np.sin(around * np.arctan2(y, x - axis_x_m) + 0.4) * np.cos(along * z)
-    return plain._replace(colours=plain.colours * np.where(field > 0.0, _DARKER, 1.0)[:, None])
+    colours = plain.colours * np.where(field > 0.0, _DARKER, 1.0)[:, None]
+    return _flat(plain._replace(colours=colours))
+
+
+def _flat(painted: Painted) -> _Shape:
+    """Return a painted mesh with one normal and colour for each triangle."""
+    vertices, faces = painted.mesh
+    assert painted.normals is not None
+    normals = painted.normals[faces].mean(axis=1)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    return _Shape(vertices, faces, normals, painted.colours[faces].mean(axis=1)[:, ::-1])
 
 
 def _arm(person: ScenePerson, number: int, hand_m: Floats, eye_m: Floats) -> list[_Solid]:
@@ -147,7 +175,7 @@ def _thing(thing: Thing, eye_m: Floats) -> _Solid:
 
 
 def _facing(
-    shape: Painted, p_m: Floats, radius_m: float, turned_rad: float, eye_m: Floats
+    shape: _Shape, p_m: Floats, radius_m: float, turned_rad: float, eye_m: Floats
 ) -> _Solid:
     """Return a shape of radius 1 whose x axis points to the camera, turned about it."""
     R = _R_towards(eye_m - p_m) @ np.array(rotation((0.0, 0.0, -turned_rad)))
@@ -160,16 +188,16 @@ def _R_towards(way: Floats) -> Floats:
 
 
 @lru_cache(maxsize=1)
-def _ball() -> Painted:
+def _ball() -> _Shape:
     """Return a ball of radius 1 in six coloured sectors about x, so that its turns are visible."""
     ball = paint(cap(1.0, pi, 9, 24), (96, 150, 200))
     _, y, z = ball.mesh.vertices.T
     ball.colours[np.sin(3.0 * np.arctan2(z, y)) > 0.0] = (238, 206, 120)
-    return ball
+    return _flat(ball)
 
 
 @lru_cache(maxsize=8)
-def _limb(number: int, is_sleeve: bool) -> Painted:
+def _limb(number: int, is_sleeve: bool) -> _Shape:
     """Return an arm's link of length 1 along z; the radius is in metres."""
     look = LOOKS[number % len(LOOKS)]
     thick = _SLEEVE_M if is_sleeve else 0.75 * _SLEEVE_M
@@ -181,7 +209,7 @@ def _limb(number: int, is_sleeve: bool) -> Painted:
     return _pattern(limb, 0.0, 4.0, 5.0 * pi)
 
 
-def _link(limb: Painted, start_m: Floats, end_m: Floats, eye_m: Floats) -> _Solid:
+def _link(limb: _Shape, start_m: Floats, end_m: Floats, eye_m: Floats) -> _Solid:
     """Return a link between two points."""
     way = end_m - start_m
     length_m = max(float(np.linalg.norm(way)), 1e-6)
@@ -195,24 +223,24 @@ def _link(limb: Painted, start_m: Floats, end_m: Floats, eye_m: Floats) -> _Soli
 
 def _draw_solid(image: ImageArray, seen_by: PinholeView, solid: _Solid) -> None:
     """Draw a shape triangle by triangle, the farthest first, with diffuse shading."""
-    mesh, lens = solid.shape.mesh, seen_by.lens
-    world = solid.scale * mesh.vertices @ solid.R.T + solid.p_m
+    shape, lens = solid.shape, seen_by.lens
+    world = solid.scale * shape.vertices @ solid.R.T + solid.p_m
     seen = (world - np.array(seen_by.p_m)) @ np.array(seen_by.R)
     if seen[:, 2].min() < _NEAREST_M:
         return
     pixels = seen[:, :2] / seen[:, 2:] * (lens.fx_px, lens.fy_px) + (lens.cx_px, lens.cy_px)
     if (pixels.max(axis=0) < 0.0).any() or (pixels.min(axis=0) > seen_by.size_px).any():
         return
-    corners = pixels[mesh.faces]
+    corners = pixels[shape.faces]
     one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    facing = np.flatnonzero(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] < 0.0)
-    facing = facing[np.argsort(-seen[mesh.faces[facing], 2].sum(axis=1))]
-    assert solid.shape.normals is not None
-    normals = solid.shape.normals @ solid.R.T
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    bright = _AMBIENT + _DIRECT * np.clip(normals @ _TO_LIGHT, 0.0, 1.0)
-    lit = np.clip(solid.shape.colours * bright[:, None], 0.0, 255.0)
-    colours = lit[mesh.faces[facing]].mean(axis=1)[:, ::-1].tolist()
+    area = one[:, 1] * other[:, 0] - one[:, 0] * other[:, 1]
+    # A triangle fills at least a pixel: of those that are smaller, some suffice.
+    drawn = (area > _SMALL_PX2) | ((area > 0.0) & (np.arange(len(area)) % _OF_SMALL == 0))
+    facing = np.flatnonzero(drawn)
+    facing = facing[np.argsort(-seen[shape.faces[facing], 2].sum(axis=1))]
+    light = _TO_LIGHT @ (solid.R / np.linalg.norm(solid.R, axis=0))
+    bright = _AMBIENT + _DIRECT * np.clip(shape.normals[facing] @ light, 0.0, 1.0)
+    colours = np.minimum(shape.colours[facing] * bright[:, None], 255.0).tolist()
     fixed = np.rint(corners[facing] * (1 << _SHIFT)).astype(np.int32)
     for triangle, colour in zip(fixed, colours, strict=True):
         cv2.fillConvexPoly(image, triangle, colour, cv2.LINE_8, _SHIFT)
