@@ -93,6 +93,7 @@ class Supervisor:
         self._restarts: dict[int, list[float]] = {servo_id: [] for servo_id in self._ids}
         self._marked: dict[int, float] = {}  # time of the next attempt to set it up
         self._problems: dict[int, tuple[str, int]] = {}  # result of attempts, and their number
+        self._prepared: dict[int, bool] = {}  # only lacks torque; whether it had it
         self._held: set[int] = set()  # gets no goals until it is set up
         self._silent_since_s: dict[int, float] = {}
         self._rearmed: dict[int, float] = {}  # end of its slow way, -inf if it has none
@@ -131,6 +132,7 @@ class Supervisor:
         """Stop supervision, as the servos have no torque."""
         self.engaged, self.limp = False, frozenset()
         self._held.clear()
+        self._prepared.clear()
         self._silent_since_s.clear()
         self._rearmed.clear()
         self._line.starving_s, self._line.starved, self._line.tries = inf, False, TRIES
@@ -225,13 +227,15 @@ class Supervisor:
         """Mark a servo; ``is_held``: it gets no goals until it is set up."""
         if servo_id not in self._marked:
             self._marked[servo_id] = self.due_s = -inf
-        if is_held and self.engaged:
-            self._held.add(servo_id)
+        if is_held:
+            self._prepared.pop(servo_id, None)
+            if self.engaged:
+                self._held.add(servo_id)
 
     # --- after every read
 
     def service(self, group: Collection[int], now_s: float) -> None:
-        """Do the tasks that are due after a read: one servo is set up at most.
+        """Do the tasks that are due after a read: one step of setting up one servo at most.
 
         Args:
             group: Servos that answer.
@@ -271,12 +275,22 @@ class Supervisor:
     # --- one marked servo
 
     def _attend(self, servo_id: int, now_s: float) -> None:
-        """Find out what a marked servo lacks, and set it up if it has no fault."""
-        before, self._line.tries = self._line.tries, 1  # other servos are waiting
+        """Find out what a marked servo lacks, set it up if it has no fault, and give it torque.
+
+        Torque follows in the next read, as other servos are waiting.
+        """
+        arms, position, problem = self.engaged and servo_id not in self.limp, 0, ""
+        before, self._line.tries = self._line.tries, 1
         try:
-            position, problem = self._set_up(servo_id, now_s)
+            if servo_id not in self._prepared:
+                problem = self._prepare(servo_id, arms, now_s)
+                if arms and not problem:
+                    return
+            if not problem:
+                position = self._arm(servo_id, now_s) if arms else self._position(servo_id)
         except (ServoMissing, ServoFault) as error:
-            position, problem = 0, NOT_SET_UP
+            self._prepared.pop(servo_id, None)
+            problem = NOT_SET_UP
             self._pause_until_s = now_s + PAUSE_S  # it takes time that other servos wait
             if isinstance(error, ServoFault):
                 problem = f"{NOT_SET_UP}: {error}"
@@ -303,53 +317,60 @@ class Supervisor:
         if servo_id in self.faults:
             self._clear_fault(servo_id)
             self._log.add(f"{self._line.label(servo_id)}: the fault is gone")
-        arms, at_s = self.engaged and servo_id not in self.limp, self._line.port.now_s()
-        self._feedback.hold(self._slot[servo_id], position, at_s, arms)
+        self._prepared.pop(servo_id, None)
+        self._feedback.hold(self._slot[servo_id], position, self._line.port.now_s(), arms)
 
-    def _set_up(self, servo_id: int, now_s: float) -> tuple[int, str]:
-        """Set a servo up as at the start, holding its position if it shall have torque.
-
-        Returns:
-            Its position, and why it was not set up, "" if it was.
+    def _prepare(self, servo_id: int, arms: bool, now_s: float) -> str:
+        """Set a servo up as at the start, but for its torque; return its fault, "" for none.
 
         Raises:
             ServoMissing: it does not answer or rejects something.
-            ServoFault: it refuses its torque.
         """
-        line, family, setup = self._line, self._family, self._setups[servo_id]
-        ids, arms = (servo_id,), self.engaged and servo_id not in self.limp
+        line, family, setup, ids = self._line, self._family, self._setups[servo_id], (servo_id,)
         line.write_all(ids, "status_return_level", [family.answer_level])
         names = ("torque_enable", "model_number", family.error_register)
         found = [line.ask(ids, name).get(servo_id) for name in names]
         if None in found:
             raise ServoMissing(f"{line.label(servo_id)} does not answer")
         torque, number, bits = found
-        (position,) = read_positions(line, ids)
         if number != family.models[setup.model].number:
-            return position, f"is no longer {setup.model}: exchanged?"
+            return f"is no longer {setup.model}: exchanged?"
         if arms and not torque:
             self._held.add(servo_id)
             self._feedback.set_torque(self._slot[servo_id], False)
         if bits:
-            return position, " and ".join(family.name_errors(bits))
-        if arms and (text := self._misplaced_text(setup, position)):
+            return " and ".join(family.name_errors(bits))
+        if arms and (text := self._misplaced_text(setup, self._position(servo_id))):
             switch_off(line, ids)
-            return position, text
+            return text
         self._provisioning.apply(ids)
         restarts = [t_s for t_s in self._restarts[servo_id] if now_s - t_s < WITHIN_S]
         self._restarts[servo_id] = restarts
         if arms and not torque and len(restarts) >= MOST_RESTARTS:
-            return position, AGAIN_AND_AGAIN
-        if arms:
-            _, outside = enable(line, self._setups, ids, self._watchdog)
-            self._record_rearmed({servo_id: -inf, **outside})
-            line.errors["rearmed"] += 1
-            if not torque:
-                line.errors["restarted"] += 1
-                restarts.append(now_s)
-                self._log.add(f"{line.label(servo_id)} restarted: set up again")
-            (position,) = read_positions(line, ids)
-        return position, ""
+            return AGAIN_AND_AGAIN
+        self._prepared[servo_id] = bool(torque)
+        return ""
+
+    def _arm(self, servo_id: int, now_s: float) -> int:
+        """Give a prepared servo torque; return its position.
+
+        Raises:
+            ServoMissing: it does not answer or rejects something.
+            ServoFault: it refuses its torque.
+        """
+        line = self._line
+        (position,), outside = enable(line, self._setups, (servo_id,), self._watchdog)
+        self._record_rearmed({servo_id: -inf, **outside})
+        line.errors["rearmed"] += 1
+        if not self._prepared[servo_id]:
+            line.errors["restarted"] += 1
+            self._restarts[servo_id].append(now_s)
+            self._log.add(f"{line.label(servo_id)} restarted: set up again")
+        return self._position(servo_id) if outside else position
+
+    def _position(self, servo_id: int) -> int:
+        (position,) = read_positions(self._line, (servo_id,))
+        return position
 
     def _misplaced_text(self, setup: ServoConfig, position: int) -> str:
         """Return why a servo must get no torque where it is, "" if it may."""
