@@ -91,7 +91,7 @@ class Bodies(Struct, frozen=True, gc=False):
     def rows(self) -> "BodyRows":
         """Return the bodies as plain numbers."""
         columns = self.p_world_m, self.v_world_m_s, self.w_world_rad_s
-        return BodyRows(self.ids, self.kinds, *([vec(row) for row in one] for one in columns))
+        return BodyRows(self.ids, self.kinds, *([*map(tuple, one.tolist())] for one in columns))
 
 
 class BodyRows(NamedTuple):

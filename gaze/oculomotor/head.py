@@ -378,13 +378,12 @@ class HeadModel:
         both_eyes_rad: eccentricity up to which both eyes converge on the target point
         """
         self._share = self._share_for(target, both_eyes_rad)
-        self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
-        soon_rad = facing_rad if soon_rad is None else soon_rad
+        there = direction(facing_rad)
+        self._decide(target, facing_rad, there, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
         if self._pursues and target.kind == AWAY and eccentricity_rad < _FARTHEST_AWAY_RAD:
-            ahead = add(direction(facing_rad), scale(self._drift, self.foresees_s))
-            soon_rad = yaw_pitch(ahead)
-        if self._is_in_sustained_motion(facing_rad, soon_rad, since_eye_onset_s, t_s):
-            self._pursue(target, facing_rad, soon_rad, t_s)
+            soon_rad = yaw_pitch(add(there, scale(self._drift, self.foresees_s)))
+        if self._is_in_sustained_motion(there, soon_rad, since_eye_onset_s, t_s):
+            self._pursue(target, facing_rad, facing_rad if soon_rad is None else soon_rad, t_s)
         since_s = t_s - self._planned_s
         if since_s >= self._lasts_s:
             return self.clip_to_range(self._goal)
@@ -398,12 +397,16 @@ class HeadModel:
         self,
         target: Target,
         facing: Angles2,
+        there: Vec3,
         gaze: Angles2,
         eccentricity: float,
         since_onset: float,
         t_s: float,
     ) -> None:
-        """Choose between turning to the target, recentring an eccentric eye, and rest."""
+        """Choose between turning to the target, recentring an eccentric eye, and rest.
+
+        there: direction of ``facing``
+        """
         share, trigger_rad = self._share, self._trigger_rad(target)
         moving, is_face = t_s < self._ends_s, target.kind in _FACES
         if (target.kind, target.id) != self._target:
@@ -425,13 +428,13 @@ class HeadModel:
         elif (
             not moving
             and self._start is not self._goal_direction
-            and angle_between(self._goal_direction, direction(facing)) < trigger_rad
+            and angle_between(self._goal_direction, there) < trigger_rad
         ):
             self._start = self._goal_direction
         comfort_rad, aside_rad = self._comfort_rad, eccentricity
         if is_face:
             comfort_rad *= _BEFORE_FACE
-            aside_rad = angle_between(self._goal_direction, direction(facing))
+            aside_rad = angle_between(self._goal_direction, there)
         if aside_rad <= comfort_rad:
             self._aside_since_s = t_s
         wait_s = _RECENTRE_S + self._later * _RECENTRE_SPREAD_S
@@ -445,14 +448,14 @@ class HeadModel:
             self._follows = self._relieves = False
         if self._relieves:
             relief_rad = min(self._relief * comfort_rad, share.trigger_rad)
-            self._follow(target, facing, gaze, relief_rad, t_s)
+            self._follow(target, facing, there, gaze, relief_rad, t_s)
         elif self._follows:
-            arc_rad = angle_between(self._start, direction(facing))
+            arc_rad = angle_between(self._start, there)
             steeper = self._steeper * _SLOPE_SD
             short_rad = share.undershoot_rad(target.salience, arc_rad, steeper)
             if target.kind == SEARCH:
                 short_rad = min(short_rad, _SEARCH_RAD)
-            self._follow(target, facing, gaze, short_rad, t_s)
+            self._follow(target, facing, there, gaze, short_rad, t_s)
 
     def _is_urgent(self, target: Target) -> bool:
         """Return whether a rule's target matters so much that the head does not wait."""
@@ -483,15 +486,15 @@ class HeadModel:
             )
 
     def _is_in_sustained_motion(
-        self, facing: Angles2, soon: Angles2, since_onset: float, t_s: float
+        self, there: Vec3, soon: Angles2 | None, since_onset: float, t_s: float
     ) -> bool:
         """Return whether the target is in sustained motion, which the head pursues."""
         dt_s, self._stepped_s = t_s - self._stepped_s, t_s
         if not self._people:
             return False
         least, v = _PURSUES_RAD_S, _NO_DRIFT
-        if soon is not facing:
-            v = scale(sub(direction(soon), direction(facing)), 1.0 / _FORESEES_S)
+        if soon is not None:
+            v = scale(sub(direction(soon), there), 1.0 / _FORESEES_S)
             v = scale(v, min(1.0, _FASTEST * least / max(norm(v), 1e-9)))
         new = 1.0 - exp(-max(0.0, dt_s) / _MEAN_S)
         self._drift = add(self._drift, scale(sub(v, self._drift), new))
@@ -517,25 +520,31 @@ class HeadModel:
         self._planned_s, self._lasts_s, self._ends_s = t_s, _PURSUES_S, t_s + _PURSUES_S
 
     def _follow(
-        self, target: Target, facing: Angles2, gaze: Angles2, short_rad: float, t_s: float
+        self,
+        target: Target,
+        facing: Angles2,
+        there: Vec3,
+        gaze: Angles2,
+        short_rad: float,
+        t_s: float,
     ) -> None:
         """Turn towards the target, but never away from it only because its salience has decreased.
 
         A person who steps aside is most salient while moving; with the larger offset of a still
         person the head would swing back from its new direction.
         """
-        way, to_centre = self._goal_direction, direction(facing)
-        to_gaze = to_centre if gaze is facing else direction(gaze)
-        near_enough = angle_between(way, to_centre) <= short_rad + _ROUNDING_RAD
+        way = self._goal_direction
+        to_gaze = there if gaze is facing else direction(gaze)
+        near_enough = angle_between(way, there) <= short_rad + _ROUNDING_RAD
         in_reach = angle_between(way, to_gaze) <= self._share.reach_rad + _ROUNDING_RAD
         moving, start = t_s < self._ends_s, self._start
-        arc_rad = angle_between(start, to_centre)
+        arc_rad = angle_between(start, there)
         if near_enough and in_reach and not (moving and angle_between(start, way) > arc_rad):
             return
         if moving:
             # From the point where it can stop, unless that is past the target.
             stop = self._extrapolated_direction(t_s, _BRAKES_S)
-            start = stop if angle_between(start, stop) <= arc_rad else to_centre
+            start = stop if angle_between(start, stop) <= arc_rad else there
         goal = self._reachable_goal(target, facing, gaze, short_rad, start, self._share)
         self._plan_to(goal, t_s)
 
