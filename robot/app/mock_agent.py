@@ -1,6 +1,6 @@
 """A simulated voice agent: it reports the turns of a script to the head, as a real one does."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import dist
 from typing import Protocol, runtime_checkable
 
@@ -46,18 +46,19 @@ class MockAgent:
         """Begin a script at the next tick, once; a person in it is the nearest one. Thread-safe."""
         self._asked = acts
 
-    def update(self, tick: Tick, start_s: float | None = None) -> None:
+    def update(self, tick: Tick, start_s: Callable[[], float | None] = lambda: None) -> None:
         """Report what has become due.
 
         Args:
             tick: the newest tick.
-            start_s: start of the scene; None: the first tick.
+            start_s: returns the start of the scene; None: the first tick.
         """
         if self._asked:
             self._scene, self._acts, self._round_s = None, self._asked, 0.0
             self._start_s, self._next, self._asked = tick.t_s, 0, ()
         if self._start_s is None:
-            self._start_s = tick.t_s if start_s is None else start_s
+            begun_s = start_s()
+            self._start_s = tick.t_s if begun_s is None else begun_s
         while self._next < len(self._acts):
             act = self._acts[self._next]
             if tick.t_s - self._start_s < act.at_s:

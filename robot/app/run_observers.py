@@ -333,9 +333,12 @@ class RunObservers:
 
     def _report_talk(self, tick: Tick) -> None:
         """Let the simulated voice agent report its turns."""
+        self._agent.update(tick, self._scene_start_s)
+
+    def _scene_start_s(self) -> float | None:
+        """Return the start of the scene, None before or without one."""
         room = self._made.room
-        start_s = room.start_s() if room is not None else scene_start_s(self._made.robot.camera)
-        self._agent.update(tick, start_s)
+        return room.start_s() if room is not None else scene_start_s(self._made.robot.camera)
 
     def _play_talk(self) -> str:
         """Play a minute of conversation with the nearest person; return a message."""

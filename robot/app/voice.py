@@ -346,10 +346,8 @@ class RunVoice:
     def update(self, tick: Tick) -> tuple[str, ...]:
         """Store a tick, and return lines for its events; called by the loop."""
         self._tick = tick
-        seen = (
-            tick.stopped,
-            *[(one.number, one.end_reason) for one in tick.tracks],
-        )
+        ends = [(one.number, one.end_reason) for one in tick.tracks] if tick.tracks else []
+        seen = (tick.stopped, ends)
         if seen != self._seen:
             self._seen = seen
             if not self._fast and (

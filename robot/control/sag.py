@@ -4,8 +4,8 @@ A servo without an integral part holds a load only with a sufficiently large err
 follows from the load and the servo's P gain, so the goal is moved by it in the opposite direction.
 """
 
-from collections.abc import Iterator, Sequence
-from math import radians
+from collections.abc import Iterable, Iterator, Sequence
+from math import inf, radians
 
 from gazerig.robot.description.statics import Statics
 
@@ -27,11 +27,12 @@ class SagCompensation:
     """
 
     def __init__(self, statics: Statics, names: Sequence[str]) -> None:
-        self._places = tuple((i, name) for i, name in enumerate(names) if name in statics.joints)
-        self._at: tuple[float, ...] = ()
-        self._wanted: tuple[float, ...] = ()
+        found = [(i, name) for i, name in enumerate(names) if name in statics.joints]
+        self._numbers, self._names = [i for i, _ in found], [name for _, name in found]
+        self._at = [inf] * len(found)
+        self._wanted: list[float] = []
         self._statics = statics
-        joints = [statics.joints[name] for _, name in self._places]
+        joints = [statics.joints[name] for name in self._names]
         self._stiffness = [joint.model_facts.stiffness(joint.gains) for joint in joints]
         linkages = [joint.make_linkage() for joint in joints]
         self._steepest = [linkage.steepest for linkage in linkages]
@@ -40,37 +41,33 @@ class SagCompensation:
 
     def restart(self) -> None:
         """Start with unchanged goals, because torque has just been switched on."""
-        self._now: tuple[float, ...] = (0.0,) * len(self._places)
+        self._now = [0.0] * len(self._names)
         self._last_s: float | None = None
 
-    def offsets(self, command_rad: Sequence[float], t_s: float) -> tuple[tuple[int, float], ...]:
+    def offsets(self, command_rad: Sequence[float], t_s: float) -> Iterable[tuple[int, float]]:
         """Return the change of goals in steps, by the number of the joint.
 
         Args:
             command_rad: desired joint angles.
             t_s: time of the last reading.
         """
-        at = tuple([command_rad[i] for i, _ in self._places])
-        if not self._at or max(map(_distance, at, self._at)) > _NEW_RAD:
-            self._at = at
-            self._wanted = tuple(self._wanted_steps(at))
+        for i, at in zip(self._numbers, self._at, strict=True):
+            if abs(command_rad[i] - at) > _NEW_RAD:
+                self._at = [command_rad[k] for k in self._numbers]
+                self._wanted = [*self._wanted_steps(self._at)]
+                break
         if self._now != self._wanted:
             since = 0.0 if self._last_s is None else max(0.0, t_s - self._last_s)
             room = radians(FASTEST_DEG_S) * since
-            self._now = tuple(
-                _approach(now, wanted, room * steepest)
-                for now, wanted, steepest in zip(
-                    self._now, self._wanted, self._steepest, strict=True
-                )
-            )
+            rows = zip(self._now, self._wanted, self._steepest, strict=True)
+            self._now = [_approach(now, wanted, room * steep) for now, wanted, steep in rows]
         self._last_s = t_s
-        return tuple([(i, steps) for (i, _), steps in zip(self._places, self._now, strict=True)])
+        return zip(self._numbers, self._now, strict=True)
 
     def _wanted_steps(self, at: Sequence[float]) -> Iterator[float]:
-        pose = {name: angle for (_, name), angle in zip(self._places, at, strict=True)}
-        shares = self._statics.drive_shares(pose)
-        for (_, name), stiff, steepest, rising in zip(
-            self._places, self._stiffness, self._steepest, self._rising, strict=True
+        shares = self._statics.drive_shares(dict(zip(self._names, at, strict=True)))
+        for name, stiff, steepest, rising in zip(
+            self._names, self._stiffness, self._steepest, self._rising, strict=True
         ):
             if not stiff:
                 yield 0.0
@@ -84,7 +81,3 @@ def _approach(now: float, wanted: float, room: float) -> float:
     if abs(wanted - now) <= room:
         return wanted
     return now + room if wanted > now else now - room
-
-
-def _distance(a: float, b: float) -> float:
-    return abs(a - b)
