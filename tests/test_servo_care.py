@@ -36,6 +36,14 @@ def sts(started):
     return copied(started)
 
 
+def test_a_stranger_is_named_where_a_servo_is_missing():
+    specs = [ServoSpec(i, "sts3215", 2000) for i in (1, 9)]
+    setups = [ServoConfig(i, "sts3215", 1000, 3000, 3000.0, NAMES[i - 1]) for i in (1, 2)]
+    told = r"jaw \(servo 2\) does not answer; unexpected: servo 9 \(sts3215\).*the missing one"
+    with pytest.raises(ServoMissing, match=told):
+        StsRig(specs, setups).bus.open()
+
+
 # --- torque comes on
 
 
