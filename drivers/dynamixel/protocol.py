@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 
 from fastcrc.crc16 import umts
 
-from gazerig.drivers.servo_bus.family import Frame, Identity, Status
+from gazerig.drivers.servo_bus.family import AnswerFrame, Identity, Status
 
 HEADER = b"\xff\xff\xfd\x00"
 RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
@@ -86,7 +86,7 @@ def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes
     return instruction(BROADCAST, SYNC_WRITE, _SPAN.pack(address, size) + body)
 
 
-class GoalWrite:
+class GoalPositionWrite:
     """Builder of packets that write the goals (116..119) of a fixed set of servos."""
 
     def __init__(self, ids: Sequence[int]) -> None:
@@ -123,16 +123,16 @@ def parse_statuses(raw: bytes) -> list[Status]:
     return found
 
 
-def answer_frame(ids: Sequence[int], length: int, fast: bool) -> Frame:
+def answer_frame(ids: Sequence[int], length: int, fast: bool) -> AnswerFrame:
     """Return the frame of the answer to a sync read of ``length`` bytes, fast or not."""
     count = len(ids)
     if not fast:
         heads = [_HEAD.pack(HEADER, i, length + 4, STATUS) + b"\x00" for i in ids]
-        return Frame(b"", heads, "H", f"{length + 9}s2x" * count, _are_intact)
+        return AnswerFrame(b"", heads, "H", f"{length + 9}s2x" * count, _are_intact)
     front = _HEAD.pack(HEADER, BROADCAST, (length + 4) * count + 1, STATUS)
     # Each part reaches from the previous CRC, or the begin, up to a servo's CRC.
     parts = f"{len(front) + length + 2}s" + f"{length + 4}s" * (count - 1) + "2x"
-    return Frame(front, [bytes((0, i)) for i in ids], "H", parts, _are_chained)
+    return AnswerFrame(front, [bytes((0, i)) for i in ids], "H", parts, _are_chained)
 
 
 def _are_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from typing import Literal
 from zlib import adler32
 
-from gazerig.drivers.servo_bus.family import Frame, Identity, Status
+from gazerig.drivers.servo_bus.family import AnswerFrame, Identity, Status
 
 HEADER = b"\xff\xff"
 BROADCAST = 0xFE
@@ -149,10 +149,10 @@ def parse_statuses(raw: bytes) -> list[Status]:
     return kept
 
 
-def answer_frame(ids: Sequence[int], length: int, fast: bool) -> Frame:
+def answer_frame(ids: Sequence[int], length: int, fast: bool) -> AnswerFrame:
     """Return the frame of the answer to a sync read of ``length`` bytes; ``fast``: not known."""
     heads = [HEADER + bytes((servo_id, length + 2, 0)) for servo_id in ids]
-    return Frame(b"", heads, "B", f"2x{length + 4}s" * len(ids), _are_intact)
+    return AnswerFrame(b"", heads, "B", f"2x{length + 4}s" * len(ids), _are_intact)
 
 
 def _are_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:

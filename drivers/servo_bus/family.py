@@ -129,7 +129,7 @@ class Window(NamedTuple):
         return struct.calcsize(self.layout)
 
 
-class Frame(NamedTuple):
+class AnswerFrame(NamedTuple):
     """The bytes around the registers in an answer of several servos without errors.
 
     front: bytes before those of the first servo

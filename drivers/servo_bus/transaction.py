@@ -21,8 +21,8 @@ ROOM = 4096
 """Largest number of bytes read at once from a line that does not fall silent."""
 
 
-class Answers(NamedTuple):
-    """Answers to one request.
+class GroupAnswers(NamedTuple):
+    """GroupAnswers to one request.
 
     good: intact answers by id, refusals included
     damaged: servos whose answers arrived damaged or disagree
@@ -34,7 +34,7 @@ class Answers(NamedTuple):
 
 def sort_answers(
     statuses: Iterable[Status], ids: Collection[int], length: int, refusal: int
-) -> Answers:
+) -> GroupAnswers:
     """Return the answers of some servos with ``length`` params, or with bits of ``refusal``.
 
     Two equal answers are an echo; two different ones are those of two servos with one id.
@@ -51,7 +51,7 @@ def sort_answers(
             twofold.add(status.id)
     for servo_id in twofold:
         del good[servo_id]
-    return Answers(good, (damaged - good.keys()) | twofold)
+    return GroupAnswers(good, (damaged - good.keys()) | twofold)
 
 
 def read_some(port: BusPort, deadline_s: float) -> bytes:
@@ -175,7 +175,7 @@ class Transactions:
         length: int,
         deadline_s: float,
         parse: Callable[[bytes], list[Status]],
-    ) -> Answers:
+    ) -> GroupAnswers:
         """Return the answers in received bytes, after waiting for those that have not arrived.
 
         Args:
