@@ -248,10 +248,11 @@ class Struck:
             assert own_speed or abs(now - was) <= most, f"servo {i}: {was} -> {now}"
         self.before_s, self.before, self.count = began_s, places, self.count + 1
         if self.count % 5 == 0 or any(outside):
+            holding = bench.holding()
             for i, goal in enumerate(bench.true_goals_steps()):
                 weak = own_speed and bench.name in FEETECH  # noise passes a check of one byte
                 assert goal is None or weak or kind.low <= goal <= kind.high, f"{i} has goal {goal}"
-                if goal is None:
+                if not holding[i]:
                     self.fallen.add(i)
                 elif not outside[i]:
                     self.fallen.discard(i)
