@@ -78,5 +78,5 @@ def test_a_line_is_disturbed_for_a_while_after_a_damaged_answer():
     for later_s, believed in ((DISTURBED_S - 0.1, False), (DISTURBED_S + 0.1, True)):
         plausible = known(1000)
         plausible.record_damaged(1.0)
-        assert plausible.is_plausible(0, 1000, 0.995 + later_s)
+        plausible.record(0, 1000, 0.995 + later_s)
         assert plausible.is_plausible(0, 1060, 1.0 + later_s) == believed

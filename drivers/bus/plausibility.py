@@ -31,8 +31,8 @@ DISTURBED_S = 5.0
 NEAR_STEPS, NEAR_LATE_S = 4, 0.002
 """Distance allowed on a disturbed line from the way at the speed so far, and jitter of times."""
 
-HARDEST_STEPS_S2 = 150_000.0
-"""Highest acceleration of a joint: a small servo reaches full speed in 30 ms."""
+FULL_SPEED_S = 0.03
+"""A small servo reaches full speed in this time."""
 
 
 class _Place(NamedTuple):
@@ -132,6 +132,12 @@ class Plausibility:
         way, reach = position - place.steps, self._free[slot] + self._pace[slot] * since_s
         if at_s >= self.disturbed_until_s:
             return abs(way) <= reach
+        if since_s > FULL_SPEED_S:  # it may be anywhere: only agreeing answers are believed
+            return False
         ahead = since_s * place.speed_steps_s
-        room = NEAR_STEPS + NEAR_LATE_S * abs(place.speed_steps_s) + HARDEST_STEPS_S2 * since_s**2
+        room = (
+            NEAR_STEPS
+            + NEAR_LATE_S * abs(place.speed_steps_s)
+            + self._fastest[slot] / FULL_SPEED_S * since_s**2
+        )
         return -min(reach, room - min(0.0, ahead)) <= way <= min(reach, room + max(0.0, ahead))
