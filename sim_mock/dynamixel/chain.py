@@ -54,13 +54,15 @@ class DynamixelChain(ServoChain[DynamixelServo]):
     def _execute_group(self, code: int, params: bytes) -> list[Piece]:
         """Execute an instruction to all servos."""
         if code == FAST_SYNC_READ:
-            return self._answer_fast(self._reads(params))
+            if len(params) <= self.span.size:
+                return []
+            address, size = self.span.unpack_from(params)
+            return self._answer_fast([(one, address, size) for one in params[self.span.size :]])
         if code in (BULK_READ, FAST_BULK_READ) and len(params) % _ROW.size == 0:
-            reads = [
-                (params[at], params[at + 1 : at + _ROW.size])
-                for at in range(0, len(params), _ROW.size)
-            ]
-            return self._answer_reads(reads) if code == BULK_READ else self._answer_fast(reads)
+            if code == FAST_BULK_READ:
+                return self._answer_fast([*_ROW.iter_unpack(params)])
+            starts = range(0, len(params), _ROW.size)
+            return self._answer_reads([(params[at], params[at + 1 : at + 5]) for at in starts])
         if code == BULK_WRITE:
             at = 0
             while len(params) - at > _ROW.size:
@@ -71,38 +73,41 @@ class DynamixelChain(ServoChain[DynamixelServo]):
             return []
         return super()._execute_group(code, params)
 
-    def _answer_fast(self, reads: Sequence[tuple[int, bytes]]) -> list[Piece]:
+    def _answer_fast(self, reads: Sequence[tuple[int, int, int]]) -> list[Piece]:
         """Return one packet of all answers in their pieces; a missing block ends it.
 
         The CRC of a block counts for the next piece, as its sender continues from it.
         """
-        length = 1 + sum([4 + self.span.unpack(span)[1] for _, span in reads])
+        length = 1 + sum([4 + read[2] for read in reads])
         before, crc, pack = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0, CRC.pack
-        pieces = list[Piece]()
-        for servo_id, span in reads:
-            data, after, delay_s = b"", b"", 0.0
+        pieces, faulty = list[Piece](), self._wire.has_any
+        for servo_id, address, size in reads:
+            data, after, following, delay_s = b"", b"", 0, 0.0
             for servo in self._by_id.get(servo_id, ()):
-                block = self._block(servo, servo_id, span)
+                block = self._block(servo, servo_id, address, size)
                 if block:
                     own = before + block
-                    end, delay_s = pack(umts(own, crc)), servo.delay_s
-                    data, after = (merge(data, own), merge(after, end)) if data else (own, end)
-            if not data or self._is_muted(servo_id):
+                    following, delay_s = umts(own, crc), servo.delay_s
+                    end = pack(following)
+                    if data:  # of another servo with this id
+                        own, end = merge(data, own), merge(after, end)
+                        following = umts(own, crc)
+                    data, after = own, end
+            if not data or (faulty and self._is_muted(servo_id)):
                 break
-            crc = umts(data, crc)
+            crc = following
             pieces.append(Piece(servo_id, data, 0.0 if pieces else delay_s))
             before = after
         if pieces:
             pieces[-1] = pieces[-1]._replace(data=pieces[-1].data + before)
         return pieces
 
-    def _block(self, servo: DynamixelServo, servo_id: int, span: bytes) -> bytes:
+    def _block(self, servo: DynamixelServo, servo_id: int, address: int, size: int) -> bytes:
         """Return a servo's part of a fast read; it fills the part of a refused read with zeros."""
         if not servo.advance(self._now_ms, self._fed_ms):
             return b""
         if not servo.fast_reads or not servo.answers_instruction(READ):
             return b""
-        address, size = self.span.unpack(span)
         data, error = servo.read(address, size), servo.error_flag
         if data is None:
             data, error = bytes(size), error | ACCESS

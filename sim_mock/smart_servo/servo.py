@@ -245,8 +245,9 @@ class EmulatedServo(ABC):
 
     def answers_instruction(self, code: int) -> bool:
         """Return whether it answers an instruction that addresses it alone."""
-        needed = 0 if code == PING else self.read_level if code == READ else self.answer_level
-        return self._status_level >= needed
+        if code == READ:
+            return self._status_level >= self.read_level
+        return code == PING or self._status_level >= self.answer_level
 
     def identity(self) -> bytes:
         """Return the parameters of the answer to a ping."""
