@@ -293,13 +293,13 @@ def test_fix_leaves_a_servo_alone_whose_torque_is_on(kind):
     ("kind", "value", "fault", "says"),
     [
         (DYNAMIXEL, 255, "clear", "does not take it"),
-        (DYNAMIXEL, 0, "lose 7", "does not answer"),
-        (FEETECH, 0, "lose 7", "does not answer"),
+        (DYNAMIXEL, 3, "lose 7", "does not answer"),
+        (FEETECH, 3, "lose 7", "does not answer"),
     ],
 )
 def test_a_servo_that_does_not_take_it_is_said(kind, value, fault, says):
     rig = Rig(kind)
-    fix = Diagnostic("warn", "w", YAW, "", (Fix(7, "return_delay_time", 3, value),))
+    fix = Diagnostic("warn", "w", YAW, "", (Fix(7, "return_delay_time", value, 0),))
     rig.command(fault)
     (done,) = rig.fix([fix])
     assert "not done" in done and says in done
