@@ -59,7 +59,7 @@ class Lx16aChain:
         self, servos: list[EmulatedLx16a], now_s: Callable[[], float], seed: int = 0
     ) -> None:
         self.servos, self.now_s = {servo.id: servo for servo in servos}, now_s
-        self.faults = ChainFaults(self, COMMANDS, seed, p.HEADER)
+        self.faults = ChainFaults(self, COMMANDS, seed)
         self._rest = b""
         for servo in servos:
             servo.advance(now_s())
