@@ -7,22 +7,12 @@ import pytest
 from bus_kinds import in_process
 
 from gazerig.drivers.errors import PortError, ServoMissing
-from gazerig.drivers.process.host_lateness import AFTERMATH_S, BUSY, WITHIN_S, HostLateness
+from gazerig.drivers.process.host_lateness import AFTERMATH_S, HostLateness
 from gazerig.drivers.serial.port import BlockingPort
 
 KINDS = ("dynamixel", "feetech", "maestro", "pca9685")
 BLAME = r"check|cable\b|with its id|program|supply too weak"
 """Words that name something else than this computer."""
-
-
-def test_few_late_answers_are_no_busy_computer():
-    lateness = HostLateness()
-    for k in range(BUSY - 1):
-        lateness.record_late_answer(5.0 + 0.01 * k)
-    assert lateness.late_answers(5.1) == 0
-    lateness.record_late_answer(5.1)
-    assert lateness.late_answers(5.1) == BUSY
-    assert lateness.late_answers(5.2 + WITHIN_S) == 0
 
 
 def test_what_servos_do_soon_after_a_late_computer_is_put_down_to_it():

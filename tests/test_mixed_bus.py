@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from feedback_rows import Row, feedback_of, rows
 
-from gazerig.drivers.bus.multi_bus import AGAIN_S, IN_A_ROW, BusShare, MultiBus
+from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.types import BusHealth, ServoConfig
 
@@ -148,26 +148,3 @@ def test_goals_that_cannot_be_reach_no_bus_at_all(mixture, goals):
     with pytest.raises(ValueError, match="not a number|goals for 5 servos"):
         mixture.bus.write(goals)
     assert mixture.reported() == []
-
-
-def test_a_silent_bus_is_asked_seldom_until_it_answers_or_is_opened_again(mixture):
-    mixture.b.silent = True
-    for k in range(100):
-        assert steps(rows(mixture.bus.read(0.01 * k))) == [None, 11, None, 13, 14]
-    assert len(mixture.a.reads_s) == 100
-    # So many in a row, and then five a second.
-    assert mixture.b.reads_s[:IN_A_ROW] == [0.0, 0.01, 0.02]
-    assert len(mixture.b.reads_s) == IN_A_ROW + int(0.97 / AGAIN_S)
-    mixture.b.silent = False
-    answered = [rows(mixture.bus.read(1.0 + 0.01 * k))[0] is not None for k in range(30)]
-    assert answered.index(True) * 0.01 <= AGAIN_S
-    assert all(answered[answered.index(True) :])
-    mixture.b.silent = True
-    for k in range(10):
-        mixture.bus.read(2.0 + 0.01 * k)
-    mixture.reported()
-    mixture.bus.close()
-    mixture.b.silent = False
-    mixture.bus.open()
-    assert mixture.reported() == ["a close", "b close", "a open", "b open"]
-    assert None not in rows(mixture.bus.read(2.1))

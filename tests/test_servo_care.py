@@ -300,7 +300,7 @@ def test_one_that_was_silent_gets_no_goals_until_it_holds_its_place_again(sts):
     assert goals and all(list(p[7:-1:7]) == [1, 3, 4] for p in goals)
     sts.command("clear")
     seen = [row for row in (sts.tick([2600] * 4)[1] for _ in range(120)) if row is not None]
-    assert [row.rearmed for row in seen].count(True) == 1 and seen[1].rearmed
+    assert [row.rearmed for row in seen].count(True) == 1 and seen[0].rearmed
     assert sts.chain.positions_steps()[1] == pytest.approx(2600, abs=8)
 
 

@@ -7,10 +7,12 @@ from typing import Any
 import pytest
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.protocol import checksum
+from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, PollList, silent_servos
+from gazerig.drivers.servo_bus.poll_list import AGAIN_S, PollList, silent_servos
 from gazerig.drivers.servo_bus.sync_read import GroupRead
 from gazerig.drivers.servo_bus.transaction import sort_answers
 from gazerig.drivers.types import ServoConfig
@@ -176,35 +178,36 @@ def test_only_those_who_kept_silent_themselves_are_blamed(heard, blamed):
     assert silent_servos(IDS, heard) == blamed
 
 
-def test_a_silent_servo_is_asked_at_once_then_ever_more_seldom():
-    polled = PollList(IDS)
-    now_s = 10.0
-    polled.record_silent(1, now_s)
-    assert (polled.group, polled.next_due(now_s)) == ((4, 9), 1)
-    waits = []
-    for _ in range(6):
-        polled.record_silent(1, now_s)
-        start_s = now_s
-        while polled.next_due(now_s) is None:
-            now_s += AGAIN_FIRST_S / 4
-        waits.append(now_s - start_s)
-    assert waits == [0.0625, 0.125, 0.25, 0.5, 0.5, AGAIN_LAST_S]
-    assert polled.record_answer(1)
+def poll_list():
+    return PollList({i: f"servo {i}" for i in IDS}, EventLog(), HostLateness())
+
+
+def test_silent_servos_are_read_at_once_then_in_turn():
+    polled = poll_list()
+    polled.record_silent(1, 10.0)
+    assert (polled.group, polled.next_due(10.0)) == ((4, 9), 1)
+    polled.record_silent(1, 10.0)
+    assert (polled.next_due(10.0), polled.next_due(10.0 + AGAIN_S)) == (None, 1)
+    polled.record_silent(9, 10.1)
+    polled.record_silent(9, 10.1)
+    assert (polled.next_due(10.2), polled.next_due(10.1 + AGAIN_S), polled.group) == (None, 1, (4,))
+    polled.record_answer(1)  # the other one may be back, too
+    assert (polled.group, polled.next_due(10.25)) == ((4, 1), 9)
+    polled.record_answer(9)
     assert (polled.group, polled.is_troubled) == (IDS, False)
-    assert not polled.record_answer(1)
 
 
-def test_where_all_are_out_somebody_is_always_asked_and_one_answer_calls_all_back():
-    polled = PollList(IDS)
+def test_where_all_are_silent_one_answer_calls_all_back():
+    polled = poll_list()
     for servo_id in IDS * 2:
         polled.record_silent(servo_id, 1.0)
-    assert (polled.group, polled.next_due(1.0)) == ((), 4)
-    assert polled.record_answer(1)
-    assert (polled.group, polled.next_due(1.0)) == (IDS, None)
+    assert (polled.group, polled.next_due(1.0 + AGAIN_S)) == ((), 4)
+    polled.record_answer(1)
+    assert (polled.group, polled.next_due(9.0)) == (IDS, None)
 
 
 def test_damage_three_times_in_a_row_takes_a_servo_out():
-    polled = PollList(IDS)
+    polled = poll_list()
     for _ in range(2):
         polled.record_damaged(9, 0.0)
     polled.record_answer(9)

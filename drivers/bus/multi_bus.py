@@ -4,19 +4,12 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from contextlib import ExitStack, suppress
 from itertools import chain
-from math import inf, isfinite
+from math import isfinite
 from typing import NamedTuple
 
 from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.plugins import describe_error
 from gazerig.drivers.types import BusHealth, Feedback, LimpableBus, ServoBus, ServoConfig
-
-IN_A_ROW = 3
-"""Consecutive reads without any answer after which a bus is read less often."""
-
-AGAIN_S = 0.2
-"""Time between reads of a bus of which no servo answers. Each costs its whole time-out, usually 20
-ms, and the servos of the other buses wait for their goals meanwhile."""
 
 
 class BusShare(NamedTuple):
@@ -57,11 +50,6 @@ class MultiBus:
             raise ValueError(
                 f"buses cover the indices {sorted(given)}: each index from 0 on must occur once"
             )
-        self._forget_silence()
-
-    def _forget_silence(self) -> None:
-        self._in_vain = [0] * len(self._shares)
-        self._due_s = [-inf] * len(self._shares)
 
     def open(self) -> None:
         """Open every bus; if one cannot be opened, close those opened before it.
@@ -70,7 +58,6 @@ class MultiBus:
             PortError: a port cannot be opened.
             ServoMissing: servos are absent or of another model.
         """
-        self._forget_silence()
         with ExitStack() as opened:
             for share in self._shares:
                 share.bus.open()
@@ -80,29 +67,18 @@ class MultiBus:
     def read(self, now_s: float) -> Feedback:
         """Read all servos of all buses.
 
-        A bus without any answer is read only five times a second until a servo answers, so that the
-        servos of the other buses do not wait for it.
-
         Raises:
             BusLost: no servo of a bus has answered for longer than its ``give_up_s``, or another
                 package's bus returned no feedback.
         """
-        feedbacks, lost = [], list[BusLost]()
-        for i, share in enumerate(self._shares):
-            feedback = Feedback.create_missing(len(share.servo_indices))
-            if now_s >= self._due_s[i]:
-                try:
-                    answer = share.bus.read(now_s)
-                    if share.label:
-                        _check_feedback(answer, share)
-                    feedback = answer
-                except BusLost as error:  # the others are still read, so that they may reconnect
-                    lost.append(error)
-                silent = len(feedback.missing) == len(share.servo_indices)
-                self._in_vain[i] = self._in_vain[i] + 1 if silent else 0
-                if self._in_vain[i] >= IN_A_ROW:
-                    self._due_s[i] = now_s + AGAIN_S
-            feedbacks.append(feedback)
+        feedbacks, lost = list[Feedback](), list[BusLost]()
+        for share in self._shares:
+            try:
+                feedbacks.append(share.bus.read(now_s))
+                if share.label:
+                    _check_feedback(feedbacks[-1], share)
+            except BusLost as error:  # the others are still read, so that they may reconnect
+                lost.append(error)
         if lost:
             raise lost[0]
         columns = [tuple(chain.from_iterable(parts)) for parts in zip(*feedbacks, strict=True)]

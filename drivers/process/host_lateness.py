@@ -6,14 +6,7 @@ of a busy computer resemble bad plugs: answers arrive after their time-outs, and
 watchdog was not fed stop. Answers that are intact but late distinguish it from a silent servo.
 """
 
-from collections import deque
 from math import inf
-
-WITHIN_S = 1.0
-"""Time within which late answers are counted."""
-
-BUSY = 3
-"""Number of late answers within that time from which this computer counts as busy."""
 
 SILENCE_S = 0.25
 """Silence of all servos after which a line is logged."""
@@ -44,17 +37,15 @@ NOT_THE_BUS = "cables, ids and power are not the cause"
 class HostLateness:
     """Record of delays of this computer.
 
-    It counts answers that arrive after their time-outs, and stores the last long pause in sending.
+    It stores the last answer that arrived after its time-out, and the last long pause in sending.
     """
 
     def __init__(self) -> None:
         self._silent_s, self._silent_until_s = 0.0, -inf
-        self._late: deque[float] = deque(maxlen=1000)
         self._last_s = -inf
 
     def record_late_answer(self, at_s: float) -> None:
         """Record a late answer."""
-        self._late.append(at_s)
         self._last_s = at_s
 
     def record_wait(self, deadline_s: float, ended_s: float) -> None:
@@ -88,10 +79,3 @@ class HostLateness:
         if self.was_late_since(begin_s):
             return "this computer was busy, or the emulator was suspended: answers arrived late"
         return ""
-
-    def late_answers(self, now_s: float) -> int:
-        """Return the number of late answers within the last second; 0 if they are few."""
-        late = self._late
-        while late and late[0] < now_s - WITHIN_S:
-            late.popleft()
-        return len(late) if len(late) >= BUSY else 0

@@ -14,10 +14,9 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import find
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.servo_bus.poll_list import PollList
+from gazerig.drivers.servo_bus.poll_list import CHECK_SUPPLY, PollList
 from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.drivers.servo_bus.silence import CHECK_SUPPLY, SilenceLog
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 from gazerig.drivers.servo_bus.sync_read import ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import switch_off
@@ -26,6 +25,10 @@ from gazerig.drivers.types import Feedback, ServoConfig
 
 _WATCHDOG_S = 0.2
 """Silence after which servos with a watchdog stop by themselves."""
+
+RESTART_S = 0.1
+"""Silence after which a servo may have restarted: it gets no goals until it is set up."""
+
 POLL_S = 0.05
 """Interval of the reads of values that a group read does not cover; the servos take turns."""
 
@@ -74,6 +77,7 @@ class SmartServoBus(PortBus):
         self._highest = tuple(setup.max_steps for setup in setups)
         self._goals = family.create_goal_packets(self._ids)
         self._nothing = Feedback.create_missing(len(self._ids))
+        self._labels = {setup.id: setup.label() for setup in setups}
         self._log = EventLog()
         self._line = Transactions(
             port,
@@ -81,7 +85,7 @@ class SmartServoBus(PortBus):
             family.prompt_timeout_s,
             timing.reply_timeout_s,
             baud,
-            {setup.id: setup.label() for setup in setups},
+            self._labels,
         )
         self._poll_at_s, self._turn = -inf, 0
         self._corrupt, self._is_troubled = 0, False
@@ -92,8 +96,7 @@ class SmartServoBus(PortBus):
         line, log, family = self._line, self._log, self._family
         self._by_id = {setup.id: setup for setup in self._setups}
         self._is_down = self._release_due = False
-        self._poll_list = PollList(self._ids)
-        self._silence = SilenceLog(self._by_id, log, line.lateness)
+        self._poll_list = PollList(self._labels, log, line.lateness)
         self._provisioning = Provisioning(
             line, Registers(self._port, family, 1, line.lateness), self._setups, log
         )
@@ -111,7 +114,6 @@ class SmartServoBus(PortBus):
     def _apply_one_by_one(self, replies: Mapping[int, ServoReply], now_s: float) -> None:
         """Apply answers servo by servo, each with its errors."""
         line, supervisor, feedback = self._line, self._supervisor, self._feedback
-        codec, poll_list = self._family.codec, self._poll_list
         feedback.begin()
         if line.errors["corrupt"] != self._corrupt:
             self._corrupt = line.errors["corrupt"]
@@ -122,9 +124,11 @@ class SmartServoBus(PortBus):
             elif not feedback.apply_reply(self._slot[servo_id], reply):
                 line.errors["implausible"] += 1
                 continue
-            supervisor.check_status(servo_id, reply.error & codec.ALERT)
-        supervisor.record_out_of_group(poll_list.out_ids, now_s)
-        self._silence.update(poll_list.out_ids, poll_list.garbling_ids, bool(replies), now_s)
+            if reply.error & self._family.codec.ALERT:
+                supervisor.mark(servo_id, is_held=False)
+        for servo_id, silent_s in self._poll_list.report(bool(replies), now_s).items():
+            if silent_s >= RESTART_S:
+                supervisor.mark(servo_id)
         self._is_troubled = len(replies) < len(self._ids)
 
     def _poll(self, now_s: float) -> None:
@@ -224,11 +228,10 @@ class SmartServoBus(PortBus):
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
-        if self._poll_list.is_troubled:
-            silent_s = self._silence.silent_for_s(now_s)
-            if silent_s >= self._give_up_s:
-                fault = f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s"
-                raise BusLost(line.lateness.blame(fault, CHECK_SUPPLY, now_s, now_s - silent_s))
+        silent_s = self._poll_list.all_silent_s(now_s) if self._poll_list.is_troubled else 0.0
+        if silent_s >= self._give_up_s:
+            fault = f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s"
+            raise BusLost(line.lateness.blame(fault, CHECK_SUPPLY, now_s, now_s - silent_s))
         return feedback.now
 
     def enable_torque(self) -> tuple[int, ...]:
@@ -285,7 +288,10 @@ class SmartServoBus(PortBus):
         supervisor, line = self._supervisor, self._line
         if not supervisor.engaged or self._is_down or line.starved:
             return
-        withheld, speeds = supervisor.withheld_ids(self._now_s), supervisor.speeds
+        speeds, withheld = supervisor.speeds, supervisor.limp.union(supervisor.held)
+        for servo_id, since_s in self._poll_list.silent_since_s.items():
+            if self._now_s - since_s >= RESTART_S:
+                withheld |= {servo_id}
         try:
             packet = self._goals.packet(goals, speeds)
         except struct.error:  # goals are usually whole numbers
@@ -342,9 +348,9 @@ class SmartServoBus(PortBus):
 
     def _reset_after_reconnect(self) -> None:
         """Reset the state after the port reconnects."""
-        self._poll_list = self._reader.poll_list = PollList(self._ids)
+        self._poll_list.restore()
         self._line.starved = False
-        self._supervisor.mark_all_for_recovery()
+        self._supervisor.mark_all()
 
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
         # Ranges are within one turn: a servo forgets whole turns when it restarts.

@@ -1,83 +1,139 @@
-"""Servos of the group read, servos removed from it, and times of the next attempts.
+"""Servos that are read together, and those that are silent.
 
 Later servos in a group read wait for the earlier ones, so a silent servo must leave the group
-immediately. It is then read alone, immediately and after that at increasing intervals.
+immediately. It is then read alone, at once and after that at intervals.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from math import inf
 
-AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
-"""Interval of attempts to read a silent servo: doubled from the first to the last value."""
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S, HostLateness
+
+AGAIN_S = 0.15
+"""Interval of attempts to read silent servos, which take turns; less than a servo's watchdog."""
 
 DAMAGED_IN_A_ROW = 3
 """Consecutive damaged answers after which a servo leaves the group, as it costs every read its time
 limit."""
 
+BAD_LINE = "a second servo with its id, or a bad cable"
+
+CHECK_SUPPLY = "check servo power and cable"
+
 
 class PollList:
     """List of the servos to read, by id, in the order of the bus.
 
+    Args:
+        labels: Labels of the servos by id, in the order of the bus.
+        log: Records silent servos, each once after a longer silence.
+        lateness: Delays of this computer, which are reported as the cause if there were any.
+
     group: ids that are read together
     is_troubled: whether a servo is out of the group or has answered badly recently
-    garbling_ids: ids of servos out of the group because their answers arrive damaged
+    silent_since_s: beginning of the silence of servos out of the group
     """
 
-    def __init__(self, ids: Sequence[int]) -> None:
-        self._ids = tuple(ids)
-        self._due_s: dict[int, float] = {}
-        self._wait_s: dict[int, float] = {}
+    def __init__(self, labels: Mapping[int, str], log: EventLog, lateness: HostLateness) -> None:
+        self._labels, self._log, self._lateness = labels, log, lateness
+        self._silent: list[int] = []
+        self._next_s = -inf
         self._damaged: dict[int, int] = {}
-        self.group = self._ids
+        self._reported: set[int] = set()
+        self._all_since_s, self._all_until_s = inf, -inf
+        self._all_reported = False
+        self.group = tuple(labels)
         self.is_troubled = False
-        self.garbling_ids: set[int] = set()
-
-    @property
-    def out_ids(self) -> tuple[int, ...]:
-        """Return the ids of servos out of the group."""
-        return tuple(self._due_s)
+        self.silent_since_s: dict[int, float] = {}
 
     def next_due(self, now_s: float) -> int | None:
-        """Return a servo to be read alone now; if all are out there is always one."""
-        waiting = self._due_s
-        ready = [i for i, due_s in waiting.items() if due_s <= now_s or not self.group]
-        return min(ready, key=waiting.__getitem__, default=None)
+        """Return a silent servo to be read alone now."""
+        return self._silent[0] if self._silent and now_s >= self._next_s else None
 
     def record_silent(self, servo_id: int, now_s: float) -> None:
         """Record that a servo did not answer; it is due immediately the first time."""
-        if servo_id in self._due_s:
-            wait_s = self._wait_s.get(servo_id, AGAIN_FIRST_S)
-            self._due_s[servo_id] = now_s + wait_s
-            self._wait_s[servo_id] = min(2.0 * wait_s, AGAIN_LAST_S)
+        if servo_id in self._silent:
+            self._silent.remove(servo_id)
+            self._silent.append(servo_id)
+            self._next_s = now_s + AGAIN_S
         else:
-            self._due_s[servo_id] = now_s
+            self._silent.insert(0, servo_id)
+            self._next_s = now_s
+        self.silent_since_s.setdefault(servo_id, now_s)
         self._regroup()
 
     def record_damaged(self, servo_id: int, now_s: float) -> None:
         """Record that a servo's answer arrived damaged."""
         self._damaged[servo_id] = self._damaged.get(servo_id, 0) + 1
         self.is_troubled = True
-        if self._damaged[servo_id] >= DAMAGED_IN_A_ROW or servo_id in self._due_s:
-            self.garbling_ids.add(servo_id)
+        if self._damaged[servo_id] >= DAMAGED_IN_A_ROW or servo_id in self._silent:
             self.record_silent(servo_id, now_s)
 
-    def record_answer(self, servo_id: int) -> bool:
-        """Record a good answer; return whether the servo had been out."""
-        self.garbling_ids.discard(servo_id)
-        if self._damaged.pop(servo_id, None) is not None:
-            self.is_troubled = bool(self._due_s or self._damaged)
-        if self._due_s.pop(servo_id, None) is None:
-            return False
-        self._wait_s.pop(servo_id, None)
-        if not self.group:
-            # The whole line has recovered: the other servos need not wait.
-            self._due_s.clear()
-            self._wait_s.clear()
+    def record_answer(self, servo_id: int) -> None:
+        """Record a good answer: the other silent servos need not wait either."""
+        if self._damaged.pop(servo_id, None) is None and servo_id not in self._silent:
+            return
+        if servo_id in self._silent:
+            self._silent = [i for i in self._silent if i != servo_id and self.group]
+            self._next_s = -inf
         self._regroup()
-        return True
+
+    def restore(self) -> None:
+        """Read all servos together again, as the port was lost."""
+        self._silent.clear()
+        self._damaged.clear()
+        self._regroup()
 
     def _regroup(self) -> None:
-        self.group = tuple(servo_id for servo_id in self._ids if servo_id not in self._due_s)
-        self.is_troubled = bool(self._due_s or self._damaged)
+        self.group = tuple(servo_id for servo_id in self._labels if servo_id not in self._silent)
+        self.is_troubled = bool(self._silent or self._damaged)
+
+    def report(self, answered: bool, now_s: float) -> dict[int, float]:
+        """Report silent servos; return those that answer again, with the times of their silence.
+
+        Args:
+            answered: Whether any servo has answered.
+            now_s: Present time.
+        """
+        self._report_all(answered, now_s)
+        back = [servo_id for servo_id in self.silent_since_s if servo_id not in self._silent]
+        silences_s = {i: now_s - self.silent_since_s.pop(i) for i in back}
+        for servo_id in self._reported.intersection(back):
+            self._reported.discard(servo_id)
+            silent_s = silences_s[servo_id]
+            self._log.add(f"{self._labels[servo_id]} answers again after {silent_s:.1f} s")
+        for servo_id, since_s in self.silent_since_s.items() if answered else ():
+            # While no servo answered, none in particular was silent.
+            silent_s = now_s - max(since_s, self._all_until_s)
+            if servo_id not in self._reported and silent_s >= SILENCE_S:
+                self._reported.add(servo_id)
+                fault, remedy = "does not answer", CHECK_SUPPLY
+                if servo_id in self._damaged:
+                    fault, remedy = "answers, but its bytes arrive damaged", BAD_LINE
+                self._blame(f"{self._labels[servo_id]} {fault}", remedy, now_s)
+        return silences_s
+
+    def _report_all(self, answered: bool, now_s: float) -> None:
+        """Report that no servo answers, and the end of such a silence."""
+        silent_s = self.all_silent_s(now_s)
+        if not answered:
+            self._all_since_s = min(self._all_since_s, now_s)
+            if silent_s >= BLAME_S and not self._all_reported:
+                self._all_reported = True
+                self._blame("no servo answers", CHECK_SUPPLY, now_s, self._all_since_s)
+        elif self._all_since_s < inf:
+            if silent_s >= SILENCE_S:
+                fault = f"no servo answered for {silent_s:.1f} s"
+                self._blame(fault, CHECK_SUPPLY, now_s, self._all_since_s)
+            self._all_since_s, self._all_until_s, self._all_reported = inf, now_s, False
+
+    def _blame(self, fault: str, remedy: str, now_s: float, since_s: float = inf) -> None:
+        self._log.add(self._lateness.blame(fault, remedy, now_s, since_s))
+
+    def all_silent_s(self, now_s: float) -> float:
+        """Return the time for which no servo has answered, seconds."""
+        return max(0.0, now_s - self._all_since_s)
 
 
 def silent_servos(ids: Sequence[int], answered: Collection[int]) -> tuple[int, ...]:
