@@ -51,7 +51,7 @@ def test_a_stranger_is_named_where_a_servo_is_missing():
     ("spoil", "error", "told"),
     [
         (lambda chain: chain[3].fail("overload"), ServoFault, "servo 3: overload: let it cool"),
-        (lambda chain: chain[2].restart(), ServoMissing, "servo 2 does not answer"),
+        (lambda chain: chain[2].restart(), ServoMissing, "no answer from servo 2: check its cable"),
     ],
     ids=["latched", "silent"],
 )
@@ -88,7 +88,7 @@ def test_torque_does_not_come_on_before_the_goal_is_known_to_be_kept(xl):
         return real(address, data)
 
     xl.chain[1].write = deaf_to_goals
-    with pytest.raises(ServoMissing, match="goal_position is not accepted .servo 1: 2400."):
+    with pytest.raises(ServoMissing, match="servo 1 does not accept Goal Position 2400: restart"):
         xl.bus.enable_torque()
     assert len(refused) == 3 and xl.chain[1].shaft.x == 2400
 

@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from contextlib import ExitStack, suppress
 from itertools import chain
-from math import isfinite
 from typing import NamedTuple
 
 from gazerig.drivers.errors import BusLost, DriverError
@@ -13,17 +12,15 @@ from gazerig.drivers.types import BusHealth, Feedback, LimpableBus, ServoBus, Se
 
 
 class BusShare(NamedTuple):
-    """One of the buses: its name and its servos.
+    """One of the buses, with its name in messages.
 
     servo_indices: index of each of its servos in the whole rig
-    label: name of another package's bus in messages, "" for ours
-    setups: servos of another package's bus, whose goals are clipped and whose readings are checked
+    setups: servos of another package's bus, whose goals are clipped here; empty for ours
     """
 
     name: str
     bus: ServoBus
     servo_indices: tuple[int, ...]
-    label: str = ""
     setups: tuple[ServoConfig, ...] = ()
 
 
@@ -68,15 +65,12 @@ class MultiBus:
         """Read all servos of all buses.
 
         Raises:
-            BusLost: no servo of a bus has answered for longer than its ``give_up_s``, or another
-                package's bus returned no feedback.
+            BusLost: no servo of a bus has answered for longer than its ``give_up_s``.
         """
         feedbacks, lost = list[Feedback](), list[BusLost]()
         for share in self._shares:
             try:
                 feedbacks.append(share.bus.read(now_s))
-                if share.label:
-                    _check_feedback(feedbacks[-1], share)
             except BusLost as error:  # the others are still read, so that they may reconnect
                 lost.append(error)
         if lost:
@@ -126,7 +120,7 @@ class MultiBus:
             raise ValueError("a goal is not a number: every goal must be a whole number of steps")
         for share in self._shares:
             goals = [goals_steps[place] for place in share.servo_indices]
-            if share.label:
+            if share.setups:
                 goals = [
                     round(min(max(goal, setup.min_steps), setup.max_steps))
                     for goal, setup in zip(goals, share.setups, strict=True)
@@ -152,7 +146,8 @@ class MultiBus:
         for i, share in enumerate(self._shares):
             own = tuple([setups[place] for place in share.servo_indices])
             share.bus.retune(own)
-            self._shares[i] = share._replace(setups=own)
+            if share.setups:
+                self._shares[i] = share._replace(setups=own)
 
     def disable_torque(self) -> None:
         """Switch torque off on every bus, even if another bus fails.
@@ -168,7 +163,7 @@ class MultiBus:
                 lost.append(str(error))
             except Exception as error:
                 failed = f"torque-off failed ({describe_error(error)}): cut the servo power"
-                lost.append(f"{share.label or share.name}: {failed}")
+                lost.append(f"{share.name}: {failed}")
         if lost:
             raise BusLost("; ".join(lost))
 
@@ -185,20 +180,3 @@ class MultiBus:
         with ExitStack() as stack:
             for share in reversed(self._shares):
                 stack.callback(share.bus.close)
-
-
-def _check_feedback(feedback: Feedback, share: BusShare) -> None:
-    """Check the feedback of another package's bus.
-
-    Raises:
-        BusLost: it is not that of its servos, or a servo that is not missing has no finite values.
-    """
-    count = len(share.servo_indices)
-    if not isinstance(feedback, Feedback) or {*map(len, feedback[:-1])} != {count}:
-        raise BusLost(f"{share.label}: read returned no feedback of {count} servos")
-    for i in set(range(count)).difference(feedback.missing):
-        if not all(isfinite(column[i]) for column in feedback[:4]):
-            raise BusLost(
-                f"{share.label}: no finite position, speed, load or time of "
-                f"{share.setups[i].label()}, which is not missing"
-            )

@@ -19,7 +19,7 @@ from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 from gazerig.drivers.servo_bus.sync_read import ServoReply, SyncReader
-from gazerig.drivers.servo_bus.torque import switch_off
+from gazerig.drivers.servo_bus.torque import raise_missing, switch_off
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import Feedback, ServoConfig
 
@@ -97,9 +97,7 @@ class SmartServoBus(PortBus):
         self._by_id = {setup.id: setup for setup in self._setups}
         self._is_down = self._release_due = False
         self._poll_list = PollList(self._labels, log, line.lateness)
-        self._provisioning = Provisioning(
-            line, Registers(self._port, family, 1, line.lateness), self._setups, log
-        )
+        self._provisioning = Provisioning(line, self._setups, log)
         self._feedback = FeedbackColumns(family, self._setups)
         is_fast = bool(firmware) and all(
             family.has_fast_read(setup.model, firmware[setup.id]) for setup in self._setups
@@ -177,9 +175,15 @@ class SmartServoBus(PortBus):
         registers = Registers(self._port, self._family, lateness=self._line.lateness)
         try:
             self._assemble(find(self._line, registers, self._setups, self._log))
-            first = Provisioning(self._line, registers, self._setups, self._log)
-            first.disable(self._ids)
-            first.apply(self._ids)
+            # A servo may be set to answer only reads; this write needs no answer.
+            level = [self._family.answer_level] * len(self._ids)
+            self._line.write_all(self._ids, "status_return_level", level)
+            released = switch_off(self._line, self._ids)
+            raise_missing(self._line, released.unconfirmed_ids)
+            for servo_id in released.holding_ids:
+                fault = f"{where}: {self._line.label(servo_id)} keeps its torque"
+                raise ServoMissing(f"{fault}: restart its power")
+            self._provisioning.apply(self._ids)
             self._line.starved = False
         except (ServoMissing, BusLost):
             self._port.closePort()

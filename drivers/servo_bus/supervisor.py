@@ -235,9 +235,9 @@ class Supervisor:
         if now_s < until_s:
             return
         if until_s > -inf and not self._family.goal_speed:
-            speed = goal_speeds(self._family, (self._setups[servo_id],), ())
+            (speed,) = goal_speeds(self._family, (self._setups[servo_id],), ())
             try:
-                write_verified(self._line, (servo_id,), self._family.arming.register, speed)
+                write_verified(self._line, self._family.arming.register, {servo_id: speed})
             except ServoMissing:
                 return
         del self._rearmed[servo_id]

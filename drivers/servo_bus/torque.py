@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
+from gazerig.drivers.event_log import register_label
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.transaction import Transactions
@@ -55,7 +56,7 @@ def enable(
     if not ids:
         return (), {}
     if family.watchdog_unit_s is not None:
-        write_verified(line, ids, "bus_watchdog", [0] * len(ids))
+        write_verified(line, "bus_watchdog", dict.fromkeys(ids, 0))
     present = dict(zip(ids, read_positions(line, ids), strict=True))
     for servo_id, steps in present.items():
         if crosses_zero(family, setups[servo_id], steps):
@@ -75,10 +76,10 @@ def enable(
     speeds = goal_speeds(family, own, outside)
     accelerations = [family.acceleration_units(one.max_accel_steps_s2) for one in own]
     armed = speeds if family.arming.limits_speed else accelerations
-    write_verified(line, ids, family.arming.register, armed)
+    write_verified(line, family.arming.register, dict(zip(ids, armed, strict=True)))
     _switch_on(line, present, dict(zip(ids, zip(goals, speeds, strict=True), strict=True)))
     if family.watchdog_unit_s is not None:
-        write_verified(line, ids, "bus_watchdog", [watchdog] * len(ids))
+        write_verified(line, "bus_watchdog", dict.fromkeys(ids, watchdog))
     return tuple(goals), outside
 
 
@@ -113,39 +114,36 @@ def read_positions(line: Transactions, ids: Sequence[int]) -> tuple[int, ...]:
         ServoMissing: a servo does not answer.
     """
     found = line.ask(ids, "present_position")
-    _raise_missing(line, [servo_id for servo_id in ids if servo_id not in found])
+    raise_missing(line, [servo_id for servo_id in ids if servo_id not in found])
     return tuple(found[servo_id] for servo_id in ids)
 
 
 def write_verified(
-    line: Transactions, ids: Sequence[int], name: str, values: Sequence[int]
+    line: Transactions,
+    name: str,
+    wanted: Mapping[int, int],
+    send: Callable[[Sequence[int]], None] | None = None,
+    resting: Mapping[int, int] | None = None,
 ) -> None:
     """Write a register and read it back until every servo has its value.
+
+    Args:
+        line: Exchanges on the bus.
+        name: The register.
+        wanted: Values by id.
+        send: Sends the values to some servos; None: by a write of the register.
+        resting: Positions of servos without torque: their goals may follow their shafts, which
+            cannot cause a jump.
 
     Raises:
         ServoMissing: a servo does not answer or rejects it.
     """
-    wanted = dict(zip(ids, values, strict=True))
-    _send_until(
-        line, name, wanted, lambda left: line.write_all(left, name, [wanted[i] for i in left])
-    )
-
-
-def _send_until(
-    line: Transactions,
-    name: str,
-    wanted: Mapping[int, int],
-    send: Callable[[Sequence[int]], None],
-    resting: Mapping[int, int] | None = None,
-) -> None:
-    """Send and read until every servo has its wanted value.
-
-    resting: positions of servos without torque: their goals may follow their shafts, which cannot
-        cause a jump
-    """
     left, found = dict(wanted), dict[int, int]()
     for _ in range(TRIES):
-        send(tuple(left))
+        if send:
+            send(tuple(left))
+        else:
+            line.write_all(tuple(left), name, left.values())
         found = line.ask(tuple(left), name)
         left = {i: value for i, value in left.items() if found.get(i) != value}
         if resting:
@@ -156,10 +154,13 @@ def _send_until(
             }
         if not left:
             return
-    _raise_missing(line, [servo_id for servo_id in left if servo_id not in found])
-    refused = ", ".join(f"{line.label(servo_id)}: {value}" for servo_id, value in left.items())
+    raise_missing(line, [servo_id for servo_id in left if servo_id not in found])
+    refused = "; ".join(
+        f"{line.label(servo_id)} does not accept {register_label(name)} {value}"
+        for servo_id, value in left.items()
+    )
     raise ServoMissing(
-        f"{line.port.port_name}: {name} is not accepted ({refused}): restart the servo power"
+        f"{line.port.port_name}: {refused}: restart its power or correct the rig file"
     )
 
 
@@ -174,7 +175,7 @@ def _switch_on(
         builder = family.create_goal_packets(left)
         line.send(builder.packet([goals[i][0] for i in left], [goals[i][1] for i in left]))
 
-    _send_until(line, "goal_position", steps, send, present if family.goal_speed else None)
+    write_verified(line, "goal_position", steps, send, present if family.goal_speed else None)
     before = read_positions(line, ids)
     # Damaged bytes may pass a checksum of one byte: a goal from them would be a jump.
     moved = [i for i, at in zip(ids, before, strict=True) if abs(at - present[i]) > STILL_STEPS]
@@ -182,7 +183,7 @@ def _switch_on(
         named = ", ".join(map(line.label, moved))
         raise ServoMissing(f"{line.port.port_name}: {named} does not rest: hold it still")
     try:
-        write_verified(line, ids, "torque_enable", [1] * len(ids))
+        write_verified(line, "torque_enable", dict.fromkeys(ids, 1))
     except ServoMissing:
         named = ", ".join(
             f"{line.label(i)}: {' and '.join(family.name_errors(bits))}"
@@ -199,7 +200,7 @@ def _switch_on(
                 f"switched on: {family.jump_cure}"
             )
     if family.goal_speed:
-        _send_until(line, "goal_position", steps, send)
+        write_verified(line, "goal_position", steps, send)
 
 
 def switch_off(line: Transactions, ids: Sequence[int]) -> ReleaseResult:
@@ -240,8 +241,11 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
     return (*released.holding_ids, *released.unconfirmed_ids)
 
 
-def _raise_missing(line: Transactions, missing: Sequence[int]) -> None:
+def raise_missing(line: Transactions, missing: Sequence[int]) -> None:
+    """Raise ``ServoMissing`` if any servo has not answered."""
     if missing:
         named = ", ".join(line.label(servo_id) for servo_id in missing)
         fault = f"{line.port.port_name}: no answer from {named}"
-        raise ServoMissing(line.lateness.blame(fault, "check its cable", line.port.now_s()))
+        raise ServoMissing(
+            line.lateness.blame(fault, "check its cable and power", line.port.now_s())
+        )

@@ -146,7 +146,7 @@ def has_watchdog(rig: Rig, name: str) -> bool:
 
 def _join_buses(shares: list[BusShare]) -> ServoBus:
     """Return several buses as one; a single one of ours is returned unchanged."""
-    return shares[0].bus if len(shares) == 1 and not shares[0].label else MultiBus(shares)
+    return shares[0].bus if len(shares) == 1 and not shares[0].setups else MultiBus(shares)
 
 
 def _bus_share(rig: Rig, name: str, port: BusPort) -> BusShare:
@@ -165,4 +165,4 @@ def _bus_share(rig: Rig, name: str, port: BusPort) -> BusShare:
         raise
     except Exception as error:
         raise PluginError(f"{label} cannot be created: {describe_error(error)}") from error
-    return BusShare(name, bus, places, label, tuple(own))
+    return BusShare(label, bus, places, tuple(own))
