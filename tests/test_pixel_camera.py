@@ -11,7 +11,7 @@ import pytest
 from fakes.scenes import EmptyScene
 from present import present
 
-from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
@@ -23,14 +23,9 @@ from gazerig.robot.dashboard.feed.gaze_trail import GazeTrail
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.scene_view import PinholeView, Rendered
+from gazerig.robot.model.scene_view import PinholeView
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
-from gazerig.sim_mock.cameras.optics import (
-    Sensor,
-    SensorParams,
-    through_lens,
-)
 from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
@@ -72,7 +67,7 @@ def seen_from(yaw_deg: float = 0.0, pitch_deg: float = 0.0, p_m: Vec3 = ORIGIN) 
 
 
 def drawn(scene: EmptyScene, *view: Any) -> ImageArray:
-    return DrawnScene(scene).draw(seen_from(*view)).image
+    return DrawnScene(scene).draw(seen_from(*view))
 
 
 def pixel_of(point_m: Vec3, view: PinholeView) -> Any:
@@ -138,7 +133,7 @@ def test_every_scene_can_be_sent_and_drawn(name: str) -> None:
     sent = pickle.loads(pickle.dumps(scene))
     for t_s in (0.0, 17.9):
         view = seen_from(0.0, 0.0, (0.05, 0.0, 0.16))._replace(t_s=t_s)
-        assert np.array_equal(scene.draw(view).image, sent.draw(view).image)
+        assert np.array_equal(scene.draw(view), sent.draw(view))
 
 
 def level(_: float) -> tuple[Mat3, Vec3]:
@@ -192,46 +187,6 @@ def test_a_turn_during_the_exposure_smears_along_the_turn() -> None:
         return float(np.abs(np.diff(image[60:300].astype(float), axis=1)).mean())
 
     assert sharpness(200.0) < 0.7 * sharpness(0.0)
-
-
-def test_distances_have_the_noise_of_stereo_and_holes_at_edges() -> None:
-    sensor = Sensor(SensorParams(depth_noise_1_m=0.01), np.random.default_rng(1))
-    true = np.full((80, 80), 1.0, np.float32)
-    true[:, 40:] = 3.0
-    seen = sensor.stereo(true)
-    assert np.isnan(seen[:, 38:42]).all() and not np.isnan(seen[:, :36]).any()
-    assert np.std(seen[:, :36]) == pytest.approx(0.01, rel=0.1)
-    assert np.std(seen[:, 44:]) == pytest.approx(0.09, rel=0.1)
-
-
-class Dot:
-    """White dots of 3 x 3 pixels in a known direction."""
-
-    def __init__(self, direction: Vec3) -> None:
-        self.direction = direction
-
-    def draw(self, seen_by: PinholeView, *, depth: bool = False) -> Rendered:
-        image = np.zeros((seen_by.size_px[1], seen_by.size_px[0], 3), np.uint8)
-        x, y = np.rint(project([self.direction], seen_by.lens)[0]).astype(int)
-        image[y - 1 : y + 2, x - 1 : x + 2] = 255
-        return Rendered(image, np.full(image.shape[:2], 2.0, np.float32) if depth else None)
-
-    def close(self) -> None:
-        pass
-
-
-@pytest.mark.parametrize("k1", [-0.3, 0.15])
-def test_what_a_lens_bends_lands_where_the_programs_model_of_it_says(k1: float) -> None:
-    size = 160, 120
-    lens = Intrinsics(120.0, 124.0, 82.0, 57.0, (k1, 0.05, 0.001, -0.002, 0.0))
-    rows, columns = np.mgrid[0 : size[1], 0 : size[0]]
-    for direction in ((0.0, 0.0, 1.0), (-0.55, 0.3, 1.0)):
-        view = PinholeView(0.0, lens, size, LEVEL, ORIGIN)
-        seen = through_lens(Dot(direction), view, depth=True)
-        light = seen.image[..., 0].astype(float)
-        place = (light * columns).sum() / light.sum(), (light * rows).sum() / light.sum()
-        assert place == pytest.approx(project([direction], lens)[0].tolist(), abs=0.75)
-        assert (present(seen.depth_m) == 2.0).all()
 
 
 def test_warmth_lies_where_the_gaze_has_been() -> None:

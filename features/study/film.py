@@ -97,6 +97,6 @@ def _render(study: Study, key: str, path: Path, progress: Callable[[str, float],
             for name, angle in angles.items():
                 data.qpos[model.joint(name).qposadr[0]] = angle
             mujoco.mj_forward(model, data)
-            write(renderer.render(data, lens, R, p_m).image)
+            write(renderer.render(data, lens, R, p_m))
             progress(f"film of {key}", i / len(ticks))
     os.replace(partial, path)

@@ -1,7 +1,7 @@
-"""Pictures and distances of a MuJoCo world from any camera, without a display.
+"""Pictures of a MuJoCo world from any camera, without a display.
 
 The camera is the program's own pinhole (gazerig.drivers.camera.pinhole), including the principal
-point; gazerig.sim_mock.cameras.optics adds the effects of lens and sensor.
+point; gazerig.sim_mock.cameras.rendered adds the effects of the sensor.
 """
 
 import threading
@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import ImageArray
 from gazerig.features.world.gl_context import Backend, open_context
 from gazerig.gaze.angles import add, compose, rotate
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.description.links import IDENTITY, ORIGIN
-from gazerig.robot.model.scene_view import PinholeView, Rendered
+from gazerig.robot.model.scene_view import PinholeView
 
 _NEAREST_M, _FARTHEST_M = 0.02, 60.0
 _FONT = 100  # the smallest: no text is drawn
@@ -90,9 +91,7 @@ class Renderer:
         R: ArrayLike,
         p_m: ArrayLike,
         size_px: tuple[int, int] | None = None,
-        *,
-        depth: bool = False,
-    ) -> Rendered:
+    ) -> ImageArray:
         """Return the picture of a camera, without the lens's distortion.
 
         Args:
@@ -101,7 +100,6 @@ class Renderer:
             R: (3, 3) rotation of the camera in the world, its axes optical.
             p_m: (3,) position of the camera in the world.
             size_px: width and height; None: the largest.
-            depth: whether to return distances, too.
 
         Raises:
             ValueError: the picture is larger than the renderer's largest, or the renderer is
@@ -115,7 +113,6 @@ class Renderer:
             )
         rect = mujoco.MjrRect(0, 0, width, height)
         rgb = np.empty((height, width, 3), np.uint8)
-        z = np.empty((height, width), np.float32) if depth else None
         with self._lock:
             if not self._finalizer.alive:
                 raise ValueError("the renderer is closed")
@@ -136,15 +133,8 @@ class Renderer:
             self._look(lens, turn, place, width, height)
             with self._context.as_current():
                 mujoco.mjr_render(rect, self._scene, self._mjr)
-                mujoco.mjr_readPixels(rgb, z, rect, self._mjr)
-        image = np.ascontiguousarray(rgb[::-1, :, ::-1])
-        if z is None:
-            return Rendered(image, None)
-        # The depth buffer is 1 at the nearest and 0 far away.
-        near, far, z = _NEAREST_M, _FARTHEST_M, z[::-1]
-        metres = (near * far / (near + z.astype(np.float64) * (far - near))).astype(np.float32)
-        metres[z <= 0.0] = np.inf
-        return Rendered(image, metres)
+                mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
+        return np.ascontiguousarray(rgb[::-1, :, ::-1])
 
     def close(self) -> None:
         """Free all resources; safe to call twice."""
@@ -246,7 +236,7 @@ class WorldPicture:
         """Return the name of the rendering library, "" before the first picture."""
         return self._renderer.backend if self._renderer is not None else ""
 
-    def draw(self, seen_by: PinholeView, *, depth: bool = False) -> Rendered:
+    def draw(self, seen_by: PinholeView) -> ImageArray:
         """Return a picture; see ``SceneView.draw``."""
         t_s, lens, size_px, R, p_m = seen_by
         self._place(self._data, t_s)
@@ -259,7 +249,7 @@ class WorldPicture:
             self._size = wide, high
         R_world_base, p_world_base_m = self._base
         R, p_m = compose(R_world_base, R), add(p_world_base_m, rotate(R_world_base, p_m))
-        return self._renderer.render(self._data, lens, R, p_m, size_px, depth=depth)
+        return self._renderer.render(self._data, lens, R, p_m, size_px)
 
     def close(self) -> None:
         """Free the renderer; safe to call twice."""

@@ -85,7 +85,7 @@ class DrawnSource:
             self._due_s = now_s() + max(0.0, self._period_s - (now_s() - newest.t_s))
             self._number, image = found.number, found.image
             assert image is not None
-            return Shot(found.captured_s, found.number, image, found.depth_m)
+            return Shot(found.captured_s, found.number, image)
         return None
 
     def events(self) -> tuple[str, ...]:

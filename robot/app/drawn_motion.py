@@ -28,4 +28,4 @@ class SyntheticMotionDetector:
             if before is not None and self._detector.before_s is not None
             else None
         )
-        return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
+        return self._detector.find(shot.image, shot.captured_s, lens, turned)

@@ -297,10 +297,11 @@ def _hair(look: PersonLook, fineness: float) -> list[Painted]:
         hair._replace(colours=mix(hair.colours, _mix_colours(look.hair, (255, 230, 200)), shine))
     ]
     if look.long_hair:
-        fall = paint(ellipsoid_mesh((0.42, 0.30, 1.35), 0.9, 13), look.hair)
+        rows = 8 if fineness < 0.5 else 13
+        fall = paint(ellipsoid_mesh((0.42, 0.30, 1.35), 0.9, rows), look.hair)
         left = move_mesh(fall, (-1.95, 1.02, -0.55))
         back = move_mesh(
-            paint(ellipsoid_mesh((0.45, 1.05, 1.35), 0.9, 13), look.hair), (-2.35, 0.0, -0.55)
+            paint(ellipsoid_mesh((0.45, 1.05, 1.35), 0.9, rows), look.hair), (-2.35, 0.0, -0.55)
         )
         parts += [left, mirror_mesh(left), back]
     return parts

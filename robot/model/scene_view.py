@@ -2,9 +2,6 @@
 
 from typing import NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import ImageArray
 from gazerig.gaze.types import Mat3, Vec3
@@ -28,23 +25,11 @@ class PinholeView(NamedTuple):
     p_m: Vec3
 
 
-class Rendered(NamedTuple):
-    """A picture: image (h, w, 3) BGR; depth_m (h, w) along the axis, inf without a surface."""
-
-    image: ImageArray
-    depth_m: NDArray[np.float32] | None
-
-
 class SceneView(Protocol):
     """A renderer of a scene through a pinhole camera."""
 
-    def draw(self, seen_by: PinholeView, *, depth: bool = False) -> Rendered:
-        """Return a picture.
-
-        Args:
-            seen_by: The camera.
-            depth: Include distances, if the renderer has them.
-        """
+    def draw(self, seen_by: PinholeView) -> ImageArray:
+        """Return the picture of a camera, (h, w, 3) BGR."""
         ...
 
     def close(self) -> None:

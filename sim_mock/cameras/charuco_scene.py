@@ -2,8 +2,7 @@
 
 The hand moves it everywhere, near and far, and tilts it to all sides, as the calibration
 requires. The camera's true lens and mount differ a little from the rig file, so that the
-calibration has an error to find. The lens distorts, edges are soft, pixels have noise. Not
-modelled: motion blur, glare, paper that is not flat.
+calibration has an error to find. Not modelled: distortion, motion blur, glare, bent paper.
 """
 
 from dataclasses import replace
@@ -15,58 +14,24 @@ import numpy as np
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import ImageArray
-from gazerig.gaze.angles import add, compose, rotate, rotate_back, sub
-from gazerig.gaze.types import Angles3, HeadGeometry, Mat3, Vec3
+from gazerig.gaze.angles import add
+from gazerig.gaze.types import Angles3, Floats, HeadGeometry, Vec3
 from gazerig.robot.model.charuco_board import CharucoBoard
 from gazerig.robot.model.frames import CameraMount, CameraParams
-from gazerig.robot.model.intrinsics import intrinsics_of_lens, rays
-from gazerig.robot.model.scene_view import PinholeView, Rendered
-from gazerig.sim_mock.cameras.optics import Sensor, SensorParams, through_lens
+from gazerig.robot.model.intrinsics import intrinsics_of_lens
 
 SIZE_PX = (640, 400)
-_TEXTURE_PX_PER_MM, _PAPER_EDGE_MM = 2.0, 12.0
-_WHITE, _BLACK, _WALL = 210.0, 28.0, 90.0
-_BLUR_PX = 0.7
+BoardPose = tuple[Floats, Floats]
+"""Rotation (3, 3) of the board in the camera, and its position (3,), m."""
+_TEXTURE_PX_PER_MM = 2.0
+_WALL, _NOISE_GREY = 90.0, 3.0
 # The board has optical axes, so this board hangs upright in front of a head that looks along
 # the world's x axis.
-_R_WORLD_BOARD: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
-_AWAY_M = 0.7
+_R_WORLD_BOARD = np.array(((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)))
+_AWAY_M: Vec3 = (0.7, 0.02, 0.01)
 # Offset of the camera's true mount from the rig file.
 _OFF_MM: Vec3 = (6.0, -4.0, 5.0)
 _OFF_DEG: Angles3 = (2.0, -3.0, 1.5)
-
-
-class HeldBoard:
-    """SceneView of a board alone; poses of the camera are in the frame of the board."""
-
-    def __init__(self, board: CharucoBoard) -> None:
-        edge = round(_PAPER_EDGE_MM * _TEXTURE_PX_PER_MM)
-        grey = _BLACK + (_WHITE - _BLACK) / 255.0 * board.image(_TEXTURE_PX_PER_MM)
-        paper = cv2.copyMakeBorder(
-            grey, edge, edge, edge, edge, cv2.BORDER_CONSTANT, value=(_WHITE,)
-        )
-        self._paper = cv2.cvtColor(np.rint(paper).astype(np.uint8), cv2.COLOR_GRAY2BGR)
-        per_px = 1e-3 / _TEXTURE_PX_PER_MM
-        # Pixels of the texture, whose centres are at integers, to metres on the board.
-        self._to_board = np.array(
-            [(per_px, 0.0, (0.5 - edge) * per_px), (0.0, per_px, (0.5 - edge) * per_px), (0, 0, 1)]
-        )
-
-    def draw(self, seen_by: PinholeView, *, depth: bool = False) -> Rendered:
-        """Return a picture; see ``SceneView.draw``."""
-        back = np.array(seen_by.R).T
-        plane = np.stack((back[:, 0], back[:, 1], -back @ seen_by.p_m), axis=1)
-        image = cv2.warpPerspective(
-            self._paper,
-            seen_by.lens.matrix @ plane @ self._to_board,
-            seen_by.size_px,
-            flags=cv2.INTER_LINEAR,
-            borderValue=(_WALL, _WALL, _WALL),
-        )
-        return Rendered(np.asarray(image, np.uint8), None)
-
-    def close(self) -> None:
-        """Do nothing: there is nothing to free."""
 
 
 class BoardScene:
@@ -96,13 +61,10 @@ class BoardScene:
             else intrinsics_of_lens(camera.lens, radians(field_deg), *SIZE_PX)
         )
         self.head_rad: Angles3 = (0.0, 0.0, 0.0)
-        self._board, self._view = board, HeldBoard(board)
-        self._sensor = Sensor(SensorParams(), rng)
-        self._where, self._geometry = CameraMount(self.mount), geometry
-        wide, high = board.size_m
+        self._board, self._rng, self._geometry = board, rng, geometry
         _, head = geometry.head_pose((0.0, 0.0, 0.0))
-        centre = add(head, (_AWAY_M, 0.02, 0.01))
-        self._p_world_board_m = sub(centre, rotate(_R_WORLD_BOARD, (wide / 2, high / 2, 0.0)))
+        wide, high = board.size_m
+        self._p_world_board_m = np.add(head, _AWAY_M) - _R_WORLD_BOARD @ (wide / 2, high / 2, 0.0)
         self._is_hanging = False
         self._number = 0
 
@@ -113,25 +75,33 @@ class BoardScene:
     def look(self, now_s: float) -> Shot:
         """Return the next frame."""
         self._number += 1
-        if self._is_hanging:
-            pose = self.seen_pose(self.head_rad)
-        else:
-            pose = hand_held_pose(self._number - 1, self.lens, self._board)
-        return Shot(now_s, self._number, self.image(*pose))
+        pose = (
+            self.seen_pose(self.head_rad)
+            if self._is_hanging
+            else hand_held_pose(self._number - 1, self.lens, self._board)
+        )
+        return Shot(now_s, self._number, self.image(pose))
 
-    def image(self, R_camera_board: Mat3, p_camera_board_m: Vec3) -> ImageArray:
+    def image(self, pose: BoardPose) -> ImageArray:
         """Return a frame of the board: (h, w, 3) BGR."""
-        R = _transpose(R_camera_board)
-        p_m = sub((0.0, 0.0, 0.0), rotate(R, p_camera_board_m))
-        seen = through_lens(self._view, PinholeView(0.0, self.lens, SIZE_PX, R, p_m))
-        soft = cv2.GaussianBlur(seen.image, (0, 0), _BLUR_PX)
-        return self._sensor.image(np.asarray(soft, np.uint8))
+        texture = self._board.image(_TEXTURE_PX_PER_MM)
+        high, wide = texture.shape[:2]
+        # Pixels have their centres at whole numbers.
+        corners = np.array(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)))
+        board_m = np.column_stack((corners * self._board.size_m, np.zeros(4)))
+        R, p_m = pose
+        seen_px, _ = cv2.projectPoints(board_m, R, p_m, self.lens.matrix, None)
+        paper_px = (corners * (wide, high) - 0.5).astype(np.float32)
+        warp = cv2.getPerspectiveTransform(paper_px, seen_px.astype(np.float32))
+        grey = cv2.warpPerspective(30.0 + 0.7 * texture, warp, SIZE_PX, borderValue=(_WALL,))
+        noisy = grey + self._rng.normal(0.0, _NOISE_GREY, grey.shape)
+        return np.repeat(np.clip(noisy, 0.0, 255.0).astype(np.uint8)[..., None], 3, axis=2)
 
-    def seen_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
-        """Return R_camera_board and p_camera_board_m of the hanging board for neck angles."""
-        R, p_m = self._where.pose(*self._geometry.head_pose(head_rad))
-        to_board_m = rotate_back(R, sub(self._p_world_board_m, p_m))
-        return compose(_transpose(R), _R_WORLD_BOARD), to_board_m
+    def seen_pose(self, head_rad: Angles3) -> BoardPose:
+        """Return the pose of the hanging board for neck angles."""
+        R, p_m = CameraMount(self.mount).pose(*self._geometry.head_pose(head_rad))
+        back = np.array(R).T
+        return back @ _R_WORLD_BOARD, back @ (self._p_world_board_m - p_m)
 
 
 def true_lens(horizontal_field_deg: float = 69.0) -> Intrinsics:
@@ -143,34 +113,25 @@ def true_lens(horizontal_field_deg: float = 69.0) -> Intrinsics:
         float(focal * 1.004),
         0.5 * (width_px - 1) + 0.012 * width_px,
         0.5 * (height_px - 1) - 0.015 * width_px,
-        (-0.11, 0.06, 0.0008, -0.0006, 0.0),
     )
 
 
-def hand_held_pose(number: int, lens: Intrinsics, board: CharucoBoard) -> tuple[Mat3, Vec3]:
-    """Return R_camera_board and p_camera_board_m of the number-th pose in the hand, from 0.
+def hand_held_pose(number: int, lens: Intrinsics, board: CharucoBoard) -> BoardPose:
+    """Return the number-th pose in the hand, from 0.
 
     The poses are everywhere in the frame, near and far, tilted to all sides, and all different.
     """
-    width_px, height_px = SIZE_PX
     # Golden ratios spread any number of samples evenly.
     a, b, c = ((number + 0.5) * g % 1.0 for g in (0.7548776662, 0.5698402910, 0.6180339887))
     fills = 0.38 + 0.34 * c
     tilt, about = radians(12.0 + 26.0 * ((number * 0.41) % 1.0)), 2.0 * pi * c + number * pi / 2
     turn, _ = cv2.Rodrigues(tilt * np.array((cos(about), sin(about), 0.0)))
     spin, _ = cv2.Rodrigues(np.array((0.0, 0.0, radians(15.0) * (2.0 * b - 1.0))))
-    R = turn @ spin
-    wide, high = board.size_m
-    away = lens.fx_px * wide / (fills * width_px)
+    R = np.asarray(turn @ spin, float)
+    size_px, board_m = np.array(SIZE_PX), np.array(board.size_m)
+    away_m = lens.fx_px * board_m[0] / (fills * size_px[0])
     # Sometimes a part of it is out of the frame.
-    fills_height = fills * (width_px / height_px) * high / wide
-    u = width_px * (0.5 + (0.5 - 0.4 * fills) * (2.0 * a - 1.0))
-    v = height_px * (0.5 + (0.5 - 0.4 * fills_height) * (2.0 * b - 1.0))
-    x, y, z = (away * rays(np.array([(u, v)]), lens)[0] - R @ (wide / 2, high / 2, 0.0)).tolist()
-    first, second, third = (tuple(row) for row in R.tolist())
-    return (first, second, third), (x, y, z)
-
-
-def _transpose(R: Mat3) -> Mat3:
-    first, second, third = zip(*R, strict=True)
-    return first, second, third
+    share = fills * board_m / board_m[0] * size_px[0] / size_px
+    middle_px = size_px * (0.5 + (0.5 - 0.4 * share) * (2.0 * np.array((a, b)) - 1.0))
+    ray = np.linalg.inv(lens.matrix) @ (*middle_px, 1.0)
+    return R, away_m * ray - R @ (*(0.5 * board_m), 0.0)

@@ -2,7 +2,7 @@
 
 The people are those of the page's 3-D view; their eyes, noses and mouths are at the landmarks of
 gazerig.robot.model.face_geometry, so that a face detector made for people finds them there. Arms
-are drawn to raised hands only. Shapes are triangles in one colour each, the farthest first. Not
+are drawn to raised hands only. Shapes are faces in one colour each, the farthest first. Not
 drawn: arms that hang, expression, blinks; the eyes look straight ahead.
 """
 
@@ -33,7 +33,7 @@ _SPINE_M, _DARKER = -0.117, 0.85
 """Axis of the chest behind the nose, and brightness of the dark fields of a pattern."""
 _TO_LIGHT: Floats = np.array((-0.52, 0.48, 0.71))
 _AMBIENT, _DIRECT = 0.66, 0.46
-_SMALL_PX2, _OF_SMALL = 1.0, 4
+_SMALL_PX2, _OF_SMALL = 2.0, 4
 _SHIFT = 4
 """OpenCV draws polygons with a resolution of 1/16 pixel."""
 
@@ -54,7 +54,10 @@ _STEP_PX = 8
 
 
 class _Shape(NamedTuple):
-    """Triangles in one colour each: corners (n, 3), and of each normal and colour (m, 3), BGR."""
+    """Quadrangles in one colour each.
+
+    vertices: (n, 3); faces: (m, 4) their numbers; normals, colours: (m, 3), BGR
+    """
 
     vertices: Floats
     faces: NDArray[np.uint32]
@@ -138,9 +141,13 @@ def _pattern(plain: Painted, axis_x_m: float, around: float, along: float) -> _S
 
 
 def _flat(painted: Painted) -> _Shape:
-    """Return a painted mesh with one normal and colour for each triangle."""
-    vertices, faces = painted.mesh
+    """Return a painted mesh with one normal and colour for each two triangles of its grids."""
+    vertices, triangles = painted.mesh
     assert painted.normals is not None
+    first, second = triangles[::2], triangles[1::2]
+    # A mirrored mesh has the corners of each triangle in the opposite order.
+    last = np.where(second[:, 2] == first[:, 2], second[:, 0], second[:, 2])
+    faces = np.column_stack((first, last))
     normals = painted.normals[faces].mean(axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     return _Shape(vertices, faces, normals, painted.colours[faces].mean(axis=1)[:, ::-1])
@@ -222,7 +229,7 @@ def _link(limb: _Shape, start_m: Floats, end_m: Floats, eye_m: Floats) -> _Solid
 
 
 def _draw_solid(image: ImageArray, seen_by: PinholeView, solid: _Solid) -> None:
-    """Draw a shape triangle by triangle, the farthest first, with diffuse shading."""
+    """Draw a shape face by face, the farthest first, with diffuse shading."""
     shape, lens = solid.shape, seen_by.lens
     world = solid.scale * shape.vertices @ solid.R.T + solid.p_m
     seen = (world - np.array(seen_by.p_m)) @ np.array(seen_by.R)
@@ -232,9 +239,9 @@ def _draw_solid(image: ImageArray, seen_by: PinholeView, solid: _Solid) -> None:
     if (pixels.max(axis=0) < 0.0).any() or (pixels.min(axis=0) > seen_by.size_px).any():
         return
     corners = pixels[shape.faces]
-    one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    one, other = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     area = one[:, 1] * other[:, 0] - one[:, 0] * other[:, 1]
-    # A triangle fills at least a pixel: of those that are smaller, some suffice.
+    # A face fills at least a pixel: of those that are smaller, some suffice.
     drawn = (area > _SMALL_PX2) | ((area > 0.0) & (np.arange(len(area)) % _OF_SMALL == 0))
     facing = np.flatnonzero(drawn)
     facing = facing[np.argsort(-seen[shape.faces[facing], 2].sum(axis=1))]
@@ -242,31 +249,27 @@ def _draw_solid(image: ImageArray, seen_by: PinholeView, solid: _Solid) -> None:
     bright = _AMBIENT + _DIRECT * np.clip(shape.normals[facing] @ light, 0.0, 1.0)
     colours = np.minimum(shape.colours[facing] * bright[:, None], 255.0).tolist()
     fixed = np.rint(corners[facing] * (1 << _SHIFT)).astype(np.int32)
-    for triangle, colour in zip(fixed, colours, strict=True):
-        cv2.fillConvexPoly(image, triangle, colour, cv2.LINE_8, _SHIFT)
+    for face, colour in zip(fixed, colours, strict=True):
+        cv2.fillConvexPoly(image, face, colour, cv2.LINE_8, _SHIFT)
 
 
 def _draw_room(seen_by: PinholeView) -> ImageArray:
     """Return the view of the wall all round and of the floor painted below it."""
     lens, (width, height) = seen_by.lens, seen_by.size_px
-    R, (x_m, y_m, z_m) = np.array(seen_by.R), seen_by.p_m
+    R, wall = np.array(seen_by.R), _wall()
     columns = np.arange(-_STEP_PX, width + 2 * _STEP_PX, _STEP_PX) + 0.5 * (_STEP_PX - 1)
     rows = np.arange(-_STEP_PX, height + 2 * _STEP_PX, _STEP_PX) + 0.5 * (_STEP_PX - 1)
     right, down = np.meshgrid((columns - lens.cx_px) / lens.fx_px, (rows - lens.cy_px) / lens.fy_px)
     x, y, z = np.moveaxis(np.stack((right, down, np.ones_like(right)), axis=-1) @ R.T, -1, 0)
-    flat = np.maximum(x * x + y * y, 1e-6)
-    along = x * x_m + y * y_m
-    t = (np.sqrt(along * along + flat * (_ROOM_M**2 - x_m**2 - y_m**2)) - along) / flat
-    x, y, z = x_m + t * x, y_m + t * y, z_m + t * z
     # Azimuths are relative to the camera's, so that they are continuous in its view.
     ahead = atan2(R[1, 2], R[0, 2])
     c, s = np.cos(ahead), np.sin(ahead)
     azimuth = ahead + np.arctan2(c * y - s * x, c * x + s * y)
-    wall = _wall()
+    up_m = _ROOM_M * z / np.maximum(np.hypot(x, y), 1e-3)
     size = len(columns) * _STEP_PX, len(rows) * _STEP_PX
     maps = (
         0.5 * wall.shape[1] - azimuth * (wall.shape[1] / (2.0 * pi)),
-        np.clip((_ROOM_HEIGHT_M - z) * _PX_PER_M, 0.0, wall.shape[0] - 1.0),
+        np.clip((_ROOM_HEIGHT_M - up_m) * _PX_PER_M, 0.0, wall.shape[0] - 1.0),
     )
     own = slice(_STEP_PX, _STEP_PX + height), slice(_STEP_PX, _STEP_PX + width)
     fine = [cv2.resize(one.astype(np.float32), size)[own] for one in maps]

@@ -23,7 +23,6 @@ class WorldCameraParams:
     width_px: Annotated[int, Bounds(64, 1920), "width of a picture"] = 320
     height_px: Annotated[int, Bounds(48, 1200), "height of a picture"] = 240
     rate_hz: Annotated[float, Bounds(1, 120), "pictures per second"] = 30.0
-    depth: Annotated[bool, "whether distances are measured too, as by a stereo camera"] = False
     samples: Annotated[int, Bounds(0, 16), "samples per pixel against jagged edges; 0: one"] = 4
     # fmt: on
 

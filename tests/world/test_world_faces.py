@@ -54,7 +54,7 @@ def pictures_of(look: int) -> Iterator[tuple[ImageArray, Floats]]:
         sight = R @ (np.cos(aside), np.sin(aside), 0.1)
         x, y, z = (nose + away_m * sight).tolist()
         turned = compose(rotation((*yaw_pitch(tuple((-sight).tolist())), 0.0)), OPTICAL)
-        image = picture.draw(PinholeView(t_s, LENS, SIZE_PX, turned, (x, y, z))).image
+        image = picture.draw(PinholeView(t_s, LENS, SIZE_PX, turned, (x, y, z)))
         marks = nose + figures.measures["ann"].head_scale * LANDMARKS_FACE_M @ R.T
         yield image, project((marks - (x, y, z)) @ np.array(turned), LENS)
     picture.close()

@@ -165,7 +165,6 @@ class RenderedWorld(NamedTuple):
             horizontal_field_deg=self.camera.horizontal_field_deg,
             rate_hz=asked.rate_hz,
             latency_ms=_LATENCY_MS if simulated else 0.0,
-            depth=asked.depth,
         )
         field_rad = radians(self.camera.horizontal_field_deg)
         size_px = asked.width_px, asked.height_px

@@ -218,7 +218,7 @@ class LiveFeed:
             size_px = found.width_px, found.height_px
             seen_by = PinholeView(found.captured_s - start_s, lens, size_px, R, p_m)
             began_s = time.thread_time()
-            found = replace(found, image=self._picture.draw(seen_by).image)
+            found = replace(found, image=self._picture.draw(seen_by))
             pause_s = (time.thread_time() - began_s) / _DRAWING_SHARE
             self._undrawn_s = found.captured_s, found.captured_s + pause_s
         # The page's process draws; the control loop's imports this module too, without OpenCV.
