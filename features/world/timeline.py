@@ -13,7 +13,7 @@ from gazerig.features.world.room import (
 from gazerig.gaze.types import Vec3
 from gazerig.sim_mock.scenes import timeline
 from gazerig.sim_mock.scenes.script import HEAD, Act, Fault, PersonScript, SceneScript
-from gazerig.sim_mock.scenes.timeline import LASTS_S, TimedAct, name_faults, overlap_faults
+from gazerig.sim_mock.scenes.timeline import LASTS_S, TimedAct, name_faults
 
 HEAD_M: Vec3 = (0.05, 0.0, 0.125)
 """Gaze target of people who look at the robot: between the eyes of a head on its neck base."""
@@ -66,7 +66,6 @@ def script_faults(script: SceneScript) -> Iterable[Fault]:
     timelines = {name: timed_acts(script, name, 0) for name in script.people}
     yield from handover_faults(script, timelines)
     for name, person in script.people.items():
-        yield from overlap_faults(script, f"people.{name}", timelines[name])
         yield from _walk_paths(script, name, person)
     yield from _crowding_faults(script)
 

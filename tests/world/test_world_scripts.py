@@ -28,18 +28,11 @@ def refused(tmp_path: Path, acts: str, start: str = "door", more: str = "") -> s
             "      - {at_s: 0, do: walk, to: moon}\n",
             "door",
             7,
-            "no place 'moon'; it has behind, chair_left",
+            "no 'moon' here; it has behind, chair_left",
         ),
         ("      - {at_s: 1, do: sit}\n", "door", 7, "there is no seat at door; walk to one"),
         ("      - {at_s: 1, do: walk, to: door}\n", "chair_left", 7, "add `stand` before walk"),
         ("      - {at_s: 1, do: walk, to: front}\n", "door", 6, "began it at door; let it end"),
-        ("      - {at_s: 19, do: wave}\n", "front", 7, "ends at 21.6 s, the round at 20 s"),
-        (
-            "      - {at_s: 1, do: wave}\n      - {at_s: 2, do: point, to: head}\n",
-            "front",
-            8,
-            "wave (acts.0) keeps the right arm busy until 3.6 s; begin then",
-        ),
     ],
 )
 def test_an_act_that_cannot_be_done_is_refused_at_its_line(
