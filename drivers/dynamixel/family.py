@@ -30,9 +30,6 @@ which a lid at 600 deg/s overshoots by 4 deg."""
 USUAL_RATES = (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600, 4_500_000)
 """Every baud rate of the servos, the usual ones first."""
 
-THOROUGH_S = 0.016 + 0.003 * 253
-"""Time that the manufacturer's SDK allows for all ids: 3 ms each and the adaptor's latency."""
-
 
 _SENSED = ("effort", "velocity", "position")
 
@@ -105,9 +102,6 @@ DYNAMIXEL = Family(
     watchdog_unit_s=WATCHDOG_UNIT_S,
     goal_speed=False,
     single_turn=False,
-    broadcast_ping=True,
-    quiet_s=0.1,
-    thorough_s=THOROUGH_S,
     duplicate_id_registers=("realtime_tick", "present_position"),
     arming=Arming("profile_velocity", limits_speed=True),
     most_goals=253,

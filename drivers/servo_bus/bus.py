@@ -16,7 +16,6 @@ from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import CHECK_SUPPLY, PollList
 from gazerig.drivers.servo_bus.provisioning import Provisioning
-from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 from gazerig.drivers.servo_bus.sync_read import ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import raise_missing, switch_off
@@ -172,9 +171,8 @@ class SmartServoBus(PortBus):
             raise PortError(
                 f"{where} cannot run at {baud} bit/s: choose {self._family.recommended_bauds}"
             )
-        registers = Registers(self._port, self._family, lateness=self._line.lateness)
         try:
-            self._assemble(find(self._line, registers, self._setups, self._log))
+            self._assemble(find(self._line, self._setups))
             # A servo may be set to answer only reads; this write needs no answer.
             level = [self._family.answer_level] * len(self._ids)
             self._line.write_all(self._ids, "status_return_level", level)

@@ -202,9 +202,6 @@ class Family:
         watchdog_unit_s: unit of Bus Watchdog; None without a watchdog
         goal_speed: whether a goal includes its speed
         single_turn: whether a servo measures its position within one turn when it starts
-        broadcast_ping: whether servos answer a broadcast ping one after another; otherwise each id
-            is read
-        quiet_s, thorough_s: time-outs of a search: silence after a broadcast ping, or for each id
         duplicate_id_registers: first and last of the registers in which two servos with the same id
             differ
         arming: register written before torque is switched on
@@ -245,9 +242,6 @@ class Family:
     watchdog_unit_s: float | None
     goal_speed: bool
     single_turn: bool
-    broadcast_ping: bool
-    quiet_s: float
-    thorough_s: float
     duplicate_id_registers: tuple[str, str]
     arming: Arming
     most_goals: int

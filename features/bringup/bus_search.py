@@ -125,7 +125,7 @@ def _search_servos(port: BusPort, kind: BusKind, baud: int, thorough: bool) -> S
         return SearchRound(kind, baud, is_supported=False)
     if not thorough and not has_any_reply(port, family):
         return SearchRound(kind, baud)
-    found, junk = scan_ids(port, family, baud, family.thorough_s if thorough else family.quiet_s)
+    found, junk = scan_ids(port, family, baud)
     tables = {one.id: FAMILY_OF.get(one.model, family) for one in found}
     shared = tuple(i for i, table in tables.items() if count_corrupt(port, table, i) >= SHARED)
     return SearchRound(kind, baud, found=found, unknown_bytes=junk, shared_ids=shared)

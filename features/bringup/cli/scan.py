@@ -65,7 +65,7 @@ def scan(
     bauds: Annotated[str, typer.Option(help="all, or bit/s: 1000000,57600")] = "all",
     thorough: Annotated[
         bool,
-        typer.Option("--thorough", help="Search every id at every baud rate, with long timeouts."),
+        typer.Option("--thorough", help="Search every id at every baud rate."),
     ] = False,
     mock: MockOption = False,
     as_json: JsonOption = False,
