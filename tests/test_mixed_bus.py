@@ -98,13 +98,6 @@ def steps(readings):
     return [None if reading is None else reading.position_steps for reading in readings]
 
 
-@pytest.mark.parametrize("places", [((0, 1), (1, 2)), ((1,), (2,)), ((0, 1), (-1,))])
-def test_every_place_must_be_there_once(places):
-    shares = [BusShare(str(k), Scripted(str(k), own, []), own) for k, own in enumerate(places)]
-    with pytest.raises(ValueError, match="each index from 0 on must occur once"):
-        MultiBus(shares)
-
-
 def test_every_sequence_is_in_the_order_of_the_whole(mixture):
     assert mixture.bus.enable_torque() == (10, 11, 12, 13, 14)
     reported = mixture.bus.read(1.0)

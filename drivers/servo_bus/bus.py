@@ -1,6 +1,5 @@
 """Smart servos of one family on one serial bus: one read and one write per tick."""
 
-import struct
 from collections.abc import Collection, Mapping, Sequence
 from math import ceil, inf
 
@@ -15,7 +14,7 @@ from gazerig.drivers.servo_bus.discovery import find
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import CHECK_SUPPLY, PollList
-from gazerig.drivers.servo_bus.provisioning import Provisioning
+from gazerig.drivers.servo_bus.provisioning import Provisioning, read_registers
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 from gazerig.drivers.servo_bus.sync_read import ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import raise_missing, switch_off
@@ -139,16 +138,9 @@ class SmartServoBus(PortBus):
         servo_id = self._ids[slot]
         if servo_id not in self._poll_list.group:
             return
-        first, last = (family.registers[name] for name in family.polled[span])
-        size = last.address + last.size - first.address
-        data = self._line.ask_bytes((servo_id,), first.address, size).get(servo_id)
-        if data is None:
+        values = read_registers(self._line, (servo_id,), *family.polled[span]).get(servo_id)
+        if values is None:
             return
-        values = {
-            one.name: one.decode(data[at : at + one.size])
-            for one in family.registers.values()
-            if (at := one.address - first.address) >= 0 and at + one.size <= size
-        }
         torque, volts = values.get("torque_enable"), values.get("present_input_voltage")
         if torque is not None:
             self._feedback.set_torque(slot, torque == 1)
@@ -286,7 +278,7 @@ class SmartServoBus(PortBus):
         Raises:
             ValueError: a goal is not a number, or their number is wrong.
         """
-        goals = clip_goals(goals_steps, self._lowest, self._highest)
+        goals = [*map(round, clip_goals(goals_steps, self._lowest, self._highest))]
         supervisor, line = self._supervisor, self._line
         if not supervisor.engaged or self._is_down or line.starved:
             return
@@ -295,18 +287,13 @@ class SmartServoBus(PortBus):
             if self._now_s - since_s >= RESTART_S:
                 withheld |= {servo_id}
         try:
-            packet = self._goals.packet(goals, speeds)
-        except struct.error:  # goals are usually whole numbers
-            goals = [round(goal) for goal in goals]
-            packet = self._goals.packet(goals, speeds)
-        try:
             if withheld:
                 kept = [k for k, servo_id in enumerate(self._ids) if servo_id not in withheld]
                 if kept:
                     some = self._family.create_goal_packets([self._ids[k] for k in kept])
                     line.send(some.packet([goals[k] for k in kept], [speeds[k] for k in kept]))
             else:
-                line.send(packet)
+                line.send(self._goals.packet(goals, speeds))
         except BusLost as lost:
             self._record_loss(lost)
 
@@ -334,18 +321,14 @@ class SmartServoBus(PortBus):
         return self._line.label(servo_id)
 
     def _cannot_release(self) -> str:
-        unit_s = self._family.watchdog_unit_s
-        rest = "they continue to their last goal and hold it"
-        if self._watchdog and unit_s:
-            stops_s = self._watchdog * unit_s
+        rest = "continue to their last goal, as this kind has no bus watchdog, and hold it"
+        if self._watchdog:
             rest = (
-                f"their bus watchdog stops them within {stops_s:.2f} s and they hold their position"
+                f"are stopped by their bus watchdog within {_WATCHDOG_S} s and hold their position"
             )
-        elif not unit_s:
-            rest += ", as this kind has no bus watchdog"
         return (
             f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
-            f"power keep their torque, {rest}: {CUT} to free them"
+            f"power {rest}: {CUT} to free them"
         )
 
     def _reset_after_reconnect(self) -> None:

@@ -64,19 +64,16 @@ class Provisioning:
         """Read servos and return the settings that differ."""
         different: Differences = {}
         registers = self._family.registers
-        for first, last in self._family.read_spans:
-            start, stop = registers[first].address, registers[last].address + registers[last].size
+        for span in self._family.read_spans:
+            low, high = (registers[name].address for name in span)
             concerned = [
-                i for i in ids if any(start <= registers[n].address < stop for n in self._wanted[i])
+                i for i in ids if any(low <= registers[n].address <= high for n in self._wanted[i])
             ]
-            found = self._line.ask_bytes(concerned, start, stop - start)
+            found = read_registers(self._line, concerned, *span)
             raise_missing(self._line, [i for i in concerned if i not in found])
-            for servo_id, data in found.items():
-                for name, wanted in self._wanted[servo_id].items():
-                    at = registers[name].address - start
-                    if not 0 <= at < stop - start:
-                        continue
-                    value = registers[name].decode(data[at : at + registers[name].size])
+            for servo_id, values in found.items():
+                for name in filter(values.__contains__, self._wanted[servo_id]):
+                    wanted, value = self._wanted[servo_id][name], values[name]
                     wanted = self._family.corrected_value(name, value, wanted)
                     if value != wanted:
                         different.setdefault(servo_id, {})[name] = value, wanted
@@ -96,3 +93,19 @@ class Provisioning:
         finally:
             if lock:
                 write_verified(line, lock, {servo_id: 1})
+
+
+def read_registers(
+    line: Transactions, ids: Sequence[int], first: str, last: str
+) -> dict[int, dict[str, int]]:
+    """Read a range of registers of some servos; return the values by id and name."""
+    registers = line.family.registers
+    start, stop = registers[first].address, registers[last].address + registers[last].size
+    inside = [one for one in registers.values() if start <= one.address < stop]
+    return {
+        servo_id: {
+            one.name: one.decode(data[one.address - start : one.address - start + one.size])
+            for one in inside
+        }
+        for servo_id, data in line.ask_bytes(ids, start, stop - start).items()
+    }
