@@ -48,12 +48,10 @@ class PortBus(ABC):
     _give_up_s: longest loss of the port, seconds
     _is_down: whether the port is lost
     _release_due: whether torque must be switched off as soon as the port is open
-    holding_text, unconfirmed_text: messages for a servo whose torque is not off, or that does not
-        confirm it
+    holding_text: message for a servo whose torque is not off
     """
 
     holding_text: ClassVar[str] = "torque still on"
-    unconfirmed_text: ClassVar[str] = "torque-off not confirmed"
 
     _port: BusPort
     _line: Exchange
@@ -102,8 +100,7 @@ class PortBus(ABC):
         Raises:
             ValueError: the servos are not the same, or a setup is not possible.
         """
-        same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
-        if not same:
+        if [(s.id, s.model) for s in setups] != [(s.id, s.model) for s in self._setups]:
             raise ValueError("ids and models must not change: create another bus for other servos")
         self._check_setups(setups)
         self._target_setups = tuple(setups)
@@ -150,10 +147,7 @@ class PortBus(ABC):
             if now_s >= self._next_s:
                 self._next_s = now_s + AGAIN_S
                 if self._reopen():
-                    name = self._port.port_name
-                    where = getattr(self._port, "opened_as", name)
-                    renamed = f" as {where}" if where != name else ""
-                    self._log.add(f"port back after {gone_s:.1f} s{renamed}")
+                    self._log.add(f"port back after {gone_s:.1f} s")
             if self._is_down and gone_s >= self._give_up_s:
                 raise BusLost(
                     f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
@@ -190,12 +184,10 @@ class PortBus(ABC):
             self._log.add("torque switched off, as requested while the port was gone")
         self._release_due = False
         self._line.errors["refused"] += len(released.holding_ids)
-        for ids, what in (
-            (released.holding_ids, self.holding_text),
-            (released.unconfirmed_ids, self.unconfirmed_text),
-        ):
-            for servo_id in ids:
-                self._log.add(f"{self._servo_label(servo_id)}: {what}: {CUT}")
+        for servo_id in (*released.holding_ids, *released.unconfirmed_ids):
+            holds = servo_id in released.holding_ids
+            what = self.holding_text if holds else "torque-off not confirmed"
+            self._log.add(f"{self._servo_label(servo_id)}: {what}: {CUT}")
 
     def _record_loss(self, lost: BusLost) -> None:
         """Record that the port is lost."""

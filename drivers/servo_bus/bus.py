@@ -71,20 +71,13 @@ class SmartServoBus(PortBus):
         self._baud, self._give_up_s = baud, timing.give_up_s
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
-        self._lowest = tuple(setup.min_steps for setup in setups)
-        self._highest = tuple(setup.max_steps for setup in setups)
+        self._by_id: dict[int, ServoConfig] = {}
         self._goals = family.create_goal_packets(self._ids)
         self._nothing = Feedback.create_missing(len(self._ids))
         self._labels = {setup.id: setup.label() for setup in setups}
         self._log = EventLog()
-        self._line = Transactions(
-            port,
-            family,
-            family.prompt_timeout_s,
-            timing.reply_timeout_s,
-            baud,
-            self._labels,
-        )
+        prompt_s, most_s = family.prompt_timeout_s, timing.reply_timeout_s
+        self._line = Transactions(port, family, prompt_s, most_s, baud, self._labels)
         self._poll_at_s, self._turn = -inf, 0
         self._corrupt, self._is_troubled = 0, False
         self._assemble({})
@@ -92,10 +85,10 @@ class SmartServoBus(PortBus):
     def _assemble(self, firmware: Mapping[int, int]) -> None:
         """Create the parts in their initial state, for servos with this firmware, by id."""
         line, log, family = self._line, self._log, self._family
-        self._by_id = {setup.id: setup for setup in self._setups}
+        self._apply_target()
         self._is_down = self._release_due = False
         self._poll_list = PollList(self._labels, log, line.lateness)
-        self._provisioning = Provisioning(line, self._setups, log)
+        self._provisioning = Provisioning(line, self._by_id, log)
         self._feedback = FeedbackColumns(family, self._setups)
         is_fast = bool(firmware) and all(
             family.has_fast_read(setup.model, firmware[setup.id]) for setup in self._setups
@@ -130,10 +123,8 @@ class SmartServoBus(PortBus):
     def _poll(self, now_s: float) -> None:
         """Read what a group read does not cover of one servo; servos and spans take turns."""
         family, count = self._family, len(self._ids)
-        self._poll_at_s, self._turn = (
-            now_s + POLL_S,
-            (self._turn + 1) % (count * len(family.polled)),
-        )
+        self._poll_at_s = now_s + POLL_S
+        self._turn = (self._turn + 1) % (count * len(family.polled))
         span, slot = divmod(self._turn, count)
         servo_id = self._ids[slot]
         if servo_id not in self._poll_list.group:
@@ -157,7 +148,6 @@ class SmartServoBus(PortBus):
             PortError: the port cannot be opened.
             ServoMissing: servos are absent, of another model or refuse a setting.
         """
-        self._apply_wanted()
         where, baud = self._port.port_name, self._baud
         if not self._port.setBaudRate(baud):
             raise PortError(
@@ -243,7 +233,7 @@ class SmartServoBus(PortBus):
                 zero, so that it would move in the wrong direction.
         """
         try:
-            self._apply_wanted()
+            self._apply_target()
             goals = self._supervisor.enable_torque()
             for slot, goal in enumerate(goals):
                 if self._lowest[slot] < goal < self._highest[slot]:
@@ -297,15 +287,12 @@ class SmartServoBus(PortBus):
         except BusLost as lost:
             self._record_loss(lost)
 
-    def _apply_wanted(self) -> None:
+    def _apply_target(self) -> None:
         """Apply the setups stored since torque was last on."""
-        if self._target_setups == self._setups:
-            return
         self._setups = self._target_setups
         self._lowest = tuple(setup.min_steps for setup in self._setups)
         self._highest = tuple(setup.max_steps for setup in self._setups)
         self._by_id.update({setup.id: setup for setup in self._setups})
-        self._provisioning.set_target(self._setups)
 
     def faults(self) -> tuple[str, ...]:
         """Return the present faults, one line each, e.g. "neck_yaw (servo 7): overload"."""

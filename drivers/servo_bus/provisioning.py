@@ -21,22 +21,19 @@ class Provisioning:
 
     Args:
         line: Exchanges on the bus.
-        setups: The servos.
+        setups: The servos by id, with the present setups.
         log: Records every write.
     """
 
-    def __init__(self, line: Transactions, setups: Sequence[ServoConfig], log: EventLog) -> None:
+    def __init__(
+        self, line: Transactions, setups: Mapping[int, ServoConfig], log: EventLog
+    ) -> None:
         self._line, self._family = line, line.family
-        self._log = log
-        self.set_target(setups)
-
-    def set_target(self, setups: Sequence[ServoConfig]) -> None:
-        """Set the required settings."""
-        self._wanted = {setup.id: self._family.wanted_settings(setup) for setup in setups}
+        self._setups, self._log = setups, log
 
     def wanted(self, servo_id: int) -> Mapping[str, int]:
         """Return the required values of a servo's registers, by name."""
-        return self._wanted[servo_id]
+        return self._family.wanted_settings(self._setups[servo_id])
 
     def apply(self, ids: Sequence[int]) -> None:
         """Set servos to position mode with their limits, speeds and gains.
@@ -64,19 +61,20 @@ class Provisioning:
         """Read servos and return the settings that differ."""
         different: Differences = {}
         registers = self._family.registers
+        wanted = {servo_id: self.wanted(servo_id) for servo_id in ids}
         for span in self._family.read_spans:
             low, high = (registers[name].address for name in span)
             concerned = [
-                i for i in ids if any(low <= registers[n].address <= high for n in self._wanted[i])
+                i for i in ids if any(low <= registers[n].address <= high for n in wanted[i])
             ]
             found = read_registers(self._line, concerned, *span)
             raise_missing(self._line, [i for i in concerned if i not in found])
             for servo_id, values in found.items():
-                for name in filter(values.__contains__, self._wanted[servo_id]):
-                    wanted, value = self._wanted[servo_id][name], values[name]
-                    wanted = self._family.corrected_value(name, value, wanted)
-                    if value != wanted:
-                        different.setdefault(servo_id, {})[name] = value, wanted
+                for name in filter(values.__contains__, wanted[servo_id]):
+                    value = values[name]
+                    target = self._family.corrected_value(name, value, wanted[servo_id][name])
+                    if value != target:
+                        different.setdefault(servo_id, {})[name] = value, target
         return different
 
     def _correct(self, servo_id: int, settings: Mapping[str, tuple[int, int]]) -> None:
