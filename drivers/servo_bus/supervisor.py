@@ -324,7 +324,7 @@ class Supervisor:
             self._feedback.set_torque(slot, False)
         if found[family.error_register]:
             return " and ".join(family.name_errors(found[family.error_register]))
-        (position,) = read_positions(line, ids)
+        position = read_positions(line, ids)[servo_id]
         misplaced = far_outside_steps(setup, position)
         if crosses_zero(family, setup, position):
             misplaced = FAR_SIDE
@@ -339,7 +339,7 @@ class Supervisor:
                 return AGAIN_AND_AGAIN
             (position,), outside = enable(line, self._setups, ids, self._watchdog)
             if outside:
-                (position,) = read_positions(line, ids)
+                position = read_positions(line, ids)[servo_id]
             self._record_rearmed({servo_id: -inf, **outside})
             line.errors["rearmed"] += 1
             if has_restarted:

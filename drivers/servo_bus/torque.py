@@ -57,30 +57,30 @@ def enable(
         return (), {}
     if family.watchdog_unit_s is not None:
         write_verified(line, "bus_watchdog", dict.fromkeys(ids, 0))
-    present = dict(zip(ids, read_positions(line, ids), strict=True))
+    present = read_positions(line, ids)
+    goals, outside = dict[int, int](), dict[int, float]()
     for servo_id, steps in present.items():
-        if crosses_zero(family, setups[servo_id], steps):
-            low, high = setups[servo_id].min_steps, setups[servo_id].max_steps
+        setup = setups[servo_id]
+        low, high = setup.min_steps, setup.max_steps
+        if crosses_zero(family, setup, steps):
             raise ServoFault(
                 f"{line.label(servo_id)} is at {steps}, beyond its encoder's zero, and would move "
                 f"into {low}..{high} in the wrong direction: turn it into that range by hand, then "
                 "restart its power"
             )
-    goals = [min(max(present[i], setups[i].min_steps), setups[i].max_steps) for i in ids]
-    own = [setups[i] for i in ids]
-    outside = {
-        one.id: abs(goal - present[one.id]) / entry_speed_steps_s(one, family.steps_per_turn)
-        for one, goal in zip(own, goals, strict=True)
-        if goal != present[one.id]
-    }
+        goals[servo_id] = min(max(steps, low), high)
+        if not low <= steps <= high:
+            away = abs(goals[servo_id] - steps)
+            outside[servo_id] = away / entry_speed_steps_s(setup, family.steps_per_turn)
+    own = [setups[servo_id] for servo_id in ids]
     speeds = goal_speeds(family, own, outside)
-    accelerations = [family.acceleration_units(one.max_accel_steps_s2) for one in own]
+    accelerations = [family.acceleration_units(setup.max_accel_steps_s2) for setup in own]
     armed = speeds if family.arming.limits_speed else accelerations
     write_verified(line, family.arming.register, dict(zip(ids, armed, strict=True)))
-    _switch_on(line, present, dict(zip(ids, zip(goals, speeds, strict=True), strict=True)))
+    _switch_on(line, present, goals, dict(zip(ids, speeds, strict=True)))
     if family.watchdog_unit_s is not None:
         write_verified(line, "bus_watchdog", dict.fromkeys(ids, watchdog))
-    return tuple(goals), outside
+    return tuple(goals.values()), outside
 
 
 def crosses_zero(family: Family, setup: "ServoConfig", steps: int) -> bool:
@@ -107,15 +107,15 @@ def goal_speeds(
     ]
 
 
-def read_positions(line: Transactions, ids: Sequence[int]) -> tuple[int, ...]:
-    """Read every position, in the servos' own count.
+def read_positions(line: Transactions, ids: Sequence[int]) -> dict[int, int]:
+    """Read every position, in the servos' own count; return them by id.
 
     Raises:
         ServoMissing: a servo does not answer.
     """
     found = line.ask(ids, "present_position")
     raise_missing(line, [servo_id for servo_id in ids if servo_id not in found])
-    return tuple(found[servo_id] for servo_id in ids)
+    return {servo_id: found[servo_id] for servo_id in ids}
 
 
 def write_verified(
@@ -145,13 +145,10 @@ def write_verified(
         else:
             line.write_all(tuple(left), name, left.values())
         found = line.ask(tuple(left), name)
-        left = {i: value for i, value in left.items() if found.get(i) != value}
-        if resting:
-            left = {
-                i: value
-                for i, value in left.items()
-                if i not in found or abs(found[i] - resting[i]) > STILL_STEPS
-            }
+        for servo_id, value in found.items():
+            rests = resting is not None and abs(value - resting[servo_id]) <= STILL_STEPS
+            if rests or value == left[servo_id]:
+                del left[servo_id]
         if not left:
             return
     raise_missing(line, [servo_id for servo_id in left if servo_id not in found])
@@ -165,22 +162,24 @@ def write_verified(
 
 
 def _switch_on(
-    line: Transactions, present: Mapping[int, int], goals: Mapping[int, tuple[int, int]]
+    line: Transactions,
+    present: Mapping[int, int],
+    goals: Mapping[int, int],
+    speeds: Mapping[int, int],
 ) -> None:
     """Set the goals with their speeds, then switch torque on; no position may change by that."""
     family, ids = line.family, tuple(goals)
-    steps = {servo_id: goal for servo_id, (goal, _) in goals.items()}
 
     def send(left: Sequence[int]) -> None:
         builder = family.create_goal_packets(left)
-        line.send(builder.packet([goals[i][0] for i in left], [goals[i][1] for i in left]))
+        line.send(builder.packet([goals[i] for i in left], [speeds[i] for i in left]))
 
-    write_verified(line, "goal_position", steps, send, present if family.goal_speed else None)
+    write_verified(line, "goal_position", goals, send, present if family.goal_speed else None)
     before = read_positions(line, ids)
     # Damaged bytes may pass a checksum of one byte: a goal from them would be a jump.
-    moved = [i for i, at in zip(ids, before, strict=True) if abs(at - present[i]) > STILL_STEPS]
+    moved = [line.label(i) for i in ids if abs(before[i] - present[i]) > STILL_STEPS]
     if moved:
-        named = ", ".join(map(line.label, moved))
+        named = ", ".join(moved)
         raise ServoMissing(f"{line.port.port_name}: {named} does not rest: hold it still")
     try:
         write_verified(line, "torque_enable", dict.fromkeys(ids, 1))
@@ -193,14 +192,14 @@ def _switch_on(
         if not named:
             raise
         raise ServoFault(f"{named}: let it cool, free it, {family.fault_cure}") from None
-    for servo_id, was, now in zip(ids, before, read_positions(line, ids), strict=True):
-        if abs(now - was) > JUMP_TURN * family.steps_per_turn:
+    for servo_id, now in read_positions(line, ids).items():
+        if abs(now - before[servo_id]) > JUMP_TURN * family.steps_per_turn:
             raise ServoFault(
-                f"{line.label(servo_id)}: position jumped from {was} to {now} when torque was "
-                f"switched on: {family.jump_cure}"
+                f"{line.label(servo_id)}: position jumped from {before[servo_id]} to {now} when "
+                f"torque was switched on: {family.jump_cure}"
             )
     if family.goal_speed:
-        write_verified(line, "goal_position", steps, send)
+        write_verified(line, "goal_position", goals, send)
 
 
 def switch_off(line: Transactions, ids: Sequence[int]) -> ReleaseResult:
