@@ -1,25 +1,20 @@
 """A serial port without a wire, over an emulated device in this process.
 
-Drivers use it as a gazerig.drivers.serial.port.BusPort, ROBOTIS' SDK as its PortHandler. Time is
-the device's: a missing answer costs no time. With wire time or late answers by faults, bytes
-arrive when the device's clock reaches their time; waiting advances that clock with
-``sleep_until``. The baud rate is that of ``setBaudRate``.
+It is a gazerig.drivers.serial.port.BusPort. Time is the device's: a missing answer costs no time.
+With wire time or late answers by faults, bytes arrive when the device's clock reaches their time;
+waiting advances that clock with ``sleep_until``. The baud rate is that of ``setBaudRate``.
 """
 
 import errno
 import os
 from collections.abc import Callable
 
-from dynamixel_sdk import PortHandler
-
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.wire import ServoLine
 
-BITS_PER_BYTE = 10
 
-
-class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
+class InProcessPort:
     """The host's end of an emulated device.
 
     Args:
@@ -37,7 +32,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         sleep_until: Callable[[float], None] | None = None,
         wire_time: bool = False,
     ) -> None:
-        super().__init__(name)
+        self.port_name = name
         self.chain = chain
         self.faults = chain.faults
         self.line = ServoLine(chain, wire_time)
@@ -46,9 +41,28 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._sleep_until = sleep_until
         self._waiting = b""
         self._lost = False
-        self._give_up_s = 0.0
+        self.baudrate = 0
 
-    # --- methods for a driver's control loop
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Open at a baud rate.
+
+        Raises:
+            PortError: unplugged.
+        """
+        if self.faults.is_on("unplug"):
+            raise PortError(f"cannot open {self.port_name}: {os.strerror(errno.ENOENT)}")
+        self.baudrate = baudrate
+        self._lost = False
+        self._waiting = b""
+        self.line.forget()
+        return True
+
+    def closePort(self) -> None:
+        """Do nothing: there is nothing to free."""
+
+    def clearPort(self) -> None:
+        """Discard received bytes."""
+        self.drain()
 
     def write(self, data: bytes) -> None:
         """Send bytes; answers wait to be read.
@@ -114,75 +128,3 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         if self._sleep_until is not None and until_s > self.now_s():
             self._sleep_until(until_s)
         self._fetch_arrived()
-
-    # --- methods for the SDK
-
-    def setBaudRate(self, baudrate: int) -> bool:
-        """Open at a baud rate."""
-        return self.setupPort(baudrate)
-
-    def setupPort(self, cflag_baud: int) -> bool:
-        """Open at a baud rate.
-
-        Raises:
-            PortError: unplugged.
-        """
-        if self.faults.is_on("unplug"):
-            raise PortError(f"cannot open {self.port_name}: {os.strerror(errno.ENOENT)}")
-        self.is_open = True
-        self.is_using = False
-        self.baudrate = cflag_baud
-        self.tx_time_per_byte = 1000.0 * BITS_PER_BYTE / self.baudrate
-        self._lost = False
-        self._waiting = b""
-        self.line.forget()
-        return True
-
-    def closePort(self) -> None:
-        """Close; safe to call twice."""
-        self.is_open = False
-
-    def clearPort(self) -> None:
-        """Discard received bytes."""
-        self.drain()
-
-    def getBytesAvailable(self) -> int:
-        """Return the number of received bytes."""
-        self._fetch_arrived()
-        return len(self._waiting)
-
-    def readPort(self, length: int) -> bytes:
-        """Return up to ``length`` bytes."""
-        return self.read_until(length, self.now_s())
-
-    def writePort(self, packet: bytes | list[int]) -> int:
-        """Send bytes; return their number."""
-        data = bytes(packet)
-        self.write(data)
-        return len(data)
-
-    def getCurrentTime(self) -> float:
-        """Return the device's time in milliseconds."""
-        return self.now_s() * 1000.0
-
-    def setPacketTimeout(self, packet_length: int) -> None:
-        """Set the SDK's time-out from the length of the packet."""
-        self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + 34.0)
-
-    def setPacketTimeoutMillis(self, msec: float) -> None:
-        """Set the SDK's time-out."""
-        self._give_up_s = self.now_s() + msec / 1000.0
-
-    def isPacketTimeout(self) -> bool:
-        """Return whether further waiting is useless because no more answers will arrive.
-
-        A simulated clock is advanced to the next bytes or to the end of the time-out.
-        """
-        if self._sleep_until is None or self._waiting:
-            return not self.line.is_busy
-        due_s = self.line.next_due_s()
-        if due_s is None or due_s > self._give_up_s:
-            self._wait(self._give_up_s)
-            return True
-        self._wait(due_s)
-        return False

@@ -15,7 +15,7 @@ ROOMS = ("config", "doors", "drivers", "features", "gaze", "robot", "sim_mock")
 # Vendor packages, and the only modules that may see each.
 OWNERS = {
     "serial": ("drivers.serial.", "sim_mock.in_process_port"),
-    "dynamixel_sdk": ("sim_mock.in_process_port",),
+    "dynamixel_sdk": (),
     "depthai": ("drivers.camera.oak.discovery",),
     "mcap": ("drivers.camera.playback", "drivers.camera.recorder", "robot.recording."),
     "smbus2": ("drivers.i2c.port",),

@@ -4,6 +4,7 @@ import time
 
 import dynamixel_sdk as sdk
 import pytest
+from fakes.sdk_port import SdkPort
 from fakes.waiting import eventually
 
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -66,7 +67,6 @@ def test_the_vendors_sdk():
     time passes as it is waited for.
     """
     port, packets = SimulatedPort(), sdk.PacketHandler(2.0)
-    assert port.openPort() and port.setBaudRate(BAUD)
     ok = sdk.COMM_SUCCESS
     assert packets.ping(port, 1) == (1200, ok, 0)
     assert packets.ping(port, 99)[1] == sdk.COMM_RX_TIMEOUT
@@ -78,16 +78,17 @@ def test_the_vendors_sdk():
     registers_with_sdk(port, packets)
     groups_with_sdk(port, packets)
     instructions_with_sdk(port, packets)
-    port.closePort()
 
 
-class SimulatedPort(InProcessPort):
-    """A port whose clock advances with each wait."""
+class SimulatedPort(SdkPort):
+    """A port of the SDK whose clock advances with each wait."""
 
     def __init__(self):
         self._t_s = 0.0
         chain = build_dynamixel([*SPECS, *X430], lambda: self._t_s, baud=BAUD)
-        super().__init__(chain, sleep_until=self._pass_until, wire_time=True)
+        port = InProcessPort(chain, sleep_until=self._pass_until, wire_time=True)
+        port.setBaudRate(BAUD)
+        super().__init__(port)
 
     def _pass_until(self, t_s):
         self._t_s = max(self._t_s, t_s)

@@ -9,7 +9,7 @@ from fakes.films import write_film
 from light_python import LightPython
 
 ALLOWED = {
-    *("gazerig", "numpy", "serial", "fastcrc", "msgspec", "smbus2", "dynamixel_sdk"),
+    *("gazerig", "numpy", "serial", "fastcrc", "msgspec", "smbus2"),
     # for the rig's file, which is read and written while running
     *("yaml", "pydantic", "pydantic_core", "annotated_types", "typing_inspection"),
     *("typing_extensions", "cython_runtime"),

@@ -4,6 +4,7 @@ import struct
 
 import pytest
 from dynamixel_sdk import PacketHandler
+from fakes.sdk_port import SdkPort
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.sim_mock.devices import DynamixelLine, build
@@ -30,8 +31,7 @@ class World:
 
     def raw(self, servo_id=2, wait_s=0.1):
         """Ask for a position and give all bytes that arrive in time."""
-        self.packets.readTx(self.port, servo_id, POSITION, SIZE)
-        self.port.is_using = False
+        self.packets.readTx(SdkPort(self.port), servo_id, POSITION, SIZE)
         return self.port.read_until(200, self.now_s + wait_s)
 
 

@@ -12,6 +12,7 @@ from statistics import mean
 import pytest
 from bus_kinds import BOARDS, FEETECH, SMART, TICK_S, every_kind, in_process
 from dynamixel_sdk import PacketHandler
+from fakes.sdk_port import SdkPort
 
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.types import LimpableBus
@@ -367,10 +368,10 @@ def test_servos_that_answer_less_than_they_could_are_understood(name, level):
     )
     assert bench.port.setBaudRate(1_000_000)
     for setup in bench.setups:
-        packets = PacketHandler(protocol)
+        packets, port = PacketHandler(protocol), SdkPort(bench.port)
         if lock:
-            packets.write1ByteTxOnly(bench.port, setup.id, lock, 0)
-        packets.write1ByteTxOnly(bench.port, setup.id, address, level)
+            packets.write1ByteTxOnly(port, setup.id, lock, 0)
+        packets.write1ByteTxOnly(port, setup.id, address, level)
     bench.port.closePort()
     bus = bench.hold()
     assert all(f.missing == () and all(f.torque) for f in bench.ticks(bus, 1.0))
