@@ -6,9 +6,8 @@ the servos, so that a search through 254 silent ids or a slow motion takes as lo
 arithmetic. What is not served here is opened as ever.
 """
 
-import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 import pytest
@@ -17,10 +16,9 @@ from gazerig.drivers.serial import port as ports
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.pty.client import ServerProcess
-from gazerig.sim_mock.pty.line import BusSettings
+from gazerig.sim_mock.pty.client import PtyBuses
 
 START_S = 1000.0
 """No port was opened at the beginning of time."""
@@ -51,35 +49,31 @@ class _Wires:
     def __init__(self, clock: SimulatedClock) -> None:
         self._clock = clock
         self._devices: dict[str, Device] = {}
-        self._of: dict[ServerProcess, dict[str, str]] = {}
+        self._of: dict[PtyBuses, dict[str, str]] = {}
         self._terminals: dict[str, tuple[int, int]] = {}
 
     def start(
-        self, server: ServerProcess, buses: Sequence[BusSettings], world: object = None
-    ) -> list[str]:
-        """Stands for ServerProcess.serve."""
+        self, server: PtyBuses, devices: Mapping[str, Emulated], world: object = None
+    ) -> dict[str, str]:
+        """Stands for PtyBuses.start."""
         assert world is None  # a world's servos answer on terminals alone
         paths: dict[str, str] = {}
-        for bus in buses:
-            assert not bus.wire_time
+        for name, served in devices.items():
             # The doctor looks whether a path is a serial port; nothing goes through this one.
             ends = os.openpty()
-            path = os.ttyname(ends[1])
-            device = build(bus.device, self._clock.now_s)
-            paths[bus.name or ""] = path
-            self._devices[path], self._terminals[path] = device, ends
+            paths[name] = path = os.ttyname(ends[1])
+            self._devices[path], self._terminals[path] = build(served, self._clock.now_s), ends
         self._of[server] = paths
-        return list(paths.values())
+        return paths
 
-    def command(self, server: ServerProcess, text: str, bus: str = "") -> str:
-        """Stands for ServerProcess.command."""
+    def command(self, server: PtyBuses, text: str, bus: str = "") -> str:
+        """Stands for PtyBuses.command."""
         if server not in self._of:
             raise RuntimeError("the emulated bus is not running: start it first")
-        done = self._devices[self._of[server][bus]].faults.command(text)
-        return json.dumps({"ok": "status", **json.loads(done)}) if done[:1] == "{" else done
+        return self._devices[self._of[server][bus]].faults.command(text)
 
-    def stop(self, server: ServerProcess) -> None:
-        """Stands for ServerProcess.stop."""
+    def stop(self, server: PtyBuses) -> None:
+        """Stands for PtyBuses.stop."""
         for path in self._of.pop(server, {}).values():
             del self._devices[path]
             for end in self._terminals.pop(path):
@@ -101,11 +95,11 @@ def simulated_wires() -> Iterator[SimulatedClock]:
     clock = SimulatedClock(START_S)
     with pytest.MonkeyPatch.context() as patch:
         wires = _Wires(clock)
-        patch.setattr(ServerProcess, "serve", lambda server, *given: wires.start(server, *given))
+        patch.setattr(PtyBuses, "start", lambda server, *given: wires.start(server, *given))
         patch.setattr(
-            ServerProcess, "command", lambda server, text, bus="": wires.command(server, text, bus)
+            PtyBuses, "command", lambda server, text, bus="": wires.command(server, text, bus)
         )
-        patch.setattr(ServerProcess, "stop", lambda server: wires.stop(server))
+        patch.setattr(PtyBuses, "stop", lambda server: wires.stop(server))
         patch.setattr(ports, "BlockingPort", wires.port)
         patch.setattr(RealClock, "now_s", lambda _: clock.now_s())
         patch.setattr(RealClock, "sleep_until", lambda _, t_s: clock.sleep_until(t_s))

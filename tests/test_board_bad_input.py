@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from board_rig import SECTION, on_pca9685
+from fakes.pty_bus import PtyBus
 from typer.testing import CliRunner
 
 from gazerig.robot.cli.main import app
 from gazerig.sim_mock.devices import Emulated, MaestroLine, Pca9685Line
-from gazerig.sim_mock.pty.client import PtyBus
 
 PULSES = "hobby servos without pulses go to their parking place"
 

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 from command_line import options, parse, typed
+from fakes.pty_bus import PtyBus
 from features_there import needs_all_features
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, spans
 
@@ -21,7 +22,6 @@ from gazerig.robot.remote.client import RobotClient
 from gazerig.sim_mock.dynamixel.chain import DynamixelChain
 from gazerig.sim_mock.feetech.chain import FeetechChain
 from gazerig.sim_mock.maestro.board import COMMANDS as MAESTRO
-from gazerig.sim_mock.pty.client import PtyBus
 
 pytestmark = needs_all_features  # the documents describe every command
 

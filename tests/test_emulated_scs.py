@@ -3,11 +3,11 @@
 import math
 
 import pytest
+from fakes.pty_bus import PtyBus
 from fakes.waiting import eventually
 from servo_bench import ALL, PING, READ, SYNC_READ, SYNC_WRITE, WRITE, FeetechBench
 
 from gazerig.sim_mock.devices import FeetechLine
-from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000

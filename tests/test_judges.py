@@ -4,12 +4,12 @@ import time
 
 import dynamixel_sdk as sdk
 import pytest
+from fakes.pty_bus import PtyBus
 from fakes.sdk_port import SdkPort
 from fakes.waiting import eventually
 
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.pty.client import PtyBus
 
 BAUD = 1_000_000
 IDS = (1, 2, 3)

@@ -3,10 +3,10 @@
 import math
 
 import pytest
+from fakes.pty_bus import PtyBus
 from fakes.waiting import eventually
 
 from gazerig.sim_mock.devices import FeetechLine
-from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000

@@ -11,12 +11,13 @@ import time
 from pathlib import Path
 
 import pytest
+from fakes.pty_bus import PtyBus
 from present import present
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
-from gazerig.sim_mock.pty.client import PtyBus, PtyBuses
+from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.pty.server import ServerSettings
 from gazerig.sim_mock.smart_servo.physics import ServoSpec

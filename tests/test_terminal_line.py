@@ -18,14 +18,7 @@ class Bench:
 
     def __init__(self, device=STS, **settings):
         self.now_s = 5.0
-        self.said: list[str] = []
-        self.warned: list[str] = []
-        self.line = TerminalLine(
-            BusSettings(device, **settings),
-            self.clock,
-            self.said.append,
-            self.warned.append,
-        )
+        self.line = TerminalLine(BusSettings(device, **settings), self.clock)
         self.fd = os.open(self.line.terminal.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
 
     def clock(self):

@@ -14,15 +14,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SentWorld:
-    """``SentSurroundings`` of gazerig.sim_mock.pty.client."""
+    """World that is sent to a server's process, and the folder of its files."""
 
     spec: WorldSpec
+    folder: Path
 
-    def in_folder(self, folder: Path) -> "SentWorld":
-        """Return the world that shares its files in a folder."""
-        return SentWorld(self.spec.with_shared_file(folder))
-
-    def serve(self, folder: Path, clock_s: Callable[[], float]) -> "ServedWorld":
+    def __call__(self, clock_s: Callable[[], float]) -> "ServedWorld":
         """Return the world of a server.
 
         Raises:
@@ -31,4 +28,4 @@ class SentWorld:
         import_mujoco()  # whatever MUJOCO_GL permits
         from gazerig.features.world.served_world import ServedWorld
 
-        return ServedWorld(self.spec, state_file(folder), clock_s)
+        return ServedWorld(self.spec, state_file(self.folder), clock_s)

@@ -4,24 +4,22 @@ import json
 import pickle
 import subprocess
 import threading
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Self
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
 from gazerig.drivers.process.own_folder import OwnFolder
-from gazerig.sim_mock.devices import DynamixelLine, Emulated
+from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.line import BusSettings
-from gazerig.sim_mock.pty.server import SentSurroundings, ServerSettings
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.pty.server import MakeSurroundings, ServerSettings
 
 STOP_S = 2.0
 
 
-class ServerProcess:
-    """A server process of ``gazerig.sim_mock.pty.server``."""
+class PtyBuses:
+    """Emulated buses in one process of ``gazerig.sim_mock.pty.server``."""
 
     def __init__(self) -> None:
         self._server: subprocess.Popen[bytes] | None = None
@@ -30,10 +28,16 @@ class ServerProcess:
         self.joints: dict[str, int] = {}
         """Index of each joint in the state of the surroundings; {} without these."""
 
-    def serve(
-        self, buses: Sequence[BusSettings], surroundings: SentSurroundings | None = None
-    ) -> list[str]:
+    def start(
+        self,
+        devices: Mapping[str, Emulated],
+        surroundings: Callable[[Path], MakeSurroundings] | None = None,
+    ) -> dict[str, str]:
         """Start it; return the path of each bus, which does not change when it is unplugged.
+
+        Args:
+            devices: the device of each bus, by its name; a single bus may have the name "".
+            surroundings: returns the surroundings of all servos, given a folder for their files.
 
         Raises:
             SetupError: the surroundings cannot be used; the message gives the reason.
@@ -41,10 +45,13 @@ class ServerProcess:
         """
         self._folder = OwnFolder("servos")
         folder = self._folder.path
-        around = None if surroundings is None else (surroundings.in_folder(folder), folder)
-        linked = tuple(replace(bus, link=str(folder / f"tty{k}")) for k, bus in enumerate(buses))
+        around = None if surroundings is None else surroundings(folder)
+        buses = tuple(
+            BusSettings(device, name, link=str(folder / f"tty{k}"))
+            for k, (name, device) in enumerate(devices.items())
+        )
         settings = folder / "settings"
-        settings.write_bytes(pickle.dumps(ServerSettings(linked, True, around)))
+        settings.write_bytes(pickle.dumps(ServerSettings(buses, True, around)))
         self._server = child_process.start(
             # The servos must outlive their client's shutdown: they end when their input does.
             "gazerig.sim_mock.pty.server",
@@ -55,7 +62,7 @@ class ServerProcess:
         try:
             if surroundings is not None:
                 self.joints = self._read_answer()["joints"]
-            return [str(self._read_answer()["path"]) for _ in buses]
+            return {name: str(self._read_answer()["path"]) for name in devices}
         except BaseException:
             self.stop()
             raise
@@ -88,11 +95,9 @@ class ServerProcess:
             pipe.write(line.replace("\n", " ").encode() + b"\n")
             pipe.flush()
             try:
-                answer = self._read_answer()
+                return str(self._read_answer()["ok"])
             except (SetupError, RuntimeError) as error:
                 raise ValueError(str(error)) from None
-        answer.pop("bus", None)
-        return json.dumps(answer) if len(answer) > 1 else str(answer["ok"])
 
     def stop(self) -> None:
         """End the server; safe to call twice."""
@@ -134,35 +139,3 @@ class ServerProcess:
         if "error" in answer:
             raise SetupError(answer["error"])
         return answer
-
-
-class PtyBus(ServerProcess):
-    """One emulated bus in its own process, and its terminal."""
-
-    def start(
-        self,
-        specs: Sequence[ServoSpec | tuple[int, str, float]],
-        baud: int | None = None,
-        wire_time: bool = False,
-    ) -> str:
-        """Start a server for Dynamixel servos; return the path to open as a serial port."""
-        line = DynamixelLine(tuple(ServoSpec(*spec) for spec in specs), baud)
-        return self.start_device(line, wire_time)
-
-    def start_device(self, device: Emulated, wire_time: bool = False) -> str:
-        """Start a server for servos or a board; return the path to open as a serial port."""
-        return self.serve([BusSettings(device, wire_time=wire_time)])[0]
-
-
-class PtyBuses(ServerProcess):
-    """All emulated buses of a rig in one process."""
-
-    def start(
-        self, devices: Mapping[str, Emulated], surroundings: SentSurroundings | None = None
-    ) -> dict[str, str]:
-        """Start a server for the devices of every bus; return the path of each, by the same names.
-
-        The errors are those of ``serve``.
-        """
-        buses = [BusSettings(device, name) for name, device in devices.items()]
-        return dict(zip(devices, self.serve(buses, surroundings), strict=True))

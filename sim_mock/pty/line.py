@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,37 +41,30 @@ class TerminalLine:
     Args:
         settings: the device and its line.
         now_s: the clock of device and line.
-        say: receives the bus's new path as JSON when it is plugged in again without a link.
-        warn: called once for each wrong baud rate of a client.
         device: a device; None: it is built from its specification, with its own mechanics.
+
+    Attributes:
+        heard: whether a client has sent anything yet.
 
     Raises:
         ValueError, OSError: the settings are invalid.
     """
 
     def __init__(
-        self,
-        settings: BusSettings,
-        now_s: Callable[[], float],
-        say: Callable[[str], None],
-        warn: Callable[[str], None] | None = None,
-        device: Device | None = None,
+        self, settings: BusSettings, now_s: Callable[[], float], device: Device | None = None
     ) -> None:
-        self.settings = settings
-        self._now_s, self._say, self._warn = now_s, say, warn
+        self._settings, self._now_s = settings, now_s
         self.device = device or build(settings.device, now_s)
         if isinstance(self.device, ServoChain):
             self.device.packet_gap_s = _PACKET_GAP_S
         self.line = ServoLine(self.device, settings.wire_time)
         link = None if settings.link is None else Path(os.path.abspath(settings.link))
         self.terminal = Terminal(link)
-        self._warned: int | None = None
         self.heard = False
-        """Whether a client has sent anything yet."""
 
     def address_json(self) -> str:
         """Return the path to open, the baud rate, and the name, if it has one, as JSON."""
-        return self._message({"path": self.terminal.path, "baud": self.settings.device.baud})
+        return self._json(path=self.terminal.path, baud=self._settings.device.baud)
 
     def close(self) -> None:
         """Remove the link and the terminal; safe to call twice."""
@@ -95,17 +88,11 @@ class TerminalLine:
         if terminal.master in ready:
             data = terminal.read()
             self.heard = self.heard or bool(data)
-            careful = self.device.check_baud or self.line.wire_time
-            baud = terminal.client_baud() if careful else 0
-            terminal.write(self.line.send(data, baud or 1, now_s))
-            if data and self.device.check_baud and baud != self._warned:
-                self._warn_of_baud(baud)
+            terminal.write(self.line.send(data, terminal.client_baud() or 1, now_s))
         if terminal.clients in ready:  # after the last client's bytes, whose answers it drops
             terminal.count_clients()
-        if self.line.is_busy:
-            data = self.line.take_arrived()
-            if terminal.is_plugged:
-                terminal.write(data)
+        if self.line.is_busy and terminal.is_plugged:
+            terminal.write(self.line.take_arrived())
         self._follow_faults()
 
     def obey(self, text: str) -> str:
@@ -113,32 +100,18 @@ class TerminalLine:
         try:
             done = self.device.faults.command(text)
         except ValueError as error:
-            return self._message({"error": str(error)})
+            return self._json(error=str(error))
         self._follow_faults()
-        if done.startswith("{"):
-            return self._message({"ok": "status", **json.loads(done)})
-        return self._message({"ok": done})
+        return self._json(ok=done)
 
-    def _message(self, message: Mapping[str, object]) -> str:
-        """Return a message about this bus as JSON, with the bus's name."""
-        name = self.settings.name
+    def _json(self, **message: object) -> str:
+        name = self._settings.name
         return json.dumps(message if name is None else {"bus": name, **message})
 
-    def _warn_of_baud(self, baud: int) -> None:
-        if self._warn is not None and not self.device.understands_baud(baud):
-            self._warned = baud
-            own = self.settings.device.baud
-            self._warn(f"a client sends at {baud} bit/s; the servos listen at {own}")
-
     def _follow_faults(self) -> None:
-        """Apply the faults of the adapter to the terminal."""
-        faults, terminal = self.device.faults, self.terminal
-        if faults.is_on("unplug"):
-            terminal.unplug()
+        """Unplug the terminal, or plug it in again."""
+        if self.device.faults.is_on("unplug"):
+            self.terminal.unplug()
             self.line.forget()
-            return
-        if not terminal.is_plugged:
-            before = terminal.path
-            terminal.plug()
-            if terminal.path != before:
-                self._say(self._message({"path": terminal.path}))
+        elif not self.terminal.is_plugged:
+            self.terminal.plug()

@@ -57,20 +57,12 @@ class ServedSurroundings(Protocol):
         ...
 
 
-class SentSurroundings(Protocol):
-    """Surroundings that are sent to the server's process."""
+MakeSurroundings = Callable[[Callable[[], float]], ServedSurroundings]
+"""Creates surroundings on a clock in the server's process.
 
-    def in_folder(self, folder: Path) -> "SentSurroundings":
-        """Return the surroundings that share their files in a folder."""
-        ...
-
-    def serve(self, folder: Path, clock_s: Callable[[], float]) -> ServedSurroundings:
-        """Return the surroundings in the server.
-
-        Raises:
-            SetupError: they cannot be used.
-        """
-        ...
+Raises:
+    SetupError: they cannot be used.
+"""
 
 
 @dataclass(frozen=True)
@@ -80,13 +72,12 @@ class ServerSettings:
     Attributes:
         buses: each on its own terminal.
         until_eof: stop at the end of standard input.
-        surroundings: surroundings of all servos, and their folder; None: each servo has its own
-            mechanics.
+        surroundings: surroundings of all servos; None: each servo has its own mechanics.
     """
 
     buses: tuple[BusSettings, ...]
     until_eof: bool = False
-    surroundings: tuple[SentSurroundings, Path] | None = None
+    surroundings: MakeSurroundings | None = None
 
 
 class Server:
@@ -102,13 +93,11 @@ class Server:
         self.lines: dict[str, TerminalLine] = {}
         self.surroundings: ServedSurroundings | None = None
         if settings.surroundings is not None:
-            sent, folder = settings.surroundings
-            self.surroundings = sent.serve(folder, time.monotonic)
-        warn = None if settings.until_eof else _warn
+            self.surroundings = settings.surroundings(time.monotonic)
         try:
             for bus in settings.buses:
                 device = None if self.surroundings is None else self.surroundings.device(bus)
-                line = TerminalLine(bus, time.monotonic, say, warn, device)
+                line = TerminalLine(bus, time.monotonic, device)
                 self.lines[bus.name or ""] = line
         except BaseException:
             self.close()
@@ -168,10 +157,6 @@ class Server:
             first = next(iter(self.lines))
             return json.dumps({"error": f"name the bus first ({names}): {first}: {text}"})
         return self.lines[""].obey(text)
-
-
-def _warn(text: str) -> None:
-    sys.stderr.write(text + "\n")
 
 
 def run(settings: ServerSettings, say: Callable[[str], None], heed_ctrl_c: bool) -> None:

@@ -6,7 +6,6 @@ would echo and fail between two clients.
 """
 
 import ctypes
-import errno
 import fcntl
 import os
 import pty
@@ -27,7 +26,11 @@ class Terminal:
     """Master side of a pseudo-terminal.
 
     Args:
-        link: a symbolic link to the terminal; an old link is replaced.
+        link: a symbolic link to the terminal; a link to an old terminal is replaced.
+
+    Attributes:
+        path: the path to open.
+        is_plugged: whether the terminal exists.
 
     Raises:
         FileExistsError: another file has the name of the link.
@@ -36,46 +39,34 @@ class Terminal:
 
     def __init__(self, link: Path | None = None) -> None:
         self._link = link
-        self.master = self._slave = self.clients = -1
-        self.path = ""
         self.plug()
-
-    @property
-    def is_plugged(self) -> bool:
-        """Return whether the terminal exists."""
-        return self.master >= 0
 
     def plug(self) -> None:
         """Create the terminal and its link; ``clients`` becomes readable when one comes or goes."""
         self.master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self.master, False)
-        self.path = os.ttyname(self._slave)
-        libc = ctypes.CDLL(None, use_errno=True)
+        name = os.ttyname(self._slave)
+        libc = ctypes.CDLL(None)
         self.clients = int(libc.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC))
-        libc.inotify_add_watch(
-            self.clients, self.path.encode(), _OPEN | _CLOSE_WRITE | _CLOSE_NOWRITE
-        )
+        libc.inotify_add_watch(self.clients, name.encode(), _OPEN | _CLOSE_WRITE | _CLOSE_NOWRITE)
         self._opened = 0
         if self._link is not None:
-            try:
-                _create_link(self._link, self.path)
-            except OSError:
-                self._link = None
-                self.unplug()
-                raise
-            self.path = str(self._link)
+            if self._link.is_symlink() and os.readlink(self._link).startswith("/dev/pts/"):
+                self._link.unlink()
+            self._link.symlink_to(name)
+        self.path = str(self._link or name)
+        self.is_plugged = True
 
     def unplug(self) -> None:
         """Remove the link and the terminal: a client gets an I/O error or a hang-up."""
         if not self.is_plugged:
             return
-        link, own = self._link, os.ttyname(self._slave)
-        if link is not None and link.is_symlink() and os.readlink(link) == own:
-            link.unlink()
+        self.is_plugged = False
+        if self._link is not None:
+            self._link.unlink(missing_ok=True)
         for fd in (self.clients, self._slave, self.master):
             os.close(fd)
-        self.master = self._slave = self.clients = -1
 
     def read(self) -> bytes:
         """Return the bytes that the client has sent."""
@@ -98,27 +89,8 @@ class Terminal:
 
     def count_clients(self) -> None:
         """Drop what the last client has left: unread answers, and the lock of a killed client."""
-        events, was_open = os.read(self.clients, 4096), self._opened > 0
-        at, is_last = 0, False
-        while at < len(events):
-            _, mask, _, name_length = _EVENT.unpack_from(events, at)
-            at += _EVENT.size + name_length
+        for _, mask, _, _ in _EVENT.iter_unpack(os.read(self.clients, 4096)):
             self._opened = max(0, self._opened + (1 if mask & _OPEN else -1))
-            is_last = is_last or self._opened == 0
-        if self._opened == 0 and (is_last or was_open):
+        if self._opened == 0:
             termios.tcflush(self._slave, termios.TCIFLUSH)
             fcntl.ioctl(self._slave, termios.TIOCNXCL)
-
-
-def _create_link(link: Path, target: str) -> None:
-    """Create a link; a dangling link, or one to a terminal, is replaced."""
-    if link.is_symlink() and (
-        os.readlink(link).startswith("/dev/pts/") or not os.path.exists(link)
-    ):
-        link.unlink()
-    if os.path.lexists(link):
-        raise FileExistsError(errno.EEXIST, "another file has this name", str(link))
-    try:
-        link.symlink_to(target)
-    except OSError as error:
-        raise OSError(error.errno, os.strerror(error.errno or 0), str(link)) from None

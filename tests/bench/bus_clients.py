@@ -15,6 +15,7 @@ from functools import partial
 from typing import Literal
 
 from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler, PortHandler
+from fakes.pty_bus import PtyBus
 from fastcrc.crc16 import umts
 from rustypot import Sts3215PyController, Xl330PyController
 from serial import Serial
@@ -27,7 +28,6 @@ from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
-from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 IDS = tuple(range(1, 10))
@@ -44,9 +44,7 @@ def served(kind: str, client: Open) -> Iterator[Cycle]:
     """Open a client on a bus of its own, whose servos our driver has set up and answer at once."""
     line, model = (FeetechLine, "sts3215") if kind == "feetech" else (DynamixelLine, "xl330-m077")
     with PtyBus() as server:
-        path = server.start_device(
-            line(tuple(ServoSpec(i, model, 2048) for i in IDS), None), wire_time=False
-        )
+        path = server.start_device(line(tuple(ServoSpec(i, model, 2048) for i in IDS), None))
         with ours(kind, path):
             pass
         with client(path) as cycle:

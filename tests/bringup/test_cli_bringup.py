@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 from command_line import invoked
 from commands_started import hear, start, status
+from fakes.pty_bus import PtyBus
 from served_rigs import Served, hide_real_ports, rig_files, served
 
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.features.bringup.cli import ports
 from gazerig.features.bringup.manual_control import ManualControl
 from gazerig.sim_mock.devices import MaestroLine
-from gazerig.sim_mock.pty.client import PtyBus
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")
 ROW = r"(\d) +[│|] ([\w-]+) +[│|] ([\d.]+) +[│|] (\d+) +[│|] "

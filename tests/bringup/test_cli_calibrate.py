@@ -8,10 +8,10 @@ import pytest
 from command_line import Invoked, answers_in, invoked
 from commands_started import hear, start, status
 from desk import GAZE_JOINTS
+from fakes.pty_bus import PtyBus
 from served_rigs import rig_files
 
 from gazerig.config.schema import load_rig
-from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")

@@ -1,6 +1,6 @@
 """The port that the vendor's SDK needs, over an emulated device in this process."""
 
-from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.drivers.serial.port import BusPort
 
 
 class SdkPort:
@@ -8,13 +8,13 @@ class SdkPort:
 
     is_using = False
 
-    def __init__(self, port: InProcessPort) -> None:
+    def __init__(self, port: BusPort) -> None:
         self._port = port
         self._give_up_s = 0.0
         self.clearPort = port.clearPort
 
     def getBaudRate(self) -> int:
-        return self._port.baudrate
+        return 1_000_000
 
     def writePort(self, packet: list[int]) -> int:
         self._port.write(bytes(packet))

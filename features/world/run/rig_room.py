@@ -93,7 +93,9 @@ def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> R
     if options.fast:
         return simulated_room(rig, options, clock, world, world.computed(clock.now_s))
     buses = PtyBuses()
-    paths = buses.start(emulated_lines(rig), SentWorld(world.spec))
+    paths = buses.start(
+        emulated_lines(rig), lambda folder: SentWorld(world.spec.with_shared_file(folder), folder)
+    )
     run_bus = RunBus(guarded_rig_bus(rig, paths), close=buses.stop, inject_fault=buses.command)
     joints = RigInState(rig_kinematics(rig), buses.joints)
     head = WorldPoses(state_file(buses.folder), joints)
