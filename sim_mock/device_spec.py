@@ -1,4 +1,4 @@
-"""Servos written as text: ``1-6:xl330-m077,7:xc330-m288@1024`` (ids, model, start position)."""
+"""Servos written as text: ``1-6:xl330-m077,7:xc330-m288@1024`` (ids, model, start in steps)."""
 
 import re
 
@@ -20,18 +20,8 @@ _HIGHEST_ID: dict[BusKind, int] = {"dynamixel": 252, "feetech": 253}
 _MODELS = {name: facts.bus for name, facts in SERVOS.items() if facts.bus in _LINES}
 
 
-def line_of(text: str, firmware: int | None, baud: int) -> DynamixelLine | FeetechLine:
-    """Parse the servos of one line; ``firmware``: of all servos, None: as delivered.
-
-    Raises:
-        SetupError: the text is invalid; the message names the wrong part and valid ones.
-    """
-    specs = parse_servos(text, DEFAULT_FIRMWARE if firmware is None else firmware)
-    return _LINES[_MODELS[specs[0].model]](specs, baud)
-
-
-def parse_servos(text: str, firmware: int) -> tuple[ServoSpec, ...]:
-    """Parse servos such as ``1-6:sts3215`` or ``7:xc330-m288@1024`` (@: start in steps).
+def line_of(text: str, baud: int) -> DynamixelLine | FeetechLine:
+    """Parse the servos of one line, such as ``1-6:sts3215`` or ``7:xc330-m288@1024``.
 
     Raises:
         SetupError: the text is invalid; the message names the wrong part and valid ones.
@@ -58,5 +48,6 @@ def parse_servos(text: str, firmware: int) -> tuple[ServoSpec, ...]:
         for servo_id in range(first, last + 1):
             if servo_id in specs:
                 raise SetupError(f"--servos {part!r}: id {servo_id} is taken; ids must differ")
-            specs[servo_id] = ServoSpec(servo_id, model, start, firmware)
-    return tuple(specs.values())
+            specs[servo_id] = ServoSpec(servo_id, model, start)
+    assert kind is not None  # a text has a part
+    return _LINES[kind](tuple(specs.values()), baud)

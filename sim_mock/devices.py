@@ -123,8 +123,7 @@ def build(
     """
     if isinstance(what, PluginLine):
         make = load(BUS, what.kind, BusPlugin).device
-        if make is None:
-            raise ValueError(f"{find(BUS, what.kind).label} has no emulated device")
+        assert make is not None  # ``plugin_line`` has checked it
         device: Device = make(what.settings, what.servos, now_s, seed)
         return device
     # A chain or board is imported when it is built: a process that starts a server needs none.

@@ -23,7 +23,7 @@ def with_faults(rig: TickedRig, fault: Callable[[str], str]) -> None:
 
 def test_a_command_reaches_the_emulated_servos_and_says_what_it_did(rig: TickedRig) -> None:
     assert "xl330-m077" in SERVOS
-    device = build(line_of("1-2:xl330-m077", None, 57600), lambda: 0.0)
+    device = build(line_of("1-2:xl330-m077", 57600), lambda: 0.0)
     with_faults(rig, device.faults.command)
     assert not device.faults.wire.has_any
     said = gazerig("ctl", "fault", "lose", "2", "count", "3")

@@ -20,7 +20,7 @@ from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.cli import emulate as command
 from gazerig.robot.cli.emulate import app
-from gazerig.sim_mock.device_spec import line_of, parse_servos
+from gazerig.sim_mock.device_spec import line_of
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 
 ROOT = Path(__file__).parents[1]
@@ -111,8 +111,8 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
 
 
 MIXED = {
-    "": FeetechLine(parse_servos("1:sts3215", 10), 1_000_000),
-    "eyes": DynamixelLine(parse_servos("1-2:xl330-m077", 53), 57_600),
+    "": line_of("1:sts3215", 1_000_000),
+    "eyes": line_of("1-2:xl330-m077", 57_600),
 }
 
 
@@ -170,15 +170,15 @@ def test_bad_input_is_one_clear_line(options, says, monkeypatch):
 )
 def test_servos_that_cannot_be_are_refused(text, says):
     with pytest.raises(SetupError) as error:
-        parse_servos(text, 53)
+        line_of(text, 1_000_000)
     assert says in str(error.value)
 
 
 def test_the_models_decide_the_kind_of_line():
-    line = line_of("3:STS3215@7,253:sts3215-12v", 10, 500_000)
+    line = line_of("3:STS3215@7,253:sts3215-12v", 500_000)
     assert isinstance(line, FeetechLine) and line.baud == 500_000
-    assert [(s.id, s.model, s.start_steps, s.firmware) for s in line.servos] == [
-        (3, "sts3215", 7, 10),
-        (253, "sts3215-12v", 2048, 10),
+    assert [(s.id, s.model, s.start_steps) for s in line.servos] == [
+        (3, "sts3215", 7),
+        (253, "sts3215-12v", 2048),
     ]
-    assert isinstance(line_of("1:xl330-m077", None, 57_600), DynamixelLine)
+    assert isinstance(line_of("1:xl330-m077", 57_600), DynamixelLine)

@@ -104,7 +104,7 @@ def emulate(
             )
         devices: dict[str, Emulated]
         if servos is not None:
-            devices = {"": line_of(servos, firmware, DEFAULT_BAUD)}
+            devices = {"": line_of(servos, DEFAULT_BAUD)}
         elif maestro is not None:
             if maestro not in _CHANNELS:
                 sizes = ", ".join(map(str, _CHANNELS))

@@ -226,8 +226,8 @@ class _EyeParts(NamedTuple):
 
 def _eye_parts(look: PersonLook, fineness: float) -> _EyeParts:
     """Return the parts of a left eye."""
-    rings = 5 if fineness < 1.0 else 9
-    around = 18 if fineness < 0.5 else 48
+    rings = 3 if fineness < 0.3 else 5 if fineness < 1.0 else 9
+    around = 12 if fineness < 0.3 else 18 if fineness < 0.5 else 48
     balls = (
         (1.0, 66.0, (250, 249, 247)),
         (1.02, 31.0, look.iris),
@@ -308,7 +308,7 @@ def _hair(look: PersonLook, fineness: float) -> list[Painted]:
 
 
 @lru_cache(maxsize=8)
-def torso(number: int, length_m: float) -> Painted:
+def torso(number: int, length_m: float, columns: int = 40) -> Painted:
     """Return neck hole, shoulders and chest in the face frame, for an upright person."""
     look = LOOKS[number % len(LOOKS)]
     bottom = -length_m / PUPIL_DISTANCE_M
@@ -318,7 +318,7 @@ def torso(number: int, length_m: float) -> Painted:
         (-2.40, 1.12, 2.62), (-2.75, 1.22, 3.02), (-3.20, 1.30, 3.20), (-3.90, 1.38, 3.18),
         (-4.60, 1.40, 2.96), (min(-4.61, bottom), 1.36, 2.84),
     ]  # fmt: skip
-    around = np.linspace(0.0, 2.0 * pi, 40, endpoint=False)
+    around = np.linspace(0.0, 2.0 * pi, columns, endpoint=False)
     points = np.array(
         [[(-1.85 + x * cos(a), y * sin(a), z) for a in around.tolist()] for z, x, y in rows[::-1]]
     )

@@ -49,7 +49,7 @@ class FrameTimes:
         self._on_the_way: deque[Detections] = deque()
         self._arrived: Detections | None = None
         self.start_s, self.number = self._begins_s, 0
-        self._due_s, self._arrives_s = -inf, inf
+        self._due_s = -inf
 
     def next_frame_s(self, now_s: float) -> float | None:
         """Return the time of the scene at which a frame is exposed now, None if none is due."""
@@ -66,16 +66,10 @@ class FrameTimes:
     def send(self, found: Detections) -> None:
         """Send detections on their way."""
         self._on_the_way.append(found)
-        self._arrives_s = self._next_arrival_s()
 
     def arrived(self, now_s: float) -> Detections | None:
         """Return the newest detections that have arrived."""
-        while now_s >= self._arrives_s:
+        sent_s = now_s - self._latency_s + 1e-9
+        while self._on_the_way and self._on_the_way[0].captured_s <= sent_s:
             self._arrived = self._on_the_way.popleft()
-            self._arrives_s = self._next_arrival_s()
         return self._arrived
-
-    def _next_arrival_s(self) -> float:
-        if not self._on_the_way:
-            return inf
-        return self._on_the_way[0].captured_s + self._latency_s - 1e-9

@@ -24,9 +24,10 @@ from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 _NEAREST_M = 0.06
 """Nothing nearer is drawn."""
-_FINENESS, _HAND_ROWS, _CHEST_M, _HAND_M = 0.4, 26, 0.75, 0.1
+_FINE, _COARSE, _NEAR_M = 0.4, 0.28, 0.9
+"""Fineness of the heads of people who are near and far, and the distance between these."""
+_HAND_ROWS, _CHEST_M, _HAND_M = 26, 0.75, 0.1
 _SLEEVE_M, _WRIST_M = 0.052, 0.028
-_UPPER_ARM_M, _FOREARM_M = 0.30, 0.29
 _SHOULDER_M = np.array((0.10, 0.19, -0.17))
 """Shoulder from the tip of the nose: backwards, to the side, and up."""
 _SPINE_M, _DARKER = -0.117, 0.85
@@ -34,6 +35,7 @@ _SPINE_M, _DARKER = -0.117, 0.85
 _TO_LIGHT: Floats = np.array((-0.52, 0.48, 0.71))
 _AMBIENT, _DIRECT = 0.66, 0.46
 _SMALL_PX2, _OF_SMALL = 2.0, 4
+_LAYER_M = 0.02
 _SHIFT = 4
 """OpenCV draws polygons with a resolution of 1/16 pixel."""
 
@@ -43,12 +45,6 @@ _PX_PER_M = 100.0
 _WALL_BGR, _FLOOR_BGR, _SKIRTING_BGR = (222, 226, 222), (120, 148, 172), (240, 242, 242)
 _PATCHES: tuple[tuple[float, float], ...] = ((0.06, 5.0), (0.18, 6.0), (0.6, 8.0))
 """Sizes of the soft patches on the wall in metres, and their contrast in grey values."""
-_PAINTINGS = (
-    (1.2, 0.72, 0.34, 0.26, (206, 178, 150)),
-    (-0.35, 0.95, 0.20, 0.15, (172, 196, 168)),
-    (-1.3, 0.66, 0.24, 0.32, (150, 176, 206)),
-)
-"""Place along the wall and height, half width and height in metres, colour."""
 _STEP_PX = 8
 """Distance of the pixels whose places on the wall are computed; between them they change evenly."""
 
@@ -101,7 +97,7 @@ def _person(person: ScenePerson, number: int, eye_m: Floats) -> list[_Solid]:
     R_head = np.array(rotation((*person.face_yaw_pitch_rad, 0.0)))
     to_eye = eye_m - place
     away_m = float(np.linalg.norm(to_eye))
-    solid, features = _head(number)
+    solid, features = _head(number, _FINE if away_m < _NEAR_M else _COARSE)
     # The chest is drawn before the head in any case: the neck is in its collar.
     chest = _Solid(_chest(number), _R_towards(to_eye), place, away_m + 0.01)
     found = [chest, _Solid(solid, R_head, place, away_m)]
@@ -111,16 +107,16 @@ def _person(person: ScenePerson, number: int, eye_m: Floats) -> list[_Solid]:
 
 
 @lru_cache(maxsize=8)
-def _head(number: int) -> tuple[_Shape, _Shape]:
+def _head(number: int, fineness: float) -> tuple[_Shape, _Shape]:
     """Return skin and hair, and the features of the face on them."""
-    solid, features = head_parts(number, _FINENESS)
+    solid, features = head_parts(number, fineness)
     return _flat(solid), _flat(features)
 
 
 @lru_cache(maxsize=8)
 def _chest(number: int) -> _Shape:
     """Return a chest in a checked shirt."""
-    return _pattern(torso(number, _CHEST_M), _SPINE_M, 7.0, 9.0)
+    return _pattern(torso(number, _CHEST_M, 28), _SPINE_M, 7.0, 9.0)
 
 
 @lru_cache(maxsize=8)
@@ -154,24 +150,14 @@ def _flat(painted: Painted) -> _Shape:
 
 
 def _arm(person: ScenePerson, number: int, hand_m: Floats, eye_m: Floats) -> list[_Solid]:
-    """Return sleeve, forearm and hand; the elbow is as low as two links of true lengths allow."""
+    """Return a straight arm, as long as the hand is far, and the hand."""
     face_m = np.array(person.p_world_face_m)
     R_chest = _R_towards(eye_m - face_m)
     side = 1.0 if (hand_m - face_m) @ R_chest[:, 1] > 0.0 else -1.0
     shoulder_m = face_m + R_chest @ (_SHOULDER_M * (-1.0, side, 1.0))
-    way = hand_m - shoulder_m
-    far_m = max(float(np.linalg.norm(way)), 1e-6)
-    ahead = way / far_m
-    reach_m = min(far_m, _UPPER_ARM_M + _FOREARM_M)  # a hand beyond it stretches the arm
-    along_m = 0.5 * (reach_m + (_UPPER_ARM_M**2 - _FOREARM_M**2) / reach_m)
-    down = np.array((0.0, 0.0, -1.0)) + ahead[2] * ahead
-    down /= max(float(np.linalg.norm(down)), 1e-6)
-    off_m = max(0.0, _UPPER_ARM_M**2 - along_m**2) ** 0.5
-    elbow_m = shoulder_m + ahead * along_m * far_m / reach_m + down * off_m
     wrist_m = hand_m - (0.0, 0.0, 0.8 * _HAND_M)
     return [
-        _link(_limb(number, True), shoulder_m, elbow_m, eye_m),
-        _link(_limb(number, False), elbow_m, wrist_m, eye_m),
+        _link(_sleeve(number), shoulder_m, wrist_m, eye_m),
         _facing(_palm(number), hand_m, _HAND_M, 0.0, eye_m),
     ]
 
@@ -204,16 +190,13 @@ def _ball() -> _Shape:
 
 
 @lru_cache(maxsize=8)
-def _limb(number: int, is_sleeve: bool) -> _Shape:
-    """Return an arm's link of length 1 along z; the radius is in metres."""
-    look = LOOKS[number % len(LOOKS)]
-    thick = _SLEEVE_M if is_sleeve else 0.75 * _SLEEVE_M
-    thin = 0.75 * _SLEEVE_M if is_sleeve else _WRIST_M
-    length = np.linspace(0.0, 1.0, 11)
-    tube = [(thick + share * (thin - thick), share) for share in length.tolist()]
-    profile = [(0.0, -0.10), (0.7 * thick, -0.06), *tube, (0.0, 1.04)]
-    limb = paint(lathe(profile, around=16), look.shirt if is_sleeve else look.skin)
-    return _pattern(limb, 0.0, 4.0, 5.0 * pi)
+def _sleeve(number: int) -> _Shape:
+    """Return an arm of length 1 along z; the radius is in metres."""
+    share = np.linspace(0.0, 1.0, 17)
+    tube = zip(_SLEEVE_M + share * (_WRIST_M - _SLEEVE_M), share, strict=True)
+    profile = [(0.0, -0.05), (0.7 * _SLEEVE_M, -0.03), *tube]
+    limb = paint(lathe(profile, around=16), LOOKS[number % len(LOOKS)].shirt)
+    return _pattern(limb, 0.0, 4.0, 9.0 * pi)
 
 
 def _link(limb: _Shape, start_m: Floats, end_m: Floats, eye_m: Floats) -> _Solid:
@@ -244,7 +227,9 @@ def _draw_solid(image: ImageArray, seen_by: PinholeView, solid: _Solid) -> None:
     # A face fills at least a pixel: of those that are smaller, some suffice.
     drawn = (area > _SMALL_PX2) | ((area > 0.0) & (np.arange(len(area)) % _OF_SMALL == 0))
     facing = np.flatnonzero(drawn)
-    facing = facing[np.argsort(-seen[shape.faces[facing], 2].sum(axis=1))]
+    # Of a shape's parts the later ones lie on the earlier ones, such as hair on the skull.
+    away_m = seen[shape.faces[facing], 2].mean(axis=1) - _LAYER_M * facing / len(area)
+    facing = facing[np.argsort(-away_m)]
     light = _TO_LIGHT @ (solid.R / np.linalg.norm(solid.R, axis=0))
     bright = _AMBIENT + _DIRECT * np.clip(shape.normals[facing] @ light, 0.0, 1.0)
     colours = np.minimum(shape.colours[facing] * bright[:, None], 255.0).tolist()
@@ -294,11 +279,4 @@ def _wall() -> ImageArray:
     wall[edge:] += np.subtract(_FLOOR_BGR, _WALL_BGR)
     image: ImageArray = np.clip(wall, 0.0, 255.0).astype(np.uint8)
     image[edge - 8 : edge] = _SKIRTING_BGR
-    for quarter in range(4):
-        for along_m, up_m, half_m, high_m, colour in _PAINTINGS:
-            x = round((quarter + 0.5) * width / 4 + (width / 8 - along_m * _PX_PER_M)) % width
-            y = round((_ROOM_HEIGHT_M - up_m) * _PX_PER_M)
-            for share, shade in ((1.0, (250, 250, 248)), (0.87, colour)):
-                half, high = round(share * half_m * _PX_PER_M), round(share * high_m * _PX_PER_M)
-                cv2.rectangle(image, (x - half, y - high), (x + half, y + high), shade, -1)
     return image

@@ -3,36 +3,15 @@
 Frames are not blurred, distorted, dropped or reordered, and the delay is constant.
 """
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer, Locate, Motion
 from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
-from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Detections, FaceDetector
 
-
-class Film(Protocol):
-    """Frames by number from 1, each due at a film time; without end."""
-
-    def open(self) -> None:
-        """Open at film time 0."""
-        ...
-
-    def due_s(self, number: int) -> float:
-        """Return the film time at which a frame is due."""
-        ...
-
-    def shot(self, number: int) -> Shot:
-        """Read a frame and its data; numbers never decrease."""
-        ...
-
-    def events(self) -> tuple[str, ...]:
-        """Return messages about the film for the user, one line each, once."""
-        ...
-
-    def close(self) -> None:
-        """Free the file."""
-        ...
+if TYPE_CHECKING:
+    from gazerig.drivers.camera.playback import CameraReplay
+    from gazerig.drivers.camera.video_file import VideoFile
 
 
 class FilmCamera:
@@ -42,7 +21,7 @@ class FilmCamera:
     equal those of any other run to the same time.
 
     Args:
-        video: the film.
+        video: the film, whose frames are due at film times, without end.
         detector: finds faces.
         delay_s: time from exposure to detections, at least 0.
         start_s: simulated time of the first exposure.
@@ -55,7 +34,7 @@ class FilmCamera:
 
     def __init__(
         self,
-        video: Film,
+        video: "VideoFile | CameraReplay",
         detector: FaceDetector,
         delay_s: float,
         start_s: float = 0.0,
@@ -63,8 +42,6 @@ class FilmCamera:
         locate: Locate | None = None,
         orientation: FrameOrientation = AS_DELIVERED,
     ) -> None:
-        if not delay_s >= 0.0:
-            raise ValueError(f"detections cannot arrive before their frame: delay {delay_s} s")
         self._video = video
         self._frames = FrameAnalyzer(detector, motion, locate, orientation.rotation)
         self._orientation = orientation

@@ -74,8 +74,15 @@ class IdealBus:
         """Do nothing: there is no port."""
 
     def read(self, now_s: float) -> Feedback:
-        """Return the positions, rounded to steps, and the speeds."""
-        steps, speeds = self._measure(now_s)
+        """Return the positions, rounded to steps, and the mean speeds since the last call."""
+        steps, (last_s, last) = self._motion.steps(now_s), self._read
+        self._read = now_s, steps
+        passed_s = now_s - last_s
+        speeds = (
+            tuple(map(truediv, map(sub, steps, last), repeat(passed_s)))
+            if passed_s > 0.0
+            else (0.0,) * len(steps)
+        )
         count = len(steps)
         zeros, no = (0.0,) * count, (False,) * count
         return Feedback(
@@ -115,15 +122,6 @@ class IdealBus:
     def health(self) -> BusHealth:
         """Report that no byte was sent."""
         return BusHealth(0, 0, {})
-
-    def _measure(self, now_s: float) -> tuple[Steps, Steps]:
-        """Return positions and mean speeds since the last call."""
-        steps, (last_s, last) = self._motion.steps(now_s), self._read
-        self._read = now_s, steps
-        passed_s = now_s - last_s
-        if passed_s <= 0.0:
-            return steps, (0.0,) * len(steps)
-        return steps, tuple(map(truediv, map(sub, steps, last), repeat(passed_s)))
 
     def _follow(self, goals_steps: Sequence[int]) -> tuple[int, ...]:
         """Start a motion to goals; return the goals within the limits."""
