@@ -1,19 +1,15 @@
 """Rigs whose descriptions are compared with the program's own geometry, shipped and others."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from math import radians
 from typing import NamedTuple
 
 import numpy as np
-from hypothesis import strategies as st
 
-from gazerig.config.rig import LidJoints
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.types import Floats, GazeState
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_limits import lid_ends
-from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import JointState
@@ -85,65 +81,6 @@ def _compare_lid(rig: Rig, name: str, opening: float, angle: float, poses: Poses
 def _same(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> None:
     assert np.abs(one[0] - other[0]).max() < ANGLE_RAD
     assert np.abs(one[1] - other[1]).max() < PLACE_M
-
-
-_NECKS = ("neck_yaw", "neck_pitch", "neck_roll", "lower_neck_yaw", "lower_neck_pitch")
-_OTHERS = (
-    "jaw",
-    "left_brow",
-    "right_brow",
-    "left_ear",
-    "right_ear",
-    "camera",
-    "base",
-    "right_eyes_pan",
-)
-
-
-@st.composite
-def rigs(draw: st.DrawFn) -> Rig:
-    """Draw a rig with any measures, any axes missing, linkages, couplings and further joints."""
-    desk, maker = _shipped("desk"), _shipped("maker")
-    model = desk.joints["neck_yaw"]
-    joints = {name: model for name in _NECKS + _OTHERS if draw(st.booleans(), name)}
-    for turn in ("pan", "tilt"):
-        kind = draw(st.sampled_from(("each", "both", "none")), turn)
-        names = [f"{side}_eye_{turn}" for side in ("left", "right")] if kind == "each" else []
-        joints |= {name: model for name in names or ([f"eyes_{turn}"] if kind == "both" else [])}
-    lids: dict[str, tuple[float, float]] = {}
-    for name in LIDS:
-        if draw(st.booleans(), name):
-            joints[name] = model
-            ends = draw(st.sampled_from(((-25.0, 20.0), (30.0, -30.0), (-5.0, 60.0))))
-            lids[LidJoints.key(name)] = ends
-    couplings = {}
-    if {"neck_pitch", "neck_roll"} <= joints.keys() and draw(st.booleans(), "differential"):
-        couplings["neck"] = CouplingParams("neck_pitch", "neck_roll")
-    size = st.floats(0.0, 300.0)
-    geometry = replace(
-        desk.geometry,
-        pitch_axis_height_mm=draw(size),
-        eyes_ahead_mm=draw(st.floats(-100.0, 150.0)),
-        eyes_above_mm=draw(st.floats(-50.0, 200.0)),
-        interocular_mm=draw(st.floats(15.0, 200.0)),
-        lower_pitch_axis_height_mm=draw(size),
-    )
-    angle = st.floats(-90.0, 90.0)
-    camera = replace(
-        draw(st.sampled_from((desk.camera, maker.camera))),
-        position_mm=(draw(angle), draw(angle), draw(angle)),
-        yaw_deg=2.0 * draw(angle),
-        pitch_deg=draw(angle),
-        roll_deg=2.0 * draw(angle),
-    )
-    return replace(
-        desk,
-        geometry=geometry,
-        joints=joints,
-        lid_joints=LidJoints(**lids),
-        couplings=couplings,
-        camera=camera,
-    )
 
 
 _READ: dict[str, Rig] = {}

@@ -33,28 +33,6 @@ def tick(t_s: float, kind: str, place: Vec3) -> Tick:
     return Tick(t_s, unread, unread, None, None, target, unread, (), unread)
 
 
-def scored(
-    events: tuple[Event, ...],
-    looks: Callable[[float], tuple[str, Vec3]],
-    seconds: float = 10.0,
-    first_s: float = 5.0,
-) -> dict[str, dict[str, float | int | None]]:
-    score = BehaviourScore(events, 10.0)
-    for slot in range(round(seconds * 200) + 1):
-        score.update(tick(first_s + slot * 0.005, *looks(slot * 0.005)))
-    return score.figures()
-
-
-WAVE = Event("wave", "look", "hand", 2.0, 3.0, HAND, 0.3)
-
-
-def test_latency_is_from_the_start_of_the_event_to_the_first_look() -> None:
-    found = scored((WAVE,), lambda t: ("hand", HAND) if 2.3 <= t < 2.8 else ("face", FACE))
-    assert found["wave"]["seen"] == found["wave"]["of"] == 1
-    assert found["wave"]["latency_s"] == pytest.approx(0.3, abs=0.006)
-    assert found["wave"]["share"] == pytest.approx(0.5, abs=0.02)
-
-
 class Lived:
     """A scene as a robot lived through it: its ticks, and the scene's time of each."""
 
@@ -164,36 +142,10 @@ def test_a_guard_counts_when_the_fist_arrives(
     assert found["lead_ms"] == (pytest.approx(150.0, abs=11.0) if in_time else None)
 
 
-def test_attacks_are_into_an_opening_or_after_a_punch_or_neither() -> None:
-    starts = (5.2, 12.65, 17.6)
-    found = planned(lambda t: "attack" if any(s <= t < s + 0.3 for s in starts) else "wait")
-    counts = [found[name] for name in ("attacks", "open", "counters", "looked_at")]
-    assert counts == [3, 1, 1, 1]
-    assert planned(lambda t: "wait") == {}
-
-
 def test_no_wave_no_feint_and_no_hand_from_aside_is_guarded_against(boxing: Lived) -> None:
     for event in boxing._scene.events():
         if event.name in ("wave", "return", "reach", "step"):
             assert actions(boxing, event.start_s, event.end_s) == ["wait"], event
-
-
-@pytest.mark.parametrize("planned", [True, False])
-def test_without_the_pull_of_motion_the_planner_alone_brings_the_gaze_there(planned: bool) -> None:
-    rig = load_rig("desk")
-    dull = replace(rig.gaze.bottom_up, form="none")
-    rig = replace(
-        rig, gaze=replace(rig.gaze, bottom_up=dull), loop=replace(rig.loop, rate_hz=100.0)
-    )
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="boxing"))
-    if not planned:
-        made.robot.ask("behaviour", "wait")
-    lived = Lived(made, load_scene("boxing"), 7.8)
-    figures = lived.score.figures()
-    count = (2, 1) if planned else (0, 0)
-    assert (figures["punch"]["seen"], figures["attack"]["seen"]) == count
-    assert (figures["punch"]["of"], figures["attack"]["of"]) == (2, 1)
-    assert {each.target.plan for each in lived.ticks} >= {"wait: asked for"} or planned
 
 
 def test_e46_b_the_place_to_be_hit_is_looked_at_before_the_blow(boxing: Lived) -> None:

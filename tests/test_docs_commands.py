@@ -19,13 +19,8 @@ from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, spans
 
 import gazerig
 from gazerig.robot.remote.client import RobotClient
-from gazerig.sim_mock.dynamixel.chain import DynamixelChain
-from gazerig.sim_mock.feetech.chain import FeetechChain
-from gazerig.sim_mock.maestro.board import COMMANDS as MAESTRO
 
 pytestmark = needs_all_features  # the documents describe every command
-
-DYNAMIXEL, FEETECH = DynamixelChain.commands, FeetechChain.commands
 
 STANDS_FOR = {"NAME": "neck_yaw", "FILE": "a.mcap", "KEY": "seed"}
 """What to try where a paper has a word in capitals; 1 for all others."""
@@ -59,12 +54,6 @@ def test_an_option_named_in_prose_is_one() -> None:
                 continue
             for option in re.findall(r"^(--[a-z0-9-]+)|\s(--[a-z0-9-]+)", span):
                 assert "".join(option) in known, f"{paper.name}: {span}"
-
-
-def test_every_option_of_the_emulator_is_told() -> None:
-    text = EMULATOR.read_text(encoding="utf-8")
-    for option in options("emulate") - {"--help"}:
-        assert option.startswith("--no-") or f"`{option}" in text, option
 
 
 def _tried(word: str) -> str:
@@ -162,21 +151,6 @@ def test_make_and_pip_have_what_the_papers_ask_for() -> None:
             assert found, f"{paper.name}: {package}"
             for extra in found[1].split(",") if found[1] else ():
                 assert f"\n{extra} = [" in extras, f"{paper.name}: {package}"
-
-
-# ---- the emulator's tables
-
-
-def test_the_emulators_commands_are_those_of_its_page() -> None:
-    page = EMULATOR.read_text(encoding="utf-8")
-    reported = set(re.findall(r"`([a-z-]+)(?: [^`]*)?`", page.split("## Fault commands")[1]))
-    for commands in (DYNAMIXEL, FEETECH, MAESTRO):
-        assert not set(commands.verbs) - reported
-    verbs = {verb for commands in (DYNAMIXEL, FEETECH, MAESTRO) for verb in commands.verbs}
-    rows = page.split("| command | what it does |")[1].split("\n\n")[0].splitlines()
-    for row in rows[2:]:
-        for verb in re.findall(r"`([a-z-]+)", row.split("|")[1]):
-            assert verb in verbs, verb
 
 
 # ---- Python

@@ -22,7 +22,7 @@ import sys
 import gazerig
 from gazerig.doors import admission, livekit, openai_realtime, pipecat, voice_assistant, wyoming
 from gazerig.doors.door import Address, Door, DoorLink
-from gazerig.doors.turn_taking import Orders, TurnOrder, TurnTaking, UnknownMessage
+from gazerig.doors.turn_taking import Orders, UnknownMessage
 from gazerig.drivers.plugins import DOOR, SHIPPED, find
 from gazerig.robot.app.door_processes import load_door
 from gazerig.robot.cli import door as cli_door
@@ -622,13 +622,6 @@ def test_the_command_lists_doors_and_names_a_missing_one() -> None:
     missed = CliRunner().invoke(cli_door.app, ["wyomin"])
     assert missed.exit_code == 2
     assert "no door is called 'wyomin': did you mean 'wyoming'?" in missed.output
-
-
-def test_a_text_of_spaces_is_no_speech() -> None:
-    talk = TurnTaking()
-    talk.add_text(" " * 60, 0.0)
-    assert talk.speak(0.0) == (TurnOrder("speaking"),)
-    assert talk.speak(1.0, 4.0) == (TurnOrder("speaking", 3.0),)
 
 
 def test_the_newest_neighbour_takes_the_place_of_an_idle_one(

@@ -41,13 +41,6 @@ def test_noise_before_an_instruction_is_passed_over(make, noise):
     assert bench.chain.receive(b"U\x00" + make.instruction(1, PING)) != b""
 
 
-def test_an_instruction_may_arrive_byte_by_byte(make):
-    bench = bench_of(make)
-    answers = [bench.chain.receive(bytes([byte])) for byte in make.instruction(1, PING)]
-    assert not any(answers[:-1])
-    assert len(answers[-1]) == make.pong
-
-
 def test_a_torn_instruction_is_forgotten_after_the_gap(make):
     bench, ping = bench_of(make), make.instruction(1, PING)
     bench.chain.receive(ping[:5])
@@ -67,12 +60,6 @@ def test_a_damaged_instruction_is_met_with_silence_and_the_next_is_heard(make):
         assert bench.chain.receive(ping[:at] + bytes([ping[at] ^ 1]) + ping[at + 1 :]) == b"", at
         bench.now_s = 0.01
         assert pings(bench, 1)
-
-
-def test_two_instructions_in_one_piece_are_both_answered_where_they_end(make):
-    ping = make.instruction(1, PING)
-    replies = bench_of(make).chain.exchange(ping + ping)
-    assert [reply.end for reply in replies] == [len(ping), 2 * len(ping)]
 
 
 # --- groups

@@ -112,12 +112,6 @@ def test_reading_what_is_not_there_gives_an_error_and_no_bytes():
         assert (found, len(data)) == (error, 0 if error else size)
 
 
-def test_unknown_instruction():
-    bench = DynamixelBench((1, "xl330-m288"))
-    assert bench.chain.receive(instruction(1, 0x77))[8] == 2
-    assert bench.chain.receive(instruction(0xFE, 0x77)) == b""
-
-
 # --- bus watchdog
 
 
@@ -158,18 +152,6 @@ def test_every_register_keeps_to_its_access_range_and_size(model):
             assert memory.fields(at, raw(register.low - 1, size)) == DATA_RANGE, register.name
         if size > 1:
             assert memory.fields(at, bytes(size - 1)) == DATA_LENGTH, register.name
-
-
-@EVERY
-def test_what_no_register_covers_can_neither_be_read_nor_written(model):
-    memory = DynamixelMemory(model, 53)
-    known = {a for r in registers_of(model) for a in range(r.address, r.address + r.size)}
-    for address in set(range(148)) - known:
-        assert memory.range(address, 1) is None
-        assert memory.fields(address, b"\0") == ACCESS
-    last = 661 if model.family == "x430" else 251
-    assert memory.range(last, 1) is not None
-    assert memory.range(last, 2) is None
 
 
 @EVERY

@@ -1,8 +1,6 @@
 """One emulated Dynamixel servo alone: registers, torque, protections."""
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from present import present
 
 from gazerig.drivers.dynamixel.control_table import MODELS, registers_of
@@ -31,25 +29,6 @@ class Bench:
         """Let time pass until then; give whether it listens."""
         self.ms = ms
         return self.servo.advance(ms, ms)
-
-
-@pytest.mark.parametrize(
-    ("address", "size", "value", "error"),
-    [
-        (11, 1, 2, 4),  # no such mode
-        (116, 4, 4096, 6),  # beyond Max Position Limit
-        (132, 4, 0, 7),  # read only
-        (66, 1, 0, 7),  # undefined
-        (116, 2, 0, 5),  # half a register
-        (116, 5, 0, 7),  # runs into a read only one
-    ],
-)
-def test_bad_writes_change_nothing(address, size, value, error):
-    bench = Bench("xl330-m288", 1234)
-    before = bytes(bench.servo.memory.bytes)
-    raw = value.to_bytes(size, "little", signed=value < 0)
-    assert bench.servo.write(address, raw) == error
-    assert bytes(bench.servo.memory.bytes) == before
 
 
 def test_homing_offset_shifts_the_present_position():
@@ -82,32 +61,6 @@ def test_live_registers_tell_the_motion():
     bench.at(9000)
     assert bench.get(132) == pytest.approx(2000, abs=12)
     assert bench.get(122) == 0
-
-
-@given(
-    mode=st.sampled_from((0, 1, 3, 4, 5, 16)),
-    writes=st.lists(
-        st.tuples(
-            st.sampled_from((80, 82, 84, 100, 102, 108, 112, 116)),
-            st.integers(-20000, 20000),
-            st.integers(0, 60),
-        ),
-        max_size=12,
-    ),
-)
-@settings(max_examples=40, deadline=None)
-def test_any_writes_leave_the_same_result_however_often_one_looks(mode, writes):
-    seen = []
-    for looks in (1, 7):
-        bench = Bench(load_nm=0.02)
-        assert (bench.put(11, mode), bench.put(64, 1)) == (0, 0)
-        for address, value, ms in writes:
-            bench.put(address, value if address in (100, 102, 116) else abs(value))
-            for k in range(looks):
-                bench.servo.advance(bench.ms + ms * (k + 1) // looks, 0)
-            bench.ms += ms
-        seen.append((bench.servo.position_steps, bench.servo.read(120, 27)))
-    assert seen[0] == seen[1]
 
 
 # --- protections against load, heat and voltage

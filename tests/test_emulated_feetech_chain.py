@@ -1,11 +1,9 @@
 """The emulated STS bus: the maker's packets, memory, lock, faults and protections."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from servo_bench import ALL, PING, READ, SYNC_READ, FeetechBench
 
-from gazerig.sim_mock.feetech.packets import find_instructions, signed
+from gazerig.sim_mock.feetech.packets import signed
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 VOLTAGE, HEAT, OVERLOAD = 1, 4, 32
@@ -39,25 +37,6 @@ def test_the_makers_examples_are_answered_to_the_byte():
     assert [bench.read(i, 42, 2) for i in (1, 2, 3, 4)] == [2048] * 4
 
 
-def test_bad_lengths_and_more_ff_before_the_id_are_passed_over():
-    for length in (0, 1):
-        bad = bytes((255, 255, 1, length))
-        assert len(find_instructions(bad + FeetechBench.instruction(1, 1), 0)[0]) == 1
-    found, _ = find_instructions(b"\xff" + FeetechBench.instruction(5, 1), 0)
-    assert found == [(5, 1, b"", 7)]
-
-
-@given(st.integers(0, 0xFD), st.sampled_from([2, 3, 6, 8, 0x82, 0x83]), st.data())
-def test_random_instructions_never_raise(servo_id, code, data):
-    bench = FeetechBench((1, "sts3215", 2048.0), (servo_id, "sts3215", 10.0))
-    for _ in range(4):
-        params = data.draw(st.binary(max_size=24))
-        target = data.draw(st.sampled_from((servo_id, 0xFE)))
-        bench.chain.receive(FeetechBench.instruction(target, code, params))
-        bench.now_s += 0.5
-    assert all(abs(x) < 1e7 for x in bench.chain.positions_steps())
-
-
 @pytest.mark.parametrize(
     ("raw", "bit", "value"), [(0x8001, 15, -1), (0x7FFF, 15, 32767), (0x0464, 10, -100)]
 )
@@ -78,12 +57,6 @@ def test_read_only_registers_stay_and_nobody_complains(bench):
         before = bench.read(1, address)
         assert bench.write(1, address, before ^ 0x55) == 0
         assert bench.read(1, address) == before
-
-
-@pytest.mark.parametrize(("address", "value", "stays"), [(5, 254, 1), (6, 8, 0), (33, 4, 0)])
-def test_ids_bauds_and_modes_that_do_not_exist_change_nothing(bench, address, value, stays):
-    bench.write(1, address, value)
-    assert bench.read(1, address) == stays
 
 
 def test_only_what_is_written_while_it_is_open_is_kept(bench):

@@ -78,28 +78,7 @@ def test_it_comes_to_its_goal_and_stays(goal):
     assert (bench.read(1, 66), bench.read(1, 67, 2)) == (0, goal)
 
 
-def test_a_new_speed_counts_at_once_and_the_same_command_changes_nothing(bench):
-    bench.enable_torque()
-    command(bench, 3048, speed=500)
-    bench.wait(0.2)
-    command(bench, 3048, speed=1000)
-    for _ in range(20):
-        bench.wait(0.01)
-        command(bench, 3048, speed=1000)
-    assert led_to(bench) == pytest.approx(2048 + 100 + 200)
-
-
 # --- force
-
-
-@pytest.mark.parametrize(("limit", "moves"), [(1000, True), (300, False)])
-def test_the_torque_limit_bounds_what_it_can_lift(limit, moves):
-    bench = one(SMOOTH._replace(load_nm=-0.5 * 1.91))
-    bench.write(1, 48, limit, 2)
-    bench.enable_torque(goal=2200)
-    bench.wait(0.6)
-    assert (bench.position() > 2150) == moves
-    assert bench.read(1, 60, 2, 10) <= limit
 
 
 def test_load_and_current_at_a_stop_are_those_of_the_stall():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from servo_bench import MAKES
 
 from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Physics
@@ -140,13 +139,6 @@ def test_the_current_limit_holds_always(limit, goal, load):
 # --- body and surroundings
 
 
-def test_nothing_moves_without_cause():
-    for loop in (DISABLED, Loop(p=P, d=D), Loop(p=P, i=0.001, d=D)):
-        made = shaft(loop=loop)
-        run(made, 3)
-        assert (made.x, made.v, made.quiet) == (0.0, 0.0, True)
-
-
 def test_without_torque_friction_takes_the_speed_and_never_adds_any():
     made = shaft()
     made.lead_to(1e6, 0.0, 0.0)
@@ -177,31 +169,3 @@ def test_stops_are_never_passed_and_a_stalled_motor_draws_its_stall_current():
 
 
 # --- numbers
-
-
-@given(
-    st.lists(st.integers(1, 9), min_size=1, max_size=30),
-    st.integers(0, 16383),
-    st.integers(0, 4000),
-)
-@settings(max_examples=40, deadline=None)
-def test_in_one_go_or_in_steps_is_the_same(pieces, gain, goal):
-    loop = Loop(p=gain / 128 / 885, i=0.0001, d=D, slew=0.05)
-    once, often = (shaft(loop=loop, load_nm=0.02) for _ in range(2))
-    for made in (once, often):
-        made.lead_to(goal, 3.0, 0.02)
-    once.run(sum(pieces))
-    for piece in pieces:
-        often.run(piece)
-    assert all(getattr(once, name) == getattr(often, name) for name in ("x", "v", "u", "effort"))
-
-
-@pytest.mark.parametrize("make", MAKES, ids=lambda make: make.model)
-def test_an_hour_without_a_packet_ends_where_a_life_through_it_does(make):
-    lives = []
-    for looks in (1, 3600):
-        bench = make()
-        bench.enable_torque(1, 3000)
-        bench.wait(3600.0, looks)
-        lives.append((bench.position(), bench.chain[1].torque))
-    assert lives[0] == lives[1]

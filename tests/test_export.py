@@ -87,11 +87,6 @@ def test_an_eye_whose_servo_is_silent_is_lost_and_only_that(face: Run) -> None:
     assert np.isnan(trace.lids).tolist() == [[False] * 2] * 2 + [[False, True], [False] * 2]
 
 
-def test_fewer_than_two_ticks_are_nothing_to_export(face: Run) -> None:
-    with pytest.raises(ValueError, match="fewer than two ticks"):
-        collect_gaze_angles(face.ticks[:1])
-
-
 # --- labels
 
 
@@ -101,12 +96,6 @@ def test_every_saccade_and_blink_of_the_models_is_a_stretch(face: Run) -> None:
     assert abs(found["saccade"] - last.saccades) <= 1 and found["saccade"] > 50
     assert abs(found["blink"] - last.blinks) <= 1 and found["blink"] > 5
     assert found["fixation"] > 40
-
-
-def test_movements_leave_no_gap_and_do_not_overlap(face: Run) -> None:
-    moves = [s for s in face.stretches if s.event != "blink"]
-    ends = np.array([s.onset_s + s.duration_s for s in moves])
-    assert np.allclose(ends[:-1], [s.onset_s for s in moves[1:]], atol=1e-9)
 
 
 def test_the_plan_is_moved_by_the_lag_of_the_eyes(face: Run) -> None:

@@ -2,21 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import atan2, degrees
+from math import degrees
 
 import numpy as np
 import pytest
 import viser
 from shown_page import SNAPSHOT as SHOT
-from six_joints import of_six
 from viser import transforms
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.dashboard.view.head_view import HeadView
-from gazerig.robot.dashboard.view.overlays import CommandedPoseView
-from gazerig.robot.model.types import CommandedPose, JointState, Snapshot
+from gazerig.robot.model.types import JointState
 
 
 @pytest.fixture
@@ -24,44 +22,6 @@ def server() -> Iterator[viser.ViserServer]:
     made = viser.ViserServer(port=0, verbose=False)
     yield made
     made.stop()
-
-
-def test_the_head_has_the_lids_that_the_rig_has(server: viser.ViserServer) -> None:
-    view, ghost = HeadView(server.scene), CommandedPoseView(server.scene)
-    handles = server.scene._handle_from_node_name
-
-    def draw(shot: Snapshot) -> None:
-        shot = replace(shot, commanded_pose=_wanted(shot))
-        view.show(shot)
-        ghost.show(shot, view.lid_edges)
-
-    def edge_deg(lid: str) -> float:
-        """Return the elevation of a lid's edge above the eye's equator, by the turned mesh."""
-        frame, (look,) = view.links[f"{lid}_link"]
-        turn = transforms.SO3(np.array(frame.wxyz)) @ transforms.SO3(np.array(look.wxyz))
-        x, _, z = turn.apply(np.array((1.0, 0.0, 0.0)))
-        return degrees(atan2(z, x))
-
-    draw(SHOT)
-    assert "left_lower_lid_link" not in view.links
-    draw(replace(of_six(SHOT), lids=(0.0, 0.0), lower_lids=(0.0, 0.0)))
-    met = edge_deg("left_lower_lid")
-    assert met == pytest.approx(edge_deg("left_upper_lid"), abs=0.1)
-    draw(replace(of_six(SHOT), lids=(0.5, 1.0), lower_lids=(1.0, 0.5)))
-    assert edge_deg("left_lower_lid") < edge_deg("right_lower_lid") - 3.0 < met - 6.0
-    assert met + 30.0 < edge_deg("left_upper_lid") < edge_deg("right_upper_lid") - 30.0
-    w, _, y, _ = handles["/ghost/lid_left"].wxyz
-    assert -2.0 * degrees(atan2(y, w)) == pytest.approx(edge_deg("left_upper_lid"), abs=0.1)
-    draw(replace(SHOT, joints=("eyes_pan", "eyes_tilt", "neck_yaw"), measured_rad=(0.0,) * 3))
-    assert "left_upper_lid_link" not in view.links and not handles["/ghost/lid_left"].visible
-
-
-def _wanted(shot: Snapshot) -> CommandedPose:
-    """The measured pose as the desired one."""
-    return CommandedPose(
-        shot.R_world_head, shot.p_world_head_m, shot.p_world_eyes_m, shot.gaze_world, shot.lids,
-        shot.lower_lids,
-    )  # fmt: skip
 
 
 def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer) -> None:

@@ -46,15 +46,6 @@ def looks(targets: list[Target]) -> list[tuple[Target, float]]:
     return found
 
 
-def test_who_does_not_explore_waits_and_then_rests_for_good() -> None:
-    model = idle(explores=False)
-    model.remember(seen())
-    targets = run(model, 1.0, 120.0)
-    assert {t.kind for t in targets[:99]} == {"face"}
-    assert {(t.kind, t.id) for t in targets[101:]} == {("rest", -1)}
-    assert targets[-1].p_world_m == (1.5, 0.0, 0.2)
-
-
 def test_waiting_keeps_the_identity_and_the_place_it_had_got_to() -> None:
     model = idle()
     model.remember(seen(v=(0.0, 0.3, 0.0), at_s=0.95))
@@ -222,19 +213,6 @@ def test_a_target_that_comes_back_is_waited_for_anew() -> None:
     assert (again.kind, again.p_world_m) == ("face", (1.0, -0.4, 0.3))
     model.reset(2.0)
     assert model.step(2.0).kind == "rest"
-
-
-def test_a_late_step_lands_in_the_same_place() -> None:
-    early, late = idle(9), idle(9)
-    for model in (early, late):
-        model.remember(seen())
-        model.step(0.0)
-    run(early, 0.0, 30.0)
-    assert early.step(30.0) == late.step(30.0)
-
-
-def test_same_dice_same_looks() -> None:
-    assert run(idle(1), 0.0, 60.0) == run(idle(1), 0.0, 60.0) != run(idle(2), 0.0, 60.0)
 
 
 def test_who_does_not_explore_rests_straight_ahead_until_told_to() -> None:

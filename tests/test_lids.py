@@ -1,6 +1,5 @@
 """Blinks, winks and lids that follow the gaze; numbered checks: docs/checks.md."""
 
-from itertools import pairwise
 from math import cos, radians, sin
 
 import numpy as np
@@ -115,17 +114,6 @@ def test_e52_gaze_evoked_blinks(size_deg: float, low: float, high: float, seed: 
     assert low <= shifts.share <= high
     assert max(shifts.counts) == 1
     assert max(shifts.delays) <= 0.060
-
-
-def test_shifts_in_quick_succession_share_one_blink() -> None:
-    model, times = lids(0, blinks_per_min=0.0), []
-    for k in range(2000):
-        count = model.blinks
-        model.step(k * DT, 0.0, radians(-60.0) if k % 20 == 0 else None)
-        if model.blinks > count:
-            times.append(k * DT)
-    assert len(times) > 10
-    assert min(b - a for a, b in pairwise(times)) >= 0.6 - 1e-9
 
 
 KINEMATICS = Kinematics(GeometryParams(0.0, 0.0, 0.0), GAZE_JOINTS, LIDS)
@@ -287,10 +275,6 @@ def test_lids_follow_the_eyes_and_stay_between_shut_and_open() -> None:
     assert 0.7 <= (up - level) / (level - down) < 1.0
     assert model.step(0.0, radians(80.0), None)[0] == 1.0
     assert model.step(0.0, radians(-89.0), None)[0] == 0.0
-
-
-def test_same_dice_same_blinks() -> None:
-    assert onsets(lids(7), 60.0) == onsets(lids(7), 60.0) != onsets(lids(8), 60.0)
 
 
 def test_no_two_blinks_are_alike_and_no_two_eyes() -> None:

@@ -2,10 +2,9 @@
 
 import socket
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import NamedTuple
 
-import numpy as np
 import pytest
 from msgspec import structs
 from page_feed import IN_TIME
@@ -13,18 +12,15 @@ from shown_page import wait_for
 from world_shapes import SmallWorld
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.shared_frames import SharedDetections, SlotReader, SlotWriter
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
-from gazerig.robot.dashboard.feed.camera_overlay import background, draw_detections
 from gazerig.robot.dashboard.feed.gaze_trail import GAZE_KEPT_S, GazeHistory
 from gazerig.robot.dashboard.feed.live_feed import (
     LiveFeed,
     LiveRig,
-    gaze_pixel,
     read_waiting,
 )
 from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
@@ -139,39 +135,6 @@ def test_nothing_is_sent_before_the_page_is_there_and_everything_again_to_anothe
         assert page.rigs == n
         assert (shot.health, shot.behaviour) == ("bus: lost 3 times", "wait")
         assert len(shot.faces) == 1, "the percept in force comes again"
-
-
-@pytest.mark.parametrize("depth", [False, True])
-def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: bool) -> None:
-    page.comes_up()
-    page.publisher.depth = depth
-    page.live.choices.faces = True
-    rng = np.random.default_rng(0)
-    image = rng.integers(0, 255, (400, 640, 3), np.uint8)
-    metres = rng.random((400, 640), np.float32) + 0.5
-    tick = ran.ticks[-1]
-    assert tick.detections is not None
-    found = replace(tick.detections, image=image, depth_m=metres)
-    writer, reader = SlotWriter(), SlotReader()
-    slot = writer.put(metres if depth else image)
-    readers = reader, reader
-    shared = SharedDetections(found, None if depth else slot, slot if depth else None, readers)
-    page.stream.update(structs.replace(tick, detections=shared))
-    news = read_waiting(page.feed, page.live)
-    reader.close()
-    writer.close()
-    assert news.image is not None
-    assert found.located is not None
-    lens, poses = found.located.intrinsics, page.live._poses
-    assert poses is not None
-    R, p_m = ran.made.shown_rig().mount.pose(*poses.head_pose(found.captured_s))
-    for gaze_px in (None, gaze_pixel(tick.gaze.gaze_point_world_m, R, p_m, lens)):
-        drawn = draw_detections(background(found, depth), found, gaze_px, lens)
-        if np.array_equal(drawn, news.image):
-            break
-    else:
-        raise AssertionError("another image is drawn")
-    assert read_waiting(page.feed, page.live).image is None
 
 
 def test_a_late_frame_is_drawn_with_the_gaze_of_its_capture() -> None:

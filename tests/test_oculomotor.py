@@ -320,27 +320,6 @@ def _any_target(rng: np.random.Generator, at_s: float, shift: int) -> Target:
     )  # fmt: skip
 
 
-@settings(max_examples=16, deadline=None)
-@given(
-    eye=st.floats(15, 55),
-    yaw=st.floats(-80, 80),
-    pitch=st.floats(-30, 30),
-    salience=st.floats(0, 3),
-    seed=st.integers(0, 2**32 - 1),
-)
-def test_e16_any_eye_range_and_timing_reaches_the_target(
-    eye: float, yaw: float, pitch: float, salience: float, seed: int
-) -> None:
-    rng = np.random.default_rng(seed)
-    rig = Rig(eye_deg=eye, geometry=DESK, head=HeadParams())
-    where, t = still(yaw, salience, bool(seed % 2), pitch), 0.0
-    for _ in range(600):
-        dt = float(rng.choice((0.002, 0.005, 0.005, 0.010, 0.030)))
-        t += dt
-        rig.tick(where(t), t, dt)
-    assert rig.row(t, where(t))[3] <= 0.5
-
-
 def test_e19_no_eye_beyond_its_limit_and_no_head_beyond_its_range() -> None:
     rng = np.random.default_rng(5)
     rig = Rig(eye_deg=35.0, geometry=DESK, neck_deg=60.0)

@@ -1,6 +1,6 @@
 """The maker's eyes, the Feetech head and a rig of three kinds of bus, alive in simulated time."""
 
-from math import degrees, radians
+from math import radians
 from pathlib import Path
 
 import numpy as np
@@ -86,26 +86,3 @@ def test_four_lids_follow_and_meet(maker: Ran) -> None:
     assert np.ptp(tilt) > 2.0
     assert np.corrcoef(tilt, upper)[0, 1] > 0.6  # looks up: the upper lid opens
     assert np.corrcoef(tilt, lower)[0, 1] < -0.6  # and the lower one follows it up: less open
-
-
-def test_true_servos_keep_to_their_joints_ranges(tmp_path: Path) -> None:
-    """What the emulated shafts do, not what anybody believes of them."""
-    rig = rig_of("mixed", tmp_path)
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=1, scene="boxing"))
-    from gazerig.robot.app.run_bus import servo_index
-
-    ports = [share.bus._port for share in made.robot.body.bus._shares]  # type: ignore[attr-defined]
-    devices = dict(zip(("", "neck", "tilt"), (port.chain for port in ports), strict=True))
-    worst = dict.fromkeys(rig.names, 0.0)
-
-    def look(tick: Tick) -> None:
-        for name, joint in rig.joints.items():
-            place = devices[joint.bus].positions_steps()[servo_index(rig, name)]
-            angle = degrees(joint.angle_rad(place))
-            worst[name] = max(worst[name], angle - joint.max_deg, joint.min_deg - angle)
-
-    made.robot.start(made.clock)
-    run(made.robot, made.clock, made.loop, lambda s: "over" if s >= 4.0 else None, look)
-    assert max(worst.values()) < 0.6, worst
-    made.robot.stop()
-    made.close()

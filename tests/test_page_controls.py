@@ -5,17 +5,14 @@ import socket
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
-from math import radians
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 import pytest
-from desk import GAZE_JOINTS
 from msgspec import structs
 from page_visitor import PATIENCE_S
-from shown_page import PARAM, SNAPSHOT, wait_for
+from shown_page import PARAM, wait_for
 from stand_in import StandIn
 
 from gazerig.config.parameters import parameters, values
@@ -28,12 +25,8 @@ from gazerig.robot.dashboard.feed.page_process import (
     PageProcess,
 )
 from gazerig.robot.dashboard.feed.publisher import ParamFeed
-from gazerig.robot.dashboard.panels.controls import (
-    JogPanel,
-)
 from gazerig.robot.dashboard.panels.param_panel import (
     ParamControl,
-    ParamPanel,
     param_hint,
     parse_value,
 )
@@ -301,80 +294,6 @@ def place() -> Container:
     return Widgets().panel("steer")
 
 
-class Mouth:
-    """Keeps what is parse_request."""
-
-    def __init__(self) -> None:
-        self.parse_request: list[tuple[object, str]] = []
-
-    def command(self, command: Command, who: str) -> bool:
-        self.parse_request.append((command, who))
-        return True
-
-    def ask(self, data: Mapping[str, object], who: str) -> bool:
-        self.parse_request.append((dict(data), who))
-        return True
-
-
-WHO = "panels-5"
-
-
-class Scene:
-    """A scene that holds the target to drag."""
-
-    visible = True
-    position = (0.0, 0.0, 0.0)
-
-    def add_transform_controls(self, name: str, **of_it: object) -> "Scene":
-        return self
-
-    def on_update(self, do: object) -> None:
-        """Nobody drags here."""
-
-
-def jogging(place: Container) -> tuple[JogPanel, Mouth]:
-    mouth = Mouth()
-    view = JogPanel(place, mouth)  # type: ignore[arg-type]
-    ends = {
-        f"joints.{j}.{end}_deg": v for j in GAZE_JOINTS for end, v in (("min", -30), ("max", 40.0))
-    }
-    view.update_ranges(ends)
-    return view, mouth
-
-
-def test_every_joint_has_a_slider_with_its_limits(place: Container) -> None:
-    view, _ = jogging(place)
-    assert tuple(view.sliders) == GAZE_JOINTS
-    assert {slider.ends for slider in view.sliders.values()} == {(-30.0, 40.0)}
-    view.update_ranges({"joints.neck_yaw.min_deg": -10.0, "joints.neck_yaw.max_deg": 10.0})
-    assert view.sliders["neck_yaw"].ends == (-10.0, 10.0)
-
-
-def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
-    view, mouth = jogging(place)
-    slider = view.sliders["neck_yaw"]
-    yaw = GAZE_JOINTS.index("neck_yaw")
-    view.show(replace(SNAPSHOT, t_s=1.0))
-    assert (
-        slider.value == pytest.approx(5.7) and mouth.parse_request == []
-    )  # 0.1 rad, without a request
-    slider.receive_input(20.0, WHO)
-    assert mouth.parse_request == [(Jog((("neck_yaw", radians(20.0)),)), WHO)]
-
-    def wished(t_s: float, desired_deg: float, stopped: str = "") -> float:
-        desired = tuple(radians(desired_deg) if i == yaw else 0.1 for i in range(9))
-        view.show(replace(SNAPSHOT, t_s=t_s, desired_rad=desired, stopped=stopped))
-        return float(slider.value)
-
-    assert wished(1.1, 6.0) == 20.0  # not yet obeyed
-    assert wished(1.2, 20.0) == 20.0  # executed; the joint is still moving
-    assert wished(5.0, 20.0) == 20.0
-    assert wished(5.2, -3.0) == 20.0
-    assert wished(5.8, -3.0) == pytest.approx(5.7)  # another person released it
-    slider.receive_input(20.0, WHO)
-    assert wished(5.9, 20.0, "a test") == pytest.approx(5.7)  # a stop lets go at once
-
-
 # --- parameters ---------------------------------------------------------------------------------
 
 
@@ -400,19 +319,3 @@ def test_every_live_parameter_of_every_rig_becomes_a_control(place: Container, n
 def ignore(key: str, value: object, client: str) -> None:
     """A control that is only looked at asks for nothing."""
     raise AssertionError(f"{key} was asked to be {value} by {client}")
-
-
-def test_what_is_refused_is_shown_as_it_was() -> None:
-    widgets, mouth = Widgets(), Mouth()
-    panel = ParamPanel(widgets, widgets.panel("tune"), mouth)  # type: ignore[arg-type]
-    typed = structs.replace(PARAM, key="a.c", high=1e6)
-    panel.add_params(msgspec.to_builtins([PARAM, typed]))
-    panel.update_values({"values": {"a.b": 1.0, "a.c": 1.0}, "unsaved": ["a.c"]})
-    fields = {key: control.field for key, (control,) in panel._controls.items()}
-    assert [field.label for field in fields.values()] == ["a.b (deg)", "● a.c (deg)"]
-    fields["a.b"].receive_input(7.0, WHO)
-    fields["a.c"].receive_input("1,5", WHO)
-    asked = [{"do": "set", "changes": {"a.b": 7.0}}, {"do": "set", "changes": {"a.c": "1,5"}}]
-    assert mouth.parse_request == [(one, WHO) for one in asked]
-    panel.show_values()
-    assert [field.value for field in fields.values()] == [1.0, "1.0"]

@@ -98,13 +98,6 @@ def test_why_it_won_is_said_in_a_plain_sentence(terms: Terms, said: str) -> None
     assert reason_text(led) == shot.why
 
 
-def test_what_holds_says_why_joint_by_joint() -> None:
-    shot = replace(snapshot(reasons=tuple(f"joint {n}: hot" for n in range(6))), level="hold")
-    held = alarms(shot)
-    assert "joint 3: hot" in held and "joint 4" not in held and "and 2 more" in held
-    assert "joint 5: hot" in health_table(shot)
-
-
 def test_what_stands_still_shouts() -> None:
     stopped = replace(snapshot(), stopped="somebody pressed <STOP>", level="torque_off")
     assert "somebody pressed &lt;STOP&gt;" in health_table(
@@ -179,19 +172,6 @@ def looking(t_s: float, name: str = "face 1: nose", part: str | None = "N") -> S
 
 
 # --- the strip of the last half minute --------------------------------------------------
-
-
-def test_stretches_join_end_to_end_and_are_forgotten() -> None:
-    timeline = Timeline()
-    for k in range(1000):
-        t_s = 0.05 * k
-        timeline.update(looking(t_s, "face 1: nose" if t_s < 40.0 else "hand <7>", None))
-    face, hand = timeline._rows["target"]
-    assert face[:3] == (0.0, pytest.approx(39.95), "face 1")
-    assert hand[:3] == (pytest.approx(39.95), pytest.approx(49.95), "hand <7>")
-    for k in range(1000, 1700):
-        timeline.update(looking(0.05 * k, "hand <7>", None))
-    assert [stretch.what for stretch in timeline._rows["target"]] == ["hand <7>"]
 
 
 def test_strip_shows_targets_saccades_blinks_and_the_guard_and_runs_no_markup() -> None:

@@ -14,7 +14,6 @@ from urllib.parse import urlsplit
 
 import child_processes
 import pytest
-from page_feed import PageFeed
 from page_visitor import PATIENCE_S, Visitor
 from present import present
 from shown_page import free_port, running_page, wait_for
@@ -144,18 +143,6 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         os.kill(second, signal.SIGKILL)
         wait_for(lambda: page.started == 3, "the third page")
         assert page.notice() is None
-
-
-def test_a_suspended_page_is_replaced_while_the_rig_runs() -> None:
-    with running_page() as (page, _):
-        feed = PageFeed(page)
-        os.kill(present(page._process).pid, signal.SIGSTOP)
-
-        def is_replaced() -> bool:
-            feed.show()
-            return page.started == 2
-
-        wait_for(is_replaced, "another page")
 
 
 @pytest.mark.parametrize("beats", [True, False])

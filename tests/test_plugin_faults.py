@@ -5,10 +5,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from functools import partial
-from importlib import import_module
-from itertools import count
 from math import inf, nan
 from pathlib import Path
 from types import SimpleNamespace
@@ -33,7 +30,6 @@ from gazerig.robot.app import run_bus, session
 from gazerig.robot.app.assemble import RIGS_OWN, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
-from gazerig.robot.guardian import guardian
 from gazerig.sim_mock.pty.client import PtyBuses
 
 ODD = """
@@ -53,13 +49,6 @@ class Odd:
         self.fail()
         return ()
 """
-CLOSED = """
-class Seeing:
-    def open(self): pass
-    def events(self): return ()
-    def latest(self, now_s): return None
-    def close(self): raise KeyError("no lens")
-"""
 
 
 @pytest.fixture
@@ -70,8 +59,6 @@ def odd(tmp_path: Path) -> Iterator[None]:
     install_example(tmp_path / "site")
     with on_path(tmp_path / "site") as site:
         modules = {f"odd_{name}": ODD for name in groups}
-        parts["gazerig.camera"]["seeing"] = "odd_seeing:Seeing"
-        modules["odd_seeing"] = CLOSED
         install(site, "odd", parts, modules)
         yield
 
@@ -139,22 +126,6 @@ def test_another_part_that_raises_ends_the_run(part: str, monkeypatch: pytest.Mo
     assert not held and "torque off" in lines[-1]
 
 
-@pytest.mark.usefixtures("odd")
-def test_a_camera_that_fails_as_it_closes_hides_no_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    ticks = count()
-
-    def stopped(buses: PtyBuses) -> None:
-        if next(ticks) == 50:
-            buses.command("unplug")
-
-    _, (*_, closed, ended), held = end_of_run(
-        load_rig("desk"), monkeypatch, stopped, camera="seeing", fast=False, seconds=1.5
-    )
-    assert closed == "closing the camera: camera 'seeing' of odd 1.2 failed (KeyError: 'no lens')"
-    assert ended.startswith("stopped by seconds: not parked, torque-off could not be sent (/tmp/")
-    assert held  # its watchdog stops it
-
-
 def test_a_rule_that_returns_no_point_ends_the_run() -> None:
     for answer in ((nan, 0.0, 0.0), (1.0, inf, 0.0), (1.0, 0.0), "abc", 7):
         rule: Any = SimpleNamespace(choose=lambda *_, answer=answer: answer)
@@ -172,76 +143,44 @@ def wait(*_: object) -> None:
     threading.Event().wait()
 
 
-def ask_for_ever(bus: Any, *_: object) -> None:
-    assert all(bus._line.ask(99, 28) is None for _ in count())
-
-
 class Hanging:
     """A rule that hangs after some ticks."""
 
     ticks = 0
 
-    def __init__(self, hang: Callable[..., None] = wait) -> None:
-        self.hang = hang
-
-    def choose(self, *words: object) -> Any:
+    def choose(self, *_: object) -> Any:
         self.ticks += 1
         if self.ticks == 50:
             print("moving", flush=True)
         if self.ticks > 100:
-            self.hang(*words)
+            wait()
 
 
-def _hang(path: str, file: str, method: str, hang: Callable[..., None]) -> None:
-    hanging, rule = Hanging(hang), None
-    if method == "choose":
-        rule = hanging
-    else:
-        bus = import_module("gazerig_lx16a.bus").Lx16aBus
-        usual = getattr(bus, method)
-        setattr(bus, method, lambda *words: hanging.choose(*words) or usual(*words))
-    with gazerig.open(file, port=path, attention=rule, say=lambda line: None):
+def _hang(path: str, file: str) -> None:
+    with gazerig.open(file, port=path, attention=Hanging(), say=lambda line: None):
         time.sleep(2.0 * PATIENCE_S)
 
 
-@contextmanager
-def _hanging(file: str, *words: Any) -> Iterator[Driven]:
+def test_a_rule_that_hangs_leaves_limp_servos() -> None:
+    file = str(shipped_path("rigs", "feetech"))
     rig = load_rig(file)
     with PtyBuses() as buses:
         (path,) = buses.start(emulated_lines(rig)).values()
-        loop = Branch(partial(_hang, path, file, *words), stdout=subprocess.PIPE, text=True)
+        loop = Branch(partial(_hang, path, file), stdout=subprocess.PIPE, text=True)
         late = threading.Timer(2.0 * PATIENCE_S, loop.kill)
         late.start()
         try:
-            yield Driven(loop, buses, frozenset(joint.id for joint in rig.joints.values()))
+            it = Driven(loop, buses, frozenset(joint.id for joint in rig.joints.values()))
+            it.line("moving")
+            assert any(it.holding())
+            assert it.limp_after_s(time.monotonic(), PATIENCE_S) is not None
         finally:
             late.cancel()
             loop.kill()
             loop.communicate()
 
 
-def test_a_rule_that_hangs_leaves_limp_servos() -> None:
-    _leaves_limp_servos(str(shipped_path("rigs", "feetech")), "choose", wait)
-
-
-@pytest.mark.usefixtures("odd")
-@pytest.mark.parametrize(("method", "hang"), [("write", wait), ("read", ask_for_ever)])
-def test_a_hang_on_a_packages_bus_leaves_limp_servos(
-    method: str, hang: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "site"))  # of the guardian and the servos
-    monkeypatch.setattr(guardian, "LONGEST_CALL_S", 2.0)
-    _leaves_limp_servos(str(HEAD), method, hang)
-
-
-def _leaves_limp_servos(file: str, *words: Any) -> None:
-    with _hanging(file, *words) as it:
-        it.line("moving")
-        assert any(it.holding())
-        assert it.limp_after_s(time.monotonic(), PATIENCE_S) is not None
-
-
-# --- goals of a package's bus
+# --- values of a package's bus
 
 
 SERVOS = (ServoConfig(1, "m", 0, 1000, 500.0, "neck"), ServoConfig(2, "m", 0, 1000, 500.0, "jaw"))

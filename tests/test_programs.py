@@ -12,11 +12,9 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
-import aiohttp
 import jsonschema
 import pytest
 from branch import Branch, gazerig
@@ -406,43 +404,6 @@ def test_who_sends_far_too_much_is_disconnected_after_its_stop(rig: Rig) -> None
     assert rig.until(lambda now: now["stopped"])["stopped"] == "before the end"
 
 
-def test_a_stop_in_the_buffer_of_a_connection_that_is_closed_is_carried_out(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """It is read late: the computer is busy, and much was sent before it."""
-    monkeypatch.setattr(programs, "REST_S", 0.02)
-    stop = aiohttp.WSMessage(aiohttp.WSMsgType.TEXT, '{"do": "stop"}', None)
-    end = aiohttp.WSMessage(aiohttp.WSMsgType.CLOSED, None, None)
-    carried_out: list[object] = []
-
-    async def carry_out(frame: object, *rest: object, late: bool) -> None:
-        carried_out.append(frame)
-
-    async def receive(sends: socket.socket) -> None:
-        due_s, frames = asyncio.get_running_loop().time() + 0.07, iter((stop, end))
-
-        async def next_frame() -> aiohttp.WSMessage:
-            await asyncio.sleep(due_s - asyncio.get_running_loop().time())
-            return next(frames)
-
-        excess = programs.ExcessCount()
-        excess.is_over = True
-        routes = SimpleNamespace(_receive_frame=carry_out)
-        program = programs.ProgramSocket(0.0, False)
-        request = SimpleNamespace(transport=SimpleNamespace(get_extra_info=lambda name: sends))
-        web_socket: Any = SimpleNamespace(receive=next_frame)
-        arguments: Any = (routes, web_socket, program, asyncio.Queue(), request, excess)
-        await programs.ProgramRoutes._receive(*arguments)
-
-    here, there = socket.socketpair()
-    with here, there:
-        asyncio.run(receive(here))
-        assert carried_out == []  # nothing waits in the kernel
-        there.sendall(b"more")
-        asyncio.run(receive(here))
-    assert carried_out == [stop]
-
-
 def test_messages_that_are_dropped_are_refused_together() -> None:
     async def drop() -> list[Any]:
         program = programs.ProgramSocket(0.0, False)
@@ -539,18 +500,6 @@ def test_the_browser_example_shows_the_head_and_commands_it(
         rig.until(lambda now: now["stopped"])
         wait_for(lambda: "stopped: browser.html" in browser.words(), "the stop")
     rig.until(lambda now: not now["controlled_by"])
-
-
-@pytest.mark.parametrize("number", range(3))
-def test_a_state_after_the_answer_to_a_stop_shows_it(rig: Rig, number: int) -> None:
-    with rig.dial("&rate_hz=60") as end:
-        heard(end, "state")
-        why = f"stop {number}"
-        ask(end, do="stop", why=why, tag="s")
-        heard(end, "tag", "s")
-        assert heard(end, "state")["state"]["stopped"] == why
-    assert rig.post({"do": "stop", "why": "by post"})[0] == 200
-    assert rig.get("/state")[1]["ok"]["state"]["stopped"] == "by post"
 
 
 def test_states_after_an_answer_are_not_older() -> None:

@@ -125,35 +125,6 @@ def test_a_folder_of_somebody_else_is_refused(folder: Path) -> None:
     assert not remote_socket.is_private(folder, os.getuid() + 1)
 
 
-INTRUDES = """
-import os, socket, sys
-os.setgroups([])
-os.setuid(65534)
-try:
-    socket.socket(socket.AF_UNIX).connect(sys.argv[1])
-except PermissionError:
-    print("kept out")
-"""
-
-
-@pytest.mark.skipif(os.getuid() != 0, reason="only root can play another user")
-def test_another_user_is_kept_out(folder: Path) -> None:
-    folder.parent.chmod(0o755)
-    server = open_server()
-    path = server.open()
-
-    def said() -> str:
-        words = [sys.executable, "-S", "-c", INTRUDES, str(path)]
-        return subprocess.run(words, capture_output=True, text=True).stdout
-
-    assert said() == "kept out\n"
-    folder.chmod(0o755)
-    assert said() == "kept out\n"  # by the socket itself
-    path.chmod(0o666)
-    assert said() == ""  # so the two were what kept it out
-    server.close()
-
-
 def listens() -> None:
     """Have a socket until standard input ends."""
     server = RemoteServer(beatless(), print)
@@ -190,15 +161,6 @@ def test_a_killed_rig_leaves_a_socket_that_is_no_rig_and_that_the_next_removes(
     server.close()
 
 
-def test_a_living_neighbour_keeps_its_socket(folder: Path) -> None:
-    with listening() as neighbour:
-        server = open_server()
-        server.open()
-        assert set(remote_socket.find_sockets(folder).values()) == {neighbour.pid, os.getpid()}
-        server.close()
-        assert set(remote_socket.find_sockets(folder).values()) == {neighbour.pid}
-
-
 def test_several_rigs_are_named_and_chosen_by_process(folder: Path, rig: RobotClient) -> None:
     with listening() as other:
         with pytest.raises(NoRobotError) as which:
@@ -215,17 +177,6 @@ def test_several_rigs_are_named_and_chosen_by_process(folder: Path, rig: RobotCl
             RobotClient.connect("eva")
         with pytest.raises(NoRobotError, match=f"no rig of process 1 is running: .*{other.pid}"):
             RobotClient.connect(1)
-
-
-def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("gazerig.robot.remote.client._ANSWER_S", 0.1)
-    folder.mkdir(mode=0o700)
-    with remote_socket.listen(folder / "77.sock"), RobotClient.connect() as rig:
-        for _ in range(2):
-            with pytest.raises(ConnectionLost, match="does not answer|has ended or disconnected"):
-                rig.get()
 
 
 # Other programs steer a running rig: requests are executed, rubbish has no effect
@@ -561,37 +512,6 @@ def test_the_last_message_before_the_end_of_a_burst_may_be_a_stop(
         assert time.monotonic() < stop_s
     assert stopped == "at last"
     rig.resume(confirmed=True)
-
-
-def test_who_sends_rubbish_and_reads_slowly_is_disconnected(rig: RobotClient, folder: Path) -> None:
-    with raw(folder) as end:
-        over = threading.Event()
-
-        def read() -> None:
-            with contextlib.suppress(OSError):
-                while not over.wait(0.05):
-                    end.recv(200)
-
-        reader = threading.Thread(target=read)
-        reader.start()
-        began_s = time.monotonic()
-        with pytest.raises(ConnectionError):
-            while time.monotonic() < began_s + 60.0:  # 2 s on a quiet machine
-                end.sendall(500 * b"rubbish\n")
-        over.set()
-        reader.join()
-
-
-def test_an_answer_does_not_end_the_wait_for_the_next_request(
-    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Two threads have a connection, each with timeouts of its own."""
-    monkeypatch.setattr(server_module, "_TAKES_S", 0.02)
-    with raw(folder) as end:
-        for _ in range(20):
-            end.sendall(b'{"do": "characters"}\n')
-            assert "ok" in line_of(end)
-            time.sleep(0.03)
 
 
 def test_a_client_of_another_version_is_told_so_once_and_may_stop(

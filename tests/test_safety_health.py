@@ -182,17 +182,6 @@ def test_unknown_values_strain_nothing(world: World) -> None:
     assert world.tick(0.0, temperature_c=nan, voltage_v=nan).level == "ok"
 
 
-def test_slowing_down_in_flight_brakes_within_the_joints_own_strength() -> None:
-    for way in (1.0, -1.0):
-        world = World()
-        for k in range(80):
-            world.tick(way * 0.8, temperature_c=40.0 if k < 25 else 64.9)
-        speeds = world.speeds()
-        assert np.abs(np.diff(speeds, prepend=0.0)).max() <= NECK.accel_rad_s2 * DT + 1e-9
-        assert abs(speeds[24]) > radians(150.0)
-        assert abs(speeds[60]) == pytest.approx(0.208 * NECK.speed_rad_s, rel=0.01)
-
-
 def test_torque_off_holds_and_goes_along_with_the_joint(world: World) -> None:
     for k in range(100):  # turned by hand at 57 deg/s, then let go
         where = min(0.005 * k, 0.3)
@@ -202,17 +191,6 @@ def test_torque_off_holds_and_goes_along_with_the_joint(world: World) -> None:
     verdict = world.tick(-0.2, torque=True)
     assert reason(verdict) == "starting slowly"
     assert 0.3 - verdict.command_rad[JOINT] <= radians(300.0) * DT * DT + 1e-9
-
-
-def test_torque_off_beyond_the_range_or_faster_than_the_joint_stays_within_its_limits(
-    world: World,
-) -> None:
-    for k in range(200):
-        world.tick(0.0, stray=[9.0, -9.0, nan, 0.4][k // 40 % 4], torque=False)
-    speeds = world.speeds()
-    assert np.abs(speeds).max() <= NECK.speed_rad_s + 1e-9
-    assert np.abs(np.diff(speeds, prepend=0.0)).max() <= NECK.accel_rad_s2 * DT + 1e-9
-    assert min(world.path) >= NECK.low_rad and max(world.path) <= NECK.high_rad
 
 
 @pytest.mark.parametrize("torque", [{"torque": False}, {}])

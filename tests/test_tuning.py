@@ -236,25 +236,6 @@ def test_a_character_is_saved_by_its_name_and_of_the_values_only_those_set_by_ha
     }
 
 
-def test_a_character_of_the_command_line_is_saved_only_after_it_is_chosen(mine: Path) -> None:
-    bench = Bench(str(mine), "shy")
-    assert bench.tuning.unsaved() == () and bench.tuning.save().changes == ()
-    bench.tuning.apply_character("none")
-    assert bench.made.live_params.rig == load_rig("desk") and bench.tuning.save().changes == ()
-    bench.tuning.apply_character("bold")
-    (change,) = bench.tuning.save().changes
-    assert str(change) == "character: (not in the file) -> bold"
-    text = mine.read_text(encoding="utf-8").replace("character: bold", "character: sleepy")
-    mine.write_text(text, encoding="utf-8")
-    bench.tuning.apply_character("shy")
-    bench.tuning.reload()
-    assert [c.old for c in bench.tuning.unsaved()] == ["sleepy"]
-    mine.write_text(text.replace("character: sleepy", "character: bold"), encoding="utf-8")
-    bench.tuning.reload()  # the edited file replaces what is unsaved
-    assert bench.tuning.character_name == "bold" and bench.tuning.unsaved() == ()
-    assert bench.made.live_params.rig == load_rig(str(mine))
-
-
 def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> None:
     bench = Bench(str(mine), scanpath="random", saccade="min_jerk")
     assert bench.tuning.unsaved() == ()

@@ -16,7 +16,6 @@ from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.calibration.endstop_search import (
     STEPS_PER_DEG,
     StopSearchParams,
-    find_end_stop,
 )
 from gazerig.features.bringup.calibration.hobby_access import SPEED_US_S, HobbyServoAccess
 from gazerig.features.bringup.calibration.joint_calibration import (
@@ -186,21 +185,6 @@ def test_what_is_found_is_what_is_there_or_it_is_refused(
         assert short_steps / (ratio * STEPS_PER_DEG) < margin + 0.1 + 0.2 / ratio
 
 
-@given(span=st.integers(100, 4000), below=st.floats(0.0, 1.0), at=st.floats(0.1, 0.9))
-def test_a_travel_with_the_seam_in_it_is_always_refused_with_the_cure(
-    span: int, below: float, at: float
-) -> None:
-    start = TURN - 1 - int(below * (span - 1))
-    marks = Marks(start + span, start, start + round(at * span))
-    with pytest.raises(CalibrationRefused, match="seam") as refused:
-        joint_calibration("neck_yaw", marks, EYE, 0.0)
-    words = str(refused.value).split()
-    turn_deg = float(words[words.index("by") + 1])
-    more = "towards more steps" in str(refused.value)
-    reseated = (start + span // 2) % TURN + (1 if more else -1) * turn_deg * STEPS_PER_DEG
-    assert abs(reseated - 2048) < 8.0  # reported in whole degrees
-
-
 @pytest.mark.parametrize(
     ("marks", "says"),
     [
@@ -216,52 +200,6 @@ def test_marks_that_make_no_calibration_are_refused_in_words(marks: Marks, says:
 
 
 # --- finding a stop
-
-
-class Toy:
-    """A joint that follows its goal with a lag, between two stops, perhaps with a finger in it."""
-
-    def __init__(self, at: float, low: float, high: float, friction_steps: float = 7.0) -> None:
-        self.x, self.low, self.high = at, low, high
-        self.friction = friction_steps
-        self.goal: float | None = None
-        self.t_s = 0.0
-        self.pushed_s = self.longest_push_s = 0.0
-
-    def exchange(self, goal: int | None) -> tuple[int, float, float]:
-        self.goal = goal if goal is not None else self.goal
-        self.t_s += 0.02
-        error = 0.0 if self.goal is None else self.goal - self.x
-        before = self.x
-        if abs(error) > self.friction:
-            self.x += 0.5 * (error - (self.friction if error > 0 else -self.friction))
-        self.x = min(max(self.x, self.low), self.high)
-        stuck = abs(error) > 20.0 and self.x == before
-        self.pushed_s = self.pushed_s + 0.02 if stuck else 0.0
-        self.longest_push_s = max(self.longest_push_s, self.pushed_s)
-        # A position servo pushes with its error; a share of the stall current.
-        load = max(-GENTLY.strength, min(GENTLY.strength, error * 3.1 / 885.0)) if stuck else 0.0
-        return round(self.x), load, self.t_s
-
-
-@given(
-    at=st.floats(0.0, 1.0),
-    low=st.integers(100, 1900),
-    span=st.integers(150, 2000),
-    way=st.sampled_from([1, -1]),
-    friction=st.floats(0.0, 12.0),
-)
-def test_a_stop_is_found_where_it_is_and_never_pushed_for_half_a_second(
-    at: float, low: int, span: int, way: int, friction: float
-) -> None:
-    toy = Toy(low + at * span, low, low + span, friction)
-    found = find_end_stop(GENTLY, way, (0, TURN - 1), toy.exchange)
-    end = low + span if way > 0 else low
-    assert found.kind == "stop"
-    assert abs(found.position_steps - end) <= 2
-    assert toy.longest_push_s <= 0.5
-    back = (end - toy.x) * way / STEPS_PER_DEG
-    assert 1.5 <= back <= GENTLY.back_off_deg + 0.1
 
 
 # --- Calibrating one emulated joint by hand or by motion; refused joints
@@ -281,16 +219,6 @@ def test_by_hand_zero_sign_and_range_are_found(joint: JointParams) -> None:
     assert found.max_deg == pytest.approx((2110 - 1700) / STEPS_PER_DEG - 2.0, abs=0.2)
     assert found.min_deg == pytest.approx(-(2550 - 2110) / STEPS_PER_DEG + 2.0, abs=0.2)
     assert "turn left_eye_pan to its LEFT end, then press Enter" in bench.said
-    assert bench.get("torque_enable") == 0
-
-
-@each
-def test_by_hand_torque_that_was_left_on_goes_off_first(joint: JointParams) -> None:
-    bench = Bench(joint)
-    bench.registers.write(joint.id, "torque_enable", 1)
-    bench.script = []
-    with pytest.raises(CalibrationStopped):
-        calibrate_by_hand(bench.joint, bench, 2.0)
     assert bench.get("torque_enable") == 0
 
 
@@ -434,44 +362,7 @@ def test_a_joint_that_a_hand_took_over_the_seam_is_not_driven() -> None:
     assert bench.get("torque_enable") == 0
 
 
-def test_a_joint_that_is_left_alone_stops_by_itself() -> None:
-    bench = Bench(EYE)
-    bench.joint.enable_torque(GENTLY)
-    bench.registers.write(1, "goal_position", 3000)
-    bench.clock.sleep_until(bench.clock.now_s() + 1.0)
-    stopped_at = bench.get("present_position")
-    assert bench.get("bus_watchdog") == 255
-    bench.clock.sleep_until(bench.clock.now_s() + 1.0)
-    assert bench.get("present_position") == pytest.approx(stopped_at, abs=3)
-    assert stopped_at < 2100 + 0.5 * 2.0 * 15.0 * STEPS_PER_DEG
-
-
 # --- A joint behind a push rod: places marked by eye over an emulated board, and their linkage
-
-
-@given(
-    left=st.floats(6.0, 60.0),
-    right=st.floats(6.0, 60.0),
-    zero=st.integers(1200, 1800),
-    reach=st.integers(100, 600),
-    rising=st.booleans(),
-    margin=st.floats(0.0, 3.0),
-)
-def test_the_range_lies_inside_what_was_marked(
-    maker_rig: Rig, left: float, right: float, zero: int, reach: int, rising: bool, margin: float
-) -> None:
-    pan = maker_rig.joints["eyes_pan"]
-    way = reach if rising else -reach
-    marked = [(0.0, float(zero)), (left, float(zero + way)), (-right, float(zero - way))]
-    made = fit_linkage("eyes_pan", marked, pan, margin)
-    assert [at for _, at in made.transmission_points] == sorted(
-        (at for _, at in marked), reverse=not rising
-    )
-    assert -right - 0.051 + margin <= made.min_deg < 0.0 < made.max_deg <= left + 0.051 - margin
-    assert made.max_deg >= left - margin - 0.151 and made.min_deg <= margin - right + 0.151
-    joint = replace(pan, **made._asdict())
-    assert joint.steps(0.0) == zero * 4
-    assert joint.make_linkage().rising == rising
 
 
 @pytest.mark.parametrize(

@@ -173,20 +173,6 @@ def test_setup_gives_a_spare_its_id_in_the_chain(
         assert lock is None or chain.values(lock) == [1] * 9
 
 
-@every
-def test_at_the_rate_of_the_factory_only_the_id_is_written(
-    tmp_path: Path, make: str, writes: list[tuple[int, str, int]]
-) -> None:
-    baud = 57_600 if make == "dynamixel" else 1_000_000
-    with chain_of(tmp_path, make, baud=baud, first=30) as chain:
-        chain.renew(7)
-        writes.clear()
-        code, out = chain.run("doctor", "--fix")
-        assert f"{YAW}: id 1 -> 7: done" in out and code == 0, out
-        assert chain.places() == [(servo_id, baud) for servo_id in (*range(2, 10), 30)]
-        assert [one for one in writes if one[1] in ("id", "baud_rate")] == [(1, "id", 7)]
-
-
 @pytest.mark.parametrize("at", ["id", "baud_rate"])
 @pytest.mark.parametrize("words", [("doctor", "--fix"), ("setup", "--joint", "neck_yaw", "--yes")])
 @every
@@ -278,17 +264,6 @@ def test_a_spare_with_the_id_of_a_servo_is_named_and_not_used(
         chain.renew(7)
         out = refused(chain, writes)
         assert "left_eye_pan (servo 1): " in out and "two servos share" in out
-
-
-@every
-def test_a_chain_behind_an_adapter_with_an_echo(tmp_path: Path, make: str) -> None:
-    with chain_of(tmp_path, make) as chain:
-        chain.renew(7)
-        chain.command("echo on")
-        assert f"{YAW}: id 1 -> 7: done" in chain.run("doctor", "--fix")[1]
-        chain.command("lose 7")
-        out = chain.run("doctor")[1]
-        assert f"error {YAW}: does not answer" in out and "pieces" not in out
 
 
 @every

@@ -129,8 +129,6 @@ def test_two_processes_make_the_table_of_one(desk_rig: Rig, tmp_path: Path) -> N
     with WorkerPool(Job(OPTIONS, params_text(desk_rig)), 2, lambda: None) as pool:
         found = dict(pool.outcomes(runs))
         assert len(pool.pids) == 2
-        pids = pool.pids
-    assert not alive(pids)
     ordered = [found[i] for i in range(len(runs))]
     alone = [
         Outcome(point, seed, figures_at(desk_rig, replace(OPTIONS, seed=seed), point, lambda: None))
@@ -138,20 +136,6 @@ def test_two_processes_make_the_table_of_one(desk_rig: Rig, tmp_path: Path) -> N
     ]
     assert table_rows(ordered) == table_rows(alone)
     assert ordered[0].figures != ordered[1].figures
-
-
-def alive(pids: Sequence[int]) -> list[int]:
-    return [pid for pid in pids if Path(f"/proc/{pid}/stat").exists() and not _zombie(pid)]
-
-
-def _zombie(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except OSError:
-        return True
-
-
-# ---- the end from outside
 
 
 # ---- figures

@@ -55,9 +55,6 @@ WANTED = {
     "six stroll, for seconds behind others: IDF1": (0.95, 1.0),
     "one comes and goes: returns with the same number, %": (60.0, 100.0),
     "six come and go: visits with another person's number, %": (0.0, 15.0),
-    "identities that go on after a cut, %": (0.0, 0.0),
-    "cuts found, %": (100.0, 100.0),
-    "cuts where there is none, of 1000 pictures": (0.0, 0.0),
 }
 
 
@@ -348,17 +345,6 @@ def measure(full: bool) -> dict[str, float]:
         for name, (ways, seconds) in crossings(rng).items():
             figures.setdefault(f"{name}: IDF1", []).append(idf1(ways, seconds, rng))
     out = {name: float(np.mean(values)) for name, values in figures.items()}
-    rng, films = np.random.default_rng(0), Counter[str]()
-    for _ in range(10 if full else 2):
-        images, cuts = cut_film(rng)
-        found, ended = {*cuts_in(images)}, {*ends_in(images, rng)}
-        films.update(
-            images=len(images), cuts=len(cuts), found=len(found.intersection(cuts)),
-            false=len(found.difference(cuts)), went_on=len({*cuts} - ended),
-        )  # fmt: skip
-    out["identities that go on after a cut, %"] = 100.0 * films["went_on"] / films["cuts"]
-    out["cuts found, %"] = 100.0 * films["found"] / films["cuts"]
-    out["cuts where there is none, of 1000 pictures"] = 1e3 * films["false"] / films["images"]
     alone, six = (
         sum(
             (come_and_go(n, 1200.0 if full else 400.0, np.random.default_rng(k)) for k in range(3)),

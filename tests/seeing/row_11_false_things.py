@@ -5,10 +5,8 @@ share on which a thing is reported (recall). Rendered people walk through a rend
 then compressed, lit or shaded.
 """
 
-import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,7 +15,6 @@ from seeing.moving_room import (
     HEIGHT,
     PEOPLE,
     PLAIN,
-    RATE_HZ,
     WIDTH,
     Image,
     Seen,
@@ -35,25 +32,6 @@ def jpeg(quality: int, seen: Iterator[Seen]) -> Iterator[Seen]:
     for one in seen:
         _, data = cv2.imencode(".jpg", one.image, (cv2.IMWRITE_JPEG_QUALITY, quality))
         yield one._replace(image=_decoded(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)))
-
-
-def mpeg4(seen: Iterator[Seen]) -> Iterator[Seen]:
-    """Compress with motion compensation: blocks are taken from the frame before."""
-    given = list(seen)
-    height, width = given[0].image.shape[:2]
-    with tempfile.TemporaryDirectory() as folder:
-        path = str(Path(folder) / "film.mp4")
-        code = cv2.VideoWriter.fourcc(*"mp4v")
-        writer = cv2.VideoWriter(path, code, RATE_HZ, (width, height))
-        for one in given:
-            writer.write(cv2.cvtColor(one.image, cv2.COLOR_GRAY2BGR))
-        writer.release()
-        film = cv2.VideoCapture(path)
-        for one in given:
-            read, image = film.read()
-            assert read
-            yield one._replace(image=_decoded(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)))
-        film.release()
 
 
 def exposed(seen: Iterator[Seen]) -> Iterator[Seen]:
@@ -79,7 +57,6 @@ def shaded(seen: Iterator[Seen]) -> Iterator[Seen]:
 
 ROOMS: dict[str, Change] = {
     "JPEG of quality 30": partial(jpeg, 30),
-    "MPEG-4": mpeg4,
     "exposure that drifts": exposed,
     "lamps on 50 Hz": flickering,
     "a faint shadow": shaded,

@@ -1,7 +1,6 @@
 """Designs, sessions, data and reports."""
 
 import json
-import os
 import signal
 import time
 from collections import Counter
@@ -156,25 +155,6 @@ def test_an_incomplete_last_line_is_dropped(tmp_path: Path, study: Path) -> None
     path.write_bytes(b"nonsense\n" + whole)
     with pytest.raises(SetupError, match="jsonl:1"):
         Journal(tmp_path / "data")
-
-
-def test_a_step_that_cannot_be_written_is_repeated(
-    tmp_path: Path, study: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    journal = Journal(tmp_path / "data")
-    session = session_of(study, journal)
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "fsync", full)
-        with pytest.raises(SetupError, match="No space"):
-            session.handle(PageEvent(session.page, "consent"))
-    assert session.place.step == "consent"
-    assert events(session)
-    journal.close()
-    assert [one.kind for one in journal.records].count("consented") == 1
 
 
 def test_a_design_does_not_change_after_the_first_participant(study: Path, tmp_path: Path) -> None:

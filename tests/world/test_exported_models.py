@@ -2,45 +2,69 @@
 
 import io
 from dataclasses import replace
+from math import radians
 from typing import Any
 
 import numpy as np
 import pytest
 from described_rigs import SHIPPED
-from exported_bench import Both, Move, exported, moves
+from world_rigs import WorldBench, arm, write
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.app.servo_drives import servo_drives
+from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.description.urdf import urdf
 from gazerig.robot.model.coupling import CouplingParams
 
 pytestmark = pytest.mark.usefixtures("mujoco")
-SHARE = 0.05
-JUMP_PEAK_SHARE = 0.25
-"""Of the peak speed when the goal of an X330 jumps, which no run writes: the emulated servo brakes
-by its speed at the end of a millisecond, the exported one at its start."""
-
-LID_SHARE = 0.1
-"""Of the way of a desk's lid at full drive: the exported motor brakes later."""
 
 
-@pytest.mark.parametrize("move", [*moves()], ids=lambda one: f"{one.rig}-{one.joint}-{one.kind}")
-def test_an_exported_model_moves_as_the_running_world(move: Move) -> None:
-    both = Both(move)
-    world, plain = both.world, both.plain
-    if move.kind == "stall":
-        assert plain.torque_nm[-1] == pytest.approx(world.torque_nm[-1], rel=SHARE)
-        assert abs(world.torque_nm[-1]) > 0.1
-        return
-    size = abs(float(world.angle_deg[-1] - world.angle_deg[0]))
-    assert size > 15.0
-    share = LID_SHARE if (move.rig, move.joint) == ("desk", "left_upper_lid") else SHARE
-    assert float(np.abs(world.angle_deg - plain.angle_deg).max()) < share * size
-    peaks = [float(np.abs(one.speed_deg_s).max()) for one in (world, plain)]
-    jump = (move.rig, move.kind) == ("desk", "jump")
-    assert peaks[1] == pytest.approx(peaks[0], rel=JUMP_PEAK_SHARE if jump else SHARE)
+def exported(rig: Rig) -> Any:
+    """Return the MJCF that ``gazerig describe`` writes, compiled."""
+    import mujoco
+
+    description = description_of(rig, looks=False).with_drives(servo_drives(rig))
+    return mujoco.MjModel.from_xml_string(mjcf(description, looks=False).xml)
+
+
+def stall_torque_nm(bench: WorldBench, joint: str, angle_deg: float) -> float:
+    """Return the torque in the running world of a stuck joint that is sent to an angle."""
+    servo, params = bench.servos[joint], bench.rig.joints[joint]
+    servo.shaft.jam(True)
+    steps = round(params.steps(radians(angle_deg)))
+    if hasattr(servo, "memory"):
+        arm(servo, params.gains or ())
+        write(servo, "goal_position", steps)
+    else:
+        (board,) = bench.devices.values()
+        board.channels[params.id].set_target(steps)
+    bench.pass_ms(200)
+    at = bench.world.model.rigs[0].dof[joint]
+    return float(bench.world._data.qfrc_actuator[at])
+
+
+@pytest.mark.parametrize("angle_deg", [2.0, 25.0])
+@pytest.mark.parametrize(
+    ("name", "joint"), [("desk", "neck_pitch"), ("feetech", "left_eye_pan"), ("maker", "eyes_pan")]
+)
+def test_an_exported_motor_holds_and_stalls_as_that_of_the_running_world(
+    mujoco: Any, name: str, joint: str, angle_deg: float
+) -> None:
+    bench = WorldBench(name)
+    in_world_nm = stall_torque_nm(bench, joint, angle_deg)
+    start_rad, model = bench.world.joints_rad(), exported(bench.rig)
+    data = mujoco.MjData(model)
+    for other, angle in start_rad.items():
+        data.qpos[model.joint(other).qposadr[0]] = angle
+        data.actuator(other).ctrl[0] = angle
+    model.dof_frictionloss[model.joint(joint).dofadr[0]] = 20.0
+    data.actuator(joint).ctrl[0] = radians(angle_deg)
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+    torque_nm = data.qfrc_actuator[model.joint(joint).dofadr[0]]
+    assert torque_nm == pytest.approx(in_world_nm, rel=0.05)
 
 
 def test_an_exported_eye_has_the_inertia_of_the_emulated_one(mujoco: Any, desk_rig: Rig) -> None:

@@ -1,6 +1,5 @@
 """People of a world are bodies: limbs keep their lengths, and nothing jumps."""
 
-import pickle
 from functools import cache
 from typing import NamedTuple
 
@@ -114,18 +113,6 @@ def test_a_foot_that_stands_does_not_slide(name: str) -> None:
             stands = (height[1:] < 0.003) & (height[:-1] < 0.003)
             slid_m = np.linalg.norm(np.diff(balls[:, :2], axis=0), axis=1)[stands]
             assert slid_m.max() < 0.012 and slid_m.mean() < 0.0005, (who, foot)
-
-
-def test_the_same_seed_gives_the_same_motion_in_another_process_and_another_seed_not() -> None:
-    script = shipped_world(WORLDS[0])
-    one, other = Figures(script, 5), Figures(script, 6)
-    again: Figures = pickle.loads(pickle.dumps(one))
-    for t_s in (1.234, 17.0, 200.0):
-        assert (one.segments(t_s).p_m == again.segments(t_s).p_m).all()
-        assert (one.segments(t_s).quat == again.segments(t_s).quat).all()
-    assert any(
-        (one.segments(t_s).quat != other.segments(t_s).quat).any() for t_s in (3.0, 11.0, 19.0)
-    )
 
 
 def test_eyes_are_on_who_is_looked_at_and_lids_blink() -> None:

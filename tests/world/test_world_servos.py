@@ -107,18 +107,6 @@ def test_the_bus_watchdog_halts_a_servo_at_its_time_although_nobody_asks() -> No
     assert device.positions_steps()
 
 
-def test_motion_does_not_depend_on_how_often_the_time_is_asked() -> None:
-    """The same state, to the bit."""
-    states = set()
-    for asked_ms in ((500,), (5,) * 100, (1, 2, 3, 4) * 50):
-        bench = _armed("desk", "left_eye_pan", (1200, 0, 12000))
-        write(bench.servos["left_eye_pan"], "goal_position", 2300)
-        for ms in asked_ms:
-            bench.pass_ms(ms)
-        states.add(bench.world.state().qpos.tobytes())
-    assert len(states) == 1
-
-
 def test_a_world_whose_numbers_run_away_says_so(tmp_path: Path) -> None:
     """MuJoCo would reset silently, and servos would see a joint jump."""
     from gazerig.features.world.physics import WorldUnstable
