@@ -17,7 +17,6 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
-from gazerig.robot.dashboard.feed.gaze_trail import GAZE_KEPT_S, GazeHistory
 from gazerig.robot.dashboard.feed.live_feed import (
     LiveFeed,
     LiveRig,
@@ -135,16 +134,6 @@ def test_nothing_is_sent_before_the_page_is_there_and_everything_again_to_anothe
         assert page.rigs == n
         assert (shot.health, shot.behaviour) == ("bus: lost 3 times", "wait")
         assert len(shot.faces) == 1, "the percept in force comes again"
-
-
-def test_a_late_frame_is_drawn_with_the_gaze_of_its_capture() -> None:
-    history = GazeHistory()
-    for n in range(1000):
-        history.add(0.005 * n, (0.001 * n, 0.0, 0.0))
-    assert history.at(4.9)[0] == pytest.approx(0.98) and history.at(9.0)[0] == pytest.approx(0.999)
-    assert history.at(0.0)[0] == pytest.approx(0.999 - 0.2 * GAZE_KEPT_S, abs=0.002)  # oldest
-    history.add(1.0, (7.0, 0.0, 0.0))  # the rig was started again
-    assert history.at(4.9) == (7.0, 0.0, 0.0)
 
 
 def test_without_anyone_who_looks_no_image_is_drawn_until_somebody_does(

@@ -90,18 +90,6 @@ def test_a_hot_joint_goes_on_slowly_when_it_has_cooled(world: World) -> None:
     assert [reason(verdict) for verdict in verdicts] == ["hot"] * 4 + ["starting slowly"]
 
 
-def test_a_hot_joint_lets_the_others_park(world: World) -> None:
-    world.guard.start_gently()
-    for _ in range(300):
-        world.t_s += DT
-        joints = JointState(tuple(world.position), (0.0,) * 9, (world.t_s,) * 9, ())
-        heat = tuple(69.0 if k == JOINT else 40.0 for k in range(9))
-        verdict = world.guard.check((0.3,) * 9, replace(joints, temperature_c=heat), 0.0, world.t_s)
-        world.position = list(verdict.command_rad)
-    parked = [angle == pytest.approx(0.3) for angle in verdict.command_rad]
-    assert parked == [k != JOINT for k in range(9)]
-
-
 @pytest.mark.parametrize("load", [*np.linspace(0.3, 1.0, 29).tolist(), -0.6, -1.0])
 def test_load_slows_a_joint_down_before_it_stops_it(world: World, load: float) -> None:
     stopped = slower = None

@@ -192,6 +192,8 @@ def test_what_is_found_is_what_is_there_or_it_is_refused(
         (Marks(2300, 1800, 2400), "is not between the ends"),
         (Marks(2085, 2011, 2048), "with 2 deg of margin at each end only"),
         (Marks(2000 + 5000, 2000, 4000), "counts only one turn"),
+        (Marks(4500, 3900, 4200), "seam .* by 171 deg towards more steps"),
+        (Marks(4300, 3700, 4000), "seam .* by 172 deg towards fewer steps"),
     ],
 )
 def test_marks_that_make_no_calibration_are_refused_in_words(marks: Marks, says: str) -> None:
