@@ -82,7 +82,8 @@ class Mixture:
         self.log: list[Any] = []
         self.a = Scripted("a", (11, 13, 14), self.log)
         self.b = Scripted("b", (12, 10), self.log)
-        self.bus = MultiBus([BusShare("a", self.a, (1, 3, 4)), BusShare("b", self.b, (2, 0))])
+        shares = [BusShare("a", self.a, (1, 3, 4)), BusShare("b", self.b, (2, 0))]
+        self.bus = MultiBus(shares, WANTED)
 
     def reported(self):
         log, self.log[:] = list(self.log), []

@@ -1,34 +1,24 @@
 """Goals kept inside the limits of their servos."""
 
 from collections.abc import Sequence
-from operator import le
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
 
 
-def clip_goals(
-    steps: Sequence[int], lowest: Sequence[int], highest: Sequence[int]
-) -> Sequence[int]:
-    """Return goals inside their ranges.
+def clip_goals(steps: Sequence[float], lowest: Sequence[int], highest: Sequence[int]) -> list[int]:
+    """Return goals as whole steps inside their ranges.
 
     Raises:
         ValueError: a goal is not a number, or their number is wrong.
     """
-    as_many = len(steps) == len(lowest)
-    if as_many and all(map(le, lowest, steps)) and all(map(le, steps, highest)):
-        return steps
-    return [
-        goal if low <= goal <= high else _nearest_limit(goal, low, high)
-        for goal, low, high in zip(steps, lowest, highest, strict=True)
-    ]
-
-
-def _nearest_limit(goal: float, low: int, high: int) -> int:
-    if goal != goal:
+    if len(steps) != len(lowest):
+        raise ValueError(f"{len(steps)} goals for {len(lowest)} servos")
+    if any(goal != goal for goal in steps):
         raise ValueError("a goal is not a number: every goal must be a whole number of steps")
-    return low if goal < low else high
+    ranges = zip(steps, lowest, highest, strict=True)
+    return [round(min(max(goal, low), high)) for goal, low, high in ranges]
 
 
 ENTRY_DEG_S = 30.0

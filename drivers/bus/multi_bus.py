@@ -6,6 +6,7 @@ from contextlib import ExitStack, suppress
 from itertools import chain
 from typing import NamedTuple
 
+from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.plugins import describe_error
 from gazerig.drivers.types import BusHealth, Feedback, LimpableBus, ServoBus, ServoConfig
@@ -15,13 +16,11 @@ class BusShare(NamedTuple):
     """One of the buses, with its name in messages.
 
     servo_indices: index of each of its servos in the whole rig
-    setups: servos of another package's bus, whose goals are clipped here; empty for ours
     """
 
     name: str
     bus: ServoBus
     servo_indices: tuple[int, ...]
-    setups: tuple[ServoConfig, ...] = ()
 
 
 class MultiBus:
@@ -32,14 +31,15 @@ class MultiBus:
 
     Args:
         shares: Together they contain every index from 0 on exactly once.
+        setups: All servos of the rig, to whose limits goals are clipped.
     """
 
-    def __init__(self, shares: Sequence[BusShare]) -> None:
-        self._shares = list(shares)
+    def __init__(self, shares: Sequence[BusShare], setups: Sequence[ServoConfig]) -> None:
+        self._shares = tuple(shares)
+        self._setups = self._target_setups = tuple(setups)
         given = [place for share in shares for place in share.servo_indices]
-        self._count = len(given)
         # Position of each of the rig's servos among those of the buses, one after the other.
-        self._order = sorted(range(self._count), key=given.__getitem__)
+        self._order = sorted(range(len(given)), key=given.__getitem__)
 
     def open(self) -> None:
         """Open every bus; if one cannot be opened, close those opened before it.
@@ -86,6 +86,7 @@ class MultiBus:
         Raises:
             DriverError: raised by the bus at fault.
         """
+        self._setups = self._target_setups
         try:
             goals = [goal for share in self._shares for goal in share.bus.enable_torque()]
         except BaseException:
@@ -107,18 +108,11 @@ class MultiBus:
         Raises:
             ValueError: a goal is not a number, or their number is wrong.
         """
-        if len(goals_steps) != self._count:
-            raise ValueError(f"{len(goals_steps)} goals for {self._count} servos")
-        if any(goal != goal for goal in goals_steps):  # before any bus sends its goals
-            raise ValueError("a goal is not a number: every goal must be a whole number of steps")
+        lowest = [setup.min_steps for setup in self._setups]
+        highest = [setup.max_steps for setup in self._setups]
+        goals = clip_goals(goals_steps, lowest, highest)
         for share in self._shares:
-            goals = [goals_steps[place] for place in share.servo_indices]
-            if share.setups:
-                goals = [
-                    round(min(max(goal, setup.min_steps), setup.max_steps))
-                    for goal, setup in zip(goals, share.setups, strict=True)
-                ]
-            share.bus.write(goals)
+            share.bus.write([goals[place] for place in share.servo_indices])
 
     def faults(self) -> tuple[str, ...]:
         """Return the present servo faults, one line each."""
@@ -134,13 +128,11 @@ class MultiBus:
         Raises:
             ValueError: the servos are not the same.
         """
-        if len(setups) != self._count:
+        if len(setups) != len(self._setups):
             raise ValueError("ids and models must not change: create another bus for other servos")
-        for i, share in enumerate(self._shares):
-            own = tuple([setups[place] for place in share.servo_indices])
-            share.bus.retune(own)
-            if share.setups:
-                self._shares[i] = share._replace(setups=own)
+        for share in self._shares:
+            share.bus.retune([setups[place] for place in share.servo_indices])
+        self._target_setups = tuple(setups)
 
     def disable_torque(self) -> None:
         """Switch torque off on every bus, even if another bus fails.

@@ -220,7 +220,7 @@ class HobbyBoardBus(PortBus):
         """
         lowest = [setup.min_steps for setup in self._setups]
         highest = [setup.max_steps for setup in self._setups]
-        goals = [*map(int, clip_goals(goals_steps, lowest, highest))]
+        goals = clip_goals(goals_steps, lowest, highest)
         held = [channel for channel in self._channels if channel.held]
         supervisor = self._supervisor
         if not supervisor.engaged or self._is_down or not held:

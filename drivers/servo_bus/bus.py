@@ -268,7 +268,7 @@ class SmartServoBus(PortBus):
         Raises:
             ValueError: a goal is not a number, or their number is wrong.
         """
-        goals = [*map(round, clip_goals(goals_steps, self._lowest, self._highest))]
+        goals = clip_goals(goals_steps, self._lowest, self._highest)
         supervisor, line = self._supervisor, self._line
         if not supervisor.engaged or self._is_down or line.starved:
             return

@@ -58,7 +58,7 @@ def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:
 
     ports: ports by the name of the bus
     """
-    return _join_buses([_bus_share(rig, name, ports[name]) for name in bus_names(rig)])
+    return _join_buses(rig, [_bus_share(rig, name, ports[name]) for name in bus_names(rig)])
 
 
 def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
@@ -84,7 +84,7 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
             bus = GuardedBus(share.bus, own, guardian, guarded.index(name))
             share = share._replace(bus=bus)
         shares.append(share)
-    return _join_buses(shares)
+    return _join_buses(rig, shares)
 
 
 def release_plans(rig: Rig, paths: Mapping[str, str]) -> dict[str, ReleasePlan]:
@@ -144,9 +144,10 @@ def has_watchdog(rig: Rig, name: str) -> bool:
     return not can_be_released(rig, name)
 
 
-def _join_buses(shares: list[BusShare]) -> ServoBus:
+def _join_buses(rig: Rig, shares: list[BusShare]) -> ServoBus:
     """Return several buses as one; a single one of ours is returned unchanged."""
-    return shares[0].bus if len(shares) == 1 and not shares[0].setups else MultiBus(shares)
+    is_single = len(shares) == 1 and is_ours(BUS, rig.bus_named(bus_names(rig)[0]).kind)
+    return shares[0].bus if is_single else MultiBus(shares, servo_configs(rig))
 
 
 def _bus_share(rig: Rig, name: str, port: BusPort) -> BusShare:
@@ -165,4 +166,4 @@ def _bus_share(rig: Rig, name: str, port: BusPort) -> BusShare:
         raise
     except Exception as error:
         raise PluginError(f"{label} cannot be created: {describe_error(error)}") from error
-    return BusShare(label, bus, places, tuple(own))
+    return BusShare(label, bus, places)
