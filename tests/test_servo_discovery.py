@@ -68,13 +68,6 @@ def test_servos_are_found_whatever_the_adapter_does(family, fault):
     assert list(scan_ids(bench.port, family, bench.baud)[0]) == bench.names
 
 
-def test_one_servo_is_asked_alone(family):
-    bench = Bench(family, 1_000_000, 9)
-    assert bench.ping(9) == bench.names[0] and bench.ping(3) is None
-    bench.chain.faults.command("lose 9 count 1")
-    assert bench.ping(9) is not None
-
-
 def test_two_servos_with_one_id_are_seen(family):
     bench = Bench(family, 57_600, 1, 2)
     assert bench.corrupt(1) == 0 == bench.corrupt(77)

@@ -1,7 +1,6 @@
 """Reads of every family: whole answers at once, damaged ones servo by servo, and their feedback."""
 
 import struct
-from math import isnan
 from typing import Any
 
 import pytest
@@ -149,25 +148,6 @@ def test_an_answer_in_which_anything_is_amiss_is_looked_at(amiss):
     assert both_ways(sts_answer(906, 906, **amiss))[0] is None
 
 
-def test_an_exchange_begins_with_nobody_and_keeps_what_is_read_in_turn():
-    setups = [ServoConfig(i, "xl330-m077", 0, 4095, 1000.0) for i in (1, 2, 3)]
-    columns = FeedbackColumns(DYNAMIXEL, setups)
-    columns.set_torque(2, True)
-    columns.record_fault(0, "overload")
-    columns.set_climate(1, 51, 33)
-    columns.hold(1, 2000, 3.0, torque=True)
-    columns.mark_rearmed(1)
-    now = columns.now
-    assert (now.missing, now.position_steps[1], columns.position(0)) == ((0, 2), 2000, None)
-    assert now.rearmed == (False, True, False)
-    columns.begin()
-    now = columns.now
-    assert now.missing == (0, 1, 2) and isnan(now.position_steps[1])
-    assert now.torque == (False, True, True) and now.fault == ("overload", "", "")
-    assert now.voltage_v[1] == pytest.approx(5.1) and now.temperature_c[1] == 33
-    assert now.rearmed == (False,) * 3
-
-
 # --- silent servos
 
 
@@ -195,24 +175,3 @@ def test_silent_servos_are_read_at_once_then_in_turn():
     assert (polled.group, polled.next_due(10.25)) == ((4, 1), 9)
     polled.record_answer(9)
     assert (polled.group, polled.is_troubled) == (IDS, False)
-
-
-def test_where_all_are_silent_one_answer_calls_all_back():
-    polled = poll_list()
-    for servo_id in IDS * 2:
-        polled.record_silent(servo_id, 1.0)
-    assert (polled.group, polled.next_due(1.0 + AGAIN_S)) == ((), 4)
-    polled.record_answer(1)
-    assert (polled.group, polled.next_due(9.0)) == (IDS, None)
-
-
-def test_damage_three_times_in_a_row_takes_a_servo_out():
-    polled = poll_list()
-    for _ in range(2):
-        polled.record_damaged(9, 0.0)
-    polled.record_answer(9)
-    for _ in range(2):
-        polled.record_damaged(9, 0.0)
-    assert polled.group == IDS
-    polled.record_damaged(9, 0.0)
-    assert polled.group == (4, 1)
