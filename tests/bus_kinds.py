@@ -101,7 +101,7 @@ def _kind(name: str, patient: bool = False) -> BusUnderTest:
 
 
 OLD_FIRMWARE = 45
-"""Without fast sync reads and with another place of the indirect block."""
+"""Without fast sync reads."""
 _SMART = {
     "dynamixel": ("xl330-m077", 1000, 3000, 4000.0),
     "old dynamixel": ("xl330-m077", 1000, 3000, 4000.0),

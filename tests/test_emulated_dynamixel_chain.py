@@ -1,12 +1,11 @@
 """The emulated chain against byte-exact packets and the written rules of the protocol."""
 
-import struct
 from typing import Any
 
 import pytest
 from servo_bench import READ, DynamixelBench
 
-from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks, registers_of
+from gazerig.drivers.dynamixel.control_table import MODELS, registers_of
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.dynamixel.servo import (
     ACCESS,
@@ -95,11 +94,6 @@ def test_stuffed_write_is_unstuffed():
     packet = vector("FF FF FD 00 01 0A 00 03 68 00 FF FF FD FD 00 E2 7A")
     # The value 0x00FDFFFF is out of range for Goal Velocity, and is refused as such.
     assert bench.chain.receive(packet)[8] == 6
-    indirect = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\x00")
-    assert bench.chain.receive(indirect) == b""  # without its byte stuffing it is dropped
-    stuffed = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\xfd\x00")
-    assert bench.chain.receive(stuffed)[8] == 0
-    assert bench.read(1, 224, 4) == 0x00FDFFFF
 
 
 # --- rules
@@ -127,7 +121,7 @@ def test_any_packet_feeds_the_watchdog():
     assert bench.read(1, 98, 1) == 255
 
 
-# The control table of every emulated model as bytes: access, ranges, indirect windows
+# The control table of every emulated model as bytes: access and ranges
 
 
 EVERY = pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
@@ -139,7 +133,7 @@ def raw(value: int, size: int) -> bytes:
 
 @EVERY
 def test_every_register_keeps_to_its_access_range_and_size(model):
-    memory = DynamixelMemory(model, 53)
+    memory = DynamixelMemory(model)
     for register in registers_of(model):
         at, size = register.address, register.size
         if register.access == "r":
@@ -152,23 +146,6 @@ def test_every_register_keeps_to_its_access_range_and_size(model):
             assert memory.fields(at, raw(register.low - 1, size)) == DATA_RANGE, register.name
         if size > 1:
             assert memory.fields(at, bytes(size - 1)) == DATA_LENGTH, register.name
-
-
-@EVERY
-@pytest.mark.parametrize("firmware", [45, 52, 53])
-def test_every_window_shows_and_takes_other_bytes(model, firmware):
-    servo = DynamixelServo(ServoSpec(1, model.name, 1234, firmware), 0)
-    for block in indirect_blocks(model, firmware):
-        first, data = block.address_base, block.data_base
-        for i in range(4):
-            assert servo.write(first + 2 * i, raw(132 + i, 2)) == 0
-        assert servo.write(first + 8, raw(65, 2)) == 0
-        assert servo.read(data, 4) == raw(1234, 4)
-        assert (servo.write(data + 4, b"\1"), servo.read(65, 1)) == (0, b"\1")
-        assert servo.write(65, b"\0") == 0
-        assert servo.write(data, b"\0") == ACCESS
-        for outside in (0, 63, block.target_high + 1):
-            assert servo.write(first, raw(outside, 2)) == DATA_RANGE
 
 
 @EVERY

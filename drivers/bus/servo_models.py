@@ -13,10 +13,10 @@ from gazerig.drivers.feetech.memory_table import (
     P_FULL_STEPS,
     SCS_MODELS,
     SCS_STEPS,
-    FeetechModel,
 )
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
 from gazerig.drivers.hobby_board.params import HOBBY, US_STEPS
+from gazerig.drivers.servo_bus.family import ServoModel
 
 if TYPE_CHECKING:
     from gazerig.drivers.types import ServoConfig
@@ -26,9 +26,6 @@ BusKind = str
 BUS_KINDS: tuple[BusKind, ...] = ("dynamixel", "feetech", "maestro", "pca9685")
 HOBBY_KINDS: tuple[BusKind, ...] = ("maestro", "pca9685")
 """Our boards that send pulses to hobby servos; each moves every hobby servo."""
-
-
-SmartModel = DynamixelModel | FeetechModel
 
 
 class ServoModelInfo(NamedTuple):
@@ -81,7 +78,7 @@ class ServoModelInfo(NamedTuple):
         return self.bus in HOBBY_KINDS and kind in HOBBY_KINDS
 
 
-def _smart_servo(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoModelInfo:
+def _smart_servo(bus: BusKind, family: str, model: ServoModel, steps: int) -> ServoModelInfo:
     """Return the model information of a smart servo."""
     return ServoModelInfo(
         bus,
@@ -100,7 +97,7 @@ def _smart_servo(bus: BusKind, family: str, model: SmartModel, steps: int) -> Se
     )
 
 
-def _full_steps(model: SmartModel) -> float:
+def _full_steps(model: ServoModel) -> float:
     """Return the steps of error times P gain at which a servo's drive is full."""
     if isinstance(model, DynamixelModel):
         return P_UNIT * PWM_FULL

@@ -41,7 +41,7 @@ def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
     wanted = {"return_delay_time": 0, "drive_mode": 0, "operating_mode": POSITION_MODE}
     if setup.strength is not None:
         wanted["pwm_limit"] = round(setup.strength * PWM_FULL)
-    if model.family == "x330":
+    if model.series == "x330":
         wanted["pwm_slope"] = STEEPEST_PWM
     wanted["velocity_limit"] = min(speed, model.velocity_limit)
     wanted["max_position_limit"] = setup.max_steps
@@ -74,10 +74,12 @@ DYNAMIXEL = Family(
     # Present Current, Velocity and Position (126..135).
     window=Window(126, "<hii", _SENSED),
     polled=(
-        ("torque_enable", "hardware_error_status"),
+        # Between them are addresses without a register, whose reads are refused.
+        ("torque_enable", "torque_enable"),
+        ("hardware_error_status", "hardware_error_status"),
         ("present_input_voltage", "present_temperature"),
     ),
-    has_fast_read=lambda model, firmware: firmware >= FAST_READ_SINCE[MODELS[model].family],
+    has_fast_read=lambda model, firmware: firmware >= FAST_READ_SINCE[MODELS[model].series],
     prompt_timeout_s=0.002,
     effort_register="present_current",
     # In this order, as a new operating mode resets gains and profile.

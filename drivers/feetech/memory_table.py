@@ -8,14 +8,12 @@ comes first.
 Sources: Feetech memory table STS3215, and for missing entries the tables of public clients.
 """
 
-from typing import NamedTuple
-
 from gazerig.drivers.servo_bus.family import Register as Register
+from gazerig.drivers.servo_bus.family import ServoModel
 
 STEPS_PER_TURN = 4096
 ACCELERATION_UNIT_STEPS_S2 = 100.0
 CURRENT_UNIT_MA = 6.5
-LOAD_UNIT = 0.001
 RETURN_DELAY_UNIT_S = 2e-6
 TORQUE_FULL = 1000
 """Register value of Torque Limit and Max Torque for 100 %."""
@@ -53,42 +51,11 @@ Overload protection reduces torque to a share (34) until a goal moves the joint 
 obstacle."""
 
 
-class FeetechModel(NamedTuple):
-    """Properties of a servo model.
-
-    number: value of register 3; steps_per_turn: steps per turn of the encoder
-    temperature_limit: degC; min_voltage, max_voltage: 0.1 V; factory values of registers 13,
-        15 and 14
-    stall_torque_nm, stall_current_a, no_load_rpm: values at rated_v
-    """
-
-    name: str
-    number: int
-    steps_per_turn: int
-    temperature_limit: int
-    min_voltage: int
-    max_voltage: int
-    stall_torque_nm: float
-    rated_v: float
-    stall_current_a: float
-    no_load_rpm: float
-
-    @property
-    def no_load_steps_s(self) -> float:
-        """Return the no-load speed at the rated voltage."""
-        return self.no_load_rpm / 60.0 * self.steps_per_turn
-
-    @property
-    def load_unit(self) -> float:
-        """Return the share of the stall torque per unit of Present Load."""
-        return LOAD_UNIT
-
-
 MODELS = {
     model.name: model
     for model in (
-        FeetechModel("sts3215", 777, 4096, 70, 40, 80, 1.91, 7.4, 2.7, 55.0),
-        FeetechModel("sts3215-12v", 777, 4096, 70, 40, 140, 2.94, 12.0, 2.7, 45.0),
+        ServoModel("sts3215", 777, 4096, 70, 40, 80, 1.91, 7.4, 2.7, 55.0),
+        ServoModel("sts3215-12v", 777, 4096, 70, 40, 140, 2.94, 12.0, 2.7, 45.0),
     )
 }
 
@@ -102,9 +69,9 @@ SCS_MODELS = {
     model.name: model
     for model in (
         # 1024 steps cover 300 and 200 deg; the number is extrapolated to a full turn.
-        FeetechModel("scs0009", 1284, 1229, 70, 40, 80, 0.226, 6.0, 1.0, 100.0),
+        ServoModel("scs0009", 1284, 1229, 70, 40, 80, 0.226, 6.0, 1.0, 100.0),
         # Number and stall current of the SCS15 are assumed.
-        FeetechModel("scs15", 1295, 1843, 70, 40, 80, 1.47, 6.0, 2.0, 62.5),
+        ServoModel("scs15", 1295, 1843, 70, 40, 80, 1.47, 6.0, 2.0, 62.5),
     )
 }
 
@@ -185,7 +152,7 @@ REGISTERS: dict[str, Register] = {
 """Registers by name, with values common to all models; addresses are the same in every model."""
 
 
-def registers_of(model: FeetechModel) -> tuple[Register, ...]:
+def registers_of(model: ServoModel) -> tuple[Register, ...]:
     """Return a model's registers with its initial values."""
     own = {
         "model_number": model.number,

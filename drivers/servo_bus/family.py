@@ -65,32 +65,35 @@ def from_sign_magnitude(raw: int, sign: int) -> int:
     return -magnitude if raw >> sign & 1 else magnitude
 
 
-class Model(Protocol):
-    """A servo model of a family."""
+@dataclass(frozen=True)
+class ServoModel:
+    """A servo model of a family.
 
-    @property
-    def name(self) -> str:
-        """Name in a rig file."""
+    number: value of its model register
+    temperature_limit, min_voltage, max_voltage: factory settings, degC and 0.1 V
+    stall_torque_nm, stall_current_a, no_load_rpm: values at rated_v
+    """
 
-    @property
-    def number(self) -> int:
-        """Number in the servo's model register."""
+    name: str
+    number: int
+    steps_per_turn: int
+    temperature_limit: int
+    min_voltage: int
+    max_voltage: int
+    stall_torque_nm: float
+    rated_v: float
+    stall_current_a: float
+    no_load_rpm: float
 
     @property
     def no_load_steps_s(self) -> float:
-        """No-load speed of its shaft."""
+        """Return the no-load speed at the rated voltage."""
+        return self.no_load_rpm / 60.0 * self.steps_per_turn
 
     @property
     def load_unit(self) -> float:
-        """Share of the stall torque per unit of its present effort."""
-
-    @property
-    def max_voltage(self) -> int:
-        """Factory setting of the upper voltage limit, 0.1 V."""
-
-    @property
-    def rated_v(self) -> float:
-        """Rated voltage."""
+        """Return the share of the stall torque per unit of its present effort."""
+        return 0.001
 
 
 class Status(NamedTuple):
@@ -213,7 +216,7 @@ class Family:
     name: str
     codec: ModuleType
     registers: Mapping[str, Register]
-    models: Mapping[str, Model]
+    models: Mapping[str, ServoModel]
     steps_per_turn: int
     name_errors: Callable[[int], tuple[str, ...]]
     velocity_unit_steps_s: float

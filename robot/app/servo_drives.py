@@ -13,7 +13,8 @@ from gazerig.drivers.dynamixel.control_table import GAINS, PWM_FULL, DynamixelMo
 from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from gazerig.drivers.dynamixel.family import STEEPEST_PWM
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
-from gazerig.drivers.feetech.memory_table import REGISTERS, SCS_MODELS, FeetechModel
+from gazerig.drivers.feetech.memory_table import REGISTERS, SCS_MODELS
+from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.description.links import ServoDrive
 from gazerig.robot.model.joint import JointParams
@@ -59,13 +60,13 @@ def servo_drives(rig: Rig) -> dict[str, ServoDrive]:
     return {name: _at_joint(shafts, of) for name, of in turns.items()}
 
 
-_SMART: Mapping[str, DynamixelModel | FeetechModel] = DYNAMIXEL | FEETECH | SCS_MODELS
+_SMART: Mapping[str, ServoModel] = {**DYNAMIXEL, **FEETECH, **SCS_MODELS}
 
 
 def smart_loop(joint: JointParams) -> Loop:
     """Return the controller of a joint's smart servo as a run configures it."""
     model, strength = _SMART[joint.model], joint.torque_limit or 1.0
-    if isinstance(model, FeetechModel):
+    if not isinstance(model, DynamixelModel):
         p, _, d = joint.gains or (REGISTERS[f"position_{one}_gain"].initial or 0 for one in "pid")
         return Loop(p=P_SHARE * p, d=D_SHARE * d, u_max=strength)
     registers = dict(zip(GAINS, model.gains, strict=True))

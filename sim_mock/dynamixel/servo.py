@@ -10,9 +10,8 @@ state read 0.
 """
 
 import struct
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from math import inf
-from operator import itemgetter
 from typing import ClassVar, NamedTuple
 
 from gazerig.drivers.dynamixel.control_table import (
@@ -26,9 +25,7 @@ from gazerig.drivers.dynamixel.control_table import (
     PWM_FULL,
     VELOCITY_UNIT_STEPS_S,
     DynamixelModel,
-    IndirectBlock,
     Register,
-    indirect_blocks,
     registers_of,
 )
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
@@ -74,7 +71,7 @@ def control_loop(get: Get, model: DynamixelModel) -> Loop:
     slew, torque_max, mode = inf, inf, get("operating_mode")
     if mode not in POSITION_MODES:
         return DISABLED
-    if model.family == "x330":
+    if model.series == "x330":
         slew = get("pwm_slope") * PWM_SLOPE_V_MS[model.rated_v > 5.0] / model.rated_v
     if mode == CURRENT_POSITION:
         units = min(abs(get("goal_current")), get("current_limit"))
@@ -90,13 +87,13 @@ def control_loop(get: Get, model: DynamixelModel) -> Loop:
 
 
 class ReadRange(NamedTuple):
-    """A range of addresses, resolved through the indirect windows.
+    """A range of addresses that is read.
 
-    fetch: returns the bytes of all real addresses, in runs of neighbours
+    span: its place in the bytes
     sensed, moving: whether it contains sensor values, or tick and moving
     """
 
-    fetch: Callable[[bytearray], Iterable[bytearray]]
+    span: slice
     sensed: bool
     moving: bool
 
@@ -104,19 +101,15 @@ class ReadRange(NamedTuple):
 class DynamixelMemory(ServoMemory):
     """One servo's control table.
 
-    ranges: ranges that were read, valid until an indirect address changes
+    ranges: ranges that were read
     """
 
-    def __init__(self, model: DynamixelModel, firmware: int) -> None:
-        blocks = indirect_blocks(model, firmware)
-        registers = (*registers_of(model), *_window_registers(blocks))
+    def __init__(self, model: DynamixelModel) -> None:
+        registers = registers_of(model)
         self.ranges: dict[tuple[int, int], ReadRange] = {}
         super().__init__(registers, max(r.address + r.size for r in registers))
         self.by_address = {register.address: register for register in registers}
         self._defined = {r.address + i for r in registers for i in range(r.size)}
-        self._pointers = {
-            b.data_base + i: b.address_base + 2 * i for b in blocks for i in range(b.entries)
-        }
 
     def decode(self, register: Register, data: bytes | bytearray) -> int:
         """Return the value of a register's bytes."""
@@ -126,50 +119,24 @@ class DynamixelMemory(ServoMemory):
         """Return the value's bytes, in two's complement if it is negative."""
         return (value & (1 << 8 * register.size) - 1).to_bytes(register.size, "little")
 
-    def set(self, name: str, value: int) -> None:
-        """Set a register regardless of its access."""
-        super().set(name, value)
-        if name.startswith("indirect_address"):
-            self.ranges.clear()
-
-    def real(self, address: int) -> int:
-        """Return the address to which an indirect data byte refers, and others unchanged."""
-        at = self._pointers.get(address)
-        return address if at is None else int.from_bytes(self.bytes[at : at + 2], "little")
-
     def range(self, address: int, length: int) -> ReadRange | None:
         """Return a range that is read, None if an address is not defined."""
-        places = range(address, address + length)
-        if not length or not self._defined.issuperset(places):
+        end = address + length
+        if not length or not self._defined.issuperset(range(address, end)):
             return None
-        runs: list[list[int]] = []
-        for real in map(self.real, places):
-            if runs and runs[-1][1] == real:
-                runs[-1][1] = real + 1
-            else:
-                runs.append([real, real + 1])
-
-        def touches(span: tuple[int, int]) -> bool:
-            return any(low < span[1] and high > span[0] for low, high in runs)
-
-        # With a single slice, itemgetter would return the bytes themselves.
-        slices = [slice(low, high) for low, high in runs]
-        found = ReadRange(
-            itemgetter(*slices, slice(0, 0)), touches(SENSED_SPAN), touches(MOTION_SPAN)
-        )
-        self.ranges[address, length] = found
+        sensed, moving = (address < high and end > low for low, high in (SENSED_SPAN, MOTION_SPAN))
+        found = self.ranges[address, length] = ReadRange(slice(address, end), sensed, moving)
         return found
 
     def fields(self, address: int, data: bytes) -> list[tuple[Register, int]] | int:
         """Split bytes to write into registers with their values, or return the error number."""
-        places = [self.real(at) for at in range(address, address + len(data))]
         fields, at = list[tuple[Register, int]](), 0
         while at < len(data):
-            register = self.by_address.get(places[at])
+            register = self.by_address.get(address + at)
             if register is None or register.access == "r":
                 return ACCESS
             end = at + register.size
-            if places[at:end] != list(range(register.address, register.address + register.size)):
+            if end > len(data):
                 return DATA_LENGTH
             value, low, high = self.decode(register, data[at:end]), register.low, register.high
             if (low is not None and value < low) or (high is not None and value > high):
@@ -177,17 +144,6 @@ class DynamixelMemory(ServoMemory):
             fields.append((register, value))
             at = end
         return fields or DATA_LENGTH
-
-
-def _window_registers(blocks: Iterable[IndirectBlock]) -> Iterator[Register]:
-    """Yield the registers of the indirect windows; each starts as its own data byte."""
-    for block in blocks:
-        for i in range(block.entries):
-            at, data = block.address_base + 2 * i, block.data_base + i
-            yield Register(
-                f"indirect_address_{at}", at, 2, "rw", data, block.target_low, block.target_high
-            )
-            yield Register(f"indirect_data_{data}", data, 1, "rw", 0, 0, 255)
 
 
 class DynamixelServo(EmulatedServo):
@@ -202,11 +158,11 @@ class DynamixelServo(EmulatedServo):
 
     def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = create_shaft) -> None:
         model = MODELS[spec.model]
-        memory = DynamixelMemory(model, spec.firmware)
+        memory = DynamixelMemory(model)
         memory.set("firmware_version", spec.firmware)
         memory.set("id", spec.id)
         self.baud_rates = BAUD_RATES[: (memory.registers["baud_rate"].high or 0) + 1]
-        self.fast_reads = spec.firmware >= FAST_READ_SINCE[model.family]
+        self.fast_reads = spec.firmware >= FAST_READ_SINCE[model.series]
         unit = model.current_unit_ma
         # Models without a current sensor report load in 0.1 %.
         self._current_full = model.stall_current_a * 1000.0 / unit if unit else 1000.0
@@ -272,7 +228,7 @@ class DynamixelServo(EmulatedServo):
         found = memory.ranges.get((address, length)) or memory.range(address, length)
         if found is None:
             return None
-        fetch, sensed, moving = found
+        span, sensed, moving = found
         into = memory.bytes
         if sensed:
             SENSED.pack_into(
@@ -283,7 +239,7 @@ class DynamixelServo(EmulatedServo):
             fast = abs(shaft.v / _SPEED_UNIT) > memory.get("moving_threshold")
             tick = self._ms - self._booted_ms & 0x7FFF
             MOTION.pack_into(into, MOTION_AT, tick, fast or (self._follows and shaft.led))
-        return b"".join(fetch(into))
+        return bytes(into[span])
 
     # --- writing
 

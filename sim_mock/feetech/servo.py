@@ -40,11 +40,11 @@ from gazerig.drivers.feetech.memory_table import (
     SET_MIDDLE,
     STATUS_ERRORS,
     TORQUE_FULL,
-    FeetechModel,
     Register,
     registers_of,
 )
 from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN as TURN
+from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.sim_mock.feetech.packets import signed, unsigned
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, ServoSpec
@@ -82,7 +82,7 @@ _SCS_LACKS = {
 _SCS_STARTS = {"max_position_limit": SCS_STEPS - 1, "unloading_condition": HEAT | OVERLOAD}
 
 
-def _scs_registers(model: FeetechModel) -> tuple[Register, ...]:
+def _scs_registers(model: ServoModel) -> tuple[Register, ...]:
     """Return the registers of an SCS servo: some of STS servos, of which four lie elsewhere."""
     return tuple(
         register._replace(
@@ -98,7 +98,7 @@ def _scs_registers(model: FeetechModel) -> tuple[Register, ...]:
 class FeetechMemory(ServoMemory):
     """One servo's memory; ``bytes`` holds what is read; the permanent EEPROM is separate."""
 
-    def __init__(self, model: FeetechModel, servo_id: int, firmware: int) -> None:
+    def __init__(self, model: ServoModel, servo_id: int, firmware: int) -> None:
         scs = model.name in SCS_MODELS
         own = {"id": servo_id, "return_delay_time": RETURN_DELAY, "firmware_minor": firmware}
         registers = [
@@ -165,7 +165,7 @@ class FeetechServo(EmulatedServo):
 
     restart_ms = 800
     error_bits: ClassVar = {name: bit for bit, name in STATUS_ERRORS.items()}
-    model: FeetechModel
+    model: ServoModel
     memory: FeetechMemory
 
     def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = create_shaft) -> None:

@@ -40,7 +40,7 @@ class Rig:
     ):
         self.now_s = 100.0
         self.sent: list[Any] = []
-        # The first servo's firmware decides about fast reads; an indirect block must be common.
+        # The first servo's firmware decides about fast reads.
         first = 53 if fast and not direct else 46 if fast else 45
         versions = (first, 53, 53) if direct else (first,) * 3
         specs = [ServoSpec(*one) for one in zip(IDS, (model,) * 3, starts, versions, strict=True)]

@@ -136,7 +136,7 @@ def _startup(value: int) -> str:
 
 
 def _firmware_notes(model: str) -> tuple[tuple[int, Advice], ...]:
-    series = dynamixel.MODELS[model].family
+    series = dynamixel.MODELS[model].series
     slow = "firmware {found.firmware} has no fast sync read: the loop is slower"
     return ((dynamixel.FAST_READ_SINCE[series], Advice("warn", slow, f"update it with {WIZARD}")),)
 

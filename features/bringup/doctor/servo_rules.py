@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import FoundServo
-from gazerig.drivers.servo_bus.family import Model
+from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix
@@ -97,7 +97,7 @@ class ServoState:
         return self.values.get("present_position")
 
     @property
-    def model(self) -> Model:
+    def model(self) -> ServoModel:
         """Return the expected model."""
         return self.checks.kind.family.models[self.setup.model]
 
