@@ -126,10 +126,11 @@ def both_ways(raw, count=2):
         GroupRead(FEETECH, ids, FEETECH.window),
         *(FeedbackColumns(FEETECH, setups) for _ in range(2)),
     )
+    for servo_id, answer in sort_answers(group.parse(raw), ids, group.length, 0).good.items():
+        for columns in (single, whole):
+            assert columns.apply_reply(servo_id - 1, group.reply(answer, 1.01))
     values = group.parse_whole(raw)
     taken = values is not None and whole.apply_whole(group, values, 1.01)
-    for servo_id, answer in sort_answers(group.parse(raw), ids, group.length, 0).good.items():
-        assert single.apply_reply(servo_id - 1, group.reply(answer, 1.01))
     return (whole.now if taken else None), single.now
 
 
