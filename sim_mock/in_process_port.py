@@ -91,20 +91,6 @@ class InProcessPort:
         taken, self._waiting = self._waiting[:length], self._waiting[length:]
         return taken
 
-    def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
-        """Discard received bytes, send a request and read until the deadline.
-
-        Returns:
-            The received bytes, and the time at which the request had been sent.
-
-        Raises:
-            BusLost: unplugged.
-        """
-        self.drain()
-        self.write(request)
-        sent_s = self.now_s()
-        return self.read_until(length, deadline_s), sent_s
-
     def drain(self) -> int:
         """Discard received bytes; return their number."""
         self._fetch_arrived()

@@ -1,5 +1,7 @@
 """Patience, journal and names: the driver's small parts."""
 
+from math import inf
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -19,20 +21,21 @@ class Line:
     port_name = "line"
 
     def __init__(self):
-        self.time_s, self.late_s, self.is_owed = 0.0, 0.0, False
+        self.time_s, self.late_s, self.due_s = 0.0, 0.0, 0.0
 
     def now_s(self):
         return self.time_s
 
-    def exchange(self, request, length, deadline_s):
-        due_s = self.time_s + (len(request) + length) * 1e-5 + self.late_s
-        self.time_s = min(due_s, deadline_s)
-        return b"x" * length * (due_s <= deadline_s), 0.0
+    def write(self, request):
+        self.due_s = self.time_s + (len(request) + 6) * 1e-5 + self.late_s
 
     def read_until(self, length, deadline_s):
-        """Return a late answer to a ping, then nothing."""
-        self.is_owed = not self.is_owed
-        return LATE * self.is_owed
+        """Return an answer when it is due; a late one is an answer to a ping."""
+        if self.due_s > deadline_s:
+            self.time_s = max(self.time_s, deadline_s)
+            return b""
+        is_late, self.time_s, self.due_s = length > 6, max(self.time_s, self.due_s), inf
+        return LATE if is_late else b"x" * length
 
 
 @given(st.lists(st.floats(0.0, 0.1), max_size=300), st.floats(0.0, 0.0198))

@@ -46,7 +46,9 @@ def port_at(path):
 def found(port):
     """Return whether the servo answers."""
     # A shared machine may stall a process for seconds.
-    return len(port.exchange(PING, 14, port.now_s() + WAIT_S)[0]) == 14
+    port.clearPort()
+    port.write(PING)
+    return len(port.read_until(14, port.now_s() + WAIT_S)) == 14
 
 
 @pytest.fixture

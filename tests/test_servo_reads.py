@@ -91,7 +91,7 @@ def test_stuffed_answers_and_refusals_are_understood():
     good, _ = sort_answers(group.parse(status(1, 0x87, b"")), IDS, 10, 0x7F)
     reply = group.reply(good[1], 1.0)
     assert (reply.error, reply.is_refused) == (0x87, True)
-    assert not sort_answers(group.parse(status(1, 0x80, b"")), IDS, 10, 0x7F).good
+    assert not sort_answers(group.parse(status(1, 0x80, b"")), IDS, 10, 0x7F)[0]
 
 
 def sts_status(servo_id, params, error=0):
@@ -103,10 +103,10 @@ def test_twice_the_same_is_an_echo_and_two_that_differ_are_nobodys():
     group = GroupRead(FEETECH, (2, 5), FEETECH.window)
     one, other = sts_status(2, bytes(10)), sts_status(2, bytes(9) + b"\1")
     five = sts_status(5, bytes(10))
-    twice = sort_answers(group.parse(one * 2 + five), (2, 5), 10, 0)
-    assert set(twice.good) == {2, 5} and not twice.damaged
-    mixed = sort_answers(group.parse(one + other + five), (2, 5), 10, 0)
-    assert (set(mixed.good), mixed.damaged) == ({5}, {2})
+    good, damaged = sort_answers(group.parse(one * 2 + five), (2, 5), 10, 0)
+    assert set(good) == {2, 5} and not damaged
+    good, damaged = sort_answers(group.parse(one + other + five), (2, 5), 10, 0)
+    assert (set(good), damaged) == ({5}, {2})
 
 
 # --- feedback
@@ -126,7 +126,7 @@ def both_ways(raw, count=2):
         GroupRead(FEETECH, ids, FEETECH.window),
         *(FeedbackColumns(FEETECH, setups) for _ in range(2)),
     )
-    for servo_id, answer in sort_answers(group.parse(raw), ids, group.length, 0).good.items():
+    for servo_id, answer in sort_answers(group.parse(raw), ids, group.length, 0)[0].items():
         for columns in (single, whole):
             assert columns.apply_reply(servo_id - 1, group.reply(answer, 1.01))
     values = group.parse_whole(raw)

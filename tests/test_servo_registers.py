@@ -126,14 +126,6 @@ def test_an_alert_is_data_and_a_note(rig):
     assert rig.registers.write(2, "led", 1)
 
 
-def test_what_looks_like_a_header_passes_both_ways(rig):
-    for data in (b"\xff\xff\xfd\xfd", b"\xff\xff\xfd\x00", b"\xfd\xff\xff\xfd"):
-        rig.sent.clear()
-        assert rig.registers.write_bytes(2, 224, data + b"\xff\xff\xfd\xff\xfd\xfd")
-        assert b"\xff\xff\xfd\xfd" in rig.sent[0][8:]
-        assert rig.registers.read_bytes(2, 224, 10) == data + b"\xff\xff\xfd\xff\xfd\xfd"
-
-
 # --- a family with a lock, and answers that echoes look like
 
 

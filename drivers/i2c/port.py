@@ -153,17 +153,6 @@ class I2cPort:
         taken, self._waiting = self._waiting[:length], self._waiting[length:]
         return taken
 
-    def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
-        """Discard received bytes, write, and read; return the bytes and the end time of the write.
-
-        Raises:
-            BusLost: the bus is gone.
-        """
-        self.drain()
-        self.write(request)
-        sent_s = time.monotonic()
-        return self.read_until(length, deadline_s), sent_s
-
     def getBytesAvailable(self) -> int:
         """Return the number of available bytes."""
         return len(self._waiting)

@@ -45,7 +45,9 @@ class PlainLine:
                 self._owed_bytes = 0
         wire_s = (len(packet) + length) * self._byte_s
         deadline_s = port.now_s() + wire_s + self._reply_timeout_s
-        answer, _ = port.exchange(packet, length, deadline_s)
+        port.clearPort()
+        port.write(packet)
+        answer = port.read_until(length, deadline_s)
         self.tx_bytes += len(packet)
         self.rx_bytes += len(answer)
         self._is_late = len(answer) < length

@@ -63,16 +63,6 @@ class BusPort(Protocol):
             BusLost: the port is lost.
         """
 
-    def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
-        """Clear the port, send a request and read until the deadline, all in one.
-
-        Returns:
-            The result of ``read_until``, and the time at which the request was written, seconds.
-
-        Raises:
-            BusLost: the port is lost.
-        """
-
     def clearPort(self) -> None:
         """Discard received bytes, without waiting.
 
@@ -155,19 +145,15 @@ class BlockingPort:
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return up to ``length`` bytes, those received before the deadline.
 
+        The last wait is rounded up to the milliseconds of poll(), which also finds the bytes that
+        arrived while this process did not run.
+
         Raises:
             BusLost: the port is lost.
         """
         if self._on_traffic is not None:
             self._on_traffic()
-        return self._read(b"", length, deadline_s)
-
-    def _read(self, got: bytes, length: int, deadline_s: float) -> bytes:
-        """Read until there are ``length`` bytes, or the deadline.
-
-        The last wait is rounded up to the milliseconds of poll(), which also finds the bytes that
-        arrived while this process did not run.
-        """
+        got = b""
         while len(got) < length:
             left_s = deadline_s - time.monotonic()
             try:
@@ -185,44 +171,6 @@ class BlockingPort:
             raise self._lost("it was unplugged")
         return got
 
-    def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
-        """Clear the port, send a request and read until the deadline.
-
-        It runs in every tick, so this one function contains the whole usual path.
-
-        Returns:
-            ``length`` bytes, or those that arrived; the time at which the request was written,
-            seconds.
-
-        Raises:
-            BusLost: the port is lost or accepts no bytes.
-        """
-        if self._on_traffic is not None:
-            self._on_traffic()
-        fd, poll = self._fd, self._poll
-        try:
-            # A poll takes a quarter of the time of a flush, which is rarely needed.
-            if poll(0):
-                termios.tcflush(fd, termios.TCIFLUSH)
-            sent = os.write(fd, request)
-        except BlockingIOError:
-            sent = 0
-        except (OSError, ValueError, termios.error) as error:
-            raise self._lost(error) from error
-        if sent < len(request):
-            self._write_rest(request[sent:])
-        sent_s, got = time.monotonic(), b""
-        try:
-            if sent_s < deadline_s and poll(int(1e3 * (deadline_s - sent_s)) + 1):
-                got = os.read(fd, length)
-                if len(got) == length:
-                    return got, sent_s
-        except BlockingIOError:
-            pass  # no bytes after all
-        except (OSError, ValueError) as error:
-            raise self._lost(error) from error
-        return self._read(got, length, deadline_s), sent_s
-
     def drain(self) -> int:
         """Discard bytes until none arrives for 3 ms; return their number.
 
@@ -231,10 +179,10 @@ class BlockingPort:
         """
         end_s, dropped = time.monotonic() + BABBLE_S, 0
         while (now_s := time.monotonic()) < end_s:
-            more = self._read(b"", 1, now_s + QUIET_S)
+            more = self.read_until(1, now_s + QUIET_S)
             if not more:
                 break
-            dropped += len(more) + len(self._read(b"", 4096, now_s))
+            dropped += len(more) + len(self.read_until(4096, now_s))
         return dropped
 
     def _lost(self, reason: object) -> BusLost:

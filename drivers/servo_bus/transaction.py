@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import inf
-from typing import NamedTuple
 
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
@@ -21,23 +20,15 @@ ROOM = 4096
 """Largest number of bytes read at once from a line that does not fall silent."""
 
 
-class GroupAnswers(NamedTuple):
-    """GroupAnswers to one request.
-
-    good: intact answers by id, refusals included
-    damaged: servos whose answers arrived damaged or disagree
-    """
-
-    good: dict[int, Status]
-    damaged: set[int]
-
-
 def sort_answers(
     statuses: Iterable[Status], ids: Collection[int], length: int, refusal: int
-) -> GroupAnswers:
+) -> tuple[dict[int, Status], set[int]]:
     """Return the answers of some servos with ``length`` params, or with bits of ``refusal``.
 
     Two equal answers are an echo; two different ones are those of two servos with one id.
+
+    Returns:
+        Intact answers by id, refusals included, and servos whose answers are damaged or disagree.
     """
     good: dict[int, Status] = {}
     damaged, twofold = set[int](), set[int]()
@@ -51,7 +42,7 @@ def sort_answers(
             twofold.add(status.id)
     for servo_id in twofold:
         del good[servo_id]
-    return GroupAnswers(good, (damaged - good.keys()) | twofold)
+    return good, (damaged - good.keys()) | twofold
 
 
 def read_some(port: BusPort, deadline_s: float) -> bytes:
@@ -113,24 +104,28 @@ class Transactions:
     @property
     def timeout_s(self) -> float:
         """Return the present time-out of an answer in addition to its bytes on the wire."""
-        return min(self.most_s, max(self._least_s, FACTOR * self._worst_s))
+        timeout_s = FACTOR * self._worst_s
+        if timeout_s < self._least_s:
+            return self._least_s
+        return timeout_s if timeout_s < self.most_s else self.most_s
 
     def send(self, packet: bytes) -> None:
         """Send a packet."""
-        now_s = self.port.now_s()
-        if now_s - self._sent_s >= self.starving_s:
-            self._record_starvation(now_s)
-        self._sent_s = now_s
+        self._record_sent(len(packet))
         self.port.write(packet)
-        # Bytes leave after those still in the output buffer, at the speed of the bus.
-        free_s = self._free_s
-        self._free_s = (free_s if free_s > now_s else now_s) + len(packet) * self._byte_s
-        self.tx_bytes += len(packet)
 
-    def _record_starvation(self, now_s: float) -> None:
-        """Record a silence of this computer that tripped the servos' watchdogs."""
-        self.starved = True
-        self.lateness.record_own_silence(now_s - self._sent_s, now_s)
+    def _record_sent(self, count: int) -> float:
+        """Record bytes that are sent now; return the time at which they have left."""
+        now_s = self.port.now_s()
+        if now_s - self._sent_s >= self.starving_s:  # the servos' watchdogs have tripped
+            self.starved = True
+            self.lateness.record_own_silence(now_s - self._sent_s, now_s)
+        self._sent_s = now_s
+        self.tx_bytes += count
+        # Bytes leave after those still in the output buffer, at the speed of the bus.
+        free_s = self._free_s if self._free_s > now_s else now_s
+        self._free_s = free_s = free_s + count * self._byte_s
+        return free_s
 
     def exchange(self, request: bytes, length: int) -> tuple[bytes, float]:
         """Send a request and wait for ``length`` bytes.
@@ -140,31 +135,21 @@ class Transactions:
         Returns:
             The received bytes, and the time of their arrival, seconds.
         """
-        port, byte_s = self.port, self._byte_s
-        # As in ``send``, without the cost of another call every tick.
-        now_s, free_s = port.now_s(), self._free_s
+        port = self.port
         if self._is_owed:
-            self._count_late(port.read_until(ROOM, now_s))
-        if now_s - self._sent_s >= self.starving_s:
-            self._record_starvation(now_s)
-        self._sent_s = now_s
-        self._free_s = free_s = (free_s if free_s > now_s else now_s) + len(request) * byte_s
-        whole_s, timeout_s = free_s + length * byte_s, FACTOR * self._worst_s
-        if timeout_s < self._least_s:
-            timeout_s = self._least_s
-        elif timeout_s > self.most_s:
-            timeout_s = self.most_s
-        self.deadline_s = deadline_s = whole_s + timeout_s
-        raw, _ = port.exchange(request, length, deadline_s)
+            self._count_late(port.read_until(ROOM, port.now_s()))
+        whole_s = self._record_sent(len(request)) + length * self._byte_s
+        self.deadline_s = deadline_s = whole_s + self.timeout_s
+        port.write(request)
+        raw = port.read_until(length, deadline_s)
         at_s = port.now_s()
-        self.tx_bytes += len(request)
         self.rx_bytes += len(raw)
         self._is_owed = len(raw) < length
-        if not self._is_owed:
+        if self._is_owed:
+            self.lateness.record_wait(deadline_s, at_s)
+        else:
             late_s, worst_s = at_s - whole_s, DECAY * self._worst_s
             self._worst_s = late_s if late_s > worst_s else worst_s
-        else:
-            self.lateness.record_wait(deadline_s, at_s)
         return raw, at_s
 
     def collect(
@@ -175,7 +160,7 @@ class Transactions:
         length: int,
         deadline_s: float,
         parse: Callable[[bytes], list[Status]],
-    ) -> GroupAnswers:
+    ) -> tuple[dict[int, Status], set[int]]:
         """Return the answers in received bytes, after waiting for those that have not arrived.
 
         Args:
@@ -188,12 +173,12 @@ class Transactions:
         """
         while True:
             statuses = parse(raw.replace(request, b"", 1))
-            answers = sort_answers(statuses, ids, length, self.family.codec.REFUSAL)
-            if len(answers.good) + len(answers.damaged) >= len(ids):
-                return answers
+            good, damaged = sort_answers(statuses, ids, length, self.family.codec.REFUSAL)
+            if len(good) + len(damaged) >= len(ids):
+                return good, damaged
             more = read_some(self.port, deadline_s)
             if not more:
-                return answers
+                return good, damaged
             self.rx_bytes += len(more)
             raw += more
 
@@ -219,27 +204,22 @@ class Transactions:
     def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos.
 
-        A silent servo blocks the servos after it: they are read again without it, and it alone if
-        several attempts are allowed. In the loop there is no further attempt if no servo answers.
+        A silent servo blocks the servos after it: they are read again without it. If several
+        attempts are allowed, silent servos are read again, otherwise none if no servo answers.
         """
         values: dict[int, bytes] = {}
-        left, silent = tuple(ids), list[int]()
-        while left:
-            answered = self._ask(left, address, length)
-            values.update(answered)
-            if self.tries == 1 and not answered:
-                break
-            blamed = silent_servos(left, values)
-            silent += blamed
-            left = tuple(i for i in left if i not in values and i not in blamed)
         # A busy computer may have delayed an answer, and a servo may be restarting.
-        pauses_s = (*[0.0] * (self.tries - 1), *SETUP_PAUSES_S) if self.tries > 1 else ()
-        for pause_s in pauses_s:
-            silent = [i for i in silent if i not in values]
-            if silent and pause_s:
+        for pause_s in (0.0, 0.0, 0.0, *SETUP_PAUSES_S) if self.tries > 1 else (0.0,):
+            left = [i for i in ids if i not in values]
+            if left and pause_s:
                 self.drain(pause_s)
-            for servo_id in silent:
-                values.update(self._ask((servo_id,), address, length))
+            while left:
+                answered = self._ask(left, address, length)
+                values.update(answered)
+                if self.tries == 1 and not answered:
+                    break
+                blamed = silent_servos(left, values)
+                left = [i for i in left if i not in values and i not in blamed]
         return values
 
     def ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
