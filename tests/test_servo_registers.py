@@ -7,7 +7,7 @@ import pytest
 from sts_rig import Rig as StsRig
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.protocol import ALERT, instruction
+from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.servo_bus.family import Identity
 from gazerig.drivers.servo_bus.registers import Registers
@@ -119,10 +119,9 @@ def test_a_refusal_is_no_value_and_no_exception(rig):
     assert rig.registers.refusal == 0
 
 
-def test_an_alert_is_data_and_a_note(rig):
+def test_an_answer_with_an_alert_is_data(rig):
     rig.command("overload 2")
     assert rig.read() == 2002
-    assert rig.registers.error == ALERT
     assert rig.registers.write(2, "led", 1)
 
 
@@ -153,7 +152,6 @@ def test_registers_behind_a_lock(sts):
     sts.now_s += 0.1
     sts.chain.positions_steps()
     assert registers.read(4, "present_input_voltage") == 120
-    assert registers.error == 1
 
 
 @pytest.mark.parametrize("fault", ["lose 4 count 2", "corrupt 4 40 count 2", "delay 4 60 count 1",

@@ -3,11 +3,9 @@
 from collections.abc import Iterable, Sequence
 
 from gazerig.drivers.process.host_lateness import HostLateness
-from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
-from gazerig.drivers.servo_bus.family import Family, Identity, Register, Status
-from gazerig.drivers.servo_bus.transaction import ROOM, read_some
-
-TRIES = 3
+from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
+from gazerig.drivers.servo_bus.family import Family, Identity, Status
+from gazerig.drivers.servo_bus.transaction import ROOM, TRIES, read_some
 
 REPLY_S = 0.04
 """Time-out for one servo: the longest return delay and two turns of a 16 ms latency timer."""
@@ -28,7 +26,6 @@ class Registers:
         tries: Number of attempts for a silent servo.
         lateness: Delays of this computer, which are recorded there.
 
-    error: error byte of the newest answer
     refusal: error number of the newest exchange if it was refused, otherwise 0
     """
 
@@ -43,7 +40,7 @@ class Registers:
         self.lateness = lateness or HostLateness()
         self._tries = tries
         self._late_until_s: dict[int, float] = {}
-        self.error = self.refusal = 0
+        self.refusal = 0
 
     def identify(self, servo_id: int) -> Identity | None:
         """Return a servo's model and firmware, None if it does not answer."""
@@ -53,15 +50,7 @@ class Registers:
 
     def read(self, servo_id: int, name: str) -> int | None:
         """Return a register's value, None without a good answer."""
-        register = self._family.registers[name]
-        data = self.read_bytes(servo_id, register.address, register.size)
-        return None if data is None else register.decode(data)
-
-    def read_bytes(self, servo_id: int, address: int, length: int) -> bytes | None:
-        """Return bytes of the table, None without a good answer."""
-        request = self._family.codec.read(servo_id, address, length)
-        status = self._exchange(servo_id, request, length)
-        return None if status is None else status.params
+        return self.read_many(servo_id, (name,))[name]
 
     def read_many(self, servo_id: int, names: Iterable[str]) -> dict[str, int | None]:
         """Return values by name; adjacent registers are read together.
@@ -69,13 +58,19 @@ class Registers:
         The value is None without a good answer. A servo that falls silent is not read further.
         """
         values: dict[str, int | None] = dict.fromkeys(names)
-        for span in group_adjacent(self._family, values):
-            first = span[0].address
-            data = self.read_bytes(servo_id, first, span[-1].address + span[-1].size - first)
-            if data is not None:
+        left = sorted((self._family.registers[name] for name in values), key=lambda r: r.address)
+        while left:
+            start = end = left[0].address
+            span = []
+            while left and left[0].address == end:
+                span.append(left.pop(0))
+                end += span[-1].size
+            request = self._family.codec.read(servo_id, start, end - start)
+            status = self._exchange(servo_id, request, end - start)
+            if status is not None:
                 for one in span:
-                    at = one.address - first
-                    values[one.name] = one.decode(data[at : at + one.size])
+                    at = one.address - start
+                    values[one.name] = one.decode(status.params[at : at + one.size])
             elif not self.refusal:
                 break
         return values
@@ -83,11 +78,8 @@ class Registers:
     def write(self, servo_id: int, name: str, value: int) -> bool:
         """Write a register; return whether the servo confirmed it."""
         register = self._family.registers[name]
-        return self.write_bytes(servo_id, register.address, register.encode(value))
-
-    def write_bytes(self, servo_id: int, address: int, data: bytes) -> bool:
-        """Write bytes of the table; return whether the servo confirmed it."""
-        request = self._family.codec.write(servo_id, address, data)
+        data = register.encode(value)
+        request = self._family.codec.write(servo_id, register.address, data)
         return self._exchange(servo_id, request, 0, insist=True) is not None
 
     def write_all(self, ids: Sequence[int], name: str, value: int) -> None:
@@ -121,55 +113,23 @@ class Registers:
         self, servo_id: int, request: bytes, length: int, insist: bool = False
     ) -> Status | None:
         """Send a request until a good answer arrives; ``insist``: also after a refusal."""
+        port, codec = self._port, self._family.codec
+        self.refusal = 0
         for _ in range(self._tries):
             # No answer to an earlier request may arrive any more, as it does not contain the
             # address of its register.
-            until_s = self._late_until_s.pop(servo_id, None)
-            if until_s is not None:
-                self._drop_late(servo_id, until_s)
-            self._port.clearPort()
-            self.refusal = 0
-            raw, status = transact(self._port, self._family, request, length, REPLY_S, servo_id)
+            dropped = port.read_until(ROOM, self._late_until_s.pop(servo_id, 0.0))
+            if any(one.intact and one.id == servo_id for one in codec.parse_statuses(dropped)):
+                self.lateness.record_late_answer(port.now_s())
+            _, status = transact(port, self._family, request, length, REPLY_S, servo_id)
+            self.refusal = 0 if status is None else status.error & codec.REFUSAL
             if status is None:
-                self._late_until_s[servo_id] = self._port.now_s() + LATE_S
-                self._drop_late(servo_id, self._port.now_s() + QUIET_S, raw)
-                continue
-            self.error = status.error
-            self.refusal = status.error & self._family.codec.REFUSAL
-            if not self.refusal:
+                self._late_until_s[servo_id] = port.now_s() + LATE_S
+            elif not self.refusal:
                 return status
-            if not insist:
+            elif not insist:
                 return None
         return None
-
-    def _drop_late(self, servo_id: int, until_s: float, raw: bytes = b"") -> None:
-        """Discard bytes that arrive until a time; a good answer among them is a late one.
-
-        raw: bytes that arrived before the time-out
-        """
-        end_s = self._port.now_s() + BABBLE_S
-        while (more := self._port.read_until(ROOM, until_s)) and self._port.now_s() < end_s:
-            raw += more
-        statuses = self._family.codec.parse_statuses(raw)
-        if any(one.intact and one.id == servo_id for one in statuses):
-            self.lateness.record_late_answer(self._port.now_s())
-
-
-def group_adjacent(family: Family, names: Iterable[str]) -> list[list[Register]]:
-    """Return registers in groups that one request can read: without unused bytes between them."""
-    known = {
-        address
-        for one in family.registers.values()
-        for address in range(one.address, one.address + one.size)
-    }
-    groups: list[list[Register]] = []
-    for one in sorted((family.registers[name] for name in names), key=lambda r: r.address):
-        last = groups[-1][-1] if groups else None
-        if last and known.issuperset(range(last.address + last.size, one.address)):
-            groups[-1].append(one)
-        else:
-            groups.append([one])
-    return groups
 
 
 def transact(

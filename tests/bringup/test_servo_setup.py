@@ -142,7 +142,7 @@ def test_two_servos_are_refused(kind, ids, says):
 def test_another_model_is_refused_and_left_alone(kind):
     bench = Bench(kind=kind)
     before = bench.kept(1)
-    models = {bench.model: kind.family.models[bench.model]._replace(number=1029)}
+    models = {bench.model: replace(kind.family.models[bench.model], number=1029)}
     bench.kind = kind._replace(family=replace(kind.family, models=models))
     with pytest.raises(ServoMissing, match=r"this is model number \d+, neck_yaw \(servo 7\) wants"):
         bench.assign()
