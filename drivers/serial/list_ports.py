@@ -10,7 +10,7 @@ import grp
 import os
 import re
 import stat
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -34,6 +34,9 @@ class Host:
     latency: Path = Path("/sys/bus/usb-serial/devices")
     by_id: Path = Path("/dev/serial/by-id")
     processes: Path = Path("/proc")
+
+
+HOST = Host()
 
 
 class SerialPort(NamedTuple):
@@ -64,31 +67,24 @@ class Access(NamedTuple):
     is_member: bool
 
 
-def serial_ports(host: Host | None = None) -> tuple[SerialPort, ...]:
+def serial_ports(host: Host = HOST) -> tuple[SerialPort, ...]:
     """Return the serial ports, those on USB first."""
-    names = _persistent_names((host or Host()).by_id)
     ports = [
         SerialPort(
             port.device,
             port.description,
             f"{port.vid:04x}:{port.pid:04x}" if port.vid is not None else "",
-            names.get(os.path.realpath(port.device)),
+            persistent_name(port.device, host.by_id),
         )
         for port in list_ports.comports()
     ]
     return tuple(sorted(ports, key=lambda port: (not port.usb, port.device)))
 
 
-def _persistent_names(by_id: Path) -> dict[str, str]:
-    """Return the persistent name of every device that has one."""
-    if not by_id.is_dir():
-        return {}
-    return {os.path.realpath(link): str(link) for link in sorted(by_id.iterdir())}
-
-
-def persistent_name(device: str, by_id: Path | None = None) -> str | None:
+def persistent_name(device: str, by_id: Path = HOST.by_id) -> str | None:
     """Return the name of a port that persists when it is replugged; None without one."""
-    return _persistent_names(by_id or Host().by_id).get(os.path.realpath(device))
+    real, links = os.path.realpath(device), sorted(by_id.glob("*"))
+    return next((str(link) for link in links if os.path.realpath(link) == real), None)
 
 
 def access(device: str) -> Access:
@@ -106,41 +102,30 @@ def access(device: str) -> Access:
     return Access(True, stat.S_ISCHR(found.st_mode), allowed, group, joined)
 
 
-def port_users(device: str, host: Host | None = None) -> tuple[str, ...]:
+def port_users(device: str, host: Host = HOST) -> tuple[str, ...]:
     """Return the other programs that have a port open, "python3 (process 1234)".
 
     Only programs that this user may inspect are found.
     """
-    real, own = os.path.realpath(device), str(os.getpid())
+    real, found = os.path.realpath(device), dict[str, str]()
     if real.startswith("/dev/pts/"):  # the program that serves a pseudo-terminal also has it open
         return ()
-    found = []
-    for process in sorted((host or Host()).processes.glob("[0-9]*")):
-        if process.name != own and real in _open_files(process):
-            program = "a program"
-            with contextlib.suppress(OSError, ValueError):
+    for file in sorted(host.processes.glob("[0-9]*/fd/*")):
+        process = file.parent.parent
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            if process.name != str(os.getpid()) and os.readlink(file) == real:
                 program = (process / "comm").read_text(encoding="utf-8").strip()
-            found.append(f"{program} (process {process.name})")
-    return tuple(found)
-
-
-def _open_files(process: Path) -> Iterable[str]:
-    """Return the files that a process has open; none if it may not be inspected."""
-    files = []
-    with contextlib.suppress(OSError):
-        for link in (process / "fd").iterdir():
-            with contextlib.suppress(OSError):
-                files.append(os.readlink(link))
-    return files
+                found[process.name] = f"{program} (process {process.name})"
+    return tuple(found.values())
 
 
 # --- latency timer of FTDI adaptors
 
 
-def latency_file(device: str, host: Host | None = None) -> Path | None:
+def latency_file(device: str, host: Host = HOST) -> Path | None:
     """Return the file of the adaptor's latency timer, None if it has none."""
     name = Path(os.path.realpath(device)).name
-    file = (host or Host()).latency / name / "latency_timer"
+    file = host.latency / name / "latency_timer"
     return file if file.is_file() else None
 
 
@@ -163,37 +148,29 @@ def set_latency(file: Path, ms: int = RECOMMENDED_LATENCY_MS) -> bool:
 
 def open_failure_text(port_name: str, code: int | None) -> str:
     """Return in one line why a port or an I2C bus cannot be opened, with the remedy."""
-    i2c = is_i2c(port_name)
+    kind, remedy, group, use = "serial port", "plug the adapter in", "dialout", "uses it"
+    here = ", ".join(f"{one.device} ({one.description})" for one in list_ports.comports())
+    if is_i2c(port_name):
+        kind, remedy, group, use = "I2C bus", ABSENT_I2C_REMEDY, "i2c", "moves servos on it"
+        here = i2c_names_text()
+    others = f"{'buses' if group == 'i2c' else 'ports'} here: {here or 'none'}"
     if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        if i2c:
-            return f"no I2C bus {port_name}: {ABSENT_I2C_REMEDY}; buses here: {i2c_names_text()}"
-        return f"no serial port {port_name}: plug the adapter in; ports here: {port_names_text()}"
+        return f"no {kind} {port_name}: {remedy}; {others}"
     if code in (errno.EACCES, errno.EPERM):
         found = access(port_name)
-        group = found.group if found.is_device else "i2c" if i2c else "dialout"
         return (
             f"no permission to open {port_name}: join its group with "
-            f"'sudo usermod -aG {group} $USER' and log in again"
+            f"'sudo usermod -aG {found.group if found.is_device else group} $USER' and log in again"
         )
     if code in (errno.EBUSY, errno.EAGAIN):
         held = ", ".join(port_users(port_name))
         who = f", {held}," if held else ""
-        what = "moves servos on it" if i2c else "uses it"
-        return f"{port_name} is busy: close the other program{who} that {what}"
-    if i2c:
-        reason = os.strerror(code) if code else "unknown"
-        return f"{port_name} is not an I2C bus ({reason}); buses here: {i2c_names_text()}"
-    reason = os.strerror(code) if code else "not a serial port"
-    return f"cannot open {port_name} ({reason}); ports here: {port_names_text()}"
+        return f"{port_name} is busy: close the other program{who} that {use}"
+    reason = os.strerror(code) if code else "not a device"
+    return f"cannot open {port_name} as {kind} ({reason}); {others}"
 
 
 ABSENT_I2C_REMEDY = "switch I2C on (on a Raspberry Pi: sudo raspi-config, Interface Options), or plug the adapter in"
-
-
-def port_names_text() -> str:
-    """Return the names of the serial ports as text."""
-    ports = [f"{port.device} ({port.description})" for port in list_ports.comports()]
-    return ", ".join(ports) or "none"
 
 
 def i2c_names_text() -> str:
