@@ -126,16 +126,6 @@ def test_pwm_limit_and_slope_bound_the_output():
     assert made.u > 0.15
 
 
-@given(limit=st.floats(0.0, 1.0), goal=st.floats(-4000, 4000), load=st.floats(-0.3, 0.3))
-@settings(max_examples=40, deadline=None)
-def test_the_current_limit_holds_always(limit, goal, load):
-    made = shaft(loop=Loop(p=4 * P, d=D, torque_max=limit), load_nm=load)
-    made.lead_to(goal, 0.0, 0.0)
-    for _ in range(60):
-        made.run(1)
-        assert abs(made.effort) <= limit + 1e-12
-
-
 # --- body and surroundings
 
 

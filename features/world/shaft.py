@@ -247,10 +247,8 @@ class WorldShaft(Shaft):
             self._brake()
 
     def _brake(self) -> None:
-        """Let the motor brake with its induced torque, unless it is off or has a torque limit."""
-        # A torque limit includes that torque, which is then a part of the effort.
-        braked = self._loop.torque_max == inf
-        self.axis.damp(self._free_nm_s + (self._induced_nm_s if braked else 0.0))
+        """Let the motor brake with its induced torque, unless it is off."""
+        self.axis.damp(self._free_nm_s + (0.0 if self._off else self._induced_nm_s))
 
     # --- from the world, every millisecond
 
@@ -258,7 +256,7 @@ class WorldShaft(Shaft):
         """Run the control loop for one millisecond; return the effort of the motor in it."""
         if self._off:
             return LIMP
-        kp, _, kd, most, torque_max, slew = self._loop
+        kp, _, kd, most, slew = self._loop
         rv, before = self._rv, self.r
         r = self.lead(1)[0] if self.led else before
         if rv or r != before:
@@ -276,13 +274,6 @@ class WorldShaft(Shaft):
         self._least, self._most, self._profiled = least, most, c
         push = self._stall_nm
         gain = -push * (kp + kd) * SPEED_UNIT
-        if torque_max != inf:
-            # The torque is limited with the motor's induced torque in it.
-            strongest = self._stall_nm * torque_max
-            induced = self._induced_nm_s * self.v / SPEED_UNIT
-            low = max(-strongest, push * least - induced)
-            high = min(strongest, push * most - induced)
-            return push * c, gain - self._induced_nm_s, min(low, high), max(low, high)
         return push * c, gain, push * least, push * most
 
     def _error(self, r: float) -> float:
@@ -303,17 +294,11 @@ class WorldShaft(Shaft):
         clipped = not least <= u <= most
         if clipped:
             u = most if u > most else least
-        t = u - v * self._built.rate
-        torque_max = loop.torque_max
-        if not -torque_max <= t <= torque_max:
-            clipped = True
-            t = torque_max if t > torque_max else -torque_max
-            u = t + v * self._built.rate if torque_max > 0.0 else 0.0
         error = self.r - self.x
         if loop.i and not clipped and abs(error) > RESOLUTION:
             i = self._integral + loop.i * error
             self._integral = min(max(i, -loop.u_max), loop.u_max)
-        self.u, self.effort = u, t
+        self.u, self.effort = u, u - v * self._built.rate
 
 
 REST_STEPS_MS = 1e-3

@@ -7,11 +7,9 @@ import struct
 
 from fastcrc.crc16 import umts
 
+from gazerig.drivers.dynamixel.protocol import HEADER, RAW, STATUS, STUFFED, instruction
 from gazerig.sim_mock.replies import Instruction
 
-HEADER = b"\xff\xff\xfd\x00"
-RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
-STATUS = 0x55
 SHORTEST = 10
 LONGEST = 1024
 """Longest packet; a larger length is noise."""
@@ -22,10 +20,7 @@ CRC = struct.Struct("<H")
 
 def status(servo_id: int, error: int, params: bytes) -> bytes:
     """Build a status packet."""
-    if RAW in params:
-        params = params.replace(RAW, STUFFED)
-    packet = HEAD.pack(HEADER, servo_id, len(params) + 4, STATUS) + bytes((error,)) + params
-    return packet + CRC.pack(umts(packet))
+    return instruction(servo_id, STATUS, b"%c%b" % (error, params))
 
 
 def find_instructions(data: bytes, before: int) -> tuple[list[Instruction], bytes]:
@@ -46,8 +41,9 @@ def find_instructions(data: bytes, before: int) -> tuple[list[Instruction], byte
             break
         packet = data[at:end]
         if at + SHORTEST <= end <= len(data) and umts(packet[:-2]) == CRC.unpack(packet[-2:])[0]:
-            if RAW not in packet[7:-2].replace(STUFFED, b""):
-                params = packet[8:-2].replace(STUFFED, RAW)
+            params = packet[8:-2]
+            if RAW not in params.replace(STUFFED, b""):
+                params = params.replace(STUFFED, RAW)
                 found.append(Instruction(packet[4], packet[7], params, end - before))
             at = done = end
         else:

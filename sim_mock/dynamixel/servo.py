@@ -1,18 +1,18 @@
 """One emulated Dynamixel X servo: its control table, permitted writes, errors and watchdog.
 
 Places, access and ranges are those of the driver's table, as in the e-Manual. It moves in the modes
-with a position: 3, 4 (more than a turn) and 5 (with a limit of the current). The other modes can be
-set, then it does not move. Gains are divided as the ROBOTIS e-Manual documents (P 128, D 16, I
-65536). Their units are not documented. Assumed here: positions in steps, speeds in steps/ms, sums
-per ms; the output is in units of PWM (885 are 100 %). Registers without any effect: feed-forward,
-velocity gains, startup configuration, secondary id, LED; moving status, PWM and the profile's
-state read 0.
+with a position: 3 and 4 (more than a turn). The other modes can be set, then it does not move;
+there are no indirect windows (168 and up). Gains are divided as the ROBOTIS e-Manual documents (P
+128, D 16, I 65536). Their units are not documented. Assumed here: positions in steps, speeds in
+steps/ms, sums per ms; the output is in units of PWM (885 are 100 %). Registers without any effect:
+feed-forward, velocity gains, startup configuration, secondary id, LED; moving status, PWM and the
+profile's state read 0.
 """
 
 import struct
 from collections.abc import Callable
 from math import inf
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from gazerig.drivers.dynamixel.control_table import (
     ACCELERATION_UNIT_STEPS_S2,
@@ -30,7 +30,7 @@ from gazerig.drivers.dynamixel.control_table import (
 )
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, ServoSpec
-from gazerig.sim_mock.smart_servo.servo import EmulatedServo
+from gazerig.sim_mock.smart_servo.servo import EmulatedServo, Result
 from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
 
 INSTRUCTION_ERROR, DATA_RANGE, DATA_LENGTH, DATA_LIMIT, ACCESS = 2, 4, 5, 6, 7
@@ -41,16 +41,15 @@ SENSED, SENSED_AT = struct.Struct("<hii"), 126
 """Current, velocity, position: a control loop reads them every tick."""
 MOTION, MOTION_AT = struct.Struct("<HB"), 120
 """Tick and moving."""
-SENSED_SPAN, MOTION_SPAN = (SENSED_AT, 136), (MOTION_AT, 123)
+SENSED_END, MOTION_END = 136, 123
 
 GOAL_AT, GOAL_END, WATCHDOG_AT = 116, 120, 98
 WATCHDOG_UNIT_MS, TRIPPED = 20, 255
 """Unit of Bus Watchdog, and its value after it has stopped the servo."""
 
-CURRENT, POSITION, EXTENDED, CURRENT_POSITION = 0, 3, 4, 5
-POSITION_MODES = POSITION, EXTENDED, CURRENT_POSITION
+POSITION, EXTENDED = POSITION_MODES = 3, 4
 MODES_WITHOUT_CURRENT = 1, POSITION, EXTENDED, 16
-MODES = CURRENT, CURRENT_POSITION, *MODES_WITHOUT_CURRENT
+MODES = 0, 5, *MODES_WITHOUT_CURRENT
 
 REVERSE = 1
 """Bit of Drive Mode (10)."""
@@ -68,45 +67,25 @@ Get = Callable[[str], int]
 
 def control_loop(get: Get, model: DynamixelModel) -> Loop:
     """Return the controller that the registers describe."""
-    slew, torque_max, mode = inf, inf, get("operating_mode")
-    if mode not in POSITION_MODES:
+    if get("operating_mode") not in POSITION_MODES:
         return DISABLED
+    slew = inf
     if model.series == "x330":
         slew = get("pwm_slope") * PWM_SLOPE_V_MS[model.rated_v > 5.0] / model.rated_v
-    if mode == CURRENT_POSITION:
-        units = min(abs(get("goal_current")), get("current_limit"))
-        torque_max = units * model.current_unit_ma / 1000.0 / model.stall_current_a
     return Loop(
         p=get("position_p_gain") / 128.0 / PWM_FULL,
         i=get("position_i_gain") / 65536.0 / PWM_FULL,
         d=get("position_d_gain") / 16.0 / PWM_FULL,
         u_max=min(get("pwm_limit"), abs(get("goal_pwm"))) / PWM_FULL,
-        torque_max=torque_max,
         slew=slew,
     )
 
 
-class ReadRange(NamedTuple):
-    """A range of addresses that is read.
-
-    span: its place in the bytes
-    sensed, moving: whether it contains sensor values, or tick and moving
-    """
-
-    span: slice
-    sensed: bool
-    moving: bool
-
-
 class DynamixelMemory(ServoMemory):
-    """One servo's control table.
-
-    ranges: ranges that were read
-    """
+    """One servo's control table."""
 
     def __init__(self, model: DynamixelModel) -> None:
         registers = registers_of(model)
-        self.ranges: dict[tuple[int, int], ReadRange] = {}
         super().__init__(registers, max(r.address + r.size for r in registers))
         self.by_address = {register.address: register for register in registers}
         self._defined = {r.address + i for r in registers for i in range(r.size)}
@@ -119,14 +98,9 @@ class DynamixelMemory(ServoMemory):
         """Return the value's bytes, in two's complement if it is negative."""
         return (value & (1 << 8 * register.size) - 1).to_bytes(register.size, "little")
 
-    def range(self, address: int, length: int) -> ReadRange | None:
-        """Return a range that is read, None if an address is not defined."""
-        end = address + length
-        if not length or not self._defined.issuperset(range(address, end)):
-            return None
-        sensed, moving = (address < high and end > low for low, high in (SENSED_SPAN, MOTION_SPAN))
-        found = self.ranges[address, length] = ReadRange(slice(address, end), sensed, moving)
-        return found
+    def has(self, address: int, length: int) -> bool:
+        """Return whether all these addresses are defined."""
+        return bool(length) and self._defined.issuperset(range(address, address + length))
 
     def fields(self, address: int, data: bytes) -> list[tuple[Register, int]] | int:
         """Split bytes to write into registers with their values, or return the error number."""
@@ -150,7 +124,6 @@ class DynamixelServo(EmulatedServo):
     """One Dynamixel servo on the chain."""
 
     restart_ms = 400
-    unreadable = ACCESS
     read_level, answer_level = 1, 2
     error_bits: ClassVar = {name: 1 << bit for bit, name in HARDWARE_ERRORS.items()}
     model: DynamixelModel
@@ -222,24 +195,22 @@ class DynamixelServo(EmulatedServo):
 
     # --- reading
 
-    def read(self, address: int, length: int) -> bytes | None:
-        """Return bytes of the control table, None if an address is not defined."""
-        memory, shaft, side = self.memory, self.shaft, self._side
-        found = memory.ranges.get((address, length)) or memory.range(address, length)
-        if found is None:
-            return None
-        span, sensed, moving = found
-        into = memory.bytes
-        if sensed:
-            SENSED.pack_into(
-                into, SENSED_AT, round(side * shaft.effort * self._current_full),
-                round(side * shaft.v / _SPEED_UNIT), round(side * shaft.x + self._shift),
-            )  # fmt: skip
-        if moving:
+    def read(self, address: int, length: int) -> Result:
+        """Return bytes of the control table, or an error number."""
+        shaft, side, end = self.shaft, self._side, address + length
+        current = round(side * shaft.effort * self._current_full)
+        sensed = current, round(side * shaft.v / _SPEED_UNIT), round(side * shaft.x + self._shift)
+        if address == SENSED_AT and end == SENSED_END:
+            return 0, SENSED.pack(*sensed)  # a control loop reads them every tick
+        memory, into = self.memory, self.memory.bytes
+        if not memory.has(address, length):
+            return ACCESS, b""
+        SENSED.pack_into(into, SENSED_AT, *sensed)
+        if address < MOTION_END and end > MOTION_AT:
             fast = abs(shaft.v / _SPEED_UNIT) > memory.get("moving_threshold")
             tick = self._ms - self._booted_ms & 0x7FFF
             MOTION.pack_into(into, MOTION_AT, tick, fast or (self._follows and shaft.led))
-        return bytes(into[span])
+        return 0, bytes(into[address:end])
 
     # --- writing
 

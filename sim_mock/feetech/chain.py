@@ -4,23 +4,24 @@ Source: Feetech, communication protocol of the STS/SMS series.
 """
 
 import struct
-from functools import partial
+from functools import lru_cache
 
 from gazerig.drivers.feetech.memory_table import HIGHEST_ID
 from gazerig.sim_mock.feetech.packets import find_instructions, status
 from gazerig.sim_mock.feetech.servo import FeetechServo
-from gazerig.sim_mock.smart_servo.chain import ServoChain, build_chain
+from gazerig.sim_mock.smart_servo.chain import ServoChain
 from gazerig.sim_mock.smart_servo.faults import commands_of
 
 
-class FeetechChain(ServoChain[FeetechServo]):
+class FeetechChain(ServoChain):
     """Feetech servos on one bus."""
 
     servo_type = FeetechServo
-    find_instructions, status = staticmethod(find_instructions), staticmethod(status)
+    find_instructions = staticmethod(lru_cache(64)(find_instructions))
+    status = staticmethod(status)
     span = struct.Struct("<BB")
     misunderstood = None
     commands = commands_of(HIGHEST_ID, "id 1, 1000000 bit/s")
 
 
-build_feetech = partial(build_chain, FeetechChain)
+build_feetech = FeetechChain.build

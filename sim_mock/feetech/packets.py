@@ -7,16 +7,15 @@ parameters may contain a header. Signed numbers are sign and magnitude. Source: 
 communication protocol of the STS/SMS series.
 """
 
+from gazerig.drivers.feetech.protocol import HEADER, instruction
 from gazerig.sim_mock.replies import Instruction
 
-HEADER = b"\xff\xff"
-BYTES = tuple(bytes((i,)) for i in range(256))
+MOST_PARAMS = 253
 
 
 def status(servo_id: int, error: int, params: bytes) -> bytes:
-    """Build a status packet."""
-    body = bytes((servo_id, (len(params) + 2) & 0xFF, error)) + params
-    return HEADER + body + BYTES[~sum(body) & 0xFF]
+    """Build a status packet, of at most as many bytes as fit."""
+    return instruction(servo_id, error, params[:MOST_PARAMS])
 
 
 def signed(raw: int, bit: int) -> int:

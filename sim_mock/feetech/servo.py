@@ -48,7 +48,14 @@ from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.sim_mock.feetech.packets import signed, unsigned
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, ServoSpec
-from gazerig.sim_mock.smart_servo.servo import HEAT, OVERLOAD, REBOOT, VOLTAGE, EmulatedServo
+from gazerig.sim_mock.smart_servo.servo import (
+    HEAT,
+    OVERLOAD,
+    REBOOT,
+    VOLTAGE,
+    EmulatedServo,
+    Result,
+)
 from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
 
 SCS_TRAVEL_DEG = {"scs0009": 300.0, "scs15": 200.0}
@@ -63,8 +70,8 @@ RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
 P_SHARE, I_SHARE, D_SHARE = 1 / 1600, 1 / 1.6e6, 1 / 64
 """Duty per unit of each gain for steps, steps times ms, and steps/ms, as shares of full duty."""
 
-SIZE = 256
-"""Addresses without a register read 0."""
+SIZE = 512
+"""More than can be read; addresses without a register read 0."""
 TORQUE_AT, GOALS_AT, GOAL_AT, GOAL_END, GOALS_END = 40, 41, 42, 44, 48
 _GOALS = {"little": struct.Struct("<BHHH"), "big": struct.Struct(">BHHH")}
 """Acceleration, goal position, goal time, goal speed: written together in every tick."""
@@ -137,10 +144,6 @@ class FeetechMemory(ServoMemory):
         if "torque_limit" in self.registers:
             self.set("torque_limit", self.get("max_torque"))
 
-    def read(self, address: int, length: int) -> bytes:
-        """Return bytes as they are on the wire; addresses without a register are 0."""
-        return bytes(self.bytes[address : min(SIZE, address + length)]).ljust(length, b"\0")
-
     def write(self, address: int, data: bytes) -> list[int]:
         """Write the writable bytes; return their addresses."""
         keeps, written = not self.bytes[self._lock_at], list[int]()
@@ -174,7 +177,7 @@ class FeetechServo(EmulatedServo):
             raise ValueError(f"model {spec.model!r}: Feetech servos are {', '.join(models)}")
         model = models[spec.model]
         self._scs = spec.model in SCS_MODELS
-        self.answers_groups = not self._scs
+        self.group_reads = not self._scs
         order: Order = "big" if self._scs else "little"
         self._goals, self._sensed = _GOALS[order], _SENSED[order]
         self.baud_rates = SCS_BAUD_RATES if self._scs else BAUD_RATES
@@ -258,16 +261,14 @@ class FeetechServo(EmulatedServo):
         """Return the error byte of every status."""
         return self.errors
 
-    def read(self, address: int, length: int) -> bytes:
+    def read(self, address: int, length: int) -> Result:
         """Return bytes of the memory; addresses without a register are 0."""
-        if address == SENSED_AT and length == SENSED_END - SENSED_AT:
-            return self._sensed.pack(*self._live_words())  # a control loop reads them every tick
         if address < SENSED_END and address + length > SENSED_AT:
-            self._sensed.pack_into(self.memory.bytes, SENSED_AT, *self._live_words())
-        return self.memory.read(address, length)
+            self._sense()
+        return 0, bytes(self.memory.bytes[address : address + length])
 
-    def _live_words(self) -> tuple[int, ...]:
-        """Return the registers with live values, 56 to 70."""
+    def _sense(self) -> None:
+        """Write the registers with live values, 56 to 70."""
         shaft, scale, into = self.shaft, self._scale, self.memory.bytes
         at = round((shaft.x + self._shift) * scale)
         if self._scs:
@@ -277,7 +278,8 @@ class FeetechServo(EmulatedServo):
         moving = self.torque and shaft.led or not -1 <= speed <= 1
         load, current = round(shaft.u * TORQUE_FULL), round(shaft.effort * self._current_full)
         # Half of them have no sign: the word is the value.
-        return (
+        self._sensed.pack_into(
+            into, SENSED_AT,
             at if at >= 0 else unsigned(at, 15),
             speed if speed >= 0 else unsigned(speed, 15),
             load if load >= 0 else unsigned(load, 10),

@@ -6,7 +6,8 @@ The servos after a silent one in a group read never answer, as logic analysers s
 import struct
 from abc import ABC
 from collections.abc import Callable, Iterable
-from typing import Any, Generic, TypeVar, cast
+from functools import lru_cache
+from typing import Self
 
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.grammar import CommandTable
@@ -21,6 +22,7 @@ from gazerig.sim_mock.smart_servo.servo import (
     REBOOT,
     WRITE,
     EmulatedServo,
+    Result,
 )
 from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft, whole_ms
 
@@ -29,24 +31,27 @@ SYNC_READ, SYNC_WRITE = 0x82, 0x83
 PACKET_GAP_S = 0.0015
 """Pause in a packet that real servos tolerate [A]."""
 
+MIN_WATCHDOG_MS = 20
 WEIGH_MS = 10
 """Time for which the torques of the head's weight are constant."""
 TWIN_AWAY_STEPS = 257
 """Distance of a second servo with a taken id from the first, so that they differ."""
 
-Result = tuple[int, bytes]
-"""Error number and parameters of an answer."""
-
-_MAX_KNOWN = 64
 FAST = FAST_SYNC_READ, FAST_BULK_READ = 0x8A, 0x9A
 """Dynamixel's group reads with one answer of all servos."""
-_REPEATED = frozenset((PING, READ, SYNC_READ, FAST_SYNC_READ))
-"""Instructions that a control loop repeats byte for byte."""
 
-S = TypeVar("S", bound=EmulatedServo)
+Read = tuple[int, int, int]
+"""Id, address and length of one servo's part of a group read."""
 
 
-class ServoChain(ABC, Generic[S]):
+@lru_cache(64)
+def sync_reads(span: struct.Struct, params: bytes) -> list[Read]:
+    """Return the parts of a sync read; a control loop repeats it byte for byte."""
+    ids = params[span.size :]
+    return [(servo_id, *span.unpack_from(params)) for servo_id in ids]
+
+
+class ServoChain(ABC):
     """Servos on one bus.
 
     A make of servos defines in class attributes its servo type, its packets and its fault commands.
@@ -62,7 +67,7 @@ class ServoChain(ABC, Generic[S]):
         packet_gap_s: time after which an unfinished packet is dropped.
     """
 
-    servo_type: type[S]
+    servo_type: Callable[[ServoSpec, int, ShaftMaker], EmulatedServo]
     find_instructions: Callable[[bytes, int], tuple[list[Instruction], bytes]]
     """Finds instructions in bytes, of which some arrived before."""
     status: Callable[[int, int, bytes], bytes]
@@ -75,7 +80,7 @@ class ServoChain(ABC, Generic[S]):
 
     def __init__(
         self,
-        servos: Iterable[S],
+        servos: Iterable[EmulatedServo],
         now_s: Callable[[], float],
         check_baud: bool = False,
         seed: int = 0,
@@ -90,7 +95,6 @@ class ServoChain(ABC, Generic[S]):
         self._now_s = now_s()
         self._now_ms = self._fed_ms = self._weighed_ms = whole_ms(self._now_s)
         self.packet_gap_s, self._unfinished, self._arrived_s = PACKET_GAP_S, b"", self._now_s
-        self._known: dict[bytes, list[Instruction]] = {}
         self._client_baud: int | None = None
         self.refresh()
         if weight is not None:
@@ -98,7 +102,7 @@ class ServoChain(ABC, Generic[S]):
 
     # --- time
 
-    def _advance(self, servos: Iterable[S], now_ms: int) -> None:
+    def _advance(self, servos: Iterable[EmulatedServo], now_ms: int) -> None:
         """Advance servos; the head's weight is applied every 10 ms to all."""
         weight = self._weight
         if weight is not None:
@@ -127,7 +131,7 @@ class ServoChain(ABC, Generic[S]):
 
     def refresh(self) -> None:
         """Read ids and baud rates again; needed after external changes."""
-        self._by_id: dict[int, list[S]] = {}
+        self._by_id: dict[int, list[EmulatedServo]] = {}
         for servo in self.servos:
             servo.on_address = self._mark_stale
             if not self.check_baud or self._client_baud in (None, servo.baud):
@@ -142,14 +146,14 @@ class ServoChain(ABC, Generic[S]):
         """Return whether any servo understands a client at this baud rate."""
         return not self.check_baud or any(servo.baud == client_baud for servo in self.servos)
 
-    def __getitem__(self, servo_id: int) -> S:
+    def __getitem__(self, servo_id: int) -> EmulatedServo:
         """Return a servo by its id, without advancing it."""
         for servo in self.servos:
             if servo.id == servo_id:
                 return servo
         raise KeyError(f"no servo {servo_id}; servos are {', '.join(map(str, self.ids()))}")
 
-    def find_servo(self, servo_id: int) -> S:
+    def find_servo(self, servo_id: int) -> EmulatedServo:
         """Return a servo by its id, advanced to the present time."""
         servo = self[servo_id]
         self._advance((servo,), whole_ms(self.now_s()))
@@ -161,9 +165,10 @@ class ServoChain(ABC, Generic[S]):
 
     def add_duplicate(self, servo_id: int) -> None:
         """Add a second servo with a taken id to the bus, slightly turned from the first."""
-        first, make = self.find_servo(servo_id), cast(Any, self.servo_type)
+        first = self.find_servo(servo_id)
         start = (first.position_steps + TWIN_AWAY_STEPS) % 4096
-        twin: S = make(first.spec._replace(start_steps=start), whole_ms(self.now_s()))
+        spec = first.spec._replace(start_steps=start)
+        twin = self.servo_type(spec, whole_ms(self.now_s()), create_shaft)
         for name in ("return_delay_time", "baud_rate"):
             twin.memory.set_permanently(name, first.memory.get(name))
         twin.set_baud(first.baud)
@@ -202,21 +207,20 @@ class ServoChain(ABC, Generic[S]):
 
     def _feed(self, data: bytes, now_s: float) -> list[Instruction]:
         """Return the instructions that these bytes complete; they arrive now."""
-        if not self._unfinished and data in self._known:
-            return self._known[data]
         before = len(self._unfinished) if now_s - self._arrived_s < self.packet_gap_s else 0
         if before:
             data = self._unfinished + data
         self._arrived_s = now_s
         found, self._unfinished = self.find_instructions(data, before)
-        if not before and not self._unfinished and len(found) == 1 and found[0][1] in _REPEATED:
-            if len(self._known) >= _MAX_KNOWN:
-                self._known.clear()
-            self._known[data] = found
         return found
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
         """Execute one instruction on the addressed servos; return the bytes that they send."""
+        # An expired watchdog trips, the others start again.
+        if self._now_ms - self._fed_ms >= MIN_WATCHDOG_MS:
+            for servo in self.servos:
+                servo.advance(self._now_ms, self._fed_ms)
+        self._fed_ms = self._now_ms
         servo_id, code, params, _ = instruction
         if servo_id == BROADCAST:
             pieces = self._execute_group(code, params)
@@ -230,7 +234,7 @@ class ServoChain(ABC, Generic[S]):
     def _execute_group(self, code: int, params: bytes) -> list[Piece]:
         """Execute an instruction to all servos."""
         if code == SYNC_READ:
-            return self._answer_reads(self._reads(params))
+            return self._answer_reads(sync_reads(self.span, params))
         if code == SYNC_WRITE:
             self._write_each(params)
             return []
@@ -250,22 +254,18 @@ class ServoChain(ABC, Generic[S]):
         for servo in self._by_id.get(servo_id, ()):
             if not servo.advance(self._now_ms, self._fed_ms):
                 continue
-            answers, flag, delay_s = (
-                servo.answers_instruction(code),
-                servo.error_flag,
-                servo.delay_s,
-            )
+            answers, flag = servo.answers_instruction(code), servo.error_flag
+            delay_s = servo.delay_s
             said = self._carry_out(servo, code, params)
             if said is not None and answers:
                 own = self.status(servo_id, said[0] | flag, said[1])
                 packet = merge(packet, own) if packet else own
         return None if not packet or self._is_muted(servo_id) else Piece(servo_id, packet, delay_s)
 
-    def _carry_out(self, servo: S, code: int, params: bytes) -> Result | None:
+    def _carry_out(self, servo: EmulatedServo, code: int, params: bytes) -> Result | None:
         """Execute an instruction on a servo; return its answer, None for silence."""
         if code == READ and len(params) == self.span.size:
-            data = servo.read(*self.span.unpack(params))
-            return (servo.unreadable, b"") if data is None else (0, data)
+            return servo.read(*self.span.unpack(params))
         if code == PING:
             return 0, servo.identity()
         half = self.span.size // 2
@@ -278,31 +278,32 @@ class ServoChain(ABC, Generic[S]):
 
     # --- groups
 
-    def _reads(self, params: bytes) -> list[tuple[int, bytes]]:
-        """Return the ids of a sync read, and the parameters of a read of each servo."""
-        size = self.span.size
-        return [(servo_id, params[:size]) for servo_id in params[size:]]
-
-    def _answer_reads(self, reads: Iterable[tuple[int, bytes]]) -> list[Piece]:
+    def _answer_reads(self, reads: Iterable[Read]) -> list[Piece]:
         """Answer a group read with one status per servo, up to the first silent one."""
-        pieces = list[Piece]()
-        for servo_id, params in reads:
-            answer = self._answer_all(servo_id, READ, params)
-            if answer is None or not self._by_id[servo_id][0].answers_groups:
+        pieces, now_ms, fed_ms = list[Piece](), self._now_ms, self._fed_ms
+        find, faulty = self._by_id.get, self._wire.has_any
+        for servo_id, address, length in reads:
+            packet, delay_s = b"", 0.0
+            for servo in find(servo_id, ()):
+                if servo.answers_groups and servo.advance(now_ms, fed_ms):
+                    error, data = servo.read(address, length)
+                    own = self.status(servo_id, error | servo.error_flag, data)
+                    packet, delay_s = merge(packet, own) if packet else own, servo.delay_s
+            if not packet or (faulty and self._is_muted(servo_id)):
                 break
-            pieces.append(answer)
+            pieces.append(Piece(servo_id, packet, delay_s))
         return pieces
 
     def _write_each(self, params: bytes) -> None:
-        """Execute a sync write; skip servos that already follow the same goals."""
+        """Execute a sync write."""
         start = self.span.size
         if len(params) < start:
             return
         address, length = self.span.unpack_from(params)
-        if (len(params) - start) % (1 + length):
-            return
-        for at in range(start, len(params), 1 + length):
-            self._write_part(params[at], address, params[at + 1 : at + 1 + length])
+        rows = params[start:]
+        if len(rows) % (1 + length) == 0:
+            for servo_id, data in struct.iter_unpack(f"B{length}s", rows):
+                self._write_part(servo_id, address, data)
 
     def _write_part(self, servo_id: int, address: int, data: bytes) -> None:
         """Execute one servo's part of a group write, unless it already follows the same goals."""
@@ -310,37 +311,35 @@ class ServoChain(ABC, Generic[S]):
             if servo.followed != (address, data) and servo.advance(self._now_ms, self._fed_ms):
                 servo.write(address, data)
 
+    # --- construction
 
-C = TypeVar("C", bound=ServoChain[Any])
+    @classmethod
+    def build(
+        cls,
+        specs: Iterable[ServoSpec | tuple[int, str, float]],
+        now_s: Callable[[], float],
+        baud: int | None = None,
+        seed: int = 0,
+        make_shaft: ShaftMaker = create_shaft,
+        weight: HeadWeight | None = None,
+    ) -> Self:
+        """Build servos and their bus.
 
+        Args:
+            specs: a plain tuple is (id, model, start position in steps).
+            now_s: the clock.
+            baud: rate of all servos, which keep their other factory settings; only clients at their
+                rate get answers; None: any rate works.
+            seed: seed of the random numbers of faults.
+            make_shaft: creates the shaft of each servo.
+            weight: weight of a head on these servos.
 
-def build_chain(
-    chain: type[C],
-    specs: Iterable[ServoSpec | tuple[int, str, float]],
-    now_s: Callable[[], float],
-    baud: int | None = None,
-    seed: int = 0,
-    make_shaft: ShaftMaker = create_shaft,
-    weight: HeadWeight | None = None,
-) -> C:
-    """Build servos and their bus.
-
-    Args:
-        chain: the chain type of a make.
-        specs: a plain tuple is (id, model, start position in steps).
-        now_s: the clock.
-        baud: rate of all servos, which keep their other factory settings; only clients at their
-            rate get answers; None: any rate works.
-        seed: seed of the random numbers of faults.
-        make_shaft: creates the shaft of each servo.
-        weight: weight of a head on these servos.
-
-    Raises:
-        ValueError: the model is unknown, or does not support this baud rate.
-    """
-    now_ms = whole_ms(now_s())
-    servos = [chain.servo_type(ServoSpec(*spec), now_ms, make_shaft) for spec in specs]
-    if baud is not None:
-        for servo in servos:
-            servo.set_baud(baud)
-    return chain(servos, now_s, baud is not None, seed, weight)
+        Raises:
+            ValueError: the model is unknown, or does not support this baud rate.
+        """
+        now_ms = whole_ms(now_s())
+        servos = [cls.servo_type(ServoSpec(*spec), now_ms, make_shaft) for spec in specs]
+        if baud is not None:
+            for servo in servos:
+                servo.set_baud(baud)
+        return cls(servos, now_s, baud is not None, seed, weight)

@@ -109,14 +109,13 @@ class Loop(NamedTuple):
     """Controller gains and limits, in shares of full PWM per step, per step/ms and so on.
 
     p, d: gains on position error and speed error; i: gain per ms on position error
-    u_max: PWM limit; torque_max: torque (current) limit; slew: largest change of PWM per ms
+    u_max: PWM limit; slew: largest change of PWM per ms
     """
 
     p: float = 0.0
     i: float = 0.0
     d: float = 0.0
     u_max: float = 1.0
-    torque_max: float = inf
     slew: float = inf
 
 
@@ -159,4 +158,4 @@ def mechanics_of(model: Motor, physics: Physics) -> Mechanics:
     )
 
 
-DISABLED = Loop(u_max=0.0, torque_max=0.0)
+DISABLED = Loop(u_max=0.0)

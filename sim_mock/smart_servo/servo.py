@@ -28,6 +28,8 @@ LONGEST_MS = 10_000
 """Only the end of a longer time without a packet is simulated."""
 TOO_HOT_C = 5.0
 """Temperature above the limit of a motor that a fault has overheated."""
+Result = tuple[int, bytes]
+"""Error number and parameters of an answer."""
 VOLTAGE, HEAT, OVERLOAD = 1, 4, 32
 """Bits of the errors of the protections, as in the registers of all makes."""
 
@@ -51,16 +53,14 @@ class EmulatedServo(ABC):
 
     restart_ms: int
     """Time of a restart without answers, milliseconds."""
-    unreadable = 0
-    """Error number of a read of an undefined address."""
     read_level = 0
     answer_level = 1
     """Lowest Status Return Levels at which it answers reads, and all other instructions."""
     error_bits: ClassVar[Mapping[str, int]]
     """Bits of the errors that can be triggered, by name."""
     baud_rates: tuple[int, ...]
-    answers_groups = True
-    """Whether it answers its part of a group read."""
+    group_reads, fast_reads = True, False
+    """Whether it answers its part of a group read, and of a fast one."""
 
     def __init__(
         self,
@@ -107,6 +107,8 @@ class EmulatedServo(ABC):
         get = self.memory.get
         self.followed = None
         self.id, self._status_level = get("id"), get("status_return_level")
+        self.answers_groups = self.group_reads and self.answers_instruction(READ)
+        self.answers_fast = self.fast_reads and self.answers_instruction(READ)
         self.delay_s = get("return_delay_time") * RETURN_DELAY_UNIT_S
         share, seconds = self._overload_limit()
         self._heavy_effort = share - 1e-11
@@ -156,7 +158,7 @@ class EmulatedServo(ABC):
             self._ms = self._check_ms
             self._check_ms += CHECK_MS
             self._check()
-        if not shaft.quiet:
+        if until_ms > self._ms and not shaft.quiet:
             shaft.run(until_ms - self._ms)
         self._ms = until_ms
 
@@ -254,8 +256,8 @@ class EmulatedServo(ABC):
         return b""
 
     @abstractmethod
-    def read(self, address: int, length: int) -> bytes | None:
-        """Return bytes of the memory, None if an address is not defined."""
+    def read(self, address: int, length: int) -> Result:
+        """Return bytes of the memory, or an error number."""
 
     @abstractmethod
     def write(self, address: int, data: bytes) -> int:

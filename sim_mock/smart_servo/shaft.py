@@ -8,7 +8,7 @@ step. So no gain of the registers makes the numbers diverge, and readings do not
 """
 
 from collections.abc import Callable
-from math import inf, sqrt
+from math import sqrt
 
 from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Motor, Physics, mechanics_of
 
@@ -177,15 +177,17 @@ class Shaft:
 
     def run(self, ms: int) -> None:
         """Advance by a number of milliseconds."""
-        kp, ki, kd, most, torque_max, slew = self._loop
+        kp, ki, kd, most, slew = self._loop
         accel, drag, free, dry, rate, _ = self._built
+        if self._loop == DISABLED:  # the motor has no current
+            drag, rate = free, 0.0
         x, v, u, i, rv = self.x, self.v, self.u, self._integral, self._rv
         low, high, load, before = self._low, self._high, self._load, self.r
         # Without a speed to follow, D only brakes.
         kr = kd if self._cruise else 0.0
-        k, limited = kp + kd, torque_max < inf
+        k = kp + kd
         divisor, least, smoothing = drag + accel * k, -most, SMOOTHING
-        was = x, u, i
+        was, clipped = (x, v, i), False
         for r in self.lead(ms):
             rv += (r - before - rv) * smoothing
             before = r
@@ -209,24 +211,16 @@ class Shaft:
                 u = most if u > most else least if u < least else u
                 w = pull + accel * u
                 v = (w - dry) / drag if w > dry else (w + dry) / drag if w < -dry else 0.0
-            if limited and abs(t := u - v * rate) > torque_max:
-                clipped = True
-                t = torque_max if t > 0.0 else -torque_max
-                w = pull + accel * t
-                v = (w - dry) / free if w > dry else (w + dry) / free if w < -dry else 0.0
-                u = t + v * rate if torque_max else 0.0
             x += v
             if not low <= x <= high:
                 x, v = high if x > high else low, 0.0
                 u = min(max(c, earlier - slew, least), earlier + slew, most)
-                u = min(max(u, -torque_max), torque_max)
             if ki and not clipped and abs(r - x) > RESOLUTION:
                 i = min(max(i + ki * (r - x), least), most)
         self.x, self.v, self.u, self._integral = x, v, u, i
         self._rv = 0.0 if -SLOWEST < rv < SLOWEST else rv
-        effort = u - v * rate
-        self.effort = min(max(effort, -torque_max), torque_max)
-        self.quiet = not (v or self._rv or self.led) and was == (x, u, i)
+        self.effort = u - v * rate
+        self.quiet = not (v or self._rv or self.led or clipped) and was == (x, v, i)
 
 
 ShaftMaker = Callable[[int, Motor, Physics, float], Shaft]
