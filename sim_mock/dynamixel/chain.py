@@ -25,6 +25,8 @@ from gazerig.sim_mock.smart_servo.faults import commands_of
 BULK_READ, BULK_WRITE = 0x92, 0x93
 
 _ROW = struct.Struct("<BHH")
+_MARKS = [bytes((0, servo_id)) for servo_id in range(256)]
+"""Error and id of a fast answer without an error."""
 
 
 class DynamixelChain(ServoChain):
@@ -71,8 +73,10 @@ class DynamixelChain(ServoChain):
                 if not servo.advance(now_ms, fed_ms) or not servo.answers_fast:
                     continue
                 error, said = servo.read(address, size)
-                flag = servo.errors and servo.error_flag
-                own = b"%b%c%c%b" % (before, error | flag, servo_id, said or bytes(size))
+                mark = _MARKS[servo_id]
+                if error or servo.errors:
+                    mark, said = bytes((error | servo.error_flag, servo_id)), said or bytes(size)
+                own = before + mark + said
                 following = umts(own, crc)
                 end = pack(following)
                 if data:  # of another servo with this id
