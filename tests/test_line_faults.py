@@ -104,8 +104,8 @@ def test_faults_last_for_a_count_a_time_or_until_cleared(world):
     ("text", "says"),
     [
         ("lsoe 3", "'lsoe' is not a command; commands: lose, delay"),
-        ("lose x", "'x' is not a servo id from 0 to 252"),
-        ("delay 3 nan", "'nan' is not milliseconds"),
+        ("lose x", "'x' is not ID from 0 to 252"),
+        ("delay 3 nan", "'nan' is not MS from 0 to 60000"),
     ],
 )
 def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):

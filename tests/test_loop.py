@@ -100,7 +100,7 @@ def test_parking_reaches_the_pose_and_torque_goes_off() -> None:
     parked = assembly.robot.body.angles(list(chain.positions_steps()))
     assert np.degrees(parked) == pytest.approx(np.degrees(assembly.park_rad), abs=2.5)
     assembly.robot.stop()
-    assert [chain[i].read(64, 1) for i in range(1, 10)] == [b"\x00"] * 9
+    assert [chain[i].read(64, 1)[1] for i in range(1, 10)] == [b"\x00"] * 9
 
 
 def test_what_is_asked_for_is_in_force_from_the_next_tick_on() -> None:

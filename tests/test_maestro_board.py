@@ -138,7 +138,7 @@ def test_errors_at_will_are_bits_of_the_register_and_end_all_pulses(world):
         world.ask(target(0, 6000))
         world.do(f"error {name}")
         assert (world.errors(), world.position()) == (1 << bit, 0)
-    with pytest.raises(ValueError, match="'heat' is none of signal, overrun"):
+    with pytest.raises(ValueError, match="'heat' is not signal.overrun"):
         world.do("error heat")
 
 

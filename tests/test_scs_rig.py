@@ -66,7 +66,7 @@ def test_the_guardian_lets_go_of_servos_without_sync_read():
     plan = ReleasePlan("feetech", "", 1_000_000, (1, 2), family="feetech scs")
     (again,) = decode(encode((plan,)))
     assert releaser(again)(bench.port) == ()
-    assert [bench.chain[i].read(40, 1) for i in (1, 2)] == [b"\x00", b"\x00"]
+    assert [bench.chain[i].read(40, 1)[1] for i in (1, 2)] == [b"\x00", b"\x00"]
 
 
 def test_a_place_beyond_the_potentiometer_and_a_mixture_of_series_are_refused(tmp_path):

@@ -12,14 +12,7 @@ from gazerig.features.world.physics import World
 from gazerig.features.world.state_file import StateWriter
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.faults.grammar import (
-    Argument,
-    CommandTable,
-    Verb,
-    any_word,
-    number_parser,
-    word_choice,
-)
+from gazerig.sim_mock.faults.grammar import CommandTable, Verb
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.smart_servo.shaft import whole_ms
 
@@ -36,9 +29,6 @@ DIRECTIONS = {
 PUSH_S = 0.5
 """Default duration of a push."""
 
-MOST_N = 100.0
-"""Largest force; a larger one would break a head."""
-
 
 def _push(world: World, body: str, newton: float, to: str, seconds: float = PUSH_S) -> str:
     """Push a body of the rig."""
@@ -51,12 +41,7 @@ COMMANDS = CommandTable(
     {
         "push": Verb(
             _push,
-            (
-                Argument("BODY", any_word),
-                Argument("N", number_parser(0.0, MOST_N, "newtons")),
-                Argument("|".join(DIRECTIONS), word_choice(*DIRECTIONS)),
-                Argument("SECONDS", number_parser(0.001, 60.0, "seconds"), optional=True),
-            ),
+            f"BODY NEWTONS {'|'.join(DIRECTIONS)} [SECONDS]",
             "push a part of the head, such as head, at its origin; the servos give way",
         ),
     },

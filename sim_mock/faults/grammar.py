@@ -1,32 +1,34 @@
 """Fault commands as lines of text: ``lose 3 count 2``, ``unplug for 0.5``, ``help``.
 
-The grammar of every emulated device is a table of verbs. Each verb parses its arguments and calls
-a method of the device's faults.
+The grammar of every emulated device is a table of verbs. The name of an argument decides what it
+may be.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 ALL_DEVICES = ("all", "*")
-BOTH = ("count", "for")
-TIME = ("for",)
-
-
-class Argument(NamedTuple):
-    """One word of a command: its name in the help, and its parser."""
-
-    label: str
-    read: Callable[[str], Any]
-    optional: bool = False
+BOTH, TIME = "count for", "for"
+_ENDS = {"count": ("count", "N"), "for": ("seconds", "SECONDS")}
+_WHOLE = ("ID", "BYTES", "BIT", "N")
+_RANGES: dict[str, tuple[float, float]] = {
+    "BYTES": (0, 1024), "BIT": (0, 8191), "N": (1, 1_000_000), "SECONDS": (0.0, 1e6),
+    "MS": (0.0, 60_000.0), "PERCENT": (0.0, 100.0), "V": (0.0, 30.0), "C": (-40.0, 200.0),
+    "STEPS": (-1e6, 1e6), "NEWTONS": (0.0, 100.0),
+}  # fmt: skip
 
 
 class Verb(NamedTuple):
-    """One command. duration_words: it may end with ``count N`` and ``for S``."""
+    """One command.
+
+    words: names of its arguments, optional ones in brackets; ``on|off``: one of these
+    lasting: further ends of it, ``count for``: it may end with ``count N`` and ``for SECONDS``
+    """
 
     action: Callable[..., str]
-    arguments: tuple[Argument, ...]
+    words: str
     description: str
-    duration_words: tuple[str, ...] = ()
+    lasting: str = ""
 
 
 class CommandTable(NamedTuple):
@@ -37,6 +39,7 @@ class CommandTable(NamedTuple):
 
     verbs: Mapping[str, Verb]
     ids: str
+    highest_id: int = 0
 
     def obey(self, faults: object, text: str) -> str:
         """Run one command; return a description of the effect.
@@ -44,117 +47,57 @@ class CommandTable(NamedTuple):
         Raises:
             ValueError: the command is invalid; the message names the wrong word and valid ones.
         """
-        arguments = text.split()
-        if not arguments or arguments[0] == "help":
-            return self.help(arguments[1] if len(arguments) > 1 else None)
-        name, rest = arguments[0].replace("_", "-"), arguments[1:]
+        first, *words = text.split() or ["help"]
+        if first == "help":
+            return self.help()
+        name, ends = first.replace("_", "-"), dict[str, Any]()
         verb = self.verbs.get(name)
         if verb is None:
-            raise ValueError(
-                f"{arguments[0]!r} is not a command; commands: {', '.join(self.verbs)}, help"
-            )
+            raise ValueError(f"{first!r} is not a command; commands: {', '.join(self.verbs)}, help")
         try:
-            left, found = list(rest), dict[str, Any]()
-            while len(left) >= 2 and left[-2] in BOTH:
-                value, word = left.pop(), left.pop()
-                if word not in verb.duration_words:
-                    raise ValueError(f"{word!r} is not expected here")
-                if word == "count":
-                    found["count"] = count(value)
-                else:
-                    found["seconds"] = number_parser(0.0, 1e6, "seconds")(value)
-            rest, lasting = left, found
-            return verb.action(faults, *_arguments(verb, rest), **lasting)
+            while len(words) > 1 and words[-2] in verb.lasting.split():
+                end, label = _ENDS[words[-2]]
+                ends[end] = self._read(label, words[-1])
+                del words[-2:]
+            labels = verb.words.split()
+            if len(words) > len(labels):
+                raise ValueError(f"{words[len(labels)]!r} is not expected here")
+            missing = [label for label in labels[len(words) :] if label[0] != "["]
+            if missing:
+                raise ValueError(f"{missing[0]} is missing")
+            values = map(self._read, labels, words)
+            return verb.action(faults, *values, **ends)
         except (KeyError, ValueError) as error:
             raise ValueError(f"{name}: {error.args[0]}; usage: {self.usage(name)}") from None
+
+    def _read(self, label: str, text: str) -> Any:
+        """Return the value of one word; None for all ids."""
+        label = label.strip("[]")
+        if label == "ID" and text in ALL_DEVICES:
+            return None
+        if "|" in label:
+            if text not in label.split("|"):
+                raise ValueError(f"{text!r} is not {label}")
+            return text
+        low, high = (0, self.highest_id) if label == "ID" else _RANGES.get(label, (None, None))
+        if low is None or high is None:
+            return text
+        try:
+            value = int(text, 0) if label in _WHOLE else float(text)
+        except ValueError:
+            value = float("nan")
+        if not low <= value <= high:
+            raise ValueError(f"{text!r} is not {label} from {low:g} to {high:g}")
+        return value
 
     def usage(self, name: str) -> str:
         """Return the syntax of a command."""
         verb = self.verbs[name]
-        shown = [f"[{w.label}]" if w.optional else w.label for w in verb.arguments]
-        ends = {"count": "[count N]", "for": "[for SECONDS]"}
-        return " ".join([name, *shown, *(ends[word] for word in verb.duration_words)])
+        ends = [f"[{word} {_ENDS[word][1]}]" for word in verb.lasting.split()]
+        return " ".join([name, *verb.words.split(), *ends])
 
-    def help(self, name: str | None = None) -> str:
-        """Describe one command or all of them, one per line."""
-        if name is not None and name in self.verbs:
-            return f"{self.usage(name)}: {self.verbs[name].description}"
+    def help(self) -> str:
+        """Describe all commands, one per line."""
         lines = [f"{self.usage(verb):46} {self.verbs[verb].description}" for verb in self.verbs]
         lines.append(f"ID is {self.ids} or all; a fault lasts until clear, or as given by [..]")
         return "\n".join(lines)
-
-
-def _arguments(verb: Verb, arguments: Sequence[str]) -> list[Any]:
-    needed = [word for word in verb.arguments if not word.optional]
-    if len(arguments) < len(needed):
-        raise ValueError(f"{needed[len(arguments)].label} is missing")
-    if len(arguments) > len(verb.arguments):
-        raise ValueError(f"{arguments[len(verb.arguments)]!r} is one argument too many")
-    return [word.read(text) for word, text in zip(verb.arguments, arguments, strict=False)]
-
-
-# --- words
-
-
-def number_parser(low: float, high: float, what: str) -> Callable[[str], float]:
-    """Return a parser of numbers; ``what`` and the range are part of its error message."""
-
-    def read(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = float("nan")
-        if not low <= value <= high:
-            raise ValueError(f"{text!r} is not {what} from {low:g} to {high:g}")
-        return value
-
-    return read
-
-
-def integer_parser(low: int, high: int, what: str) -> Callable[[str], int]:
-    """Return a parser of integers, also written as 0x1F."""
-
-    def read(text: str) -> int:
-        try:
-            value = int(text, 0)
-        except ValueError:
-            value = low - 1
-        if not low <= value <= high:
-            raise ValueError(f"{text!r} is not {what} from {low} to {high}")
-        return value
-
-    return read
-
-
-def id_or_all(read: Callable[[str], int]) -> Callable[[str], int | None]:
-    """Return a parser of ids that also accepts ``all``, which is None."""
-    return lambda text: None if text in ALL_DEVICES else read(text)
-
-
-def word_choice(*values: str) -> Callable[[str], str]:
-    """Return a parser of words from a short list."""
-
-    def read(text: str) -> str:
-        if text not in values:
-            two = len(values) == 2
-            listed = f"neither {' nor '.join(values)}" if two else f"none of {', '.join(values)}"
-            raise ValueError(f"{text!r} is {listed}")
-        return text
-
-    return read
-
-
-def on_off(text: str) -> bool:
-    """Parse on or off."""
-    return word_choice("on", "off")(text) == "on"
-
-
-def any_word(text: str) -> str:
-    """Return a word unchanged."""
-    return text
-
-
-count = integer_parser(1, 1_000_000, "a number of answers")
-
-MS = Argument("MS", number_parser(0.0, 60_000.0, "milliseconds"))
-SWITCH = Argument("on|off", on_off, True)

@@ -4,17 +4,9 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from gazerig.sim_mock.faults.grammar import (
-    SWITCH,
-    Argument,
-    CommandTable,
-    Verb,
-    id_or_all,
-    integer_parser,
-    number_parser,
-)
+from gazerig.sim_mock.faults.grammar import CommandTable, Verb
 from gazerig.sim_mock.faults.line import LineFaults
-from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, loss_verb
+from gazerig.sim_mock.faults.verbs import ADAPTER_VERBS, CLOSING_VERBS, LINE_VERBS, loss_verb
 from gazerig.sim_mock.hobby_servo import HobbyServo
 
 if TYPE_CHECKING:
@@ -35,11 +27,11 @@ class HobbyFaults(LineFaults):
         self.board.restart()
         return "the board restarts"
 
-    def power(self, on: bool = True) -> str:
+    def power(self, on: str = "on") -> str:
         """Switch the servos' supply on or off, which the board does not detect."""
         self.board.advance()
-        self.board.servo_power = on
-        return f"the servos have {'their' if on else 'no'} supply"
+        self.board.servo_power = on == "on"
+        return f"the servos have {'their' if on == 'on' else 'no'} supply"
 
     def jam(self, channel: int | None, stuck: bool = True) -> str:
         """Jam a servo at its position, or free it."""
@@ -88,22 +80,20 @@ def hobby_commands(highest: int, writes: str, own: Mapping[str, Verb]) -> Comman
         writes: name of its commands without an answer.
         own: verbs of its kind alone.
     """
-    one = Argument("ID", integer_parser(0, highest, "a channel"))
-    label = one._replace(read=id_or_all(one.read))
     verbs = {
-        **line_verbs(one),
+        **LINE_VERBS,
         "lose-writes": loss_verb("lose_writes", writes),
-        **adapter_verbs(),
+        **ADAPTER_VERBS,
         **own,
-        "brown-out": Verb(HobbyFaults.brown_out, (),
+        "brown-out": Verb(HobbyFaults.brown_out, "",
                           "the board restarts as a dip of its supply makes it"),
-        "power": Verb(HobbyFaults.power, (SWITCH,),
+        "power": Verb(HobbyFaults.power, "[on|off]",
                       "supply of the servos; the board does not detect it"),
-        "stick": Verb(HobbyFaults.jam, (label,), "jam the servo at its position"),
-        "free": Verb(partial(HobbyFaults.jam, stuck=False), (label,), "free a jammed servo"),
-        "turn": Verb(HobbyFaults.turn, (label, Argument("STEPS", number_parser(-1e5, 1e5, "quarter us"))),
+        "stick": Verb(HobbyFaults.jam, "ID", "jam the servo at its position"),
+        "free": Verb(partial(HobbyFaults.jam, stuck=False), "ID", "free a jammed servo"),
+        "turn": Verb(HobbyFaults.turn, "ID STEPS",
                      "turn the servo by hand; with pulses it returns"),
-        **closing_verbs(one),
+        **CLOSING_VERBS,
     }
-    return CommandTable(verbs, "a channel")
+    return CommandTable(verbs, "a channel", highest)
 # fmt: on

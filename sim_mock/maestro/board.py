@@ -9,7 +9,7 @@ reactions to errors. Source: Pololu Maestro User's Guide (0J40), section 5; [A] 
 from collections.abc import Callable, Iterator, Sequence
 
 from gazerig.sim_mock.faults.active import NO_DEVICE
-from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, word_choice
+from gazerig.sim_mock.faults.grammar import CommandTable, Verb
 from gazerig.sim_mock.faults.hobby import HobbyFaults, hobby_commands
 from gazerig.sim_mock.hobby_board import HobbyBoard
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec, build_servos
@@ -184,7 +184,7 @@ def _error(faults: HobbyFaults, name: str) -> str:
 
 # fmt: off
 COMMANDS: CommandTable = hobby_commands(23, "targets and limits", {
-    "error": Verb(_error, (Argument("NAME", word_choice(*ERRORS)),),
+    "error": Verb(_error, "|".join(ERRORS),
                   f"the board finds an error: {', '.join(ERRORS)}"),
 })
 # fmt: on

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from gazerig.sim_mock.faults.active import NO_DEVICE
-from gazerig.sim_mock.faults.grammar import TIME, Argument, Verb, count
+from gazerig.sim_mock.faults.grammar import TIME, Verb
 from gazerig.sim_mock.faults.hobby import hobby_commands
 from gazerig.sim_mock.faults.verbs import counted_command
 from gazerig.sim_mock.hobby_board import HobbyBoard
@@ -24,7 +24,7 @@ US_STEPS = 4
 
 # fmt: off
 COMMANDS = hobby_commands(255, "transfers that only write", {
-    "nack": Verb(counted_command("nack", "transfers are not acknowledged"), (Argument("N", count, True),),
+    "nack": Verb(counted_command("nack", "transfers are not acknowledged"), "[N]",
                  "the next N transfers are not acknowledged", TIME),
 })
 # fmt: on

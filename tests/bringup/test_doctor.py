@@ -267,7 +267,7 @@ def test_fix_mends_an_sts_servo_for_good():
         rig.chain[i].restart()
     rig.pass_time(1.0)
     assert not any(f.fixes for f in rig.check()) and worst_level(rig.check()) == "note"
-    assert rig.chain[1].read(TABLE_END - 1, 1) and rig.chain[1].read(55, 1) == b"\1"
+    assert rig.chain[1].read(TABLE_END - 1, 1) and rig.chain[1].read(55, 1)[1] == b"\1"
 
 
 @each

@@ -82,8 +82,8 @@ def test_a_push_that_cannot_be_is_refused_with_what_would_be_right() -> None:
     world = WorldBench("desk").world
     for text, message in (
         ("push tail 5 left", "no body 'tail': there is base_link, "),
-        ("push head 500 left", "'500' is not newtons from 0 to 100"),
-        ("push head 5 sideways", "'sideways' is none of forward, back"),
+        ("push head 500 left", "'500' is not NEWTONS from 0 to 100"),
+        ("push head 5 sideways", "'sideways' is not forward.back"),
         ("kick head", "'kick' is not a command; commands: push, help"),
     ):
         with pytest.raises(ValueError, match=message):
@@ -100,7 +100,7 @@ def test_a_server_passes_a_push_on_to_its_world_and_everything_else_to_its_servo
     server = Server(ServerSettings((BusSettings(line),), True, around), lambda text: None)
     try:
         assert "pushed left with 5 N" in server._obey("push head 5 left 0.1")
-        assert "N is missing; usage: push BODY N" in server._obey("push head")
+        assert "NEWTONS is missing; usage: push BODY NEWTONS" in server._obey("push head")
         assert "servo 7 is stuck" in server._obey("stick 7")
     finally:
         server.close()

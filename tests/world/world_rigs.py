@@ -58,7 +58,7 @@ def write(servo: Any, name: str, value: int) -> None:
 def read(servo: Any, name: str) -> int:
     """Return a register as an instruction reads it."""
     register = servo.memory.registers[name]
-    return int.from_bytes(servo.read(register.address, register.size), "little", signed=True)
+    return int.from_bytes(servo.read(register.address, register.size)[1], "little", signed=True)
 
 
 def arm(servo: Any, gains: tuple[int, ...] = ()) -> None:

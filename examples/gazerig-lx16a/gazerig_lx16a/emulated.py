@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 
 from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.sim_mock.device import DeviceReply
-from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, integer_parser
+from gazerig.sim_mock.faults.grammar import CommandTable, Verb
 from gazerig.sim_mock.faults.line import LineFaults
-from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, loss_verb
+from gazerig.sim_mock.faults.verbs import ADAPTER_VERBS, CLOSING_VERBS, LINE_VERBS, loss_verb
 from gazerig.sim_mock.replies import Piece
 from gazerig_lx16a import protocol as p
 from gazerig_lx16a.bus import FASTEST_STEPS_S, Lx16aParams
@@ -112,11 +112,9 @@ def _restart(faults: ChainFaults, servo_id: int) -> str:
     return f"servo {servo_id} restarts"
 
 
-_ID = Argument("ID", integer_parser(0, 253, "a servo id"))
 COMMANDS = CommandTable(
-    {**line_verbs(_ID), **adapter_verbs(), "brown-out": Verb(_restart, (_ID,), "restart"),
-     "lose-writes": loss_verb("lose_writes", "moves"),
-     **closing_verbs(_ID)}, "a servo's id",
+    {**LINE_VERBS, **ADAPTER_VERBS, "brown-out": Verb(_restart, "ID", "restart"),
+     "lose-writes": loss_verb("lose_writes", "moves"), **CLOSING_VERBS}, "a servo's id", 253,
 )  # fmt: skip
 
 
