@@ -11,8 +11,9 @@ import pytest
 
 from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.timing import TIMING, BusTiming
-from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
-from gazerig.drivers.pca9685.board import Pca9685Bus, Pca9685Params
+from gazerig.drivers.hobby_board.bus import HobbyBoardBus
+from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
+from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.family import Family
@@ -58,11 +59,11 @@ def _smart(
 
 
 def _maestro(port: BusPort, setups: Sequence[ServoConfig], give_up_s: float) -> ServoBus:
-    return MaestroBus(port, setups, MaestroParams(), _timing(False, give_up_s))
+    return HobbyBoardBus(MaestroBoard(port, MaestroParams(), _timing(False, give_up_s)), setups)
 
 
 def _pca9685(port: BusPort, setups: Sequence[ServoConfig], give_up_s: float) -> ServoBus:
-    return Pca9685Bus(port, setups, Pca9685Params(), _timing(False, give_up_s))
+    return HobbyBoardBus(Pca9685Board(port, Pca9685Params(), _timing(False, give_up_s)), setups)
 
 
 def _pulses_on(bench: BusBench) -> None:

@@ -3,7 +3,8 @@
 from typing import Any
 
 from gazerig.drivers.bus.timing import TIMING
-from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
+from gazerig.drivers.hobby_board.bus import HobbyBoardBus
+from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import ERRORS, build_board
@@ -42,7 +43,8 @@ class World:
         self.sent: list[Any] = []
         self.board = build_board(channels, lambda: self.now_s, crc, **options)
         self.port = InProcessPort(self.board, self.sent.append, "emulated board", self._sleep_until)
-        self.bus = MaestroBus(self.port, setups, MaestroParams(crc, channels), timing)
+        board = MaestroBoard(self.port, MaestroParams(crc, channels), timing)
+        self.bus = HobbyBoardBus(board, setups)
 
     def _sleep_until(self, at_s):
         self.now_s = max(self.now_s, at_s)

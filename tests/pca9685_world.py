@@ -5,7 +5,8 @@ import os
 from typing import Any
 
 from gazerig.drivers.bus.timing import BusTiming
-from gazerig.drivers.pca9685.board import Pca9685Bus, Pca9685Params
+from gazerig.drivers.hobby_board.bus import HobbyBoardBus
+from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -20,7 +21,7 @@ READ_FLAG = 0x0001
 
 def setup(servo_id, **changes):
     made = ServoConfig(servo_id, "hobby", 4400, 7600, SPEED_STEPS_S, f"joint {servo_id}")
-    return made._replace(rest_steps=6000, **changes)
+    return made._replace(**{"rest_steps": 6000, **changes})
 
 
 class World:
@@ -41,7 +42,7 @@ class World:
         self.sent: list[Any] = []
         self.port = InProcessPort(self.device, self.sent.append, "emulated", self._sleep_until)
         self.setups = [setup(i, **more) for i in ids]
-        self.bus = Pca9685Bus(self.port, self.setups, params, timing)
+        self.bus = HobbyBoardBus(Pca9685Board(self.port, params, timing), self.setups)
 
     def _sleep_until(self, t_s):
         self.now[0] = max(self.now[0], t_s)

@@ -86,9 +86,7 @@ def test_a_pulse_must_be_near_the_estimate_as_soon_as_a_board_that_is_behind_has
 
 def test_plans_begin_at_the_pulse_of_a_channel_that_was_enabled_again_or_is_outside():
     channel = held()
-    channel.ramp.shaft_steps = 5000
-    channel.record_rearm()
-    assert channel.ramp.shaft_steps == 6000
+    channel.rearmed = True
     assert channel.pop_rearmed() and not channel.pop_rearmed()
     channel.start(7800, 1.0)
     assert channel.pop_rearmed() and channel.pop_rearmed()

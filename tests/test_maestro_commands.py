@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.drivers.maestro.commands import (
+from gazerig.drivers.maestro.board import (
     GET_ERRORS,
     GET_POSITION,
     SET_ACCELERATION,

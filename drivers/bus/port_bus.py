@@ -28,18 +28,6 @@ class Exchange(Protocol):
         """Return the error counts by kind; other parts of the bus may add to them."""
 
 
-class BusSupervisor(Protocol):
-    """The part of a bus supervisor that ``PortBus`` needs.
-
-    engaged: whether goals are followed
-    """
-
-    engaged: bool
-
-    def stop_supervision(self) -> None:
-        """Stop supervision, as the servos have no torque."""
-
-
 class PortBus(ABC):
     """The servos on one port; base of implementations of gazerig.drivers.types.ServoBus.
 
@@ -56,7 +44,6 @@ class PortBus(ABC):
     _port: BusPort
     _line: Exchange
     _log: EventLog
-    _supervisor: BusSupervisor
     _setups: tuple[ServoConfig, ...]
     _target_setups: tuple[ServoConfig, ...]
     _baud: int
@@ -71,6 +58,10 @@ class PortBus(ABC):
         Raises:
             ValueError: a setup is not possible.
         """
+
+    @abstractmethod
+    def _stop_supervision(self) -> None:
+        """Stop supervision, as the servos have no torque."""
 
     @abstractmethod
     def _switch_off(self) -> ReleaseResult:
@@ -121,7 +112,7 @@ class PortBus(ABC):
             BusLost: the port is lost and cannot be reopened; the first read after it reconnects
                 switches torque off.
         """
-        self._supervisor.stop_supervision()
+        self._stop_supervision()
         if not self._opened:
             return
         if self._is_down and not self._reopen():
@@ -132,7 +123,7 @@ class PortBus(ABC):
     def close(self) -> None:
         """Close the port; safe to call twice. Servos keep their last goals."""
         self._opened = False
-        self._supervisor.stop_supervision()
+        self._stop_supervision()
         self._port.closePort()
 
     def _reopen_if_needed(self, now_s: float) -> bool:

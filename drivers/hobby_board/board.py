@@ -1,74 +1,190 @@
-"""Interface of a board that sends pulses to hobby servos; one class per kind of board.
+"""A board that sends pulses to hobby servos: its line, and what a kind of board defines.
 
 A board either ramps its pulses to their goals itself, within limits armed in it (Maestro), or
-applies pulses immediately, and the driver ramps them (PCA9685): ``send_goals`` then sends
-intermediate pulses.
+applies pulses immediately, and the driver ramps them (PCA9685). This module imports no more than
+the guardian needs in an emergency.
 """
 
+from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from math import inf
+from typing import TYPE_CHECKING, ClassVar
 
-from gazerig.drivers.bus.port_bus import Exchange
-from gazerig.drivers.bus.timing import BusTiming
+from gazerig.drivers.bus.release_result import ReleaseResult
+from gazerig.drivers.bus.timing import TIMING, BusTiming
+from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
-from gazerig.drivers.hobby_board.release import Stoppable
 from gazerig.drivers.process.host_lateness import HostLateness
-from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.types import ServoConfig
+from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
+
+if TYPE_CHECKING:  # the guardian starts without numpy
+    from gazerig.drivers.hobby_board.channel import Channel
+    from gazerig.drivers.types import ServoConfig
+
+TRIES = 3
+"""Number of attempts of operations that must not fail."""
+
+CHECK_SUPPLY = "check its power and the cable"
+
+ALIKE_STEPS = 400
+"""Largest difference between two readings of a pulse that is moving."""
 
 
-class ChannelStatus(NamedTuple):
-    """Status of a channel and of its board.
+class Board(ABC):
+    """One board, or several on one line; all methods that send may raise BusLost.
 
-    pulse_steps: present pulse of the channel, quarter microseconds; 0: none
-    errors: names of the board's errors since the last read
-    """
-
-    pulse_steps: int
-    errors: tuple[str, ...] = ()
-
-
-class Board(Stoppable, Exchange, Protocol):
-    """One board, or several on one line; all methods may raise BusLost.
-
-    port, lateness: its port, and the counter of late answers
+    tx_bytes, rx_bytes, errors: counts since creation
+    lateness: delays of this computer
     name: name for messages
     remedy: remedy if channels output other pulses than commanded
     longest_ramp_s: longest time for which the driver's ramps advance while nothing is sent; inf:
         the board itself ramps pulses
+
+    Args:
+        port: gazerig.drivers.serial.port.BlockingPort, or a port with its methods; not opened here.
+        params: Parameters of the board.
+        timing: Times of the bus.
     """
 
-    name: str
-    remedy: str
-    longest_ramp_s: float
-    timing: BusTiming
-    port: BusPort
-    lateness: HostLateness
+    name = "the board"
+    remedy: ClassVar[str]
+    longest_ramp_s: ClassVar[float] = inf
 
-    def __init__(self, port: BusPort, params: Any, timing: BusTiming) -> None:
-        """Use a port, which is not opened yet."""
+    def __init__(self, port: BusPort, params: HobbyBoardParams, timing: BusTiming = TIMING) -> None:
+        self.port, self.params, self.timing = port, params, timing
+        self.tx_bytes = self.rx_bytes = 0
+        self.errors: Counter[str] = Counter()
+        self.lateness = HostLateness()
+        self._owed_bytes = 0
 
-    @property
-    def params(self) -> HobbyBoardParams:
-        """Return its parameters from the rig file."""
+    # --- what a kind of board defines
 
-    def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
+    @abstractmethod
+    def find(self, setups: "Sequence[ServoConfig]", log: EventLog) -> tuple[int, ...]:
         """Find the board and return the pulses of these servos; nothing moves.
 
         Raises:
             ServoMissing: it does not answer, or a channel is not a servo channel.
         """
 
-    def prepare(self, log: EventLog) -> None:
+    def prepare(self) -> None:  # noqa: B027  # most boards need nothing
         """Prepare the board for goals, before any is sent."""
 
-    def read_status(self, channel: Channel) -> ChannelStatus | None:
-        """Read one channel's pulse and the board's errors; None without an answer."""
+    @abstractmethod
+    def read_status(self, channel: int) -> tuple[int, tuple[str, ...]] | None:
+        """Read a channel's pulse and the board's errors since the last read; None: no answer."""
 
-    def send_limits(self, channels: Sequence[Channel]) -> bool:
+    @abstractmethod
+    def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+        """Read pulses, quarter microseconds, 0 for none; None without an answer."""
+
+    @abstractmethod
+    def send_limits(self, channels: "Sequence[Channel]") -> bool:
         """Arm the speed limits of channels; return whether the board has confirmed them."""
 
-    def send_goals(self, channels: Sequence[Channel]) -> None:
+    @abstractmethod
+    def send_goals(self, channels: "Sequence[Channel]") -> None:
         """Send the goals of channels, or the intermediate pulses on the way to them."""
+
+    @abstractmethod
+    def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
+        """Stop the pulses of channels; on the last try also by stronger means."""
+
+    # --- the line
+
+    def open_port(self) -> None:
+        """Open the port.
+
+        Raises:
+            PortError: it cannot be opened.
+        """
+        if not self.port.setBaudRate(self.params.baud):
+            where = self.port.port_name
+            raise PortError(f"{where} cannot run at {self.params.baud} bit/s: choose 115200")
+
+    def send(self, packet: bytes) -> None:
+        """Send commands that are not answered."""
+        self.port.write(packet)
+        self.tx_bytes += len(packet)
+
+    def exchange(self, packet: bytes, length: int) -> bytes:
+        """Send requests and return their answers, fewer bytes if they do not come in time.
+
+        Answers have neither address nor checksum, and a late one looks like any other: what has
+        arrived since a missing one is discarded.
+        """
+        port = self.port
+        if self._owed_bytes:
+            if 0 < port.drain() <= self._owed_bytes:
+                self.lateness.record_late_answer(port.now_s())
+            self._owed_bytes = 0
+        wire_s = (len(packet) + length) * BITS_PER_BYTE / self.params.baud
+        deadline_s = port.now_s() + wire_s + self.timing.reply_timeout_s
+        answer, _ = port.exchange(packet, length, deadline_s)
+        self.tx_bytes += len(packet)
+        self.rx_bytes += len(answer)
+        if len(answer) < length:
+            self._owed_bytes = length - len(answer)
+            self.lateness.record_wait(deadline_s, port.now_s())
+        return answer
+
+    # --- what all boards have in common
+
+    def read_all(self, setups: "Sequence[ServoConfig]") -> tuple[int, ...]:
+        """Read the pulses of servos, twice, as they decide where servos are held.
+
+        Raises:
+            ServoMissing: a channel does not answer.
+        """
+        ids = [setup.id for setup in setups]
+        for _ in range(TRIES):
+            first, again = self.read_pulses(ids), self.read_pulses(ids)
+            if first is not None and again is not None and all(map(are_alike, first, again)):
+                return again
+        fault, remedy = f"{self.port.port_name}: answers are lost", CHECK_SUPPLY
+        for setup in setups:
+            if self.read_pulses((setup.id,)) is None:
+                fault = f"{self.port.port_name}: {setup.label('channel')} does not answer"
+                remedy += f"; has the board {self.params.channels} channels?"
+                break
+        raise ServoMissing(self.blame(fault, remedy))
+
+    def blame(self, fault: str, remedy: str) -> str:
+        """Return a fault with its remedy, or with this computer as its cause if it was late."""
+        return self.lateness.blame(fault, remedy, self.port.now_s())
+
+    def switch_off(self, channels: Sequence[int]) -> ReleaseResult:
+        """Stop the pulses and verify that they have stopped."""
+        left, heard = tuple(channels), False
+        for attempt in range(TRIES):
+            self.stop(left, attempt == TRIES - 1)
+            found = self.read_pulses(left)
+            if found is not None:
+                heard = True
+                left = tuple(channel for channel, pulse in zip(left, found, strict=True) if pulse)
+            if not left:
+                break
+        return ReleaseResult(left, ()) if heard else ReleaseResult((), left)
+
+
+def are_alike(pulse: int, again: int) -> bool:
+    """Return whether two readings of one pulse agree."""
+    return bool(pulse) == bool(again) and abs(pulse - again) <= ALIKE_STEPS
+
+
+def stop_pulses(board: Board, channels: Sequence[int]) -> tuple[int, ...]:
+    """Open a board's port and stop the pulses; return the channels that did not confirm it.
+
+    Args:
+        board: Board on a closed or open port, which stays open.
+        channels: Channels of the rig; others are not changed, unless these do not stop.
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: the port is lost.
+    """
+    board.open_port()
+    released = board.switch_off(channels)
+    return (*released.holding_ids, *released.unconfirmed_ids)

@@ -9,67 +9,64 @@ speed, with any armed limit.
 - No watchdog can be armed over the line: when this program dies the servos hold their last goals,
 unless the guardian process stops the pulses (gazerig.robot.guardian).
 - The board does not measure the servos' supply: a restart of a single servo is not detected.
+
+After an error or a restart a board outputs no pulses, and after a restart it has lost its settings.
+All channels are then enabled again, slowly, one after another. If that happens again soon, all stay
+without pulses and the fault is named.
 """
 
 from collections.abc import Collection, Sequence
 from math import inf, nan
-from typing import ClassVar
 
 from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.port_bus import CUT, PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
-from gazerig.drivers.bus.timing import TIMING, BusTiming
-from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import Board
-from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.params import HobbyBoardParams
-from gazerig.drivers.hobby_board.release import TRIES, switch_off
-from gazerig.drivers.hobby_board.supervisor import BoardSupervisor
-from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.hobby_board.board import CHECK_SUPPLY, TRIES, Board, are_alike
+from gazerig.drivers.hobby_board.channel import BEHIND_S, FINE_STEPS, Channel
+from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S
+from gazerig.drivers.serial.port import wait_until
 from gazerig.drivers.types import Feedback, ServoConfig
 
 UNMEASURED = "hobby servos report no positions: those shown are their goals"
+
+WITHIN_S = 10.0
+"""A board that loses its pulses twice within this time stays without."""
+
+MOST_TRIES = 300
+"""Failed attempts to enable channels again after which all stay without pulses."""
+
+IN_A_ROW, AGAIN_S = 3, 0.25
+"""A board is asked less often after so many missing answers, as each costs a read its time-out."""
 
 
 class HobbyBoardBus(PortBus):
     """The channels of one board; implements gazerig.drivers.types.ServoBus.
 
-    board_class: class of the board that sends the pulses
-
     Args:
-        port: gazerig.drivers.serial.port.BlockingPort, or a port with its methods.
+        board: Board that sends the pulses.
         setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
             are quarter microseconds.
-        params: Parameters of the board.
-        timing: Times of the bus.
 
     Raises:
         ValueError: a servo has a channel or a pulse width that the board does not have.
     """
 
-    board_class: ClassVar[type[Board]]
     holding_text = "pulses still on"
     unconfirmed_text = "end of pulses not confirmed"
-    _supervisor: BoardSupervisor
 
-    def __init__(
-        self,
-        port: BusPort,
-        setups: Sequence[ServoConfig],
-        params: HobbyBoardParams,
-        timing: BusTiming = TIMING,
-    ) -> None:
-        self._port = port
-        self._board = self._line = self.board_class(port, params, timing)
+    def __init__(self, board: Board, setups: Sequence[ServoConfig]) -> None:
+        self._board = self._line = board
+        self._port, self._baud = board.port, board.params.baud
+        self._give_up_s = board.timing.give_up_s
         self._check_setups(setups)
-        self._setups = self._target_setups = tuple(setups)
+        self._target_setups = tuple(setups)
         self._ids = tuple(setup.id for setup in setups)
         if len(set(self._ids)) < len(self._ids):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
         self._log = EventLog()
         self._nothing = Feedback.create_missing(len(self._ids))
-        self._baud, self._give_up_s = params.baud, timing.give_up_s
         self._reported = False
         self._create_parts()
 
@@ -77,11 +74,18 @@ class HobbyBoardBus(PortBus):
         """Create the stateful parts in their initial state."""
         self._setups = self._target_setups
         self._channels = tuple(Channel(setup, self._board.longest_ramp_s) for setup in self._setups)
-        self._supervisor = BoardSupervisor(self._board, self._channels, self._log)
-        self._is_down = self._release_due = False
+        # Whether goals are followed, and whether the board has kept its settings.
+        self._engaged, self._may_send = False, True
         self._limp = set[Channel]()
+        # Channels without a known position, until they are held again.
+        self._pending: list[Channel] = []
+        self._failed_tries, self._trouble_s = 0, -inf
+        self._turn = 0
+        self._missed, self._silent_since_s, self._due_s = 0, 0.0, -inf
+        self._is_silence_reported = False
+        self._is_down = self._release_due = False
 
-    # --- public interface
+    # --- torque on and off
 
     def open(self) -> None:
         """Open the port, find the board and every channel; nothing moves.
@@ -91,9 +95,7 @@ class HobbyBoardBus(PortBus):
             ServoMissing: the board or a channel does not answer.
         """
         self._create_parts()
-        if not self._port.setBaudRate(self._baud):
-            where = self._port.port_name
-            raise PortError(f"{where} cannot run at {self._baud} bit/s: choose 115200")
+        self._board.open_port()
         try:
             self._port.clearPort()
             pulses = self._board.find(self._setups, self._log)
@@ -103,51 +105,6 @@ class HobbyBoardBus(PortBus):
         for channel, pulse in zip(self._channels, pulses, strict=True):
             channel.adopt_position(pulse)
         self._opened = True
-
-    def read(self, now_s: float) -> Feedback:
-        """Read the board's errors and one pulse; return the estimated state of all servos.
-
-        All servos are missing if the board did not answer, and channels that lost their pulses are
-        missing until they are held again. A read always takes a bounded time. While the port is
-        lost all servos are missing, and the port is tried again at intervals.
-
-        Raises:
-            BusLost: port or board have been lost for longer than ``give_up_s``.
-        """
-        self._now_s = now_s
-        if (self._is_down or self._release_due) and not self._reopen_if_needed(now_s):
-            return self._nothing
-        try:
-            answered = self._supervisor.check(now_s)
-        except BusLost as lost:
-            self._record_loss(lost)
-            return self._nothing
-        if answered:
-            return self._estimate()
-        self._supervisor.check_silence(now_s)
-        return self._nothing
-
-    def _estimate(self) -> Feedback:
-        """Return the estimated state of all servos; none is measured."""
-        at_s, pending = self._port.now_s(), self._supervisor.pending
-        position, velocity, on, faults = list[float](), list[float](), list[bool](), list[str]()
-        rearmed, missing = list[bool](), list[int]()
-        for i, channel in enumerate(self._channels):
-            lost = channel in pending
-            position.append(nan if lost else round(channel.ramp.shaft_steps))
-            velocity.append(nan if lost else channel.ramp.shaft_steps_s)
-            on.append(channel.on)
-            faults.append(channel.fault)
-            rearmed.append(not lost and channel.pop_rearmed())
-            if lost:
-                missing.append(i)
-        nothing = self._nothing
-        load = tuple([nan if i in missing else 0.0 for i in range(len(on))])
-        times = tuple([-inf if i in missing else at_s for i in range(len(on))])
-        return Feedback(
-            tuple(position), tuple(velocity), load, times, nothing.temperature_c, nothing.voltage_v,
-            tuple(on), tuple(faults), (False,) * len(on), tuple(rearmed), tuple(missing),
-        )  # fmt: skip
 
     def enable_torque(self) -> tuple[int, ...]:
         """Hold every channel at its present pulse, clipped to its limits.
@@ -166,20 +123,70 @@ class HobbyBoardBus(PortBus):
         self._setups = self._target_setups
         for channel, setup in zip(self._channels, self._setups, strict=True):
             channel.set_target(setup)
+        if not self._reported:
+            self._reported = True
+            self._log.add(UNMEASURED)
         try:
-            if not self._reported:
-                self._reported = True
-                self._log.add(UNMEASURED)
-            self._supervisor.enable()
+            self._enable()
         except ServoMissing:
             self.disable_torque()
             raise
         except BusLost:
             self._release_due = True  # some channels may already have pulses
             raise
-        self._release_due = False
+        self._engaged = self._may_send = True
+        self._release_due, self._trouble_s = False, -inf
         self._limp.clear()
+        self._pending.clear()
         return tuple(channel.goal_steps for channel in self._channels)
+
+    def _enable(self) -> None:
+        """Hold every channel; channels without pulses one after another."""
+        board, port = self._board, self._port
+        board.prepare()
+        pulses = board.read_all(self._setups)
+        off = [c.label for c, pulse in zip(self._channels, pulses, strict=True) if not pulse]
+        if off:
+            self._log.add(f"{', '.join(off)} had no pulses: they move to their goals immediately")
+        start_s = -inf
+        for channel, pulse in zip(self._channels, pulses, strict=True):
+            channel.adopt_pulse(pulse)
+            if not pulse:
+                wait_until(port, start_s + board.timing.stagger_s)
+                start_s = port.now_s()
+            for _ in range(TRIES):
+                fault = self._hold(channel, pulse)
+                if not fault:
+                    break
+            else:
+                fault = f"{port.port_name}: {channel.label} {fault}"
+                raise ServoMissing(board.blame(fault, board.remedy))
+
+    def _hold(self, channel: Channel, pulse_steps: int = 0) -> str:
+        """Hold a channel at its present pulse, or without one at its servo's last position.
+
+        Speed and acceleration are armed before the goal is sent, and the pulse is read afterwards.
+        A first pulse is not ramped: the servo moves there at its own speed.
+
+        Returns:
+            "" if it is held, else the reason why not.
+        """
+        goal = channel.start(pulse_steps, self._port.now_s())
+        found = None
+        if self._board.send_limits([channel]):
+            self._board.send_goals([channel])
+            found = self._board.read_pulses((channel.id,))
+        channel.advance(self._port.now_s())
+        if found is None:
+            return "does not answer"
+        low, high = sorted((pulse_steps or goal, goal))
+        # A first pulse is exact; another one may have been moving when it was read.
+        room = FINE_STEPS + (BEHIND_S * channel.ramp.speed_steps_s if pulse_steps else 0.0)
+        if not found[0] or not low - room <= found[0] <= high + room:
+            channel.on = found[0] > 0
+            return channel.difference_text(found[0])
+        channel.record_hold(found[0])
+        return ""
 
     def set_limp(self, servos: Collection[int]) -> None:
         """Stop the pulses of these servos, by index; all others that were limp get them again.
@@ -187,7 +194,7 @@ class HobbyBoardBus(PortBus):
         Their first pulse is the last one before: a joint that was moved by hand returns there at
         the servo's own speed, as its position is not known. A channel that does not stop, is held.
         """
-        if not self._supervisor.engaged or self._is_down:
+        if not self._engaged or self._is_down:
             return
         wanted = [self._channels[i] for i in servos]
         off = [channel for channel in wanted if channel.held]
@@ -203,17 +210,163 @@ class HobbyBoardBus(PortBus):
                     break
             for channel in self._limp.difference(wanted):
                 self._limp.discard(channel)
-                if self._supervisor.hold(channel, 0):
-                    self._supervisor.pending.append(channel)
+                if self._hold(channel):
+                    self._pending.append(channel)
         except BusLost as lost:
             self._record_loss(lost)
+
+    # --- every tick
+
+    def read(self, now_s: float) -> Feedback:
+        """Read the board's errors and one pulse; return the estimated state of all servos.
+
+        All servos are missing if the board did not answer, and channels that lost their pulses are
+        missing until they are held again. A read always takes a bounded time. While the port is
+        lost all servos are missing, and the port is tried again at intervals.
+
+        Raises:
+            BusLost: port or board have been lost for longer than ``give_up_s``.
+        """
+        self._now_s = now_s
+        if (self._is_down or self._release_due) and not self._reopen_if_needed(now_s):
+            return self._nothing
+        try:
+            answered = now_s >= self._due_s and self._check()
+        except BusLost as lost:
+            self._record_loss(lost)
+            return self._nothing
+        self._check_silence(answered, now_s)
+        return self._estimate() if answered else self._nothing
+
+    def _check(self) -> bool:
+        """Read the status and one channel's pulse, and act on them; return whether all is known."""
+        self._turn = (self._turn + 1) % len(self._channels)
+        channel = self._channels[self._turn]
+        status = self._board.read_status(channel.id)
+        if status is None:
+            return False
+        pulse, errors = status
+        self._advance()
+        if channel.held:
+            if errors or not channel.is_expected(pulse):
+                first, again = pulse, self._board.read_status(channel.id)
+                if again is None:
+                    return False
+                self._advance()
+                pulse, errors = again[0], (*errors, *again[1])
+                if not channel.is_expected(pulse) and not are_alike(first, pulse):
+                    return False
+            self._may_send = channel.is_expected(pulse)
+            if self._may_send:
+                channel.adopt_pulse(pulse)
+            else:
+                self._handle_trouble(channel, pulse, errors)
+        elif not self._engaged:
+            channel.adopt_pulse(pulse)
+        if self._pending:
+            self._enable_next()
+        for one in self._channels:
+            low, high = one.setup.min_steps, one.setup.max_steps
+            if one.entering and low <= one.ramp.pulse_steps <= high:
+                one.entering = False
+                self._may_send = self._board.send_limits([one])
+        return True
+
+    def _advance(self) -> None:
+        now_s = self._port.now_s()
+        for channel in self._channels:
+            channel.advance(now_s)
+
+    def _handle_trouble(self, channel: Channel, pulse: int, errors: Sequence[str]) -> None:
+        """Handle a channel's pulse that was not expected, which may concern all channels."""
+        self._board.errors["restarted"] += 1
+        fault, remedy = "the board restarted", CHECK_SUPPLY
+        if errors:
+            fault = f"the board was sent home by an error ({' and '.join(errors)})"
+        elif pulse:
+            fault, remedy = f"{channel.label} {channel.difference_text(pulse)}", self._board.remedy
+        since_s, self._trouble_s = self._now_s - self._trouble_s, self._now_s
+        self._reset_after_reconnect()
+        if since_s < WITHIN_S:
+            self._stop_all(f"{fault}, for the second time in {since_s:.1f} s", remedy)
+        else:
+            self._log.add(f"{fault}: set up again")
+
+    def _enable_next(self) -> None:
+        """Enable one channel again; the next one at the next read, to spare the supply."""
+        channel = self._pending.pop(0)
+        fault = self._hold(channel)
+        if not fault:
+            # Plans must begin at its pulse.
+            channel.rearmed, channel.ramp.shaft_steps = True, channel.ramp.pulse_steps
+            return
+        self._pending.append(channel)
+        self._failed_tries += 1
+        if self._failed_tries >= MOST_TRIES:
+            self._stop_all(f"{channel.label} {fault}", self._board.remedy)
+
+    def _stop_all(self, fault: str, remedy: str) -> None:
+        """Stop the pulses of all channels, which stay without; name why."""
+        text = self._board.blame(fault, remedy)
+        self._log.add(f"no pulses any more: {text}")
+        self._board.stop(self._ids)
+        for channel in self._channels:
+            channel.record_stop(text)
+        self._pending.clear()
+
+    def _check_silence(self, answered: bool, now_s: float) -> None:
+        """Record whether the board has answered, and report a silence.
+
+        Raises:
+            BusLost: it has been silent for longer than ``give_up_s``.
+        """
+        if not self._missed:
+            self._silent_since_s = now_s
+        since_s, lateness = self._silent_since_s, self._board.lateness
+        silent_s = now_s - since_s
+        fault = f"the board has not answered for {silent_s:.1f} s"
+        if silent_s >= self._give_up_s and not answered:
+            text = f"{self._port.port_name}: {fault}"
+            raise BusLost(lateness.blame(text, CHECK_SUPPLY, now_s, since_s))
+        # A shorter silence looks like a busy computer, which late answers identify.
+        is_over = answered or bool(lateness.cause(now_s, since_s))
+        patience_s = SILENCE_S if is_over else BLAME_S
+        if silent_s >= patience_s and not self._is_silence_reported:
+            self._is_silence_reported = True
+            self._log.add(lateness.blame(fault, CHECK_SUPPLY, now_s, since_s))
+        if answered:
+            self._missed, self._due_s, self._is_silence_reported = 0, -inf, False
+        elif now_s >= self._due_s:
+            self._may_send = False
+            self._missed += 1
+            if self._missed >= IN_A_ROW:
+                self._due_s = now_s + AGAIN_S
+
+    def _estimate(self) -> Feedback:
+        """Return the estimated state of all servos; none is measured."""
+        at_s, none = self._port.now_s(), self._nothing
+        known = [channel not in self._pending for channel in self._channels]
+        both = list(zip(self._channels, known, strict=True))
+        return Feedback(
+            tuple([round(c.ramp.shaft_steps) if here else nan for c, here in both]),
+            tuple([c.ramp.shaft_steps_s if here else nan for c, here in both]),
+            tuple([0.0 if here else nan for here in known]),
+            tuple([at_s if here else -inf for here in known]),
+            none.temperature_c,
+            none.voltage_v,
+            tuple([c.on for c in self._channels]),
+            tuple([c.fault for c in self._channels]),
+            (False,) * len(known),
+            tuple([here and c.pop_rearmed() for c, here in both]),
+            tuple([i for i, here in enumerate(known) if not here]),
+        )
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every channel in one write; goals are clipped to the limits.
 
         Nothing is sent while no channel is held or the port is lost. While the board does not
         answer, pulses do not change: it may have restarted, and would apply goals without any speed
-        limit.
+        limit. Pulses that the driver ramps are repeated then, as a write may have been damaged.
 
         Raises:
             ValueError: a goal is not a number, or their number is wrong.
@@ -222,27 +375,24 @@ class HobbyBoardBus(PortBus):
         highest = [setup.max_steps for setup in self._setups]
         goals = clip_goals(goals_steps, lowest, highest)
         held = [channel for channel in self._channels if channel.held]
-        supervisor = self._supervisor
-        if not supervisor.engaged or self._is_down or not held:
+        if not self._engaged or self._is_down or not held:
             return
-        now_s = self._port.now_s()
+        if self._may_send:
+            now_s = self._port.now_s()
+            for channel, goal in zip(self._channels, goals, strict=True):
+                if channel.held:
+                    channel.advance(now_s)
+                    channel.goal_steps = goal
+        elif self._board.longest_ramp_s == inf:
+            return
         try:
-            if supervisor.may_send_goals:
-                for channel, goal in zip(self._channels, goals, strict=True):
-                    if channel.held:
-                        channel.advance(now_s)
-                        channel.goal_steps = goal
-                self._board.send_goals(held)
-            elif not supervisor.is_ramped_by_board:
-                self._board.send_goals(held)  # the same once more: a write may have been damaged
+            self._board.send_goals(held)
         except BusLost as lost:
             self._record_loss(lost)
 
     def faults(self) -> tuple[str, ...]:
-        """Return the present faults of channels and the board's errors of the last 10 s."""
-        channels = (f"{c.label}: {c.fault}" for c in self._channels if c.fault)
-        errors = self._supervisor.recent_errors(self._port.now_s())
-        return (*channels, *(f"{self._board.name}: {name}" for name in errors))
+        """Return the present faults of channels, one line each."""
+        return tuple(f"{c.label}: {c.fault}" for c in self._channels if c.fault)
 
     # --- parts of PortBus
 
@@ -250,8 +400,14 @@ class HobbyBoardBus(PortBus):
         for setup in setups:
             self._board.params.check_servo(setup)
 
+    def _stop_supervision(self) -> None:
+        self._engaged = False
+        self._pending.clear()
+        for channel in self._channels:
+            channel.record_release()
+
     def _switch_off(self) -> ReleaseResult:
-        released = switch_off(self._board, self._ids)
+        released = self._board.switch_off(self._ids)
         for channel in self._channels:
             if channel.id not in (*released.holding_ids, *released.unconfirmed_ids):
                 channel.record_stop()
@@ -268,4 +424,9 @@ class HobbyBoardBus(PortBus):
         )
 
     def _reset_after_reconnect(self) -> None:
-        self._supervisor.mark_all_for_recovery()
+        """Mark every channel that was held to be enabled again."""
+        self._failed_tries, self._may_send = 0, True
+        for channel in self._channels:
+            if channel.held:
+                channel.record_release()
+                self._pending.append(channel)

@@ -148,11 +148,6 @@ class Channel:
         self.held = self._is_position_known = True
         self.adopt_pulse(pulse_steps)
 
-    def record_rearm(self) -> None:
-        """Record that it was enabled again: plans must begin at its pulse."""
-        self.rearmed = True
-        self.ramp.shaft_steps = self.ramp.pulse_steps
-
     def pop_rearmed(self) -> bool:
         """Return whether plans must begin at its pulse; True once after it was enabled."""
         rearmed, self.rearmed = self.rearmed, False
@@ -186,6 +181,8 @@ class Channel:
 
     def is_expected(self, pulse_steps: int) -> bool:
         """Return whether a pulse is the estimated one, or one shortly before."""
+        if self._longest_ramp_s < inf:
+            return pulse_steps > 0  # the next goals correct it
         room = FINE_STEPS + self._moved_steps
         return pulse_steps > 0 and abs(pulse_steps - self.ramp.pulse_steps) <= room
 
@@ -214,10 +211,6 @@ class Channel:
         if pulse_steps:
             self.ramp.shaft_steps = pulse_steps
             self._is_position_known = True
-
-    def is_within_limits(self) -> bool:
-        """Return whether the pulse is within the limits."""
-        return self.setup.min_steps <= self.ramp.pulse_steps <= self.setup.max_steps
 
     def difference_text(self, pulse_steps: int) -> str:
         """Return how a pulse differs from the commanded one."""

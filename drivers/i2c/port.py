@@ -1,7 +1,7 @@
 """An I2C bus of the kernel as a byte port with the behaviour of a bridge chip.
 
-The commands are those of gazerig.drivers.i2c.line. The kernel itself frees a bus whose data line
-is held low, if its driver can.
+The commands are those of gazerig.drivers.i2c.transfers. The kernel itself frees a bus whose data
+line is held low, if its driver can.
 """
 
 import errno
@@ -14,7 +14,7 @@ from typing import Any
 from smbus2 import SMBus, i2c_msg
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.i2c.line import NO_ACKNOWLEDGE, OK, READ_STATUS, START, STOP, TIMED_OUT
+from gazerig.drivers.i2c.transfers import NO_ACKNOWLEDGE, OK, READ_STATUS, START, STOP, TIMED_OUT
 from gazerig.drivers.serial.list_ports import open_failure_text
 
 I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703

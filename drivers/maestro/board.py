@@ -1,74 +1,189 @@
 """A Pololu Maestro as a board of hobby servos: it ramps its pulses to their goals itself.
 
-Its own serial timeout, set with Pololu's program, helps if the cable or the computer fails.
+A command byte has its highest bit set; data bytes do not. Answers are plain bytes, low byte first,
+without a checksum. Source: Pololu Maestro Servo Controller User's Guide (0J40), sections 4.e and 5.
 """
 
-from collections.abc import Sequence
-from math import inf
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import ceil
+from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import ChannelStatus
-from gazerig.drivers.hobby_board.bus import HobbyBoardBus
-from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.supervisor import read_every_pulse
-from gazerig.drivers.maestro.commands import (
-    ACCEL_STEPS_S2,
-    ERRORS,
-    GET_ERRORS,
-    GET_POSITION,
-    MOST_INPUT,
-    SET_ACCELERATION,
-    SET_SPEED,
-    SPEED_STEPS_S,
-    accel_units,
-    name_errors,
-    speed_units,
-)
-from gazerig.drivers.maestro.line import MaestroLink
+from gazerig.drivers.hobby_board.board import TRIES, Board
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.types import ServoConfig
+
+if TYPE_CHECKING:  # the guardian starts without numpy
+    from gazerig.drivers.hobby_board.channel import Channel
+    from gazerig.drivers.types import ServoConfig
+
+SET_TARGET, SET_TARGETS, SET_SPEED, SET_ACCELERATION = 0x84, 0x9F, 0x87, 0x89
+GET_POSITION, GET_ERRORS, STOP_SCRIPT = 0x90, 0xA1, 0xA4
+
+MOST = 0x3FFF
+"""Largest number in two data bytes; no pulse width and no error register is larger."""
+
+MOST_INPUT = 1023
+"""Largest answer of an input channel, which reports its voltage as 0..1023 instead of a pulse
+width."""
+
+MICRO = 6
+"""Channels of the Micro Maestro, which has no command for several targets."""
+
+AT_ONCE = 6
+"""Largest number of requests in one write, as the board's receive buffer is small."""
+
+ERRORS = (
+    "serial signal error",
+    "serial overrun",
+    "serial buffer full",
+    "serial CRC error",
+    "serial protocol error",
+    "serial timeout",
+    "script stack error",
+    "script call stack error",
+    "script program counter error",
+)
+"""Errors by bit of the error register."""
+
+PROTOCOL_ERROR = ERRORS.index("serial protocol error")
+
+SPEED_STEPS_S = 100.0
+"""Unit of the board's speed limit: a quarter microsecond in 10 ms."""
+
+ACCEL_STEPS_S2 = SPEED_STEPS_S / 0.08
+"""Unit of its acceleration limit: that change of speed in 80 ms."""
+
+MOST_ACCEL = 255
+
+USB_CHANNELS = {"1ffb:0089": 6, "1ffb:008a": 12, "1ffb:008b": 18, "1ffb:008c": 24}
+"""Channels by USB vendor and product id."""
 
 
-class MaestroBoard(MaestroLink):
-    """One board; implements gazerig.drivers.hobby_board.board.Board."""
+@lru_cache(maxsize=256)
+def crc7(data: bytes) -> int:
+    """Return the check byte of a command: CRC-7, polynomial 0x91, lowest bit first."""
+    crc = 0
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc ^ 0x91) >> 1 if crc & 1 else crc >> 1
+    return crc
 
-    name = "the board"
+
+def name_errors(register: int) -> tuple[str, ...]:
+    """Return the names of the set bits of the error register."""
+    return tuple(name for bit, name in enumerate(ERRORS) if register >> bit & 1)
+
+
+@dataclass(frozen=True, slots=True)
+class MaestroCodec:
+    """Encoder of commands in the form that a board expects.
+
+    crc: whether every command ends in a check byte
+    channels: number of channels, which decides the available commands
+    """
+
+    crc: bool = False
+    channels: int = 12
+
+    def command(self, code: int, *data: int) -> bytes:
+        """Return the bytes of any command.
+
+        Raises:
+            ValueError: a data byte has its highest bit set.
+        """
+        if data and not 0 <= min(data) <= max(data) < 0x80:
+            raise ValueError(f"command {code:02X}: data bytes must be 0..127, not {data}")
+        packet = bytes((code, *data))
+        return packet + bytes((crc7(packet),)) if self.crc else packet
+
+    def number(self, code: int, channel: int, number: int) -> bytes:
+        """Encode a target (0: no pulses) or a limit (0: none) of a channel, low byte first."""
+        return self.command(code, channel, number & 0x7F, number >> 7)
+
+    def targets(self, goals: Mapping[int, int]) -> bytes:
+        """Encode targets: one command for every run of adjacent channels, if the board has it.
+
+        goals: pulse width by channel, quarter microseconds
+        """
+        packet, run = b"", list[int]()
+        for channel in sorted(goals):
+            run.append(channel)
+            if channel + 1 in goals and self.channels > MICRO:
+                continue
+            if len(run) == 1:
+                packet += self.number(SET_TARGET, channel, goals[channel])
+            else:
+                widths = [goals[one] for one in run]
+                data = [part for width in widths for part in (width & 0x7F, width >> 7)]
+                packet += self.command(SET_TARGETS, len(run), run[0], *data)
+            run.clear()
+        return packet
+
+
+def speed_units(steps_s: float) -> int:
+    """Return the smallest speed limit that is not below a speed; 0 (unlimited) if there is none.
+
+    Raises:
+        ValueError: it is not a positive number.
+    """
+    return _units(steps_s / SPEED_STEPS_S, MOST, "speed")
+
+
+def accel_units(steps_s2: float | None) -> int:
+    """Return the smallest limit that is not below an acceleration; 0 (unlimited) if there is none.
+
+    Raises:
+        ValueError: it is not a positive number.
+    """
+    return 0 if steps_s2 is None else _units(steps_s2 / ACCEL_STEPS_S2, MOST_ACCEL, "acceleration")
+
+
+def _units(wanted: float, most: int, what: str) -> int:
+    if not wanted > 0.0:
+        raise ValueError(f"a {what} limit must be above 0, not {wanted}")
+    # A value slightly above whole units is a rounding error of an earlier conversion.
+    return 0 if wanted > most else max(1, ceil(wanted - 1e-9))
+
+
+class MaestroBoard(Board):
+    """One board on its USB command port, or on its serial pins."""
+
     remedy = "set its channel to Servo and widen its range in Pololu's program, without a script"
-    longest_ramp_s = inf
+    params: MaestroParams
 
     def __init__(self, port: BusPort, params: MaestroParams, timing: BusTiming = TIMING) -> None:
         super().__init__(port, params, timing)
-        self.params, self.timing = params, timing
-        self._errors_first = False
+        self._codec = MaestroCodec(params.crc, params.channels)
 
-    def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
+    def find(self, setups: "Sequence[ServoConfig]", log: EventLog) -> tuple[int, ...]:
         """Find the board and return the pulses of these servos; nothing moves.
 
         Raises:
-            BusLost: the port is lost.
             ServoMissing: it does not answer, or a channel is not a servo channel.
         """
         where = self.port.port_name
-        register = self.read_errors()
-        if register is None:
+        errors = self.read_errors()
+        if errors is None:
             remedy = (
                 "take the first of its two USB ports and set it to 'USB Dual Port' in Pololu's "
                 f"program; its CRC must be {'on' if self.params.crc else 'off'}"
             )
-            fault = f"{where}: no Maestro answers"
-            raise ServoMissing(self.lateness.blame(fault, remedy, self.port.now_s()))
+            raise ServoMissing(self.blame(f"{where}: no Maestro answers", remedy))
         if not self.expects_crc():
             raise ServoMissing(
                 f"{where}: the board expects no CRC: switch Enable CRC on in Pololu's program, as "
                 "noise moves servos without it, or set crc to false"
             )
-        if register:
-            named = ", ".join(name_errors(register))
-            log.add(f"the board had earlier errors, cleared now: {named}")
-        pulses = read_every_pulse(self, setups)
+        if errors:
+            log.add(f"the board had earlier errors, cleared now: {', '.join(errors)}")
+        pulses = self.read_all(setups)
         for setup, pulse in zip(setups, pulses, strict=True):
             if 0 < pulse <= MOST_INPUT:
                 raise ServoMissing(
@@ -77,35 +192,66 @@ class MaestroBoard(MaestroLink):
                 )
         return pulses
 
-    def prepare(self, log: EventLog) -> None:
-        """Stop the board's own script if one runs, as it would also move servos."""
-        if self.is_script_running():
-            self.stop_script()
-            log.add("the board was running its own script: stopped")
+    def prepare(self) -> None:
+        """Stop the board's own script, which would also move servos."""
+        self.send(self._codec.command(STOP_SCRIPT))
 
-    def read_status(self, channel: Channel) -> ChannelStatus | None:
-        """Read one channel's pulse and the error register; None without an answer."""
-        codec = self.codec
-        position, errors = codec.command(GET_POSITION, channel.id), codec.command(GET_ERRORS)
-        # The order alternates: on a line that repeats its last answer a pulse width takes the place
-        # of the register, which is detected.
-        self._errors_first = not self._errors_first
-        found = self.ask_words(errors + position if self._errors_first else position + errors, 2)
-        if found is None:
+    def read_errors(self) -> tuple[str, ...] | None:
+        """Read the board's errors, which clears them; None if it is silent."""
+        for _ in range(TRIES):
+            found = self._ask_words(self._codec.command(GET_ERRORS), 1)
+            if found is not None and not found[0] >> len(ERRORS):
+                return name_errors(found[0])
+        return None
+
+    def expects_crc(self) -> bool:
+        """Return whether the board expects check bytes, if these are sent.
+
+        Other boards answer too, but find an error in every command.
+        """
+        if not self.params.crc:
+            return True
+        self.read_errors()
+        return ERRORS[PROTOCOL_ERROR] not in (self.read_errors() or ())
+
+    def read_status(self, channel: int) -> tuple[int, tuple[str, ...]] | None:
+        """Read a channel's pulse and the board's errors since the last read; None: no answer."""
+        packet = self._codec.command(GET_POSITION, channel) + self._codec.command(GET_ERRORS)
+        found = self._ask_words(packet, 2)
+        if found is None or found[1] >> len(ERRORS):
+            return None  # such errors do not exist: noise
+        return found[0], name_errors(found[1])
+
+    def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+        """Read pulses, quarter microseconds, 0 for none; None without an answer."""
+        pulses: tuple[int, ...] = ()
+        for i in range(0, len(channels), AT_ONCE):
+            some = channels[i : i + AT_ONCE]
+            packet = b"".join(self._codec.command(GET_POSITION, channel) for channel in some)
+            found = self._ask_words(packet, len(some))
+            if found is None:
+                return None
+            pulses += found
+        return pulses
+
+    def _ask_words(self, packet: bytes, count: int) -> tuple[int, ...] | None:
+        """Send requests and return their answers as 16-bit words; None without a good answer."""
+        answer = self.exchange(packet, 2 * count)
+        if len(answer) < 2 * count:
+            self.errors["incomplete" if answer else "timeout"] += 1
             return None
-        pulse, register = found[::-1] if self._errors_first else found
-        if register >> len(ERRORS):
-            # Such errors do not exist: it is a pulse width instead of the register, or noise.
+        found = struct.unpack(f"<{count}H", answer)
+        if max(found) > MOST:
             self.errors["damaged"] += 1
             return None
-        return ChannelStatus(pulse, name_errors(register))
+        return found
 
-    def send_limits(self, channels: Sequence[Channel]) -> bool:
+    def send_limits(self, channels: "Sequence[Channel]") -> bool:
         """Arm speed and acceleration; return whether the board has found no error.
 
         On an error it may have stopped all pulses, so no command that moves a servo may follow.
         """
-        packet, codec = b"", self.codec
+        packet, codec = b"", self._codec
         for channel in channels:
             speed = speed_units(channel.top_speed_steps_s)
             accel = accel_units(channel.setup.max_accel_steps_s2)
@@ -113,15 +259,50 @@ class MaestroBoard(MaestroLink):
             channel.ramp.accel_steps_s2 = accel * ACCEL_STEPS_S2
             packet += codec.number(SET_SPEED, channel.id, speed)
             packet += codec.number(SET_ACCELERATION, channel.id, accel)
-        found = self.ask_words(packet + codec.command(GET_ERRORS), 1)
+        found = self._ask_words(packet + codec.command(GET_ERRORS), 1)
         return found is not None and not found[0]
 
-    def send_goals(self, channels: Sequence[Channel]) -> None:
+    def send_goals(self, channels: "Sequence[Channel]") -> None:
         """Send the goals of channels."""
-        self.send(self.codec.targets({one.id: one.goal_steps for one in channels}))
+        self.send(self._codec.targets({one.id: one.goal_steps for one in channels}))
+
+    def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
+        """Stop pulses, each by its own command, so that a damaged one affects no other."""
+        self.send(b"".join(self._codec.number(SET_TARGET, channel, 0) for channel in channels))
 
 
-class MaestroBus(HobbyBoardBus):
-    """The channels of one Maestro; see HobbyBoardBus for its arguments."""
+class DetectedMaestro(NamedTuple):
+    """A board that answers.
 
-    board_class = MaestroBoard
+    expects_crc: whether it expects a check byte after every command
+    errors: errors of its error register, which is now cleared
+    pulses: pulse widths of the first channels, quarter microseconds; 0: no pulses
+    """
+
+    expects_crc: bool
+    errors: tuple[str, ...]
+    pulses: tuple[int, ...]
+
+
+def probe(port: BusPort, params: MaestroParams) -> DetectedMaestro | None:
+    """Return the Maestro at a port, None if no Maestro answers; nothing moves.
+
+    The port stays open. A board treats unknown commands as errors, and on an error it sends its
+    channels home. So the other setting of check bytes is tried only if it is silent, and only the
+    channels that every board has are read.
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: the port is lost.
+    """
+    for crc in (params.crc, not params.crc):
+        board = MaestroBoard(port, replace(params, crc=crc))
+        board.open_port()
+        port.drain()
+        errors = board.read_errors()
+        if errors is not None and board.expects_crc():
+            for _ in range(TRIES):  # a busy host may have been late, not the board
+                pulses = board.read_pulses(range(MICRO))
+                if pulses is not None:
+                    return DetectedMaestro(crc, errors, pulses)
+    return None

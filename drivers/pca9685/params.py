@@ -4,14 +4,18 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
-from gazerig.drivers.pca9685.registers import CHANNELS, PulseClock
 from gazerig.params import Bounds
 
-_PULSES_HZ = 50.0
+PULSES_HZ = 50.0
 """Analogue servos need 50 pulses per second."""
+
+CHANNELS, COUNTS = 16, 4096
+LEAST_PRESCALE = 3
 
 RESERVED = (0x70, *range(0x78, 0x80))
 """All boards answer at 70 after power-up; from 78 on addresses have another meaning on I2C."""
+
+ADDRESSES = tuple(address for address in range(0x40, 0x80) if address not in RESERVED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +37,8 @@ class Pca9685Params(HobbyBoardParams):
         Raises:
             ValueError: they are not; the message names them.
         """
-        for address in self.addresses:
-            if address in RESERVED:
-                raise ValueError(f"address {address:#x} is reserved: boards have 0x40 to 0x77")
+        for address in set(self.addresses).intersection(RESERVED):
+            raise ValueError(f"address {address:#x} is reserved: boards have 0x40 to 0x77")
         if len(set(self.addresses)) < len(self.addresses):
             raise ValueError("two boards have the same address: each needs its own")
 
@@ -45,9 +48,9 @@ class Pca9685Params(HobbyBoardParams):
         return (self.address, *self.further_addresses)
 
     @property
-    def clock(self) -> PulseClock:
-        """Return the clock of the boards."""
-        return PulseClock.of_frequency(_PULSES_HZ, self.oscillator_hz)
+    def prescale(self) -> int:
+        """Return the divider of the oscillator for the rate of the pulses."""
+        return max(LEAST_PRESCALE, round(self.oscillator_hz / (COUNTS * PULSES_HZ)) - 1)
 
     @property
     def channels(self) -> int:

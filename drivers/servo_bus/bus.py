@@ -301,6 +301,9 @@ class SmartServoBus(PortBus):
             for i, fault in sorted(self._supervisor.faults.items())
         )
 
+    def _stop_supervision(self) -> None:
+        self._supervisor.stop_supervision()
+
     def _switch_off(self) -> ReleaseResult:
         return switch_off(self._line, self._ids)
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from math import ceil, floor
 
 from gazerig.drivers.hobby_board.params import US_STEPS
-from gazerig.drivers.maestro.commands import accel_units, speed_units
+from gazerig.drivers.maestro.board import accel_units, speed_units
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoConfig
 

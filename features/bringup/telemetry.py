@@ -10,8 +10,7 @@ from math import degrees
 from typing import NamedTuple, Protocol
 
 from gazerig.drivers.hobby_board.params import US_STEPS
-from gazerig.drivers.maestro.commands import MOST_INPUT
-from gazerig.drivers.maestro.line import MaestroLink
+from gazerig.drivers.maestro.board import MOST_INPUT, MaestroBoard
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
@@ -110,11 +109,11 @@ class MaestroTelemetry:
     """Reads only the pulses of the channels of a Maestro."""
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
-        self._line = MaestroLink(port, params)
+        self._board = MaestroBoard(port, params)
 
     def read(self, joint: JointParams) -> Telemetry | None:
         """Read a joint's pulse; see TelemetryReader."""
-        found = self._line.read_pulses((joint.id,))
+        found = self._board.read_pulses((joint.id,))
         return None if found is None else pulse_telemetry(joint, found[0])
 
 

@@ -66,21 +66,21 @@ def _smart(plan: ReleasePlan) -> Releaser:
 
 
 def _maestro(plan: ReleasePlan) -> Releaser:
-    from gazerig.drivers.hobby_board.release import stop_pulses
-    from gazerig.drivers.maestro.line import MaestroLink
+    from gazerig.drivers.hobby_board.board import stop_pulses
+    from gazerig.drivers.maestro.board import MaestroBoard
 
     params = MaestroParams(plan.crc, plan.channels)
-    return lambda port: stop_pulses(port, plan.baud, MaestroLink(port, params), plan.ids)
+    return lambda port: stop_pulses(MaestroBoard(port, params), plan.ids)
 
 
 def _pca9685(plan: ReleasePlan) -> Releaser:
-    from gazerig.drivers.hobby_board.release import stop_pulses
+    from gazerig.drivers.hobby_board.board import stop_pulses
     from gazerig.drivers.pca9685.board import Pca9685Board
     from gazerig.drivers.pca9685.params import Pca9685Params
 
     first, *more = plan.addresses
     params = Pca9685Params(first, tuple(more))
-    return lambda port: stop_pulses(port, params.baud, Pca9685Board(port, params), plan.ids)
+    return lambda port: stop_pulses(Pca9685Board(port, params), plan.ids)
 
 
 def _package_releaser(plan: ReleasePlan) -> Releaser:

@@ -8,10 +8,9 @@ from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one
 from present import present
 
 from gazerig.drivers.feetech.memory_table import TABLE_END
-from gazerig.drivers.i2c.line import write
+from gazerig.drivers.i2c.transfers import write
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.pca9685.registers import (
+from gazerig.drivers.pca9685.board import (
     AWAKE,
     LED0,
     MODE1,
@@ -19,13 +18,14 @@ from gazerig.drivers.pca9685.registers import (
     SLEEP,
     pulse_registers,
 )
+from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.bus_search import SearchRound
 from gazerig.features.bringup.cli.scan import scan_remarks
-from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685, stop_script
+from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685
 from gazerig.features.bringup.doctor.diagnostics import (
     Diagnostic,
     Fix,
@@ -34,7 +34,6 @@ from gazerig.features.bringup.doctor.diagnostics import (
 from gazerig.features.bringup.doctor.examination import (
     UDEV_RULE,
     PortFacts,
-    apply_fixes,
     examine_latency,
     examine_port,
     fix_latency,
@@ -428,17 +427,6 @@ def test_errors_that_it_held(name, says, level, cure):
     assert not any("cleared now" in f.what for f in rig.check())
 
 
-def test_a_script_is_stopped_by_fix():
-    rig = BoardRig()
-    rig.board.is_script_running = True
-    findings = rig.check()
-    assert one(findings, "warn", "the board", "runs a script")
-    assert rig.board.is_script_running  # looking alone does not stop it
-    (done,) = apply_fixes(lambda _: stop_script(rig.port, rig.params), findings)
-    assert done == "the board: script 1 -> 0: done"
-    assert not rig.board.is_script_running and worst_level(rig.check()) != "warn"
-
-
 # --- PCA9685
 
 CHANNELS = (
@@ -460,7 +448,7 @@ class Pca9685Rig:
         self.port.setBaudRate(PCA9685.baud)
         for register, data in (
             (MODE1, bytes((SLEEP,))),
-            (PRESCALE, bytes((PCA9685.clock.prescale,))),
+            (PRESCALE, bytes((PCA9685.prescale,))),
             (MODE1, bytes((AWAKE,))),
             (LED0 + 4 * channel, pulse_registers(counts)),
         ):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
-from gazerig.drivers.maestro.commands import MaestroCodec
+from gazerig.drivers.maestro.board import MaestroCodec
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.calibration.endstop_search import (
     STEPS_PER_DEG,

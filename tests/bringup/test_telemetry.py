@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import ServoFault, SetupError
-from gazerig.drivers.maestro.commands import MaestroCodec
+from gazerig.drivers.maestro.board import MaestroCodec
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
 from gazerig.features.bringup.cli.record_track import app

@@ -7,10 +7,12 @@ board has no watchdog: a guardian stops the pulses if this program is killed.
 from collections.abc import Callable
 
 from gazerig.drivers.errors import BusLost
+from gazerig.drivers.hobby_board.board import Board
+from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.hobby_board.params import US_STEPS
-from gazerig.drivers.maestro.board import MaestroBus
+from gazerig.drivers.maestro.board import MaestroBoard
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.board import Pca9685Bus
+from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoBus, ServoConfig
@@ -62,11 +64,12 @@ class HobbyServoAccess:
         speed = SPEED_US_S * US_STEPS
         self._setup = ServoConfig(joint.id, joint.model, low, high, speed, name)
         self._maestro = isinstance(params, MaestroParams)
-        bus: ServoBus
+        board: Board
         if isinstance(params, MaestroParams):
-            bus = MaestroBus(port, [self._setup], params)
+            board = MaestroBoard(port, params)
         else:
-            bus = Pca9685Bus(port, [self._setup], params)
+            board = Pca9685Board(port, params)
+        bus = HobbyBoardBus(board, [self._setup])
         self._bus: ServoBus = (
             bus if guardian is None else GuardedBus(bus, [self._setup], guardian, 0)
         )

@@ -27,9 +27,8 @@ from gazerig.features.bringup.cli.ports import (
     setups_on,
 )
 from gazerig.features.bringup.doctor import examination as checkup
-from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685, stop_script
+from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685
 from gazerig.features.bringup.doctor.diagnostics import (
-    BOARD,
     Diagnostic,
     Fix,
     finding_json,
@@ -165,8 +164,6 @@ def _apply_fixes(
 
 def _write_fix(line: BusPort, config: BusConfig, setups: Sequence[ServoConfig], fix: Fix) -> str:
     """Write one fix; return "" or the reason of a failure."""
-    if fix.servo_id == BOARD:
-        return stop_script(line, config.maestro)
     kind, baud = servo_kind(setups[0].model), config.section.baud
     if fix.register == checkup.ADOPT:
         return checkup.adopt_spare(line, kind, fix, setups, baud, progress)

@@ -15,8 +15,8 @@ from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.hobby_board.params import US_STEPS
+from gazerig.drivers.pca9685.board import probe
 from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.pca9685.probe import probe
 from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.features.bringup.bus_search import (
@@ -248,12 +248,10 @@ def _show(rounds: Sequence[SearchRound], where: str, as_json: bool) -> None:
             size = "6 channels or more (asking for one too many would send all of them home)"
         crc = "on" if board.expects_crc else "off"
         given = [f"{n}: {pulse / US_STEPS:g} us" for n, pulse in enumerate(board.pulses) if pulse]
-        script: dict[bool | None, str] = {True: "its own script runs", False: "no script runs"}
         for line in (
             f"Pololu Maestro: {size}, CRC {crc}",
             f"pulses: {', '.join(given) or 'none'} (channels 0..{len(board.pulses) - 1})",
             f"errors it held, cleared by asking: {', '.join(board.errors) or 'none'}",
-            script.get(board.is_script_running, "its script: no answer"),
         ):
             out.print(f"{where}: {line}", markup=False)
     for line in scan_remarks(rounds, where):

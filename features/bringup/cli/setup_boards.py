@@ -12,10 +12,9 @@ from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.maestro.board import MaestroBoard
-from gazerig.drivers.maestro.probe import USB_CHANNELS
+from gazerig.drivers.maestro.board import USB_CHANNELS, MaestroBoard
 from gazerig.drivers.pca9685.board import Pca9685Board
-from gazerig.drivers.pca9685.registers import CHANNELS
+from gazerig.drivers.pca9685.params import CHANNELS
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.maestro_settings import instructions
@@ -91,7 +90,7 @@ def set_up_maestro(task: SetupTask) -> None:
         line.setBaudRate(params.baud)
         board, log = MaestroBoard(line, params), EventLog()
         board.find((), log)
-        board.prepare(log)
+        board.prepare()
         for event in log.drain():
             say(f"   {event}")
     say(_LOOK)

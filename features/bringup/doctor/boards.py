@@ -11,24 +11,26 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import servo_label
-from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.params import US_STEPS
-from gazerig.drivers.maestro.commands import MICRO, MOST_INPUT
-from gazerig.drivers.maestro.line import MaestroLink
+from gazerig.drivers.maestro.board import (
+    MICRO,
+    MOST_INPUT,
+    USB_CHANNELS,
+    DetectedMaestro,
+    MaestroBoard,
+    probe,
+)
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.diagnostics import BOARD, Advice, Diagnostic, Fix
+from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic
 from gazerig.features.bringup.maestro_settings import FACTORY_US, wide_range
 
 WHERE = "the board"
-
-SCRIPT = "script"
-"""Pseudo-register: whether the board's own script runs (1) or not (0)."""
 
 TIMEOUT = "serial timeout"
 _BAD_SCRIPT = "its script is at fault: delete it in Pololu's program"
@@ -75,8 +77,6 @@ ADVICE = {
         "write bus.maestro.channels: {size}"),
     "timeout": Advice("note", "held an error, cleared now: {error}", "{cure}"),
     "error": Advice("warn", "held an error, cleared now: {error}", "{cure}"),
-    "script": Advice("warn", "runs a script of its own, which may move servos against the program",
-        "gazerig doctor --fix stops it; for good delete it in Pololu's program"),
     "wide range": Advice("note", "goes to {low:g}..{high:g} us, beyond the "
         "{factory[0]}..{factory[1]} us of a new board, which cuts goals silently",
         "set its Min to {range[0]} and its Max to {range[1]} in Pololu's program"),
@@ -190,11 +190,11 @@ def examine_maestro(
     if found is None:
         return [ADVICE["mute"].at(WHERE)]
     channels = size or params.channels
-    line = MaestroLink(port, replace(params, crc=found.expects_crc))
+    line = MaestroBoard(port, replace(params, crc=found.expects_crc))
     pulses = _read_pulses(line, setups, channels, found, size is not None)
     crc = "on" if found.expects_crc else "off"
     named = f"{channels} channels{'' if size else ' assumed'}"
-    well = f"answers, CRC {crc}, {named}, no script"
+    well = f"answers, CRC {crc}, {named}"
     own = []
     if found.expects_crc != params.crc:
         own.append(ADVICE["CRC" if found.expects_crc else "no CRC"].at(WHERE))
@@ -205,8 +205,6 @@ def examine_maestro(
         advice = ADVICE["timeout" if error == TIMEOUT else "error"]
         cure = CURES.get(error, "look it up in Pololu's guide")
         own.append(advice.at(WHERE, error=error, cure=cure))
-    if found.is_script_running:
-        own.append(ADVICE["script"].at(WHERE, Fix(BOARD, SCRIPT, 0, 1)))
     findings = examine_channels(MAESTRO, setups, pulses, channels, own, well)
     wide = [
         ADVICE["wide range"].at(
@@ -223,7 +221,7 @@ def examine_maestro(
 
 
 def _read_pulses(
-    line: MaestroLink,
+    line: MaestroBoard,
     setups: Sequence[ServoConfig],
     channels: int,
     found: DetectedMaestro,
@@ -249,21 +247,6 @@ def _read_pulses(
     return pulses
 
 
-def stop_script(port: BusPort, params: MaestroParams) -> str:
-    """Stop the board's script; return "" or the reason of a failure. Nothing moves.
-
-    Raises:
-        PortError: the port cannot be opened.
-        BusLost: it has disappeared.
-    """
-    found = probe(port, params)
-    if found is None:
-        raise PortError(f"{port.port_name}: no Maestro answers: gazerig doctor names the cure")
-    line = MaestroLink(port, replace(params, crc=found.expects_crc))
-    line.stop_script()
-    return "" if line.is_script_running() is False else "it runs on"
-
-
 # --- PCA9685
 
 
@@ -276,9 +259,8 @@ def examine_pca9685(
         PortError: the port cannot be opened.
         BusLost: it has disappeared.
     """
-    if not port.setBaudRate(params.baud):
-        raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: name its port")
     board = Pca9685Board(port, params)
+    board.open_port()
     findings, fitting = [], []
     for setup in setups:
         try:

@@ -10,16 +10,12 @@ from gazerig.robot.control.event_text import format_ranges
 Level = Literal["ok", "note", "warn", "error"]
 LEVELS: tuple[Level, ...] = ("ok", "note", "warn", "error")
 
-BOARD = -1
-"""Used instead of a servo id: the board to which the servos are connected."""
-
 _JOINT = re.compile(r"(\w+) \((servo|channel) (\d+)\)")
 
 
 class Fix(NamedTuple):
     """Write to one register that repairs a fault and moves nothing.
 
-    servo_id: ``BOARD`` for the board itself, whose "registers" are its settings
     was: the previous value, None if it could not be read
     """
 
