@@ -103,7 +103,6 @@ class ServoConfig(NamedTuple):
         addition to planned goals (Maestro); None: unlimited
     rest_steps: assumed position of a servo without feedback when its pulses begin: its position
         before torque was switched off; None if it is not needed
-    own_speed_steps_s: speed of such a servo, from its data sheet; None: max_speed_steps_s
     entry_speed_steps_s: speed at which it moves into its limits from outside; None: 30 deg/s at its
         own shaft
     far_steps: distance outside its limits beyond which it gets no torque again after a restart
@@ -119,7 +118,6 @@ class ServoConfig(NamedTuple):
     strength: float | None = None
     max_accel_steps_s2: float | None = None
     rest_steps: int | None = None
-    own_speed_steps_s: float | None = None
     entry_speed_steps_s: float | None = None
     far_steps: float = inf
 

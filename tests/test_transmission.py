@@ -90,8 +90,6 @@ def test_a_hobby_joint_is_set_up_in_quarter_microseconds() -> None:
     assert setup.rest_steps == round(made.steps(radians(10.0)))
     assert setup.max_speed_steps_s == pytest.approx(radians(400.0) * made.steepest)
     assert setup.max_accel_steps_s2 == pytest.approx(radians(20000.0) * made.steepest)
-    # 1000..2000 us are a quarter turn by custom: 600 deg/s are 26667 quarter microseconds/s.
-    assert setup.own_speed_steps_s == pytest.approx(600.0 / 90.0 * 4000.0)
 
 
 @pytest.mark.parametrize(
@@ -117,8 +115,8 @@ def test_the_shipped_rods_give_every_joint_its_whole_range(maker_rig: Rig) -> No
         setup = joint.setup(name, 0.0)
         assert setup.max_steps - setup.min_steps > 4 * 250, name
         assert 2000 <= setup.min_steps < setup.max_steps <= 10000, name
-        own = setup.own_speed_steps_s
-        assert own is not None
-        # What the joint may do at its steepest is near what its servo can, so that an estimated
-        # place is seldom behind its goal for long.
+        assert joint.servo_speed_deg_s is not None
+        own = joint.servo_speed_deg_s / 90.0 * 4000.0
+        # What the joint may do at its steepest is near what its servo can, so that it is seldom
+        # behind its pulse for long.
         assert setup.max_speed_steps_s < 1.25 * own, name

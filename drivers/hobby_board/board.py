@@ -69,9 +69,6 @@ class Board(ABC):
             ServoMissing: it does not answer, or a channel is not a servo channel.
         """
 
-    def prepare(self) -> None:  # noqa: B027  # most boards need nothing
-        """Prepare the board for goals, before any is sent."""
-
     @abstractmethod
     def read_status(self, channel: int) -> tuple[int, tuple[str, ...]] | None:
         """Read a channel's pulse and the board's errors since the last read; None: no answer."""

@@ -16,7 +16,7 @@ without pulses and the fault is named.
 """
 
 from collections.abc import Collection, Sequence
-from math import inf, nan
+from math import inf
 
 from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.port_bus import CUT, PortBus
@@ -36,9 +36,6 @@ WITHIN_S = 10.0
 
 MOST_TRIES = 300
 """Failed attempts to enable channels again after which all stay without pulses."""
-
-IN_A_ROW, AGAIN_S = 3, 0.25
-"""A board is asked less often after so many missing answers, as each costs a read its time-out."""
 
 
 class HobbyBoardBus(PortBus):
@@ -67,7 +64,6 @@ class HobbyBoardBus(PortBus):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
         self._log = EventLog()
         self._nothing = Feedback.create_missing(len(self._ids))
-        self._reported = False
         self._create_parts()
 
     def _create_parts(self) -> None:
@@ -81,7 +77,7 @@ class HobbyBoardBus(PortBus):
         self._pending: list[Channel] = []
         self._failed_tries, self._trouble_s = 0, -inf
         self._turn = 0
-        self._missed, self._silent_since_s, self._due_s = 0, 0.0, -inf
+        self._silent_since_s: float | None = None
         self._is_silence_reported = False
         self._is_down = self._release_due = False
 
@@ -103,7 +99,8 @@ class HobbyBoardBus(PortBus):
             self._port.closePort()
             raise
         for channel, pulse in zip(self._channels, pulses, strict=True):
-            channel.adopt_position(pulse)
+            channel.adopt_pulse(pulse)
+        self._log.add(UNMEASURED)
         self._opened = True
 
     def enable_torque(self) -> tuple[int, ...]:
@@ -123,9 +120,6 @@ class HobbyBoardBus(PortBus):
         self._setups = self._target_setups
         for channel, setup in zip(self._channels, self._setups, strict=True):
             channel.set_target(setup)
-        if not self._reported:
-            self._reported = True
-            self._log.add(UNMEASURED)
         try:
             self._enable()
         except ServoMissing:
@@ -143,7 +137,6 @@ class HobbyBoardBus(PortBus):
     def _enable(self) -> None:
         """Hold every channel; channels without pulses one after another."""
         board, port = self._board, self._port
-        board.prepare()
         pulses = board.read_all(self._setups)
         off = [c.label for c, pulse in zip(self._channels, pulses, strict=True) if not pulse]
         if off:
@@ -185,7 +178,7 @@ class HobbyBoardBus(PortBus):
         if not found[0] or not low - room <= found[0] <= high + room:
             channel.on = found[0] > 0
             return channel.difference_text(found[0])
-        channel.record_hold(found[0])
+        channel.record_hold()
         return ""
 
     def set_limp(self, servos: Collection[int]) -> None:
@@ -220,9 +213,9 @@ class HobbyBoardBus(PortBus):
     def read(self, now_s: float) -> Feedback:
         """Read the board's errors and one pulse; return the estimated state of all servos.
 
-        All servos are missing if the board did not answer, and channels that lost their pulses are
-        missing until they are held again. A read always takes a bounded time. While the port is
-        lost all servos are missing, and the port is tried again at intervals.
+        All servos are missing if the board did not answer, or while channels that lost their pulses
+        are not yet held again. A read always takes a bounded time. While the port is lost all
+        servos are missing, and the port is tried again at intervals.
 
         Raises:
             BusLost: port or board have been lost for longer than ``give_up_s``.
@@ -231,38 +224,35 @@ class HobbyBoardBus(PortBus):
         if (self._is_down or self._release_due) and not self._reopen_if_needed(now_s):
             return self._nothing
         try:
-            answered = now_s >= self._due_s and self._check()
+            answered = self._check()
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
         self._check_silence(answered, now_s)
-        return self._estimate() if answered else self._nothing
+        if not answered:
+            self._may_send = False
+        return self._estimate() if answered and not self._pending else self._nothing
 
     def _check(self) -> bool:
-        """Read the status and one channel's pulse, and act on them; return whether all is known."""
+        """Read the status and one channel's pulse, and act on them; return whether it answered."""
         self._turn = (self._turn + 1) % len(self._channels)
         channel = self._channels[self._turn]
-        status = self._board.read_status(channel.id)
+        status = self._read_status(channel)
         if status is None:
             return False
         pulse, errors = status
-        self._advance()
-        if channel.held:
-            if errors or not channel.is_expected(pulse):
-                first, again = pulse, self._board.read_status(channel.id)
-                if again is None:
-                    return False
-                self._advance()
-                pulse, errors = again[0], (*errors, *again[1])
-                if not channel.is_expected(pulse) and not are_alike(first, pulse):
-                    return False
-            self._may_send = channel.is_expected(pulse)
-            if self._may_send:
-                channel.adopt_pulse(pulse)
-            else:
-                self._handle_trouble(channel, pulse, errors)
-        elif not self._engaged:
+        if not self._engaged:
             channel.adopt_pulse(pulse)
+        elif channel.held and (errors or not channel.is_expected(pulse)):
+            again = self._read_status(channel)
+            if again is None:
+                return False
+            first, pulse, errors = pulse, again[0], (*errors, *again[1])
+            if not channel.is_expected(pulse):
+                if not are_alike(first, pulse):
+                    return False
+                self._handle_trouble(channel, pulse, errors)
+        self._may_send |= channel.held
         if self._pending:
             self._enable_next()
         for one in self._channels:
@@ -272,10 +262,11 @@ class HobbyBoardBus(PortBus):
                 self._may_send = self._board.send_limits([one])
         return True
 
-    def _advance(self) -> None:
-        now_s = self._port.now_s()
-        for channel in self._channels:
-            channel.advance(now_s)
+    def _read_status(self, channel: Channel) -> tuple[int, tuple[str, ...]] | None:
+        status, now_s = self._board.read_status(channel.id), self._port.now_s()
+        for one in self._channels:
+            one.advance(now_s)
+        return status
 
     def _handle_trouble(self, channel: Channel, pulse: int, errors: Sequence[str]) -> None:
         """Handle a channel's pulse that was not expected, which may concern all channels."""
@@ -297,8 +288,7 @@ class HobbyBoardBus(PortBus):
         channel = self._pending.pop(0)
         fault = self._hold(channel)
         if not fault:
-            # Plans must begin at its pulse.
-            channel.rearmed, channel.ramp.shaft_steps = True, channel.ramp.pulse_steps
+            channel.rearmed = True
             return
         self._pending.append(channel)
         self._failed_tries += 1
@@ -320,45 +310,36 @@ class HobbyBoardBus(PortBus):
         Raises:
             BusLost: it has been silent for longer than ``give_up_s``.
         """
-        if not self._missed:
-            self._silent_since_s = now_s
-        since_s, lateness = self._silent_since_s, self._board.lateness
-        silent_s = now_s - since_s
+        since_s = now_s if self._silent_since_s is None else self._silent_since_s
+        self._silent_since_s = None if answered else since_s
+        silent_s, lateness = now_s - since_s, self._board.lateness
         fault = f"the board has not answered for {silent_s:.1f} s"
-        if silent_s >= self._give_up_s and not answered:
-            text = f"{self._port.port_name}: {fault}"
-            raise BusLost(lateness.blame(text, CHECK_SUPPLY, now_s, since_s))
+        if not answered and silent_s >= self._give_up_s:
+            fault = f"{self._port.port_name}: {fault}"
+            raise BusLost(lateness.blame(fault, CHECK_SUPPLY, now_s, since_s))
         # A shorter silence looks like a busy computer, which late answers identify.
-        is_over = answered or bool(lateness.cause(now_s, since_s))
-        patience_s = SILENCE_S if is_over else BLAME_S
+        patience_s = SILENCE_S if answered or lateness.cause(now_s, since_s) else BLAME_S
         if silent_s >= patience_s and not self._is_silence_reported:
-            self._is_silence_reported = True
             self._log.add(lateness.blame(fault, CHECK_SUPPLY, now_s, since_s))
-        if answered:
-            self._missed, self._due_s, self._is_silence_reported = 0, -inf, False
-        elif now_s >= self._due_s:
-            self._may_send = False
-            self._missed += 1
-            if self._missed >= IN_A_ROW:
-                self._due_s = now_s + AGAIN_S
+            self._is_silence_reported = True
+        self._is_silence_reported &= not answered
 
     def _estimate(self) -> Feedback:
         """Return the estimated state of all servos; none is measured."""
-        at_s, none = self._port.now_s(), self._nothing
-        known = [channel not in self._pending for channel in self._channels]
-        both = list(zip(self._channels, known, strict=True))
-        return Feedback(
-            tuple([round(c.ramp.shaft_steps) if here else nan for c, here in both]),
-            tuple([c.ramp.shaft_steps_s if here else nan for c, here in both]),
-            tuple([0.0 if here else nan for here in known]),
-            tuple([at_s if here else -inf for here in known]),
-            none.temperature_c,
-            none.voltage_v,
-            tuple([c.on for c in self._channels]),
-            tuple([c.fault for c in self._channels]),
-            (False,) * len(known),
-            tuple([here and c.pop_rearmed() for c, here in both]),
-            tuple([i for i, here in enumerate(known) if not here]),
+        channels, no = self._channels, (False,) * len(self._channels)
+        rearmed = tuple([channel.rearmed or channel.entering for channel in channels])
+        for channel in channels:
+            channel.rearmed = False
+        return self._nothing._replace(
+            position_steps=tuple([round(channel.ramp.pulse_steps) for channel in channels]),
+            velocity_steps_s=tuple([channel.ramp.mean_steps_s for channel in channels]),
+            load=(0.0,) * len(channels),
+            at_s=(self._port.now_s(),) * len(channels),
+            torque=tuple([channel.on for channel in channels]),
+            fault=tuple([channel.fault for channel in channels]),
+            measured=no,
+            rearmed=rearmed,
+            missing=(),
         )
 
     def write(self, goals_steps: Sequence[int]) -> None:
@@ -375,7 +356,7 @@ class HobbyBoardBus(PortBus):
         highest = [setup.max_steps for setup in self._setups]
         goals = clip_goals(goals_steps, lowest, highest)
         held = [channel for channel in self._channels if channel.held]
-        if not self._engaged or self._is_down or not held:
+        if not self._engaged or self._is_down or self._pending or not held:
             return
         if self._may_send:
             now_s = self._port.now_s()

@@ -1,6 +1,6 @@
-"""Channel of a board: its commanded pulse and its servo's estimated position."""
+"""Channel of a board: its commanded pulse, at which its servo is assumed to be."""
 
-from math import ceil, exp, inf, sqrt
+from math import ceil, inf, sqrt
 
 from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
 from gazerig.drivers.hobby_board.params import HOBBY, US_STEPS
@@ -10,72 +10,56 @@ _SLICE_S = 0.005
 _LONG_S = 5.0
 """Time after which any pulse has arrived."""
 
-
-class Ramp:
-    """Ramp of one channel's pulse and shaft.
-
-    A pulse moves towards its goal at a limited speed and acceleration, ramped by the board or by
-    the driver. The servo's shaft follows the pulse at its own speed. The shaft is not measured: the
-    result is an estimate, which is wrong for a stuck or loaded servo. Steps are quarter
-    microseconds.
-
-    pulse_steps: present pulse; shaft_steps, shaft_steps_s: estimated position and speed of the
-        servo
-    speed_steps_s, accel_steps_s2: limits of the pulse; 0: unlimited
-    shaft_speed_steps_s: speed of the servo itself
-    """
-
-    def __init__(self, place_steps: float, shaft_speed_steps_s: float) -> None:
-        self.shaft_speed_steps_s = shaft_speed_steps_s
-        self.speed_steps_s = self.accel_steps_s2 = 0.0
-        self.shaft_steps = place_steps
-        self.begin(place_steps)
-
-    def begin(self, pulse_steps: float) -> None:
-        """Record that pulses begin, or already are, at a width; the shaft does not move."""
-        self.pulse_steps = pulse_steps
-        self.shaft_steps_s = 0.0
-        self._pulse_steps_s = 0.0
-
-    def advance(self, goal_steps: float, for_s: float) -> None:
-        """Advance the pulse and the shaft towards a goal."""
-        if for_s <= 0.0:
-            return
-        if self.pulse_steps == goal_steps == self.shaft_steps:
-            self._pulse_steps_s = self.shaft_steps_s = 0.0
-            return
-        pulse, shaft, slices = self.pulse_steps, self.shaft_steps, 1
-        if for_s <= _LONG_S:
-            slices = ceil(for_s / _SLICE_S)
-        slice_s = for_s / slices
-        limit, accel, pulse_steps_s = self.speed_steps_s, self.accel_steps_s2, self._pulse_steps_s
-        at_once = slice_s > _LONG_S or not (limit or accel)
-        reach = self.shaft_speed_steps_s * slice_s
-        for _ in range(slices):
-            left = goal_steps - pulse
-            if at_once or left == 0.0:
-                pulse, pulse_steps_s = goal_steps, 0.0
-            else:
-                way, far = (1.0, left) if left > 0.0 else (-1.0, -left)
-                speed = limit or far / slice_s
-                if accel:
-                    towards = max(0.0, way * pulse_steps_s)
-                    speed = min(speed, towards + accel * slice_s, sqrt(2.0 * accel * far))
-                if speed * slice_s >= far:
-                    pulse, pulse_steps_s = goal_steps, way * far / slice_s
-                else:
-                    pulse += way * speed * slice_s
-                    pulse_steps_s = way * speed
-            shaft += min(reach, max(-reach, pulse - shaft))
-        self.shaft_steps_s = (shaft - self.shaft_steps) / for_s
-        self.pulse_steps, self.shaft_steps, self._pulse_steps_s = pulse, shaft, pulse_steps_s
-
-
 BEHIND_S = 0.1
 """Longest delay of the board behind the last goals: its period is 20 ms, and lines are slow."""
 
 FINE_STEPS = 24
 """Tolerance of an expected pulse at rest, half a degree: the grain of a PCA9685 is 20 steps."""
+
+
+class Ramp:
+    """Ramp of one channel's pulse, in the board or in the driver. Steps are quarter microseconds.
+
+    pulse_steps: present pulse
+    speed_steps_s, accel_steps_s2: limits of the pulse; 0: unlimited
+    mean_steps_s: mean speed of the last advance
+    """
+
+    def __init__(self) -> None:
+        self.speed_steps_s = self.accel_steps_s2 = 0.0
+        self.begin(0.0)
+
+    def begin(self, pulse_steps: float) -> None:
+        """Record that pulses begin, or already are, at a width."""
+        self.pulse_steps = pulse_steps
+        self.mean_steps_s = self._pulse_steps_s = 0.0
+
+    def advance(self, goal_steps: float, for_s: float) -> None:
+        """Advance the pulse towards a goal."""
+        if for_s <= 0.0:
+            return
+        slices = ceil(for_s / _SLICE_S) if for_s <= _LONG_S else 1
+        slice_s = for_s / slices
+        limit, accel, pulse_steps_s = self.speed_steps_s, self.accel_steps_s2, self._pulse_steps_s
+        at_once = slice_s > _LONG_S or not (limit or accel)
+        pulse = self.pulse_steps
+        for _ in range(slices):
+            left = goal_steps - pulse
+            if at_once or left == 0.0:
+                pulse, pulse_steps_s = goal_steps, 0.0
+                break
+            way, far = (1.0, left) if left > 0.0 else (-1.0, -left)
+            speed = limit or far / slice_s
+            if accel:
+                towards = max(0.0, way * pulse_steps_s)
+                speed = min(speed, towards + accel * slice_s, sqrt(2.0 * accel * far))
+            if speed * slice_s >= far:
+                pulse, pulse_steps_s = goal_steps, way * far / slice_s
+            else:
+                pulse += way * speed * slice_s
+                pulse_steps_s = way * speed
+        self.mean_steps_s = (pulse - self.pulse_steps) / for_s
+        self.pulse_steps, self._pulse_steps_s = pulse, pulse_steps_s
 
 
 class Channel:
@@ -95,31 +79,22 @@ class Channel:
 
     def __init__(self, setup: ServoConfig, longest_ramp_s: float = inf) -> None:
         self._longest_ramp_s = longest_ramp_s
-        self.id = setup.id
+        self.id, self.label = setup.id, setup.label("channel")
         self.on = self.held = self.entering = self.rearmed = False
         self.fault = ""
-        self.ramp = Ramp(0.0, 0.0)
+        self.ramp = Ramp()
         self._is_position_known = False
         self._at_s = -inf
-        self._moved_steps = 0.0
         self.set_target(setup)
 
     def set_target(self, setup: ServoConfig) -> None:
         """Apply a changed setup of the same servo."""
         self.setup = setup
-        self.ramp.shaft_speed_steps_s = setup.own_speed_steps_s or setup.max_speed_steps_s
         if not self._is_position_known:
             middle = (setup.min_steps + setup.max_steps) // 2
             rest = middle if setup.rest_steps is None else setup.rest_steps
             self.goal_steps = min(max(rest, setup.min_steps), setup.max_steps)
-            self.ramp.shaft_steps = self.goal_steps
-            if not self.on:
-                self.ramp.begin(self.goal_steps)
-
-    @property
-    def label(self) -> str:
-        """Return its label for messages."""
-        return self.setup.label("channel")
+            self.ramp.begin(self.goal_steps)
 
     @property
     def top_speed_steps_s(self) -> float:
@@ -128,30 +103,28 @@ class Channel:
             return entry_speed_steps_s(self.setup, HOBBY["hobby"].steps_per_turn)
         return self.setup.max_speed_steps_s
 
-    # --- commands
+    def adopt_pulse(self, pulse_steps: int) -> None:
+        """Adopt the pulse of a channel that is not held; 0: none."""
+        self.on = pulse_steps > 0
+        if self.on:
+            self._is_position_known = True
+            self.goal_steps = pulse_steps
+            self.ramp.begin(pulse_steps)
 
     def start(self, pulse_steps: int, now_s: float) -> int:
         """Hold at the present pulse, or at the last position if there is none; return the goal."""
-        wanted = pulse_steps or round(self.ramp.shaft_steps)
+        wanted = pulse_steps or round(self.ramp.pulse_steps)
         self.goal_steps = min(max(wanted, self.setup.min_steps), self.setup.max_steps)
         self.entering = pulse_steps not in (0, self.goal_steps)
-        if not (self.on and pulse_steps):
-            # A first pulse is not ramped, as there is no pulse to ramp from.
-            self.ramp.begin(pulse_steps or self.goal_steps)
+        # A first pulse is not ramped, as there is no pulse to ramp from.
+        self.ramp.begin(pulse_steps or self.goal_steps)
         self.on, self.fault = True, ""
         self._at_s = now_s
-        self._moved_steps = 0.0
         return self.goal_steps
 
-    def record_hold(self, pulse_steps: int) -> None:
-        """Record that it holds a pulse and follows new goals."""
-        self.held = self._is_position_known = True
-        self.adopt_pulse(pulse_steps)
-
-    def pop_rearmed(self) -> bool:
-        """Return whether plans must begin at its pulse; True once after it was enabled."""
-        rearmed, self.rearmed = self.rearmed, False
-        return rearmed or self.entering
+    def record_hold(self) -> None:
+        """Record that it has pulses and follows goals."""
+        self.on = self.held = self._is_position_known = True
 
     def record_release(self) -> None:
         """Record that it follows no goals any more; its pulses may continue."""
@@ -161,56 +134,24 @@ class Channel:
         """Record that it outputs no pulses: its servo has no torque, and is assumed not to move."""
         self.record_release()
         self.on, self.fault = False, fault or self.fault
-        self.ramp.begin(self.ramp.shaft_steps)
-
-    # --- estimated state
+        self.ramp.begin(self.ramp.pulse_steps)
 
     def advance(self, now_s: float) -> None:
         """Advance the estimate to ``now_s``."""
         spent_s = now_s - self._at_s
         if self.on and 0.0 < spent_s < inf:
-            before = self.ramp.pulse_steps
             if spent_s > self._longest_ramp_s:
-                # The ramp was paused, so it begins from rest.
-                self.ramp.advance(before, spent_s - self._longest_ramp_s)
+                self.ramp.begin(self.ramp.pulse_steps)  # it was paused, so it begins from rest
                 spent_s = self._longest_ramp_s
             self.ramp.advance(self.goal_steps, spent_s)
-            self._moved_steps *= exp(-spent_s / BEHIND_S)
-            self._moved_steps += abs(self.ramp.pulse_steps - before)
         self._at_s = now_s
 
     def is_expected(self, pulse_steps: int) -> bool:
-        """Return whether a pulse is the estimated one, or one shortly before."""
+        """Return whether a pulse can be the commanded one."""
         if self._longest_ramp_s < inf:
             return pulse_steps > 0  # the next goals correct it
-        room = FINE_STEPS + self._moved_steps
+        room = FINE_STEPS + BEHIND_S * self.ramp.speed_steps_s
         return pulse_steps > 0 and abs(pulse_steps - self.ramp.pulse_steps) <= room
-
-    def adopt_pulse(self, pulse_steps: int) -> None:
-        """Adopt the pulse width that the board reports, if the board ramps it."""
-        if pulse_steps and self.held:
-            if self._longest_ramp_s < inf:
-                return  # by now it is beyond the last one sent
-            if not self.entering:
-                # No goal is outside, so a byte was damaged; answers have no checksum.
-                pulse_steps = min(max(pulse_steps, self.setup.min_steps), self.setup.max_steps)
-            # The estimate moves there once more, which is not a motion.
-            again_steps = abs(pulse_steps - self.ramp.pulse_steps)
-            self._moved_steps = max(0.0, self._moved_steps - again_steps)
-        elif pulse_steps:
-            self.goal_steps = pulse_steps
-        self.on = pulse_steps > 0
-        if self.on:
-            self.ramp.pulse_steps = pulse_steps
-        else:
-            self.ramp.begin(self.ramp.shaft_steps)
-
-    def adopt_position(self, pulse_steps: int) -> None:
-        """Adopt a pulse as the servo's position, as it has been unchanged for a long time."""
-        self.adopt_pulse(pulse_steps)
-        if pulse_steps:
-            self.ramp.shaft_steps = pulse_steps
-            self._is_position_known = True
 
     def difference_text(self, pulse_steps: int) -> str:
         """Return how a pulse differs from the commanded one."""

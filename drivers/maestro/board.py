@@ -163,7 +163,7 @@ class MaestroBoard(Board):
         self._codec = MaestroCodec(params.crc, params.channels)
 
     def find(self, setups: "Sequence[ServoConfig]", log: EventLog) -> tuple[int, ...]:
-        """Find the board and return the pulses of these servos; nothing moves.
+        """Find the board, stop its own script and return the pulses of these servos.
 
         Raises:
             ServoMissing: it does not answer, or a channel is not a servo channel.
@@ -183,6 +183,7 @@ class MaestroBoard(Board):
             )
         if errors:
             log.add(f"the board had earlier errors, cleared now: {', '.join(errors)}")
+        self.send(self._codec.command(STOP_SCRIPT))  # which would also move servos
         pulses = self.read_all(setups)
         for setup, pulse in zip(setups, pulses, strict=True):
             if 0 < pulse <= MOST_INPUT:
@@ -191,10 +192,6 @@ class MaestroBoard(Board):
                     "move: set it to Servo in Pololu's program"
                 )
         return pulses
-
-    def prepare(self) -> None:
-        """Stop the board's own script, which would also move servos."""
-        self.send(self._codec.command(STOP_SCRIPT))
 
     def read_errors(self) -> tuple[str, ...] | None:
         """Read the board's errors, which clears them; None if it is silent."""

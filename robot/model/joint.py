@@ -182,8 +182,8 @@ class JointParams:
         "measured points of a push-rod linkage, each [joint angle, servo position]; they replace sign, ratio and zero_step"] = ()
     bus: Annotated[str, "name of the joint's bus under buses; empty: the one under bus"] = ""
     servo_speed_deg_s: Annotated[float | None, Bounds(10, 5000),
-        "speed of a hobby servo's own shaft (0.12 s for 60 deg is 500), used to estimate its position because it has no "
-        "feedback; null: max_speed_deg_s"] = None
+        "speed of a hobby servo's own shaft (0.12 s for 60 deg is 500), for emulated servos; null: that of a usual "
+        "servo"] = None
     gains: Annotated[tuple[_Gain, _Gain, _Gain] | None, "Position P, I and D Gain of the servo; null: not changed"] = None
     torque_limit: Annotated[float | None, Bounds(0.05, 1),
         "share of its full drive that the servo may use (PWM Limit), which limits both torque and speed; null: not changed"] = None
@@ -286,7 +286,6 @@ class JointParams:
         """
         linkage, facts = self.make_linkage(), self.model_facts
         ends = sorted(linkage.steps(radians(end)) for end in (self.min_deg, self.max_deg))
-        own = self.servo_speed_deg_s
         return ServoConfig(
             self.id,
             self.model,
@@ -298,7 +297,6 @@ class JointParams:
             self.torque_limit,
             radians(self.max_accel_deg_s2) * linkage.steepest,
             None if rest_rad is None or facts.measures_position else round(linkage.steps(rest_rad)),
-            None if own is None else own * facts.steps_per_turn / 360.0,
             radians(min(ENTRY_DEG_S, gentle_deg_s)) * linkage.steepest,
             radians(FAR_DEG) * linkage.steepest,
         )

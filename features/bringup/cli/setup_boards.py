@@ -90,7 +90,6 @@ def set_up_maestro(task: SetupTask) -> None:
         line.setBaudRate(params.baud)
         board, log = MaestroBoard(line, params), EventLog()
         board.find((), log)
-        board.prepare()
         for event in log.drain():
             say(f"   {event}")
     say(_LOOK)
