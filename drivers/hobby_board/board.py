@@ -119,7 +119,9 @@ class Board(ABC):
             self._owed_bytes = 0
         wire_s = (len(packet) + length) * BITS_PER_BYTE / self.params.baud
         deadline_s = port.now_s() + wire_s + self.timing.reply_timeout_s
-        answer, _ = port.exchange(packet, length, deadline_s)
+        port.clearPort()
+        port.write(packet)
+        answer = port.read_until(length, deadline_s)
         self.tx_bytes += len(packet)
         self.rx_bytes += len(answer)
         if len(answer) < length:

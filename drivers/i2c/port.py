@@ -14,17 +14,16 @@ from typing import Any
 from smbus2 import SMBus, i2c_msg
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.i2c.transfers import NO_ACKNOWLEDGE, OK, READ_STATUS, START, STOP, TIMED_OUT
+from gazerig.drivers.i2c.transfers import NO_ACKNOWLEDGE, OK, READ_STATUS, START, STOP
 from gazerig.drivers.serial.list_ports import open_failure_text
 
-I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703
+I2C_RETRIES, I2C_TIMEOUT = 0x0701, 0x0702
 """Requests of the kernel's i2c-dev."""
 READ_FLAG = 0x0001
 TIMEOUT_10_MS = 2
 """Time-out of a transfer in units of 10 ms: 20 ms instead of one second."""
 
 _GONE = (errno.ENODEV, errno.ENOENT, errno.EBADF, errno.ESHUTDOWN)
-_STUCK = (errno.ETIMEDOUT, errno.EAGAIN, errno.EBUSY, errno.EINTR)
 
 OpenBus = Callable[[str], Any]
 """Opens a bus by its path: smbus2's SMBus, or an emulated one with its methods."""
@@ -50,9 +49,7 @@ class I2cPort:
         self.port_name = port_name
         self._exclusive, self._on_traffic, self._open_bus = exclusive, on_traffic, open_bus
         self._bus: Any = None
-        self._status = OK
-        self._waiting = b""
-        self._checked: set[int] = set()
+        self._status, self._waiting = OK, b""
 
     def now_s(self) -> float:
         """Return host monotonic seconds."""
@@ -66,20 +63,16 @@ class I2cPort:
         """
         self.closePort()
         try:
-            bus = self._open_bus(self.port_name)
-        except OSError as error:
-            raise PortError(open_failure_text(self.port_name, error.errno)) from error
-        if bus.fd is not None:
-            try:
+            self._bus = self._open_bus(self.port_name)
+            if self._bus.fd is not None:
                 if self._exclusive:
-                    fcntl.flock(bus.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                fcntl.ioctl(bus.fd, I2C_TIMEOUT, TIMEOUT_10_MS)
-                fcntl.ioctl(bus.fd, I2C_RETRIES, 1)
-            except OSError as error:
-                bus.close()
-                raise PortError(open_failure_text(self.port_name, error.errno)) from error
-        self._bus, self._waiting, self._status = bus, b"", OK
-        self._checked.clear()
+                    fcntl.flock(self._bus.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.ioctl(self._bus.fd, I2C_TIMEOUT, TIMEOUT_10_MS)
+                fcntl.ioctl(self._bus.fd, I2C_RETRIES, 1)
+        except OSError as error:
+            self.closePort()
+            raise PortError(open_failure_text(self.port_name, error.errno)) from error
+        self._status, self._waiting = OK, b""
         return True
 
     def closePort(self) -> None:
@@ -94,10 +87,7 @@ class I2cPort:
         Raises:
             BusLost: the bus is gone.
         """
-        if self._on_traffic is not None:
-            self._on_traffic()
-        if self._bus is None:
-            raise self._lost("it is closed")
+        self._begin()
         at = 0
         while at < len(data):
             if data.startswith(READ_STATUS, at):
@@ -107,35 +97,23 @@ class I2cPort:
                 at, messages = transfer_at(data, at)
                 self._status = self._execute(messages)
 
+    def _begin(self) -> None:
+        if self._on_traffic is not None:
+            self._on_traffic()
+        if self._bus is None:
+            raise self._lost("it is closed")
+
     def _execute(self, messages: Sequence[Any]) -> int:
         """Execute one transfer; return its status."""
         try:
-            self._check_free(messages[0].addr)
             self._bus.i2c_rdwr(*messages)
         except OSError as error:
             unplugged = self._bus.fd is not None and not os.path.exists(self.port_name)
             if error.errno in _GONE or unplugged:
                 raise self._lost(error) from error
-            return TIMED_OUT if error.errno in _STUCK else NO_ACKNOWLEDGE
-        for message in messages:
-            if message.flags & READ_FLAG:
-                self._waiting += bytes(message)
+            return NO_ACKNOWLEDGE
+        self._waiting += b"".join([bytes(one) for one in messages if one.flags & READ_FLAG])
         return OK
-
-    def _check_free(self, address: int) -> None:
-        """Check that no kernel driver has claimed an address."""
-        if self._bus.fd is None or address in self._checked:
-            return
-        try:
-            fcntl.ioctl(self._bus.fd, I2C_SLAVE, address)
-        except OSError as error:
-            if error.errno == errno.EBUSY:
-                raise BusLost(
-                    f"{self.port_name}: a driver of the kernel has the chip at {address:#x}: remove "
-                    "its overlay (pca9685) from the system's configuration"
-                ) from error
-            raise
-        self._checked.add(address)
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return up to ``length`` available bytes; if there are none, wait until the deadline.
@@ -143,19 +121,12 @@ class I2cPort:
         Raises:
             BusLost: the bus is gone.
         """
-        if self._on_traffic is not None:
-            self._on_traffic()
-        if self._bus is None:
-            raise self._lost("it is closed")
+        self._begin()
         # Transfers have ended when ``write`` returns: no more bytes can arrive.
         if not self._waiting and (left_s := deadline_s - time.monotonic()) > 0.0:
             time.sleep(left_s)
         taken, self._waiting = self._waiting[:length], self._waiting[length:]
         return taken
-
-    def getBytesAvailable(self) -> int:
-        """Return the number of available bytes."""
-        return len(self._waiting)
 
     def clearPort(self) -> None:
         """Discard received bytes."""

@@ -14,7 +14,7 @@ from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import TRIES, Board
 from gazerig.drivers.hobby_board.params import US_STEPS
-from gazerig.drivers.i2c.transfers import FAILURES, OK, READ_STATUS, STUCK, read, write
+from gazerig.drivers.i2c.transfers import OK, READ_STATUS, read, write
 from gazerig.drivers.pca9685.params import (
     ADDRESSES,
     CHANNELS,
@@ -42,14 +42,11 @@ TOTEM_POLE = 0x04
 FULL_OFF = 0x10
 """Bit in the high byte of OFF: no pulses, for any value of ON (7.3.3)."""
 
+NO_ACKNOWLEDGES, NOT_ACKNOWLEDGED = (0xF1, 0xF2, 0xF3), "not acknowledged"
+
 START_S = 0.001
 """The oscillator is stable .5 ms after the end of sleep; a restart must not be requested earlier
 (7.3.1.1)."""
-
-
-def output_register(channel: int) -> int:
-    """Return the first register of a channel."""
-    return LED0 + BYTES * channel
 
 
 def pulse_registers(counts: int) -> bytes:
@@ -81,17 +78,15 @@ class Pca9685Board(Board):
 
     def __init__(self, port: BusPort, params: Pca9685Params, timing: BusTiming = TIMING) -> None:
         super().__init__(port, params, timing)
+        self.name = "board " + " and ".join(f"{address:#x}" for address in params.addresses)
         self.failure = ""
         # Length of one 4096th of the period, quarter microseconds.
-        self._grain_steps = self._grain(params.prescale)
-
-    def _grain(self, prescale: int) -> float:
-        return (prescale + 1) / self.params.oscillator_hz * 1e6 * US_STEPS
+        self._grain_steps = (params.prescale + 1) / params.oscillator_hz * 1e6 * US_STEPS
 
     def _place(self, servo_id: int) -> tuple[int, int]:
-        """Return the address of a servo's board, and its channel on this board."""
+        """Return the address of a servo's board, and the first register of its channel."""
         board, channel = divmod(servo_id, CHANNELS)
-        return self.params.addresses[board], channel
+        return self.params.addresses[board], LED0 + BYTES * channel
 
     def _addresses(self, ids: Sequence[int]) -> list[int]:
         """Return the addresses of the boards of servos."""
@@ -106,142 +101,111 @@ class Pca9685Board(Board):
             ServoMissing: a board does not answer, or another chip does.
         """
         for address in self._addresses([setup.id for setup in setups]):
-            self._check_board(address)
+            found = self.is_pca9685(address)
+            where = f"{self.port.port_name}: "
+            if found is False:
+                raise ServoMissing(
+                    f"{where}the chip at {address:#x} is not a PCA9685: another chip has this "
+                    "address; close a jumper and write the new one under bus.pca9685.address"
+                )
+            if found is None:
+                fault = f"{where}no PCA9685 answers at {address:#x}"
+                remedy = (
+                    "does the board have its logic supply (VCC, not only V+)? check SDA, SCL and "
+                    "ground; its jumpers set the address"
+                )
+                if self.failure != NOT_ACKNOWLEDGED:
+                    fault = f"{where}no answer as an I2C bus ({self.failure})"
+                    remedy = (
+                        "a PCA9685 is reached over an I2C bus such as /dev/i2c-1: write it under "
+                        "bus.port"
+                    )
+                raise ServoMissing(self.blame(fault, remedy))
         return self.read_all(setups)
 
     def is_pca9685(self, address: int) -> bool | None:
         """Return whether the chip at an address can be one; None without an answer.
 
-        Reserved bits of its registers are 0. They are read one by one, which needs no setting.
+        Reserved bits of its registers are 0.
         """
         for _ in range(TRIES):
-            found = self._ask([(read(address, at, 1), 1) for at in (*range(LED0), PRESCALE)])
+            found = self._read_single(address, (*range(LED0), PRESCALE))
             if found is not None:
-                registers = b"".join(found)
-                wrong = registers[MODE2] & 0xE0 or any(byte & 1 for byte in registers[2:LED0])
-                return not wrong and registers[-1] >= LEAST_PRESCALE
+                wrong = found[MODE2] & 0xE0 or any(byte & 1 for byte in found[2:LED0])
+                return not wrong and found[-1] >= LEAST_PRESCALE
         return None
-
-    def _check_board(self, address: int) -> None:
-        where = f"{self.port.port_name}: "
-        found = self.is_pca9685(address)
-        if found is None:
-            fault = f"{where}no PCA9685 answers at {address:#x}"
-            remedy = (
-                "does the board have its logic supply (VCC, not only V+)? check SDA, SCL and "
-                "ground; its jumpers set the address"
-            )
-            if self.failure == STUCK:
-                fault = f"{where}the I2C bus is stuck, its data or clock line is held low"
-                remedy = (
-                    "switch the supply of its devices off and on, check SDA and SCL for a short"
-                )
-            elif self.failure not in FAILURES.values():
-                fault = f"{where}no answer as an I2C bus ({self.failure})"
-                remedy = (
-                    "a PCA9685 is reached over an I2C bus such as /dev/i2c-1: write it under "
-                    "bus.port"
-                )
-            raise ServoMissing(self.blame(fault, remedy))
-        if not found:
-            raise ServoMissing(
-                f"{where}the chip at {address:#x} is not a PCA9685: another chip has this "
-                "address; close a jumper and write the new one under bus.pca9685.address"
-            )
-        modes = self._modes(address)
-        if modes is not None and modes[0] & EXTCLK:
-            raise ServoMissing(
-                f"{where}the board at {address:#x} was set to an external clock: switch its logic "
-                "supply off and on"
-            )
-
-    def _modes(self, address: int) -> tuple[int, int, int] | None:
-        """Read both modes and the prescaler; None after a failure."""
-        found = self._ask([(read(address, at, 1), 1) for at in (MODE1, MODE2, PRESCALE)])
-        return None if found is None else (found[0][0], found[1][0], found[2][0])
 
     def _ensure_set_up(self, address: int) -> bool:
         """Set a board up if it is not, which stops all its pulses; return whether it is set up."""
-        wanted = (AWAKE, TOTEM_POLE, self.params.prescale)
-        modes = self._modes(address)
+        wanted = bytes((AWAKE, TOTEM_POLE, self.params.prescale))
+        modes = self._read_single(address, (MODE1, MODE2, PRESCALE))
         if modes in (None, wanted):
             return modes == wanted
-        # From any state: no pulses, sleep, prescaler, then wake.
+        # From any state: no pulses, sleep, prescaler, then wake. Channels that slept with pulses on
+        # would resume at the restart; there are none now.
         for register, byte in (
             (ALL_LED + BYTES - 1, FULL_OFF),
             (MODE1, SLEEP | AUTO_INCREMENT),
             (PRESCALE, self.params.prescale),
             (MODE2, TOTEM_POLE),
             (MODE1, AWAKE),
+            (MODE1, RESTART | AWAKE),
         ):
-            if self._ask([(write(address, register, bytes((byte,))), 0)]) is None:
+            if self._ask(write(address, register, bytes((byte,))), 0) is None:
                 return False
-        wait_until(self.port, self.port.now_s() + START_S)
-        # Channels that slept with pulses on would resume here; there are none now.
-        self._ask([(write(address, MODE1, bytes((RESTART | AWAKE,))), 0)])
-        return self._modes(address) == wanted
+            wait_until(self.port, self.port.now_s() + START_S)
+        return self._read_single(address, (MODE1, MODE2, PRESCALE)) == wanted
 
     # --- reading
 
-    def _ask(self, transfers: Sequence[tuple[bytes, int]]) -> list[bytes] | None:
-        """Send transfers and return the bytes that each of them reads; None if one failed.
-
-        Args:
-            transfers: Transfers, each with the number of bytes that it reads.
-        """
-        packet = b"".join([transfer + READ_STATUS for transfer, _ in transfers])
-        wanted = sum(length + 1 for _, length in transfers)
-        answer = self.exchange(packet, wanted)
-        found, statuses, at = list[bytes](), list[int](), 0
-        for _, length in transfers if len(answer) == wanted else ():
-            found.append(answer[at : at + length])
-            statuses.append(answer[at + length])
-            at += length + 1
-        # A failed transfer returns only its status.
-        failures = [FAILURES[one] for one in statuses or answer if one in FAILURES]
+    def _ask(self, transfer: bytes, length: int) -> bytes | None:
+        """Send one transfer and return the bytes that it reads; None if it failed."""
+        answer = self.exchange(transfer + READ_STATUS, length + 1)
         self.failure = ""
-        if failures:
-            self.failure = failures[0]
-            self._owed_bytes = 0
-        elif len(answer) < wanted:
+        if len(answer) == 1 and answer[0] in NO_ACKNOWLEDGES:
+            # A failed transfer returns only its status.
+            self.failure, self._owed_bytes = NOT_ACKNOWLEDGED, 0
+        elif len(answer) <= length:
             self.failure = "incomplete" if answer else "timeout"
-        elif any(one != OK for one in statuses):
+        elif answer[-1] != OK:
             self.failure = "damaged"
-        if not self.failure:
-            return found
-        self.errors[self.failure] += 1
-        return None
+        self.errors.update([self.failure] if self.failure else ())
+        return None if self.failure else answer[:-1]
+
+    def _read_single(self, address: int, registers: Sequence[int]) -> bytes | None:
+        """Read registers one by one, which needs no particular setting; None after a failure."""
+        found = b""
+        for register in registers:
+            byte = self._ask(read(address, register, 1), 1)
+            if byte is None:
+                return None
+            found += byte
+        return found
 
     def read_status(self, channel: int) -> tuple[int, tuple[str, ...]] | None:
-        """Read a channel's pulse and the board's errors since the last read; None: no answer.
+        """Read a channel's pulse; None without an answer.
 
         A board that was reset sleeps and outputs no pulses, with any content of its registers.
         """
-        address, nth = self._place(channel)
-        output = read(address, output_register(nth), BYTES)
-        found = self._ask([(read(address, MODE1, 1), 1), (output, BYTES)])
-        if found is None:
+        address, register = self._place(channel)
+        mode = self._read_single(address, (MODE1,))
+        output = None if mode is None else self._ask(read(address, register, BYTES), BYTES)
+        if mode is None or output is None:
             return None
-        is_on = found[0][0] == AWAKE
-        return (round(counts_of(found[1]) * self._grain_steps) if is_on else 0), ()
+        return (round(counts_of(output) * self._grain_steps) if mode[0] == AWAKE else 0), ()
 
     def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Read pulses, quarter microseconds, 0 for none; None without an answer."""
-        pulses: dict[int, int] = {}
-        for address in self._addresses(channels):
-            own = [servo_id for servo_id in channels if self._place(servo_id)[0] == address]
-            modes = self._modes(address)
-            # Register by register, as the board might not auto-increment.
-            places = [output_register(one % CHANNELS) + k for one in own for k in range(BYTES)]
-            found = self._ask([(read(address, at, 1), 1) for at in places])
-            if modes is None or found is None:
+        pulses = []
+        for address, register in map(self._place, channels):
+            outputs = range(register, register + BYTES)
+            found = self._read_single(address, (MODE1, PRESCALE, *outputs))
+            if found is None:
                 return None
-            outputs = b"".join(found)
-            for k, servo_id in enumerate(own):
-                counts = counts_of(outputs[BYTES * k : BYTES * (k + 1)])
-                is_on = not modes[0] & SILENT
-                pulses[servo_id] = round(counts * self._grain(modes[2])) if is_on else 0
-        return tuple(pulses[servo_id] for servo_id in channels)
+            grain_steps = self._grain_steps * (found[1] + 1) / (self.params.prescale + 1)
+            is_on = not found[0] & SILENT
+            pulses.append(round(counts_of(found[2:]) * grain_steps) if is_on else 0)
+        return tuple(pulses)
 
     # --- sending
 
@@ -257,16 +221,15 @@ class Pca9685Board(Board):
         self.send(b"".join([self._goal_transfer(channel) for channel in channels]))
 
     def _goal_transfer(self, channel: "Channel") -> bytes:
-        address, nth = self._place(channel.id)
         steps, setup, grain = round(channel.ramp.pulse_steps), channel.setup, self._grain_steps
         counts = round(steps / grain)
         if setup.min_steps <= steps <= setup.max_steps:  # then the pulse sent is inside, too
             counts = max(min(counts, floor(setup.max_steps / grain)), ceil(setup.min_steps / grain))
-        return write(address, output_register(nth), pulse_registers(counts))
+        return write(*self._place(channel.id), pulse_registers(counts))
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses, each by one register, in any state; on the last try all of a board."""
-        places = [(address, output_register(nth)) for address, nth in map(self._place, channels)]
+        places = [*map(self._place, channels)]
         if last_try:
             places += [(address, ALL_LED) for address in self._addresses(channels)]
         off = bytes((FULL_OFF,))
@@ -285,6 +248,6 @@ def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
     for address in ADDRESSES:
         if board.is_pca9685(address):
             found.append(address)
-        elif board.failure and board.failure not in FAILURES.values():
+        elif board.failure not in ("", NOT_ACKNOWLEDGED):
             break  # no I2C bus
     return tuple(found)
