@@ -15,7 +15,8 @@ from gazerig.drivers.feetech.memory_table import (
     SCS_STEPS,
 )
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
-from gazerig.drivers.hobby_board.params import HOBBY, US_STEPS
+from gazerig.drivers.hobby_board import params as hobby
+from gazerig.drivers.hobby_board.params import HOBBY
 from gazerig.drivers.servo_bus.family import ServoModel
 
 if TYPE_CHECKING:
@@ -108,19 +109,16 @@ SERVOS: dict[str, ServoModelInfo] = {
     **{n: _smart_servo("dynamixel", "dynamixel", m, STEPS_PER_TURN) for n, m in DYNAMIXEL.items()},
     **{n: _smart_servo("feetech", "feetech", m, m.steps_per_turn) for n, m in FEETECH.items()},
     **{n: _smart_servo("feetech", "feetech scs", m, SCS_STEPS) for n, m in SCS_MODELS.items()},
-    **{
-        name: ServoModelInfo(
-            "maestro",
-            model.steps_per_turn,
-            model.lowest,
-            model.highest,
-            "us",
-            US_STEPS,
-            1500,
-            False,
-        )
-        for name, model in HOBBY.items()
-    },
+    HOBBY: ServoModelInfo(
+        "maestro",
+        hobby.STEPS_PER_TURN,
+        hobby.LOWEST,
+        hobby.HIGHEST,
+        "us",
+        hobby.US_STEPS,
+        1500,
+        False,
+    ),
 }
 """Servo models by their name in a rig's YAML; those of a package are added when its bus is used."""
 
@@ -156,4 +154,4 @@ def add_models(
 
 def servo_label(setup: "ServoConfig") -> str:
     """Return a servo's label for messages: its joint and its id, or its channel."""
-    return setup.label("channel" if setup.model in HOBBY else "servo")
+    return setup.label("channel" if setup.model == HOBBY else "servo")

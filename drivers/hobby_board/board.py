@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, ClassVar
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import PortError, ServoMissing
-from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
@@ -62,7 +61,7 @@ class Board(ABC):
     # --- what a kind of board defines
 
     @abstractmethod
-    def find(self, setups: "Sequence[ServoConfig]", log: EventLog) -> tuple[int, ...]:
+    def find(self, setups: "Sequence[ServoConfig]") -> tuple[int, ...]:
         """Find the board and return the pulses of these servos; nothing moves.
 
         Raises:
@@ -176,9 +175,7 @@ def are_alike(pulse: int, again: int) -> bool:
 def stop_pulses(board: Board, channels: Sequence[int]) -> tuple[int, ...]:
     """Open a board's port and stop the pulses; return the channels that did not confirm it.
 
-    Args:
-        board: Board on a closed or open port, which stays open.
-        channels: Channels of the rig; others are not changed, unless these do not stop.
+    Other channels are not changed, unless these do not stop. The port stays open.
 
     Raises:
         PortError: the port cannot be opened.

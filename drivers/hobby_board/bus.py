@@ -2,17 +2,15 @@
 
 Limits of such a board, and so of this bus:
 
-- Servo positions are not measured. They are estimated from goals and known speeds (``measured`` is
-False), load and current are unknown, and a stuck servo is not detected.
+- Nothing is measured: positions are the commanded pulses (``measured`` is False), and a stuck or
+restarted servo is not detected.
 - The position of a servo before its pulses begin is unknown. It moves to the first pulse at its own
 speed, with any armed limit.
 - No watchdog can be armed over the line: when this program dies the servos hold their last goals,
 unless the guardian process stops the pulses (gazerig.robot.guardian).
-- The board does not measure the servos' supply: a restart of a single servo is not detected.
 
-After an error or a restart a board outputs no pulses, and after a restart it has lost its settings.
-All channels are then enabled again, slowly, one after another. If that happens again soon, all stay
-without pulses and the fault is named.
+After an error or a restart a board outputs no pulses, and has perhaps lost its settings. All
+channels are then enabled again, one after another; if that happens again soon, all stay without.
 """
 
 from collections.abc import Collection, Sequence
@@ -24,7 +22,7 @@ from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import CHECK_SUPPLY, TRIES, Board, are_alike
-from gazerig.drivers.hobby_board.channel import BEHIND_S, FINE_STEPS, Channel
+from gazerig.drivers.hobby_board.channel import FINE_STEPS, Channel
 from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S
 from gazerig.drivers.serial.port import wait_until
 from gazerig.drivers.types import Feedback, ServoConfig
@@ -94,12 +92,11 @@ class HobbyBoardBus(PortBus):
         self._board.open_port()
         try:
             self._port.clearPort()
-            pulses = self._board.find(self._setups, self._log)
+            pulses = self._board.find(self._setups)
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise
-        for channel, pulse in zip(self._channels, pulses, strict=True):
-            channel.adopt_pulse(pulse)
+        self._adopt(pulses)
         self._log.add(UNMEASURED)
         self._opened = True
 
@@ -121,7 +118,8 @@ class HobbyBoardBus(PortBus):
         for channel, setup in zip(self._channels, self._setups, strict=True):
             channel.set_target(setup)
         try:
-            self._enable()
+            self._adopt(self._board.read_all(self._setups))
+            self._hold_all()
         except ServoMissing:
             self.disable_torque()
             raise
@@ -134,25 +132,27 @@ class HobbyBoardBus(PortBus):
         self._pending.clear()
         return tuple(channel.goal_steps for channel in self._channels)
 
-    def _enable(self) -> None:
-        """Hold every channel; channels without pulses one after another."""
-        board, port = self._board, self._port
-        pulses = board.read_all(self._setups)
-        off = [c.label for c, pulse in zip(self._channels, pulses, strict=True) if not pulse]
-        if off:
-            self._log.add(f"{', '.join(off)} had no pulses: they move to their goals immediately")
-        start_s = -inf
+    def _adopt(self, pulses: Sequence[int]) -> None:
         for channel, pulse in zip(self._channels, pulses, strict=True):
             channel.adopt_pulse(pulse)
+
+    def _hold_all(self) -> None:
+        """Hold every channel; channels without pulses one after another."""
+        board, start_s = self._board, -inf
+        off = [channel.label for channel in self._channels if not channel.on]
+        if off:
+            self._log.add(f"{', '.join(off)} had no pulses: they move to their goals immediately")
+        for channel in self._channels:
+            pulse = channel.goal_steps if channel.on else 0
             if not pulse:
-                wait_until(port, start_s + board.timing.stagger_s)
-                start_s = port.now_s()
+                wait_until(self._port, start_s + board.timing.stagger_s)
+                start_s = self._port.now_s()
             for _ in range(TRIES):
                 fault = self._hold(channel, pulse)
                 if not fault:
                     break
             else:
-                fault = f"{port.port_name}: {channel.label} {fault}"
+                fault = f"{self._port.port_name}: {channel.label} {fault}"
                 raise ServoMissing(board.blame(fault, board.remedy))
 
     def _hold(self, channel: Channel, pulse_steps: int = 0) -> str:
@@ -172,14 +172,13 @@ class HobbyBoardBus(PortBus):
         channel.advance(self._port.now_s())
         if found is None:
             return "does not answer"
-        low, high = sorted((pulse_steps or goal, goal))
         # A first pulse is exact; another one may have been moving when it was read.
-        room = FINE_STEPS + (BEHIND_S * channel.ramp.speed_steps_s if pulse_steps else 0.0)
-        if not found[0] or not low - room <= found[0] <= high + room:
-            channel.on = found[0] > 0
-            return channel.difference_text(found[0])
-        channel.record_hold()
-        return ""
+        is_right = pulse_steps or abs(found[0] - goal) <= FINE_STEPS
+        if is_right and channel.is_expected(found[0]):
+            channel.record_hold()
+            return ""
+        channel.on = found[0] > 0
+        return channel.difference_text(found[0])
 
     def set_limp(self, servos: Collection[int]) -> None:
         """Stop the pulses of these servos, by index; all others that were limp get them again.
@@ -191,16 +190,10 @@ class HobbyBoardBus(PortBus):
             return
         wanted = [self._channels[i] for i in servos]
         off = [channel for channel in wanted if channel.held]
-        ids = [channel.id for channel in off]
         try:
-            for _ in range(TRIES if off else 0):
-                self._board.stop(ids)
-                pulses = self._board.read_pulses(ids)
-                if pulses is not None and not any(pulses):
-                    for channel in off:
-                        channel.record_stop()
-                    self._limp.update(off)
-                    break
+            if off:
+                self._switch_off(off)
+                self._limp.update(channel for channel in off if not channel.held)
             for channel in self._limp.difference(wanted):
                 self._limp.discard(channel)
                 if self._hold(channel):
@@ -387,9 +380,11 @@ class HobbyBoardBus(PortBus):
         for channel in self._channels:
             channel.record_release()
 
-    def _switch_off(self) -> ReleaseResult:
-        released = self._board.switch_off(self._ids)
-        for channel in self._channels:
+    def _switch_off(self, channels: Sequence[Channel] = ()) -> ReleaseResult:
+        """Stop the pulses of channels, by default of all, and verify it."""
+        channels = channels or self._channels
+        released = self._board.switch_off([channel.id for channel in channels])
+        for channel in channels:
             if channel.id not in (*released.holding_ids, *released.unconfirmed_ids):
                 channel.record_stop()
         return released

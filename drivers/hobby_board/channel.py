@@ -3,7 +3,7 @@
 from math import ceil, inf, sqrt
 
 from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
-from gazerig.drivers.hobby_board.params import HOBBY, US_STEPS
+from gazerig.drivers.hobby_board.params import STEPS_PER_TURN, US_STEPS
 from gazerig.drivers.types import ServoConfig
 
 _SLICE_S = 0.005
@@ -100,7 +100,7 @@ class Channel:
     def top_speed_steps_s(self) -> float:
         """Return the present speed limit of its pulses, low while it enters its limits."""
         if self.entering:
-            return entry_speed_steps_s(self.setup, HOBBY["hobby"].steps_per_turn)
+            return entry_speed_steps_s(self.setup, STEPS_PER_TURN)
         return self.setup.max_speed_steps_s
 
     def adopt_pulse(self, pulse_steps: int) -> None:

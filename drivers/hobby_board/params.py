@@ -1,7 +1,7 @@
 """Parameters of boards of hobby servos, set in a rig file."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
@@ -10,24 +10,14 @@ US_STEPS = 4
 """Steps per microsecond: pulse widths are counted in quarter microseconds."""
 
 
-class HobbyModel(NamedTuple):
-    """A hobby servo: its shaft turns with the pulse width, and it has no feedback.
+STEPS_PER_TURN = 1000 * US_STEPS * 4.0
+"""1000..2000 us are usually 90 deg."""
 
-    steps_per_turn: quarter microseconds per turn, extrapolated
-    lowest, highest: range of pulse widths, quarter microseconds
-    """
+LOWEST, HIGHEST = 500 * US_STEPS, 2500 * US_STEPS
+"""Range of pulse widths that most servos accept."""
 
-    name: str
-    steps_per_turn: float
-    lowest: int
-    highest: int
-
-
-HOBBY = {
-    # 1000..2000 us are usually 90 deg; most servos accept 500..2500 us.
-    model.name: model
-    for model in (HobbyModel("hobby", 1000 * US_STEPS * 4.0, 500 * US_STEPS, 2500 * US_STEPS),)
-}
+HOBBY = "hobby"
+"""Name of a hobby servo as a model: its shaft turns with the pulse width, without feedback."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import TRIES, Board
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.serial.port import BusPort
@@ -34,9 +33,6 @@ width."""
 
 MICRO = 6
 """Channels of the Micro Maestro, which has no command for several targets."""
-
-AT_ONCE = 6
-"""Largest number of requests in one write, as the board's receive buffer is small."""
 
 ERRORS = (
     "serial signal error",
@@ -98,7 +94,7 @@ class MaestroCodec:
         Raises:
             ValueError: a data byte has its highest bit set.
         """
-        if data and not 0 <= min(data) <= max(data) < 0x80:
+        if any(not 0 <= byte < 0x80 for byte in data):
             raise ValueError(f"command {code:02X}: data bytes must be 0..127, not {data}")
         packet = bytes((code, *data))
         return packet + bytes((crc7(packet),)) if self.crc else packet
@@ -128,26 +124,16 @@ class MaestroCodec:
 
 
 def speed_units(steps_s: float) -> int:
-    """Return the smallest speed limit that is not below a speed; 0 (unlimited) if there is none.
-
-    Raises:
-        ValueError: it is not a positive number.
-    """
-    return _units(steps_s / SPEED_STEPS_S, MOST, "speed")
+    """Return the smallest speed limit that is not below a speed; 0 (unlimited) if there is none."""
+    return _units(steps_s / SPEED_STEPS_S, MOST)
 
 
 def accel_units(steps_s2: float | None) -> int:
-    """Return the smallest limit that is not below an acceleration; 0 (unlimited) if there is none.
-
-    Raises:
-        ValueError: it is not a positive number.
-    """
-    return 0 if steps_s2 is None else _units(steps_s2 / ACCEL_STEPS_S2, MOST_ACCEL, "acceleration")
+    """Return the smallest limit that is not below an acceleration; 0 (unlimited) if there is none."""
+    return 0 if steps_s2 is None else _units(steps_s2 / ACCEL_STEPS_S2, MOST_ACCEL)
 
 
-def _units(wanted: float, most: int, what: str) -> int:
-    if not wanted > 0.0:
-        raise ValueError(f"a {what} limit must be above 0, not {wanted}")
+def _units(wanted: float, most: int) -> int:
     # A value slightly above whole units is a rounding error of an earlier conversion.
     return 0 if wanted > most else max(1, ceil(wanted - 1e-9))
 
@@ -162,7 +148,7 @@ class MaestroBoard(Board):
         super().__init__(port, params, timing)
         self._codec = MaestroCodec(params.crc, params.channels)
 
-    def find(self, setups: "Sequence[ServoConfig]", log: EventLog) -> tuple[int, ...]:
+    def find(self, setups: "Sequence[ServoConfig]") -> tuple[int, ...]:
         """Find the board, stop its own script and return the pulses of these servos.
 
         Raises:
@@ -181,8 +167,6 @@ class MaestroBoard(Board):
                 f"{where}: the board expects no CRC: switch Enable CRC on in Pololu's program, as "
                 "noise moves servos without it, or set crc to false"
             )
-        if errors:
-            log.add(f"the board had earlier errors, cleared now: {', '.join(errors)}")
         self.send(self._codec.command(STOP_SCRIPT))  # which would also move servos
         pulses = self.read_all(setups)
         for setup, pulse in zip(setups, pulses, strict=True):
@@ -222,10 +206,8 @@ class MaestroBoard(Board):
     def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Read pulses, quarter microseconds, 0 for none; None without an answer."""
         pulses: tuple[int, ...] = ()
-        for i in range(0, len(channels), AT_ONCE):
-            some = channels[i : i + AT_ONCE]
-            packet = b"".join(self._codec.command(GET_POSITION, channel) for channel in some)
-            found = self._ask_words(packet, len(some))
+        for channel in channels:  # one by one, as the board's receive buffer is small
+            found = self._ask_words(self._codec.command(GET_POSITION, channel), 1)
             if found is None:
                 return None
             pulses += found

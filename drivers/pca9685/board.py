@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import TRIES, Board
 from gazerig.drivers.hobby_board.params import US_STEPS
 from gazerig.drivers.i2c.transfers import OK, READ_STATUS, read, write
@@ -94,7 +93,7 @@ class Pca9685Board(Board):
 
     # --- detection and setup
 
-    def find(self, setups: "Sequence[ServoConfig]", log: EventLog) -> tuple[int, ...]:
+    def find(self, setups: "Sequence[ServoConfig]") -> tuple[int, ...]:
         """Check that the boards answer and return the pulses of these servos; nothing changes.
 
         Raises:

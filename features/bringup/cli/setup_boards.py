@@ -11,7 +11,6 @@ import typer
 from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.maestro.board import USB_CHANNELS, MaestroBoard
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import CHANNELS
@@ -88,10 +87,7 @@ def set_up_maestro(task: SetupTask) -> None:
                 f"{', '.join(beyond)}: correct their ids in the YAML"
             )
         line.setBaudRate(params.baud)
-        board, log = MaestroBoard(line, params), EventLog()
-        board.find((), log)
-        for event in log.drain():
-            say(f"   {event}")
+        MaestroBoard(line, params).find(())
     say(_LOOK)
 
 
@@ -119,5 +115,5 @@ def set_up_pca9685(task: SetupTask) -> None:
         for one in setups:
             board, channel = divmod(one.id, CHANNELS)
             say(f"   {one.name}: channel {channel} of board {params.addresses[board]:#x}")
-        Pca9685Board(line, params).find(setups, EventLog())
+        Pca9685Board(line, params).find(setups)
     say(_LOOK)

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.params import US_STEPS
 from gazerig.drivers.maestro.board import (
     MICRO,
@@ -272,7 +271,7 @@ def examine_pca9685(
                 Diagnostic("error", what, servo_label(setup), "correct its id or range in the YAML")
             )
     try:
-        pulses = board.find(fitting, EventLog())
+        pulses = board.find(fitting)
     except ServoMissing as error:
         what, _, remedy = str(error).removeprefix(f"{port.port_name}: ").partition(": ")
         return [*findings, Diagnostic("error", what, WHERE, remedy)]
