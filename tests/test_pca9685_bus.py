@@ -242,7 +242,8 @@ class Kernel:
 @pytest.fixture
 def kernel(world, monkeypatch):
     made = Kernel(world)
-    port = I2cPort("/dev/i2c-7", open_bus=made.open)
+    port = I2cPort("/dev/i2c-7")
+    monkeypatch.setattr(i2c_port, "SMBus", made.open)
     clock = type("Clock", (), {"monotonic": lambda: world.now[0], "sleep": lambda seconds: None})
     monkeypatch.setattr(i2c_port, "time", clock)
     board = Pca9685Board(port, BOARD, QUICK._replace(give_up_s=2.0))

@@ -250,7 +250,7 @@ class HobbyBoardBus(PortBus):
             self._enable_next()
         for one in self._channels:
             low, high = one.setup.min_steps, one.setup.max_steps
-            if one.entering and low <= one.ramp.pulse_steps <= high:
+            if one.entering and low <= one.pulse_steps <= high:
                 one.entering = False
                 self._may_send = self._board.send_limits([one])
         return True
@@ -324,8 +324,8 @@ class HobbyBoardBus(PortBus):
         for channel in channels:
             channel.rearmed = False
         return self._nothing._replace(
-            position_steps=tuple([round(channel.ramp.pulse_steps) for channel in channels]),
-            velocity_steps_s=tuple([channel.ramp.mean_steps_s for channel in channels]),
+            position_steps=tuple([round(channel.pulse_steps) for channel in channels]),
+            velocity_steps_s=tuple([channel.mean_steps_s for channel in channels]),
             load=(0.0,) * len(channels),
             at_s=(self._port.now_s(),) * len(channels),
             torque=tuple([channel.on for channel in channels]),

@@ -1,14 +1,10 @@
 """Channel of a board: its commanded pulse, at which its servo is assumed to be."""
 
-from math import ceil, inf, sqrt
+from math import inf
 
 from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
 from gazerig.drivers.hobby_board.params import STEPS_PER_TURN, US_STEPS
 from gazerig.drivers.types import ServoConfig
-
-_SLICE_S = 0.005
-_LONG_S = 5.0
-"""Time after which any pulse has arrived."""
 
 BEHIND_S = 0.1
 """Longest delay of the board behind the last goals: its period is 20 ms, and lines are slow."""
@@ -17,54 +13,13 @@ FINE_STEPS = 24
 """Tolerance of an expected pulse at rest, half a degree: the grain of a PCA9685 is 20 steps."""
 
 
-class Ramp:
-    """Ramp of one channel's pulse, in the board or in the driver. Steps are quarter microseconds.
-
-    pulse_steps: present pulse
-    speed_steps_s, accel_steps_s2: limits of the pulse; 0: unlimited
-    mean_steps_s: mean speed of the last advance
-    """
-
-    def __init__(self) -> None:
-        self.speed_steps_s = self.accel_steps_s2 = 0.0
-        self.begin(0.0)
-
-    def begin(self, pulse_steps: float) -> None:
-        """Record that pulses begin, or already are, at a width."""
-        self.pulse_steps = pulse_steps
-        self.mean_steps_s = self._pulse_steps_s = 0.0
-
-    def advance(self, goal_steps: float, for_s: float) -> None:
-        """Advance the pulse towards a goal."""
-        if for_s <= 0.0:
-            return
-        slices = ceil(for_s / _SLICE_S) if for_s <= _LONG_S else 1
-        slice_s = for_s / slices
-        limit, accel, pulse_steps_s = self.speed_steps_s, self.accel_steps_s2, self._pulse_steps_s
-        at_once = slice_s > _LONG_S or not (limit or accel)
-        pulse = self.pulse_steps
-        for _ in range(slices):
-            left = goal_steps - pulse
-            if at_once or left == 0.0:
-                pulse, pulse_steps_s = goal_steps, 0.0
-                break
-            way, far = (1.0, left) if left > 0.0 else (-1.0, -left)
-            speed = limit or far / slice_s
-            if accel:
-                towards = max(0.0, way * pulse_steps_s)
-                speed = min(speed, towards + accel * slice_s, sqrt(2.0 * accel * far))
-            if speed * slice_s >= far:
-                pulse, pulse_steps_s = goal_steps, way * far / slice_s
-            else:
-                pulse += way * speed * slice_s
-                pulse_steps_s = way * speed
-        self.mean_steps_s = (pulse - self.pulse_steps) / for_s
-        self.pulse_steps, self._pulse_steps_s = pulse, pulse_steps_s
-
-
 class Channel:
-    """A servo without feedback; the ramp estimates its position.
+    """A servo without feedback, assumed to be at its pulse. Steps are quarter microseconds.
 
+    The pulse moves to its goal at a limited speed, by the board or by the driver.
+
+    pulse_steps, mean_steps_s: present pulse, and the mean speed of its last advance
+    speed_steps_s: armed limit of its speed
     on: whether it outputs pulses, as far as known
     held: whether it follows goals
     entering: whether it moves slowly into its limits
@@ -82,7 +37,8 @@ class Channel:
         self.id, self.label = setup.id, setup.label("channel")
         self.on = self.held = self.entering = self.rearmed = False
         self.fault = ""
-        self.ramp = Ramp()
+        self.pulse_steps = self.mean_steps_s = 0.0
+        self.speed_steps_s = setup.max_speed_steps_s
         self._is_position_known = False
         self._at_s = -inf
         self.set_target(setup)
@@ -94,7 +50,7 @@ class Channel:
             middle = (setup.min_steps + setup.max_steps) // 2
             rest = middle if setup.rest_steps is None else setup.rest_steps
             self.goal_steps = min(max(rest, setup.min_steps), setup.max_steps)
-            self.ramp.begin(self.goal_steps)
+            self.pulse_steps = self.goal_steps
 
     @property
     def top_speed_steps_s(self) -> float:
@@ -108,16 +64,15 @@ class Channel:
         self.on = pulse_steps > 0
         if self.on:
             self._is_position_known = True
-            self.goal_steps = pulse_steps
-            self.ramp.begin(pulse_steps)
+            self.goal_steps = self.pulse_steps = pulse_steps
 
     def start(self, pulse_steps: int, now_s: float) -> int:
         """Hold at the present pulse, or at the last position if there is none; return the goal."""
-        wanted = pulse_steps or round(self.ramp.pulse_steps)
+        wanted = pulse_steps or round(self.pulse_steps)
         self.goal_steps = min(max(wanted, self.setup.min_steps), self.setup.max_steps)
         self.entering = pulse_steps not in (0, self.goal_steps)
         # A first pulse is not ramped, as there is no pulse to ramp from.
-        self.ramp.begin(pulse_steps or self.goal_steps)
+        self.pulse_steps = pulse_steps or self.goal_steps
         self.on, self.fault = True, ""
         self._at_s = now_s
         return self.goal_steps
@@ -134,24 +89,24 @@ class Channel:
         """Record that it outputs no pulses: its servo has no torque, and is assumed not to move."""
         self.record_release()
         self.on, self.fault = False, fault or self.fault
-        self.ramp.begin(self.ramp.pulse_steps)
+        self.mean_steps_s = 0.0
 
     def advance(self, now_s: float) -> None:
         """Advance the estimate to ``now_s``."""
         spent_s = now_s - self._at_s
         if self.on and 0.0 < spent_s < inf:
-            if spent_s > self._longest_ramp_s:
-                self.ramp.begin(self.ramp.pulse_steps)  # it was paused, so it begins from rest
-                spent_s = self._longest_ramp_s
-            self.ramp.advance(self.goal_steps, spent_s)
+            most = self.speed_steps_s * min(spent_s, self._longest_ramp_s)
+            way = min(max(self.goal_steps - self.pulse_steps, -most), most)
+            self.pulse_steps += way
+            self.mean_steps_s = way / spent_s
         self._at_s = now_s
 
     def is_expected(self, pulse_steps: int) -> bool:
         """Return whether a pulse can be the commanded one."""
         if self._longest_ramp_s < inf:
             return pulse_steps > 0  # the next goals correct it
-        room = FINE_STEPS + BEHIND_S * self.ramp.speed_steps_s
-        return pulse_steps > 0 and abs(pulse_steps - self.ramp.pulse_steps) <= room
+        room = FINE_STEPS + BEHIND_S * self.speed_steps_s
+        return pulse_steps > 0 and abs(pulse_steps - self.pulse_steps) <= room
 
     def difference_text(self, pulse_steps: int) -> str:
         """Return how a pulse differs from the commanded one."""

@@ -25,9 +25,6 @@ TIMEOUT_10_MS = 2
 
 _GONE = (errno.ENODEV, errno.ENOENT, errno.EBADF, errno.ESHUTDOWN)
 
-OpenBus = Callable[[str], Any]
-"""Opens a bus by its path: smbus2's SMBus, or an emulated one with its methods."""
-
 
 class I2cPort:
     """A real I2C bus; implements gazerig.drivers.serial.port.BusPort.
@@ -36,7 +33,6 @@ class I2cPort:
         port_name: Its path, e.g. /dev/i2c-1.
         exclusive: Whether to lock out other servo programs; programs for sensors are not affected.
         on_traffic: Called whenever bytes are sent or waited for; None if not needed.
-        open_bus: Opens the bus.
     """
 
     def __init__(
@@ -44,10 +40,9 @@ class I2cPort:
         port_name: str,
         exclusive: bool = True,
         on_traffic: Callable[[], None] | None = None,
-        open_bus: OpenBus = SMBus,
     ) -> None:
         self.port_name = port_name
-        self._exclusive, self._on_traffic, self._open_bus = exclusive, on_traffic, open_bus
+        self._exclusive, self._on_traffic = exclusive, on_traffic
         self._bus: Any = None
         self._status, self._waiting = OK, b""
 
@@ -63,7 +58,7 @@ class I2cPort:
         """
         self.closePort()
         try:
-            self._bus = self._open_bus(self.port_name)
+            self._bus = SMBus(self.port_name)
             if self._bus.fd is not None:
                 if self._exclusive:
                     fcntl.flock(self._bus.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -8,7 +8,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import ceil
+from math import ceil, inf
 from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.drivers.bus.timing import TIMING, BusTiming
@@ -129,7 +129,7 @@ def speed_units(steps_s: float) -> int:
 
 
 def accel_units(steps_s2: float | None) -> int:
-    """Return the smallest limit that is not below an acceleration; 0 (unlimited) if there is none."""
+    """Return the smallest acceleration limit not below an acceleration; 0: unlimited."""
     return 0 if steps_s2 is None else _units(steps_s2 / ACCEL_STEPS_S2, MOST_ACCEL)
 
 
@@ -154,28 +154,15 @@ class MaestroBoard(Board):
         Raises:
             ServoMissing: it does not answer, or a channel is not a servo channel.
         """
-        where = self.port.port_name
-        errors = self.read_errors()
-        if errors is None:
+        if self.read_errors() is None or not self.expects_crc():
             remedy = (
                 "take the first of its two USB ports and set it to 'USB Dual Port' in Pololu's "
                 f"program; its CRC must be {'on' if self.params.crc else 'off'}"
             )
-            raise ServoMissing(self.blame(f"{where}: no Maestro answers", remedy))
-        if not self.expects_crc():
-            raise ServoMissing(
-                f"{where}: the board expects no CRC: switch Enable CRC on in Pololu's program, as "
-                "noise moves servos without it, or set crc to false"
-            )
+            fault = f"{self.port.port_name}: no Maestro answers"
+            raise ServoMissing(self.blame(fault, remedy))
         self.send(self._codec.command(STOP_SCRIPT))  # which would also move servos
-        pulses = self.read_all(setups)
-        for setup, pulse in zip(setups, pulses, strict=True):
-            if 0 < pulse <= MOST_INPUT:
-                raise ServoMissing(
-                    f"{where}: channel {setup.id} is an input, {setup.label('channel')} cannot "
-                    "move: set it to Servo in Pololu's program"
-                )
-        return pulses
+        return self.read_all(setups)
 
     def read_errors(self) -> tuple[str, ...] | None:
         """Read the board's errors, which clears them; None if it is silent."""
@@ -234,8 +221,7 @@ class MaestroBoard(Board):
         for channel in channels:
             speed = speed_units(channel.top_speed_steps_s)
             accel = accel_units(channel.setup.max_accel_steps_s2)
-            channel.ramp.speed_steps_s = speed * SPEED_STEPS_S
-            channel.ramp.accel_steps_s2 = accel * ACCEL_STEPS_S2
+            channel.speed_steps_s = speed * SPEED_STEPS_S or inf
             packet += codec.number(SET_SPEED, channel.id, speed)
             packet += codec.number(SET_ACCELERATION, channel.id, accel)
         found = self._ask_words(packet + codec.command(GET_ERRORS), 1)

@@ -209,10 +209,9 @@ class Pca9685Board(Board):
     # --- sending
 
     def send_limits(self, channels: "Sequence[Channel]") -> bool:
-        """Set the ramp limits of channels; return whether their boards are configured."""
+        """Set the speed limits of channels; return whether their boards are configured."""
         for channel in channels:
-            channel.ramp.speed_steps_s = channel.top_speed_steps_s
-            channel.ramp.accel_steps_s2 = channel.setup.max_accel_steps_s2 or 0.0
+            channel.speed_steps_s = channel.top_speed_steps_s
         return all(map(self._ensure_set_up, self._addresses([one.id for one in channels])))
 
     def send_goals(self, channels: "Sequence[Channel]") -> None:
@@ -220,7 +219,7 @@ class Pca9685Board(Board):
         self.send(b"".join([self._goal_transfer(channel) for channel in channels]))
 
     def _goal_transfer(self, channel: "Channel") -> bytes:
-        steps, setup, grain = round(channel.ramp.pulse_steps), channel.setup, self._grain_steps
+        steps, setup, grain = round(channel.pulse_steps), channel.setup, self._grain_steps
         counts = round(steps / grain)
         if setup.min_steps <= steps <= setup.max_steps:  # then the pulse sent is inside, too
             counts = max(min(counts, floor(setup.max_steps / grain)), ceil(setup.min_steps / grain))
