@@ -23,7 +23,7 @@ from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import CHECK_SUPPLY, TRIES, Board, are_alike
 from gazerig.drivers.hobby_board.channel import FINE_STEPS, Channel
-from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S
+from gazerig.drivers.process.host_lateness import BLAME_S
 from gazerig.drivers.serial.port import wait_until
 from gazerig.drivers.types import Feedback, ServoConfig
 
@@ -73,8 +73,8 @@ class HobbyBoardBus(PortBus):
         self._limp = set[Channel]()
         # Channels without a known position, until they are held again.
         self._pending: list[Channel] = []
-        self._failed_tries, self._trouble_s = 0, -inf
-        self._turn = 0
+        self._failed_tries, self._trouble_s, self._fault = 0, -inf, ""
+        self._rearmed, self._turn = False, 0
         self._silent_since_s: float | None = None
         self._is_silence_reported = False
         self._is_down = self._release_due = False
@@ -127,7 +127,7 @@ class HobbyBoardBus(PortBus):
             self._release_due = True  # some channels may already have pulses
             raise
         self._engaged = self._may_send = True
-        self._release_due, self._trouble_s = False, -inf
+        self._release_due, self._trouble_s, self._fault = False, -inf, ""
         self._limp.clear()
         self._pending.clear()
         return tuple(channel.goal_steps for channel in self._channels)
@@ -281,7 +281,7 @@ class HobbyBoardBus(PortBus):
         channel = self._pending.pop(0)
         fault = self._hold(channel)
         if not fault:
-            channel.rearmed = True
+            self._rearmed = True
             return
         self._pending.append(channel)
         self._failed_tries += 1
@@ -290,48 +290,42 @@ class HobbyBoardBus(PortBus):
 
     def _stop_all(self, fault: str, remedy: str) -> None:
         """Stop the pulses of all channels, which stay without; name why."""
-        text = self._board.blame(fault, remedy)
-        self._log.add(f"no pulses any more: {text}")
-        self._board.stop(self._ids)
-        for channel in self._channels:
-            channel.record_stop(text)
         self._pending.clear()
+        self._fault = self._board.blame(fault, remedy)
+        self._log.add(f"no pulses any more: {self._fault}")
+        self._switch_off()
 
     def _check_silence(self, answered: bool, now_s: float) -> None:
-        """Record whether the board has answered, and report a silence.
+        """Report a silence of the board.
 
         Raises:
             BusLost: it has been silent for longer than ``give_up_s``.
         """
-        since_s = now_s if self._silent_since_s is None else self._silent_since_s
-        self._silent_since_s = None if answered else since_s
-        silent_s, lateness = now_s - since_s, self._board.lateness
+        if answered:
+            self._silent_since_s, self._is_silence_reported = None, False
+            return
+        since_s = self._silent_since_s = self._silent_since_s or now_s
+        silent_s = now_s - since_s
         fault = f"the board has not answered for {silent_s:.1f} s"
-        if not answered and silent_s >= self._give_up_s:
-            fault = f"{self._port.port_name}: {fault}"
-            raise BusLost(lateness.blame(fault, CHECK_SUPPLY, now_s, since_s))
-        # A shorter silence looks like a busy computer, which late answers identify.
-        patience_s = SILENCE_S if answered or lateness.cause(now_s, since_s) else BLAME_S
-        if silent_s >= patience_s and not self._is_silence_reported:
-            self._log.add(lateness.blame(fault, CHECK_SUPPLY, now_s, since_s))
+        fault = self._board.lateness.blame(fault, CHECK_SUPPLY, now_s, since_s)
+        if silent_s >= self._board.timing.give_up_s:
+            raise BusLost(f"{self._port.port_name}: {fault}")
+        if silent_s >= BLAME_S and not self._is_silence_reported:
             self._is_silence_reported = True
-        self._is_silence_reported &= not answered
+            self._log.add(fault)
 
     def _estimate(self) -> Feedback:
         """Return the estimated state of all servos; none is measured."""
-        channels, no = self._channels, (False,) * len(self._channels)
-        rearmed = tuple([channel.rearmed or channel.entering for channel in channels])
-        for channel in channels:
-            channel.rearmed = False
+        channels, rearmed, self._rearmed = self._channels, self._rearmed, False
         return self._nothing._replace(
             position_steps=tuple([round(channel.pulse_steps) for channel in channels]),
             velocity_steps_s=tuple([channel.mean_steps_s for channel in channels]),
             load=(0.0,) * len(channels),
             at_s=(self._port.now_s(),) * len(channels),
             torque=tuple([channel.on for channel in channels]),
-            fault=tuple([channel.fault for channel in channels]),
-            measured=no,
-            rearmed=rearmed,
+            fault=(self._fault,) * len(channels),
+            measured=(False,) * len(channels),
+            rearmed=tuple([rearmed or channel.entering for channel in channels]),
             missing=(),
         )
 
@@ -366,7 +360,7 @@ class HobbyBoardBus(PortBus):
 
     def faults(self) -> tuple[str, ...]:
         """Return the present faults of channels, one line each."""
-        return tuple(f"{c.label}: {c.fault}" for c in self._channels if c.fault)
+        return tuple(f"{c.label}: {self._fault}" for c in self._channels if self._fault)
 
     # --- parts of PortBus
 

@@ -23,8 +23,6 @@ class Channel:
     on: whether it outputs pulses, as far as known
     held: whether it follows goals
     entering: whether it moves slowly into its limits
-    rearmed: whether it was enabled again and that is not yet reported
-    fault: reason why it stays without pulses; "" for none
 
     Args:
         setup: The servo.
@@ -35,8 +33,7 @@ class Channel:
     def __init__(self, setup: ServoConfig, longest_ramp_s: float = inf) -> None:
         self._longest_ramp_s = longest_ramp_s
         self.id, self.label = setup.id, setup.label("channel")
-        self.on = self.held = self.entering = self.rearmed = False
-        self.fault = ""
+        self.on = self.held = self.entering = False
         self.pulse_steps = self.mean_steps_s = 0.0
         self.speed_steps_s = setup.max_speed_steps_s
         self._is_position_known = False
@@ -73,7 +70,7 @@ class Channel:
         self.entering = pulse_steps not in (0, self.goal_steps)
         # A first pulse is not ramped, as there is no pulse to ramp from.
         self.pulse_steps = pulse_steps or self.goal_steps
-        self.on, self.fault = True, ""
+        self.on = True
         self._at_s = now_s
         return self.goal_steps
 
@@ -83,13 +80,12 @@ class Channel:
 
     def record_release(self) -> None:
         """Record that it follows no goals any more; its pulses may continue."""
-        self.held = self.entering = self.rearmed = False
+        self.held = self.entering = False
 
-    def record_stop(self, fault: str = "") -> None:
+    def record_stop(self) -> None:
         """Record that it outputs no pulses: its servo has no torque, and is assumed not to move."""
         self.record_release()
-        self.on, self.fault = False, fault or self.fault
-        self.mean_steps_s = 0.0
+        self.on, self.mean_steps_s = False, 0.0
 
     def advance(self, now_s: float) -> None:
         """Advance the estimate to ``now_s``."""
