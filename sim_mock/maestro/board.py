@@ -17,7 +17,7 @@ from gazerig.sim_mock.maestro.channel import EmulatedChannel
 from gazerig.sim_mock.replies import Piece
 
 SET_TARGET, SET_TARGETS, SET_SPEED, SET_ACCELERATION = 0x84, 0x9F, 0x87, 0x89
-GET_POSITION, GET_ERRORS, STOP_SCRIPT, GET_SCRIPT = 0x90, 0xA1, 0xA4, 0xAE
+GET_POSITION, GET_ERRORS, STOP_SCRIPT = 0x90, 0xA1, 0xA4
 DATA_BYTES = {
     SET_TARGET: 3,
     SET_TARGETS: 2,
@@ -26,7 +26,6 @@ DATA_BYTES = {
     GET_POSITION: 1,
     GET_ERRORS: 0,
     STOP_SCRIPT: 0,
-    GET_SCRIPT: 0,
 }
 """Number of data bytes; for set-targets those before the targets."""
 SETTERS = {
@@ -167,8 +166,6 @@ class EmulatedMaestro(HobbyBoard):
         elif code == GET_ERRORS:
             errors, self.errors = self.errors, 0
             return Piece(NO_DEVICE, errors.to_bytes(2, "little"))
-        elif code == GET_SCRIPT:
-            return Piece(NO_DEVICE, bytes((not self.is_script_running,)))
         else:
             self.is_script_running = False
         return None
