@@ -7,7 +7,7 @@ from gazerig.drivers.dynamixel.control_table import BAUD_RATES
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.feetech.family import FEETECH, set_middle
-from gazerig.drivers.servo_bus.discovery import FoundServo, count_corrupt, ping, scan_ids
+from gazerig.drivers.servo_bus.discovery import FoundServo, count_corrupt, scan_ids
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -39,9 +39,6 @@ class Bench:
 
     def sleep_until(self, t_s):
         self.now_s = max(self.now_s, t_s)
-
-    def ping(self, servo_id):
-        return ping(self.port, self.family, servo_id, self.baud)
 
     def corrupt(self, servo_id):
         return count_corrupt(self.port, self.family, servo_id)

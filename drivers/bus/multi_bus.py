@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from contextlib import ExitStack, suppress
 from itertools import chain
+from math import isfinite
 from typing import NamedTuple
 
 from gazerig.drivers.bus.goal_limits import clip_goals
@@ -58,12 +59,15 @@ class MultiBus:
         """Read all servos of all buses.
 
         Raises:
-            BusLost: no servo of a bus has answered for longer than its ``give_up_s``.
+            BusLost: no servo of a bus has answered for longer than its ``give_up_s``, or a bus
+                returned something else than the feedback of its servos.
         """
         feedbacks, lost = list[Feedback](), list[BusLost]()
         for share in self._shares:
             try:
-                feedbacks.append(share.bus.read(now_s))
+                feedback = share.bus.read(now_s)
+                _check_feedback(feedback, share)
+                feedbacks.append(feedback)
             except BusLost as error:  # the others are still read, so that they may reconnect
                 lost.append(error)
         if lost:
@@ -165,3 +169,13 @@ class MultiBus:
         with ExitStack() as stack:
             for share in reversed(self._shares):
                 stack.callback(share.bus.close)
+
+
+def _check_feedback(feedback: Feedback, share: BusShare) -> None:
+    """Check that a bus, which may be another package's, returned finite values of its servos."""
+    count = len(share.servo_indices)
+    if isinstance(feedback, Feedback) and {*map(len, feedback[:-1])} == {count}:
+        fresh = set(range(count)).difference(feedback.missing)
+        if all(isfinite(column[i]) for column in feedback[:4] for i in fresh):
+            return
+    raise BusLost(f"{share.name}: read returned no finite feedback of {count} servos")
