@@ -56,17 +56,6 @@ def test_things_and_hands_are_blobs_of_their_kind_at_their_place() -> None:
     assert target.p_camera_m == pytest.approx((0.1, -0.1, 0.9))
 
 
-def test_a_thing_keeps_its_number_when_another_comes_before_it() -> None:
-    ball = Thing(1, "thing", (0.9, -0.1, 0.1), 0.05)
-    other = Thing(0, "thing", (0.9, 0.1, 0.1), 0.05)
-    made = camera(Still((ball,), later=(other,)))
-    early = seen_at(made, 0.2).blobs
-    late = seen_at(made, 1.0).blobs
-    assert [len(early), len(late)] == [2, 3]
-    assert early[-1].id == late[-1].id
-    assert len({blob.id for blob in late}) == 3
-
-
 def test_a_thing_is_seen_late_and_only_inside_the_field() -> None:
     aside = Thing(0, "hand", (0.5, 0.5, 0.0), 0.05)
     behind = Thing(1, "hand", (-0.5, 0.0, 0.0), 0.05)

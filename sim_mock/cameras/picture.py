@@ -43,7 +43,7 @@ _ROOM_M, _ROOM_HEIGHT_M, _FLOOR_M = 3.2, 3.2, -0.72
 """Radius of the round wall, its height up and down, and the height of the floor's far edge."""
 _PX_PER_M = 100.0
 _WALL_BGR, _FLOOR_BGR, _SKIRTING_BGR = (222, 226, 222), (120, 148, 172), (240, 242, 242)
-_PATCHES: tuple[tuple[float, float], ...] = ((0.06, 5.0), (0.18, 6.0), (0.6, 8.0))
+_PATCHES: tuple[tuple[float, float], ...] = ((0.06, 10.0), (0.18, 12.0), (0.6, 16.0))
 """Sizes of the soft patches on the wall in metres, and their contrast in grey values."""
 _STEP_PX = 8
 """Distance of the pixels whose places on the wall are computed; between them they change evenly."""
