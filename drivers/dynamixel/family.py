@@ -16,7 +16,7 @@ from gazerig.drivers.dynamixel.control_table import (
     name_errors,
     speed_units,
 )
-from gazerig.drivers.servo_bus.family import Arming, Family, Window
+from gazerig.drivers.servo_bus.family import Family, Window
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
@@ -96,7 +96,6 @@ DYNAMIXEL = Family(
     corrected_value=lambda name, found, wanted: (
         max(found, wanted) if name == "velocity_limit" else wanted
     ),
-    correction_passes=2,
     answer_level=2,
     lock_register=None,
     error_register="hardware_error_status",
@@ -105,9 +104,8 @@ DYNAMIXEL = Family(
     goal_speed=False,
     single_turn=False,
     duplicate_id_registers=("realtime_tick", "present_position"),
-    arming=Arming("profile_velocity", limits_speed=True),
+    arming_register="profile_velocity",
     most_goals=253,
-    recommended_bauds="57600 or 1000000",
     fault_cure="then restart the servo power",
     jump_cure="set its Homing Offset to 0",
 )

@@ -20,7 +20,7 @@ from gazerig.drivers.feetech.memory_table import (
 )
 from gazerig.drivers.feetech.protocol import MOST_GOALS, GoalWrite
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.family import Arming, Family, Window
+from gazerig.drivers.servo_bus.family import Family, Window
 from gazerig.drivers.servo_bus.registers import Registers
 
 if TYPE_CHECKING:  # the guardian starts without numpy
@@ -85,7 +85,6 @@ FEETECH = Family(
     wanted_settings=wanted_settings,
     # Only one bit of Phase is changed; the others keep their values.
     corrected_value=lambda name, found, wanted: found & ~MULTI_TURN if name == "phase" else wanted,
-    correction_passes=1,
     answer_level=1,
     lock_register="lock",
     error_register="status",
@@ -94,9 +93,8 @@ FEETECH = Family(
     goal_speed=True,
     single_turn=True,
     duplicate_id_registers=("present_position", "present_current"),
-    arming=Arming("acceleration", limits_speed=False),
+    arming_register="acceleration",
     most_goals=MOST_GOALS,
-    recommended_bauds="115200 or 1000000",
     fault_cure="check its supply",
     jump_cure="restart the servo power",
 )

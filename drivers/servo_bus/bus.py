@@ -134,7 +134,7 @@ class SmartServoBus(PortBus):
             return
         torque, volts = values.get("torque_enable"), values.get("present_input_voltage")
         if torque is not None:
-            self._feedback.set_torque(slot, torque == 1)
+            self._feedback.set(slot, torque=torque == 1)
         if volts is not None:
             self._feedback.set_climate(slot, volts, values["present_temperature"])
         self._supervisor.check_polled(servo_id, values)
@@ -150,9 +150,7 @@ class SmartServoBus(PortBus):
         """
         where, baud = self._port.port_name, self._baud
         if not self._port.setBaudRate(baud):
-            raise PortError(
-                f"{where} cannot run at {baud} bit/s: choose {self._family.recommended_bauds}"
-            )
+            raise PortError(f"{where} cannot run at {baud} bit/s: choose 115200 or 1000000")
         try:
             self._assemble(find(self._line, self._setups))
             # A servo may be set to answer only reads; this write needs no answer.

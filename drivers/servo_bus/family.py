@@ -5,7 +5,7 @@ explains how to add one.
 """
 
 import struct
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
@@ -156,13 +156,6 @@ class GoalPackets(Protocol):
         """Build the packet with one goal and one speed per servo."""
 
 
-class Arming(NamedTuple):
-    """A register written before torque is switched on; ``speed``: whether it limits goal speeds."""
-
-    register: str
-    limits_speed: bool
-
-
 @dataclass(frozen=True)
 class Family:
     """A family of smart servos.
@@ -194,7 +187,6 @@ class Family:
         read_spans: first and last register of ranges that are read together
         wanted_settings: required register values; written in this order within a span
         corrected_value: value to write to a register, given the found and the wanted value
-        correction_passes: number of correction passes; a first correction may reset other settings
         answer_level: Status Return Level at which every instruction is answered
         lock_register: register that must be 0 while EEPROM is written, None if torque is the lock
 
@@ -203,13 +195,12 @@ class Family:
         faults_latch: whether a fault stays until the servo is restarted; otherwise its bit comes
             and goes
         watchdog_unit_s: unit of Bus Watchdog; None without a watchdog
-        goal_speed: whether a goal includes its speed
+        goal_speed: whether a goal includes its speed; otherwise ``arming_register`` limits it
         single_turn: whether a servo measures its position within one turn when it starts
         duplicate_id_registers: first and last of the registers in which two servos with the same id
             differ
-        arming: register written before torque is switched on
+        arming_register: limit of speed or acceleration that is written before torque is switched on
         most_goals: largest number of goals in one packet
-        recommended_bauds: bit/s to recommend if an adaptor does not support another rate
         fault_cure, jump_cure: remedies if torque is refused, or a position jumps
     """
 
@@ -237,7 +228,6 @@ class Family:
     read_spans: tuple[tuple[str, str], ...]
     wanted_settings: Callable[["ServoConfig"], Mapping[str, int]]
     corrected_value: Callable[[str, int, int], int]
-    correction_passes: int
     answer_level: int
     lock_register: str | None
     error_register: str
@@ -246,9 +236,8 @@ class Family:
     goal_speed: bool
     single_turn: bool
     duplicate_id_registers: tuple[str, str]
-    arming: Arming
+    arming_register: str
     most_goals: int
-    recommended_bauds: str
     fault_cure: str
     jump_cure: str
 
@@ -258,18 +247,9 @@ class Family:
 
     def request(self, ids: Sequence[int], address: int, length: int) -> bytes:
         """Return a request for the same registers of some servos; of one if each is read alone."""
-        if self.sync_read:
-            packet: bytes = self.codec.sync_read(ids, address, length)
-        else:
-            (servo_id,) = ids
-            packet = self.codec.read(servo_id, address, length)
+        ask, asked = (self.codec.sync_read, ids) if self.sync_read else (self.codec.read, ids[0])
+        packet: bytes = ask(asked, address, length)
         return packet
-
-    def request_groups(self, ids: Sequence[int]) -> Iterable[tuple[int, ...]]:
-        """Return the groups of servos that are read with one request."""
-        if not self.sync_read:
-            return [(servo_id,) for servo_id in ids]
-        return [tuple(ids)] if ids else []
 
     def model_name(self, number: int) -> str:
         """Return the name of a model, "model number 350" if it is unknown."""

@@ -6,7 +6,7 @@ last one is rejected (``gazerig.drivers.bus.plausibility``).
 
 from collections.abc import Collection, Sequence
 from operator import mul
-from typing import Any, TypeVar
+from typing import Any
 
 from gazerig.drivers.bus.plausibility import Plausibility
 from gazerig.drivers.servo_bus.family import Family
@@ -15,8 +15,6 @@ from gazerig.drivers.types import Feedback, ServoConfig
 
 MOST_CELSIUS = 125
 """Highest valid temperature."""
-
-Value = TypeVar("Value")
 
 
 class FeedbackColumns:
@@ -95,68 +93,50 @@ class FeedbackColumns:
         """Apply one servo's answer; return False if its position is not plausible."""
         if not self.places.is_plausible(slot, reply.position, reply.at_s):
             return False
-        load = max(-1.0, min(1.0, reply.effort * self._load_units[slot]))
-        self._set_motion(
-            slot, reply.position, reply.velocity * self._velocity_unit, load, reply.at_s
-        )
+        self._set_motion(slot, reply)
         if reply.voltage is not None and reply.temperature is not None:
             self.set_climate(slot, reply.voltage, reply.temperature)
         return True
 
-    def _set_motion(
-        self, slot: int, position: float, velocity: float, load: float, at_s: float
-    ) -> None:
+    def _set_motion(self, slot: int, reply: ServoReply) -> None:
         missing = tuple([other for other in self.now.missing if other != slot])
         self.now = self.now._replace(missing=missing)
-        self._set(
-            slot, position_steps=position, velocity_steps_s=velocity, load=load, at_s=at_s
-        )  # fmt: skip
+        self.set(
+            slot,
+            position_steps=reply.position,
+            velocity_steps_s=reply.velocity * self._velocity_unit,
+            load=max(-1.0, min(1.0, reply.effort * self._load_units[slot])),
+            at_s=reply.at_s,
+        )
 
-    def _set(self, slot: int, **values: Any) -> None:
+    def set(self, slot: int, **values: Any) -> None:
         """Set a servo's values by column."""
-        columns = {n: _replace_value(getattr(self.now, n), slot, v) for n, v in values.items()}
+        columns = {
+            name: _replace_value(getattr(self.now, name), slot, value)
+            for name, value in values.items()
+        }
         self.now = self.now._replace(**columns)
 
-    def position(self, slot: int) -> float | None:
-        """Return a servo's position, None if it has not answered in this exchange."""
-        return None if slot in self.now.missing else self.now.position_steps[slot]
-
-    def mark_rearmed(self, slot: int) -> None:
-        """Mark a servo's answer: plans must begin at its position."""
-        self._set(slot, rearmed=True)
-
-    def record_fault(self, slot: int, fault: str) -> None:
-        """Record a servo's fault, "" for none."""
-        self._set(slot, fault=fault)
-
-    def set_torque(self, slot: int, on: bool) -> None:
-        """Record whether a servo's torque is on."""
-        self._set(slot, torque=on)
-
-    def expect_torque(self, on: bool) -> None:
-        """Record that torque has been switched for all servos."""
-        self.now = self.now._replace(torque=(on,) * len(self.now.torque))
-
-    def expect_limp(self, slots: Collection[int]) -> None:
-        """Record which servos have no torque while the others have it."""
-        torque = tuple([slot not in slots for slot in range(len(self.now.torque))])
+    def expect_torque(self, on: bool, limp: Collection[int] = ()) -> None:
+        """Record that torque has been switched for all servos but the limp ones."""
+        torque = tuple([on and slot not in limp for slot in range(len(self.now.torque))])
         self.now = self.now._replace(torque=torque)
 
     def set_climate(self, slot: int, tenth_volts: int, temperature_c: int) -> None:
         """Record a servo's voltage and temperature."""
         self._tenth_volts = ()
-        self._set(slot, voltage_v=0.1 * tenth_volts)
+        self.set(slot, voltage_v=0.1 * tenth_volts)
         if temperature_c <= MOST_CELSIUS:
-            self._set(slot, temperature_c=temperature_c)
+            self.set(slot, temperature_c=temperature_c)
 
     def hold(self, slot: int, position: int, at_s: float, torque: bool) -> None:
         """Set the position of a servo that was just set up and does not move."""
-        self.set_torque(slot, torque)
+        self.set(slot, torque=torque)
         self.places.record(slot, position, at_s)
-        self._set_motion(slot, position, 0.0, 0.0, at_s)
+        self._set_motion(slot, ServoReply(at_s, 0, position))
 
 
-def _replace_value(column: tuple[Value, ...], slot: int, value: Value) -> tuple[Value, ...]:
+def _replace_value(column: tuple[Any, ...], slot: int, value: Any) -> tuple[Any, ...]:
     """Return a column with a new value for one servo."""
     return (*column[:slot], value, *column[slot + 1 :])
 

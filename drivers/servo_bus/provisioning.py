@@ -44,7 +44,7 @@ class Provisioning:
             ServoMissing: a servo does not answer or rejects a setting.
             BusLost: the port is lost.
         """
-        for _ in range(self._family.correction_passes):
+        for _ in range(2):  # a first correction may reset other settings
             differences = self._differences(ids)
             if not differences:
                 return

@@ -155,7 +155,7 @@ class Supervisor:
             limp |= set(off).difference(released.holding_ids, released.unconfirmed_ids)
         self.limp = limp
         self._enable_again(on)
-        self._feedback.expect_limp([self._slot[servo_id] for servo_id in limp])
+        self._feedback.expect_torque(True, [self._slot[servo_id] for servo_id in limp])
 
     def _enable_again(self, ids: tuple[int, ...]) -> bool:
         """Give some servos torque again at their present positions; return whether they have it."""
@@ -197,9 +197,9 @@ class Supervisor:
         if not self.engaged or servo_id in self.limp:
             return
         wanted = {**self._provisioning.wanted(servo_id), "torque_enable": 1}
-        if not self._family.arming.limits_speed:
+        if self._family.goal_speed:
             accel = self._setups[servo_id].max_accel_steps_s2
-            wanted[self._family.arming.register] = self._family.acceleration_units(accel)
+            wanted[self._family.arming_register] = self._family.acceleration_units(accel)
         if any(values.get(name, value) != value for name, value in wanted.items()):
             self.mark(servo_id)
 
@@ -229,15 +229,15 @@ class Supervisor:
         with its next goal or by a write.
         """
         slot = self._slot[servo_id]
-        if self._feedback.position(slot) is None:
+        if slot in self._feedback.now.missing:
             return
-        self._feedback.mark_rearmed(slot)
+        self._feedback.set(slot, rearmed=True)
         if now_s < until_s:
             return
         if until_s > -inf and not self._family.goal_speed:
             (speed,) = goal_speeds(self._family, (self._setups[servo_id],), ())
             try:
-                write_verified(self._line, self._family.arming.register, {servo_id: speed})
+                write_verified(self._line, self._family.arming_register, {servo_id: speed})
             except ServoMissing:
                 return
         del self._rearmed[servo_id]
@@ -321,7 +321,7 @@ class Supervisor:
         has_restarted = arms and not found["torque_enable"]
         if has_restarted:
             self.held.add(servo_id)
-            self._feedback.set_torque(slot, False)
+            self._feedback.set(slot, torque=False)
         if found[family.error_register]:
             return " and ".join(family.name_errors(found[family.error_register]))
         position = read_positions(line, ids)[servo_id]
@@ -356,4 +356,4 @@ class Supervisor:
             self._log.add(f"{self._line.label(servo_id)}: {fault}")
         if fault:
             self.faults[servo_id] = fault
-        self._feedback.record_fault(self._slot[servo_id], fault)
+        self._feedback.set(self._slot[servo_id], fault=fault)

@@ -15,11 +15,8 @@ from gazerig.drivers.servo_bus.family import Family, Status, Window, from_sign_m
 from gazerig.drivers.servo_bus.poll_list import PollList, silent_servos
 from gazerig.drivers.servo_bus.transaction import Transactions
 
-MOST_GROUPS = 64
-"""Largest number of prepared reads."""
-
-MOST_SHIFT = 7
-"""Largest number of additional bytes of a read after a lost answer."""
+MOST_GROUPS, MOST_SHIFT = 64, 7
+"""Largest numbers of prepared reads, and of additional bytes of a read after a lost answer."""
 
 CALM_S = 1.0
 """Time after a lost answer beyond which no answer is late any more."""
@@ -137,21 +134,14 @@ class SyncReader:
         self.poll_list = polled
         self._is_fast = is_fast
         self._groups: dict[tuple[tuple[int, ...], int], GroupRead] = {}
-        self._ready: GroupRead | None = None
         self._shift, self._calm_at_s = 0, -inf
 
     def group(self, now_s: float) -> GroupRead | None:
         """Return the read of all servos that answer; None if it is not one exchange."""
         if self._shift and now_s >= self._calm_at_s:
-            self._shift, self._ready = 0, None
-        ids, ready = self.poll_list.group, self._ready
-        if ready is not None and ready.ids is ids:
-            return ready
-        if not ids or not self._family.sync_read:
-            return None
-        ready = self._ready = self._prepare(ids)
-        ready.ids = ids
-        return ready
+            self._shift = 0
+        ids = self.poll_list.group
+        return self._prepare(ids) if ids and self._family.sync_read else None
 
     def read_each(self, now_s: float) -> dict[int, ServoReply]:
         """Read servos that have no sync read one by one; return those with a good answer.
@@ -186,10 +176,7 @@ class SyncReader:
         # A servo that damages its answer would spoil those of others again.
         left = tuple(i for i in left if i != spoiler) or left
         if left:
-            again = self._prepare(left)
-            raw, at_s = line.exchange(again.request, again.reply_length)
-            more, damaged = self._collect(again, raw, at_s)
-            self._record(left, more, damaged, now_s)
+            more = self._read(left, now_s)
             replies |= more
             if len(more) < len(left):
                 line.drain()
@@ -206,11 +193,7 @@ class SyncReader:
         servo_id = self.poll_list.next_due(now_s)
         if servo_id is None:
             return
-        group = self._prepare((servo_id,))
-        replies, damaged = self._collect(
-            group, *self._line.exchange(group.request, group.reply_length)
-        )
-        self._record(group.ids, replies, damaged, now_s)
+        self._read((servo_id,), now_s)
 
     def _prepare(self, ids: tuple[int, ...]) -> GroupRead:
         group = self._groups.get((ids, self._shift))
@@ -224,6 +207,14 @@ class SyncReader:
             group = GroupRead(self._family, ids, window, self._is_fast)
             self._groups[ids, self._shift] = group
         return group
+
+    def _read(self, ids: tuple[int, ...], now_s: float) -> dict[int, ServoReply]:
+        """Read some servos, and record their answers."""
+        group = self._prepare(ids)
+        raw, at_s = self._line.exchange(group.request, group.reply_length)
+        replies, damaged = self._collect(group, raw, at_s)
+        self._record(ids, replies, damaged, now_s)
+        return replies
 
     def _collect(
         self, group: GroupRead, raw: bytes, at_s: float
@@ -255,6 +246,6 @@ class SyncReader:
         for servo_id in silent_servos(ids, {*replies, *damaged}):
             errors["timeout"] += 1
             self.poll_list.record_silent(servo_id, now_s)
-            self._shift, self._ready = self._shift % MOST_SHIFT + 1, None
+            self._shift = self._shift % MOST_SHIFT + 1
             self._calm_at_s = now_s + CALM_S
         return spoiler

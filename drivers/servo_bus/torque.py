@@ -75,8 +75,8 @@ def enable(
     own = [setups[servo_id] for servo_id in ids]
     speeds = goal_speeds(family, own, outside)
     accelerations = [family.acceleration_units(setup.max_accel_steps_s2) for setup in own]
-    armed = speeds if family.arming.limits_speed else accelerations
-    write_verified(line, family.arming.register, dict(zip(ids, armed, strict=True)))
+    armed = accelerations if family.goal_speed else speeds
+    write_verified(line, family.arming_register, dict(zip(ids, armed, strict=True)))
     _switch_on(line, present, goals, dict(zip(ids, speeds, strict=True)))
     if family.watchdog_unit_s is not None:
         write_verified(line, "bus_watchdog", dict.fromkeys(ids, watchdog))
@@ -233,9 +233,7 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
         BusLost: the port is lost.
     """
     if not port.setBaudRate(baud):
-        raise PortError(
-            f"{port.port_name} cannot run at {baud} bit/s: choose {family.recommended_bauds}"
-        )
+        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 115200 or 1000000")
     released = switch_off(Transactions(port, family, LEAST_S, MOST_S, baud), ids)
     return (*released.holding_ids, *released.unconfirmed_ids)
 

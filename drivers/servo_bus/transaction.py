@@ -239,7 +239,7 @@ class Transactions:
         found: dict[int, bytes] = {}
         # In the loop other servos wait, and the delay of answers has been measured.
         timeout_s = self.most_s if self.tries > 1 else min(self.most_s, HURRIED * self.timeout_s)
-        for asked in self.family.request_groups(ids):
+        for asked in [tuple(ids)] if self.family.sync_read else [(one,) for one in ids]:
             request = self.family.request(asked, address, length)
             self.port.clearPort()
             self.send(request)
