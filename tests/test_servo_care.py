@@ -4,8 +4,6 @@ What every kind of bus promises is in tests/buses; here is what only one make do
 does not see.
 """
 
-from typing import Any
-
 import pytest
 from copied import copied
 from fakes.dynamixels import Rig as DynamixelRig
@@ -147,29 +145,11 @@ def test_a_joint_outside_its_limits_gets_its_full_speed_when_it_is_inside():
 # --- torque goes
 
 
-def test_release_survives_a_dead_bus_and_repeats_until_the_torque_is_off(xl):
+def test_a_servo_that_keeps_its_torque_is_named(xl):
     xl.bus.enable_torque()
-    xl.port.spoil = lambda code, raw: b""
+    xl.chain[2].write = lambda address, data: 0
     xl.bus.disable_torque()
-    assert not any(servo.torque for servo in xl.chain.servos)
-    xl.port.spoil = None
-    xl.bus.enable_torque()
-    stubborn, ignored = xl.chain[2], list[Any]()
-    real = stubborn.write
-
-    def hard_of_hearing(address, data):
-        if address == 64 and len(ignored) < 3:
-            ignored.append(data)
-            return 0
-        return real(address, data)
-
-    stubborn.write = hard_of_hearing
-    xl.bus.disable_torque()
-    assert len(ignored) == 3 and not stubborn.torque
-    stubborn.write = real
-    xl.bus.enable_torque()
-    stubborn.write = lambda address, data: 0
-    xl.bus.disable_torque()
+    assert [servo.torque for servo in xl.chain.servos] == [False, True, False]
     assert xl.errors()["refused"] == 1
     assert "servo 2: torque still on: cut the servo power" in xl.bus.events()
 
