@@ -1,4 +1,4 @@
-"""Patience, journal and names: the driver's small parts."""
+"""Patience and journal: the driver's small parts."""
 
 from math import inf
 
@@ -6,11 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.event_log import MOST, EventLog, register_label
+from gazerig.drivers.event_log import MOST, EventLog
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.drivers.types import ServoConfig
 
 LATE = bytes.fromhex("FFFFFD000107005500060426655D")
 
@@ -63,11 +61,3 @@ def test_the_journal_forgets_what_nobody_takes():
     lines = journal.drain()
     assert (len(lines), lines[-1]) == (MOST, str(MOST + 4))
     assert journal.drain() == ()
-
-
-def test_names_are_those_of_people_and_manuals():
-    setup = ServoConfig(7, "xl330-m077", 0, 4095, 1.0)
-    assert servo_label(setup) == "servo 7"
-    assert servo_label(setup._replace(name="neck_yaw")) == "neck_yaw (servo 7)"
-    assert register_label("return_delay_time") == "Return Delay Time"
-    assert register_label("goal_pwm") == "Goal PWM"
