@@ -137,7 +137,7 @@ def test_files_named_exist() -> None:
 
 
 @cache
-def tests() -> set[str]:
+def names_of_tests() -> set[str]:
     """Return the names of all tests."""
     names: set[str] = set()
     for path in (ROOT / "tests").rglob("test_*.py"):
@@ -148,5 +148,7 @@ def tests() -> set[str]:
 def test_every_numbered_check_listed_is_a_test() -> None:
     text = (ROOT / "docs/checks.md").read_text("utf-8")
     listed = [int(number) for number in re.findall(r"^\| E(\d+) \|", text, re.M)]
-    tested = {int(name[6:].split("_")[0]) for name in tests() if re.match(r"test_e\d+_", name)}
+    tested = {
+        int(name[6:].split("_")[0]) for name in names_of_tests() if re.match(r"test_e\d+_", name)
+    }
     assert listed == sorted(tested) and len(listed) >= 19

@@ -5,6 +5,8 @@ import socket
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
+from math import radians
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +14,7 @@ import msgspec
 import pytest
 from msgspec import structs
 from page_visitor import PATIENCE_S
-from shown_page import PARAM, wait_for
+from shown_page import PARAM, SNAPSHOT, wait_for
 from stand_in import StandIn
 
 from gazerig.config.parameters import parameters, values
@@ -25,6 +27,7 @@ from gazerig.robot.dashboard.feed.page_process import (
     PageProcess,
 )
 from gazerig.robot.dashboard.feed.publisher import ParamFeed
+from gazerig.robot.dashboard.panels.controls import JogPanel
 from gazerig.robot.dashboard.panels.param_panel import (
     ParamControl,
     param_hint,
@@ -292,6 +295,23 @@ def test_the_feed_tells_all_once_and_then_what_changed() -> None:
 @pytest.fixture
 def place() -> Container:
     return Widgets().panel("steer")
+
+
+def test_a_slider_that_was_moved_follows_its_joint_again_after_a_stop(place: Container) -> None:
+    asked: list[Command] = []
+    outbox: Any = StandIn()
+    outbox.command = lambda command, who: asked.append(command)
+    view = JogPanel(place, outbox)
+    view.update_ranges({"joints.neck_yaw.min_deg": -30, "joints.neck_yaw.max_deg": 40.0})
+    slider = view.sliders["neck_yaw"]
+    view.show(replace(SNAPSHOT, t_s=1.0))
+    assert slider.ends == (-30.0, 40.0) and slider.value == pytest.approx(5.7) and asked == []
+    slider.receive_input(20.0, "panels-5")
+    assert asked == [Jog((("neck_yaw", radians(20.0)),))]
+    view.show(replace(SNAPSHOT, t_s=1.1))
+    assert slider.value == 20.0
+    view.show(replace(SNAPSHOT, t_s=1.2, stopped="a test"))
+    assert slider.value == pytest.approx(5.7)
 
 
 # --- parameters ---------------------------------------------------------------------------------

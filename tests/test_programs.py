@@ -12,9 +12,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
+import aiohttp
 import jsonschema
 import pytest
 from branch import Branch, gazerig
@@ -402,6 +404,43 @@ def test_who_sends_far_too_much_is_disconnected_after_its_stop(rig: Rig) -> None
     assert closed.value.rcvd is not None and closed.value.rcvd.code == 1008
     assert closed.value.rcvd.reason.startswith("too many requests: more than 200 refused in 1 s")
     assert rig.until(lambda now: now["stopped"])["stopped"] == "before the end"
+
+
+def test_a_stop_in_the_buffer_of_a_connection_that_is_closed_is_carried_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is read late: the computer is busy, and much was sent before it."""
+    monkeypatch.setattr(programs, "REST_S", 0.02)
+    stop = aiohttp.WSMessage(aiohttp.WSMsgType.TEXT, '{"do": "stop"}', None)
+    end = aiohttp.WSMessage(aiohttp.WSMsgType.CLOSED, None, None)
+    carried_out: list[object] = []
+
+    async def carry_out(frame: object, *rest: object, late: bool) -> None:
+        carried_out.append(frame)
+
+    async def receive(sends: socket.socket) -> None:
+        due_s, frames = asyncio.get_running_loop().time() + 0.07, iter((stop, end))
+
+        async def next_frame() -> aiohttp.WSMessage:
+            await asyncio.sleep(due_s - asyncio.get_running_loop().time())
+            return next(frames)
+
+        excess = programs.ExcessCount()
+        excess.is_over = True
+        routes = SimpleNamespace(_receive_frame=carry_out)
+        program = programs.ProgramSocket(0.0, False)
+        request = SimpleNamespace(transport=SimpleNamespace(get_extra_info=lambda name: sends))
+        web_socket: Any = SimpleNamespace(receive=next_frame)
+        arguments: Any = (routes, web_socket, program, asyncio.Queue(), request, excess)
+        await programs.ProgramRoutes._receive(*arguments)
+
+    here, there = socket.socketpair()
+    with here, there:
+        asyncio.run(receive(here))
+        assert carried_out == []  # nothing waits in the kernel
+        there.sendall(b"more")
+        asyncio.run(receive(here))
+    assert carried_out == [stop]
 
 
 def test_messages_that_are_dropped_are_refused_together() -> None:

@@ -13,7 +13,9 @@ from gazerig.config.schema import load_rig
 from gazerig.features.world.opponent_motion import (
     HOLD_S,
     MAX_M_S,
+    MAX_M_S2,
     TAKE_S,
+    OpponentMotion,
 )
 from gazerig.features.world.run.run_world import world_scene
 from gazerig.features.world.world_scene import WorldScene
@@ -69,6 +71,14 @@ def test_the_fist_follows_within_its_limits(scene: WorldScene) -> None:
     assert at[245, 0] == pytest.approx(HIT, abs=0.05)
     assert at[390, 0] == pytest.approx(LOW, abs=0.06)
     assert at[390, 1, 2] < -0.25 < at[240, 1, 2]
+
+
+def test_the_fist_keeps_its_acceleration_where_its_order_jumps() -> None:
+    motion = OpponentMotion(READY)
+    motion.set_target(HIT, 0.0)
+    fist = np.array([motion.step(k).fist_m for k in range(90)])
+    m_s2 = np.linalg.norm(np.diff(fist, n=2, axis=0), axis=1) / 0.01**2
+    assert 0.9 * MAX_M_S2 < m_s2.max() <= MAX_M_S2 + 1e-6
 
 
 def test_the_script_takes_over_again_after_a_second(scene: WorldScene) -> None:
