@@ -101,7 +101,6 @@ FEETECH = Family(
 
 
 MIDDLE = STEPS_PER_TURN // 2
-UNANSWERED = "check its cable and servo power"
 
 NEAR_STEPS = 8
 """Motion of the joint caused by a hand's tremor during the setting."""
@@ -122,16 +121,11 @@ def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
     registers = Registers(port, family)
     where = f"{port.port_name}: servo {servo_id}"
     torque = registers.read(servo_id, "torque_enable")
-    if torque is None:
-        raise ServoMissing(
-            registers.lateness.blame(f"{where} does not answer", UNANSWERED, port.now_s())
-        )
     if torque:
         raise ServoFault(f"{where} has its torque on: switch it off before its middle is set")
-    if not registers.write(servo_id, "lock", 0):
-        raise ServoMissing(
-            registers.lateness.blame(f"{where} does not answer", UNANSWERED, port.now_s())
-        )
+    if torque is None or not registers.write(servo_id, "lock", 0):
+        fault, remedy = f"{where} does not answer", "check its cable and servo power"
+        raise ServoMissing(registers.lateness.blame(fault, remedy, port.now_s()))
     registers.write(servo_id, "torque_enable", SET_MIDDLE)
     # Some firmware leaves torque on.
     off = registers.write(servo_id, "torque_enable", 0)

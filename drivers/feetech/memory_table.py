@@ -132,19 +132,8 @@ _ALL: tuple[Register, ...] = (
     Register("status",                  65, 1),
     Register("moving",                  66, 1),
     Register("present_current",         69, 2, sign=15),
-    # Factory settings.
-    Register("moving_threshold",        80, 1, initial=1),
-    Register("dts",                     81, 1, initial=1),
-    Register("velocity_unit_factor",    82, 1, initial=50),
-    Register("hts",                     83, 1, initial=1),
-    Register("max_velocity_limit",      84, 1, initial=80),
-    Register("max_acceleration",        85, 1, initial=100),
-    Register("acceleration_factor",     86, 1, initial=1),
 )
 # fmt: on
-
-TABLE_END = 87
-"""First address after the table."""
 
 REGISTERS: dict[str, Register] = {
     r.name: r._replace(area="eeprom") if r.address < EEPROM_END else r for r in _ALL

@@ -109,11 +109,9 @@ MOST_GOALS = 35
 class GoalWrite:
     """Builder of packets that write goal, time and speed (42..47) of several servos."""
 
-    ADDRESS, SIZE, ORDER = 42, 6, "<"
-
-    def __init__(self, ids: Sequence[int]) -> None:
-        self._head = bytes((BROADCAST, 4 + 7 * len(ids), SYNC_WRITE, self.ADDRESS, self.SIZE))
-        self._rows = struct.Struct(self.ORDER + "BHHH" * len(ids))
+    def __init__(self, ids: Sequence[int], order: str = "<") -> None:
+        self._head = bytes((BROADCAST, 4 + 7 * len(ids), SYNC_WRITE, 42, 6))
+        self._rows = struct.Struct(order + "BHHH" * len(ids))
         self._row = [number for servo_id in ids for number in (servo_id, 0, 0, 0)]
 
     def packet(self, goals: Sequence[int], speeds: Sequence[int]) -> bytes:

@@ -8,6 +8,7 @@ marked [A] are assumptions, as they are not documented. Sources: Feetech, SCSCL 
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from gazerig.drivers.feetech.family import FEETECH, SENSED, SIGNS, wanted_settings
@@ -27,8 +28,7 @@ if TYPE_CHECKING:  # the guardian starts without numpy
 _ABSENT = {
     *("protection_current", "angular_resolution", "position_offset", "operating_mode"),
     *("velocity_p_gain", "velocity_i_gain", "overcurrent_time", "torque_limit", "present_current"),
-    *("velocity_unit_factor", "max_acceleration", "acceleration_factor", "max_velocity_limit"),
-    *("moving_threshold", "dts", "hts", "phase"),
+    "phase",
 }
 _ELSEWHERE = {"protective_torque": 37, "protection_time": 38, "overload_torque": 39, "lock": 48}
 _OTHERWISE: dict[str, dict[str, Any]] = {
@@ -48,12 +48,6 @@ SCS_REGISTERS: dict[str, Register] = {
 """Registers by name."""
 
 
-class ScsGoalWrite(GoalWrite):
-    """Builder of goal packets, high byte first."""
-
-    ORDER = ">"
-
-
 def scs_settings(setup: "ServoConfig") -> dict[str, int]:
     """Return the required register values; strength is Max Torque (16), in EEPROM."""
     wanted = {name: v for name, v in wanted_settings(setup).items() if name in SCS_REGISTERS}
@@ -69,7 +63,7 @@ FEETECH_SCS = replace(
     models=SCS_MODELS,
     steps_per_turn=SCS_MODELS["scs0009"].steps_per_turn,
     acceleration_units=lambda accel_steps_s2: 0,  # [A]: 41 is not documented
-    create_goal_packets=ScsGoalWrite,
+    create_goal_packets=partial(GoalWrite, order=">"),
     sync_read=False,
     baud_rates=SCS_BAUD_RATES,
     scan_rates=SCS_BAUD_RATES,

@@ -137,15 +137,6 @@ def latency_ms(file: Path) -> int | None:
         return None
 
 
-def set_latency(file: Path, ms: int = RECOMMENDED_LATENCY_MS) -> bool:
-    """Write a latency timer; return whether the adaptor has it. Needs write permission."""
-    try:
-        file.write_text(f"{ms}\n", encoding="ascii")
-    except OSError:
-        return False
-    return latency_ms(file) == ms
-
-
 def open_failure_text(port_name: str, code: int | None) -> str:
     """Return in one line why a port or an I2C bus cannot be opened, with the remedy."""
     kind, remedy, group, use = "serial port", "plug the adapter in", "dialout", "uses it"

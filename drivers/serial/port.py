@@ -192,11 +192,12 @@ class BlockingPort:
         if baudrate not in RATES:
             return False
         self.closePort()
-        where = self._path()
+        # Another adaptor may have the path of one that was unplugged.
+        where = self._lasting or self.port_name
         try:
             self._serial = Serial(where, baudrate, timeout=0, exclusive=self._exclusive or None)
         except (SerialException, OSError) as error:
-            raise PortError(open_failure_text(self.port_name, error.errno)) from error
+            raise PortError(open_failure_text(where, error.errno)) from error
         except ValueError:  # pyserial: the adapter does not support this rate
             return False
         self.opened_as = os.path.realpath(where) if where != self.port_name else where
@@ -210,23 +211,6 @@ class BlockingPort:
             self._serial.set_low_latency_mode(True)
         self.baudrate = baudrate
         return True
-
-    def _path(self) -> str:
-        """Return the path to open: a port that was open is found by its adaptor's serial number.
-
-        Raises:
-            PortError: another adaptor has the port's path now.
-        """
-        lasting = self._lasting
-        if lasting is None:
-            return self.port_name
-        if os.path.exists(lasting):
-            same = os.path.realpath(lasting) == os.path.realpath(self.port_name)
-            return self.port_name if same else lasting
-        now = persistent_name(self.port_name, self._by_id)
-        if now not in (None, lasting):
-            raise PortError(f"{self.port_name} is another adaptor now ({now}): plug in {lasting}")
-        return self.port_name
 
     def closePort(self) -> None:
         """Close; safe to call twice."""

@@ -8,8 +8,7 @@ the next new goal; other errors in Unloading Condition switch it off.
 The registers' places are those of the driver's table. Of them have no effect: goal time (44),
 modes other than position (33 and, for SCS, both limits 0), phase (18), starting force and dead
 zones (24, 26, 27; without them friction keeps it up to 2 steps from its goal, as on a real servo),
-protection current (28), angular resolution (30), velocity gains (37, 39), LED (20), the factory's
-own (80-86).
+protection current (28), angular resolution (30), velocity gains (37, 39), LED (20).
 
 Position, goal and target are sign and magnitude. The encoder knows its place within a turn, 0 to
 4095 at power-on; from there the servo counts on, and subtracts the offset (31): a shaft that was

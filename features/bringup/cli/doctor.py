@@ -149,9 +149,8 @@ def _apply_fixes(
     rig: Rig, lines: Mapping[str, BusPort], findings: Mapping[str, Sequence[Diagnostic]], tell: Tell
 ) -> None:
     """Apply all fixes, and print each of them."""
-    done = []
+    done: list[str] = []
     for bus, line in lines.items():
-        done += checkup.fix_latency(line.port_name, bench.host)
         if any(finding.fixes for finding in findings[bus]):
             write = partial(_write_fix, line, rig.bus_named(bus), setups_on(rig, bus))
             done += checkup.apply_fixes(write, findings[bus])

@@ -23,7 +23,6 @@ from gazerig.drivers.serial.list_ports import (
     latency_ms,
     port_users,
     serial_ports,
-    set_latency,
 )
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (
@@ -210,19 +209,6 @@ def _open(port: BusPort, baud: int) -> None:
 
 
 # --- fixes
-
-
-def fix_latency(device: str, host: Host) -> list[str]:
-    """Shorten the adaptor's latency timer if it is too long, and return a line about it.
-
-    It needs write permission.
-    """
-    file = latency_file(device, host)
-    was = None if file is None else latency_ms(file)
-    if file is None or was is None or was <= RECOMMENDED_LATENCY_MS:
-        return []
-    how = "done" if set_latency(file) else f"not done, {file} may not be written"
-    return [f"{device}: latency timer {was} -> {RECOMMENDED_LATENCY_MS} ms: {how}"]
 
 
 def apply_fixes(write: Callable[[Fix], str], findings: Iterable[Diagnostic]) -> Iterator[str]:
