@@ -37,4 +37,4 @@ class Rig(MovingBus):
 
     def get(self, servo_id, address, size=1):
         """Look into a servo, apart from driver and line."""
-        return int.from_bytes(self.chain.find_servo(servo_id).read(address, size), "little")
+        return int.from_bytes(self.chain.find_servo(servo_id).read(address, size)[1], "little")

@@ -52,7 +52,8 @@ class DynamixelChain(ServoChain):
                 servo_id, address, length = _ROW.unpack_from(params, at)
                 at += _ROW.size + length
                 if at <= len(params):
-                    self._write_part(servo_id, address, params[at - length : at])
+                    row = bytes((servo_id,)) + params[at - length : at]
+                    self._write_each(self.span.pack(address, length) + row)
             return []
         return super()._execute_group(code, params)
 

@@ -43,6 +43,7 @@ from gazerig.drivers.feetech.memory_table import (
     registers_of,
 )
 from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN as TURN
+from gazerig.drivers.feetech.scs import SCS_REGISTERS
 from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.sim_mock.feetech.packets import signed, unsigned
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
@@ -80,26 +81,6 @@ _SENSED = {"little": struct.Struct("<HHHBBBBBHH"), "big": struct.Struct(">HHHBBB
 
 Order = Literal["little", "big"]
 
-_SCS_PLACES = {"protective_torque": 37, "protection_time": 38, "overload_torque": 39, "lock": 48}
-_SCS_LACKS = {
-    *("protection_current", "angular_resolution", "position_offset", "operating_mode"),
-    *("velocity_p_gain", "velocity_i_gain", "overcurrent_time", "torque_limit", "present_current"),
-}
-_SCS_STARTS = {"max_position_limit": SCS_STEPS - 1, "unloading_condition": HEAT | OVERLOAD}
-
-
-def _scs_registers(model: ServoModel) -> tuple[Register, ...]:
-    """Return the registers of an SCS servo: some of STS servos, of which four lie elsewhere."""
-    return tuple(
-        register._replace(
-            address=_SCS_PLACES.get(register.name, register.address),
-            initial=_SCS_STARTS.get(register.name, register.initial),
-            order="big",
-        )
-        for register in registers_of(model)
-        if register.name not in _SCS_LACKS and register.address < SENSED_END
-    )
-
 
 class FeetechMemory(ServoMemory):
     """One servo's memory; ``bytes`` holds what is read; the permanent EEPROM is separate."""
@@ -107,9 +88,11 @@ class FeetechMemory(ServoMemory):
     def __init__(self, model: ServoModel, servo_id: int, firmware: int) -> None:
         scs = model.name in SCS_MODELS
         own = {"id": servo_id, "return_delay_time": RETURN_DELAY, "firmware_minor": firmware}
+        if scs:
+            own["model_number"] = model.number
         registers = [
             register._replace(initial=own.get(register.name, register.initial))
-            for register in (_scs_registers(model) if scs else registers_of(model))
+            for register in (SCS_REGISTERS.values() if scs else registers_of(model))
         ]
         self._kept = bytearray(SIZE)
         super().__init__(registers, SIZE)

@@ -302,14 +302,12 @@ class ServoChain(ABC):
         address, length = self.span.unpack_from(params)
         rows = params[start:]
         if len(rows) % (1 + length) == 0:
+            find, now_ms, fed_ms = self._by_id.get, self._now_ms, self._fed_ms
             for servo_id, data in struct.iter_unpack(f"B{length}s", rows):
-                self._write_part(servo_id, address, data)
-
-    def _write_part(self, servo_id: int, address: int, data: bytes) -> None:
-        """Execute one servo's part of a group write, unless it already follows the same goals."""
-        for servo in self._by_id.get(servo_id, ()):
-            if servo.followed != (address, data) and servo.advance(self._now_ms, self._fed_ms):
-                servo.write(address, data)
+                for servo in find(servo_id, ()):
+                    # Repeating the goals that it follows would change nothing.
+                    if (address, data) != servo.followed and servo.advance(now_ms, fed_ms):
+                        servo.write(address, data)
 
     # --- construction
 

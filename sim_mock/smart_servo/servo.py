@@ -158,9 +158,10 @@ class EmulatedServo(ABC):
             self._ms = self._check_ms
             self._check_ms += CHECK_MS
             self._check()
-        if until_ms > self._ms and not shaft.quiet:
-            shaft.run(until_ms - self._ms)
-        self._ms = until_ms
+        if until_ms > self._ms:
+            if not shaft.quiet:
+                shaft.run(until_ms - self._ms)
+            self._ms = until_ms
 
     def _check(self) -> None:
         """Apply weight and protections. A heavy load is torque, not duty."""
