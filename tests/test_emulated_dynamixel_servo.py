@@ -66,20 +66,20 @@ def test_live_registers_tell_the_motion():
 
 
 def test_a_jammed_joint_overloads_after_its_time_and_only_a_reboot_clears_it():
-    bench = Bench(overload_s=1.5)
+    bench = Bench()
     bench.put(64, 1)
     bench.servo.jam()
     bench.put(116, 4000)
-    bench.at(1400)
+    bench.at(1900)
     assert (bench.get(70), bench.get(64), bench.servo.error_flag) == (0, 1, 0)
-    bench.at(1600)
+    bench.at(2100)
     assert (bench.get(70), bench.get(64), bench.servo.error_flag) == (0x20, 0, 0x80)
     assert (bench.get(124), bench.get(126)) == (0, 0)
     bench.servo.jam(False)
     assert (bench.put(64, 1), bench.get(64)) == (0, 0)
     bench.servo.restart()
-    assert not bench.at(1900)
-    assert bench.at(2100)
+    assert not bench.at(2400)
+    assert bench.at(2600)
     assert (bench.get(70), bench.put(64, 1), bench.get(64)) == (0, 0, 1)
 
 

@@ -155,10 +155,6 @@ class DynamixelServo(EmulatedServo):
                 self.memory.set(f"goal_{name}", self.memory.get(f"{name}_limit"))
         self._set_goal_here()
 
-    def _overload_limit(self) -> tuple[float, float]:
-        """Return it from the physics, because no register holds it."""
-        return self.physics.overload_share, self.physics.overload_s
-
     def _set_controller(self) -> None:
         """Apply the registers of profile, gains and limits."""
         get = self.memory.get

@@ -141,8 +141,7 @@ class FeetechMemory(ServoMemory):
 class FeetechServo(EmulatedServo):
     """One Feetech servo on the chain.
 
-    The spec's ``firmware`` is the number after 3; ``overload_share`` and ``overload_s`` of its
-    physics are ignored: here they are registers.
+    The spec's ``firmware`` is the number after 3.
 
     Raises:
         ValueError: the model is unknown.
@@ -168,11 +167,6 @@ class FeetechServo(EmulatedServo):
         self._current_full = model.stall_current_a * 1000.0 / CURRENT_UNIT_MA
         memory = FeetechMemory(model, spec.id, spec.firmware)
         super().__init__(spec, model, memory, now_ms, make_shaft, turn / TURN)
-
-    def _boot(self) -> None:
-        """Reset to power-on."""
-        self._goals_followed: tuple[int, ...] = ()
-        super()._boot()
 
     def _apply_settings(self) -> None:
         """Apply settings that have changed."""
@@ -210,23 +204,15 @@ class FeetechServo(EmulatedServo):
         return 1, 0 if self._scs else -self.memory.get("position_offset")
 
     def _follow(self) -> None:
-        """Follow the goal registers if they have changed."""
+        """Follow the goal registers."""
         if not self.torque:
             return
-        wanted = self._goals.unpack_from(self.memory.bytes, GOALS_AT)
-        if wanted == self._goals_followed:
-            return
-        self._goals_followed = wanted
-        ramp, goal, _, speed = wanted
+        ramp, goal, _, speed = self._goals.unpack_from(self.memory.bytes, GOALS_AT)
         low, high = self._range
         goal = max(low, min(high, signed(goal, 15)))
         place = goal / self._scale - self._shift
         cruise = min(abs(signed(speed, 15)) / self._scale / 1000.0 or self._top, self._top)
         self.shaft.lead_to(place, cruise, ramp * RAMP_UNIT)
-
-    def _switch(self, on: bool) -> None:
-        self._goals_followed = ()
-        super()._switch(on)
 
     def _calibrate(self) -> None:
         """Set the present position to the middle; the offset is stored permanently."""

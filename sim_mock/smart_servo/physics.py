@@ -10,7 +10,7 @@ voltage, PWM a share of full PWM.
 from math import inf, pi
 from typing import NamedTuple, Protocol
 
-from gazerig.robot.model.assumed_servo import AMBIENT_C, GEAR_FRICTION
+from gazerig.robot.model.assumed_servo import GEAR_FRICTION
 
 
 class Physics(NamedTuple):
@@ -32,11 +32,6 @@ class Physics(NamedTuple):
     play_deg: deg; dead travel between output shaft and joint, 0.25 as in the data sheets of
         the X430. The encoder of X servos is at the output, so the registers show no play;
         a world has it. Play inside the gear is omitted.
-    supply_v: V, in its register; None: the rated voltage of the model. The torque is that of the
-        rated one.
-    temperature_c: degC of the motor [A].
-    overload_share: share of the stall torque at the present voltage that counts as
-        overload; overload_s: s; duration until it latches [A: in no data sheet].
     """
 
     rotor_s: float = 0.0373
@@ -50,10 +45,6 @@ class Physics(NamedTuple):
     stop_low_steps: float = -inf
     stop_high_steps: float = inf
     play_deg: float = 0.25
-    supply_v: float | None = None
-    temperature_c: float = AMBIENT_C
-    overload_share: float = 0.8
-    overload_s: float = 2.0
 
 
 class ServoSpec(NamedTuple):

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from math import sin
 from typing import ClassVar
 
+from gazerig.robot.model.assumed_servo import AMBIENT_C
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.physics import (
     STEPS_PER_RAD,
@@ -26,6 +27,8 @@ CHECK_MS = 20
 """Period of weight and protections, in the servo's own time: reading does not change them."""
 LONGEST_MS = 10_000
 """Only the end of a longer time without a packet is simulated."""
+OVERLOAD_SHARE, OVERLOAD_S = 0.8, 2.0
+"""Share of the stall torque that latches an overload, and its duration; [A: in no data sheet]."""
 TOO_HOT_C = 5.0
 """Temperature above the limit of a motor that a fault has overheated."""
 Result = tuple[int, bytes]
@@ -73,7 +76,7 @@ class EmulatedServo(ABC):
     ) -> None:
         physics = spec.physics
         self.spec, self.model, self.memory = spec, model, memory
-        self.physics, self._scale = physics, scale
+        self._scale = scale
         own = physics._replace(
             stop_low_steps=physics.stop_low_steps / scale,
             stop_high_steps=physics.stop_high_steps / scale,
@@ -82,8 +85,8 @@ class EmulatedServo(ABC):
         self._upright = physics.upright_steps / scale
         self._weight_rad = physics.gravity_turns / STEPS_PER_RAD
         self.shaft = make_shaft(spec.id, model, own, spec.start_steps / scale)
-        self._supply_v = model.rated_v if physics.supply_v is None else physics.supply_v
-        self._temperature_c = physics.temperature_c
+        self._supply_v = model.rated_v
+        self._temperature_c = AMBIENT_C
         self.on_address: Callable[[], None] = lambda: None
         self._address = 0, 0
         self._ms = self._booted_ms = self._deaf_until_ms = now_ms
@@ -118,9 +121,9 @@ class EmulatedServo(ABC):
             self._address = self.id, self.baud
             self.on_address()
 
-    @abstractmethod
     def _overload_limit(self) -> tuple[float, float]:
         """Return the share of the stall torque that is an overload, and its duration in s."""
+        return OVERLOAD_SHARE, OVERLOAD_S
 
     @abstractmethod
     def _set_controller(self) -> None:
