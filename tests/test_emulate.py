@@ -100,7 +100,7 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
     assert [servo["id"] for servo in reported["servos"]] == [1, 2, 7]
     assert reported["servos"][2]["position"] == 100
     assert "ok" in emulator.type("lose 1 count 1")
-    assert "'x' is not a servo id" in emulator.type("lose x")["error"]
+    assert "'x' is not ID from 0" in emulator.type("lose x")["error"]
     assert "lose ID" in emulator.type("help")["ok"]
     port = connect(link)
     assert ping(port, 1) is None

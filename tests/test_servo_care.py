@@ -99,10 +99,10 @@ def test_a_place_to_begin_from_must_be_read_again_before_torque():
     real = servo.read
 
     def read(address, length):
-        data = real(address, length)
-        if (address, length) == (56, 2) and data is not None:
+        error, data = real(address, length)
+        if (address, length) == (56, 2):
             data = next(places, 2000).to_bytes(2, "little")
-        return data
+        return error, data
 
     servo.read = read
     with pytest.raises(ServoMissing, match="servo 2. does not rest: hold it still"):

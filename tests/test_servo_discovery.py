@@ -75,6 +75,7 @@ def test_two_servos_with_one_id_are_seen(family):
 
 def test_the_present_place_becomes_the_middle_for_good():
     bench = Bench(FEETECH, 1_000_000, 7)
+    bench.chain[7].write(42, (1949).to_bytes(2, "little"))
     bench.chain[7].write(40, b"\x01")
     with pytest.raises(ServoFault, match="servo 7 has its torque on: switch it off before"):
         set_middle(bench.port, FEETECH, 7)

@@ -9,8 +9,7 @@ from functools import lru_cache
 
 from fastcrc.crc16 import umts
 
-from gazerig.drivers.dynamixel.protocol import HEADER, STATUS
-from gazerig.sim_mock.dynamixel.packets import CRC, HEAD, find_instructions, status
+from gazerig.sim_mock.dynamixel.packets import CRC, HEAD, HEADER, STATUS, find_instructions, status
 from gazerig.sim_mock.dynamixel.servo import INSTRUCTION_ERROR, DynamixelServo
 from gazerig.sim_mock.replies import BROADCAST, Piece, merge
 from gazerig.sim_mock.smart_servo.chain import (

@@ -7,9 +7,11 @@ import struct
 
 from fastcrc.crc16 import umts
 
-from gazerig.drivers.dynamixel.protocol import HEADER, RAW, STATUS, STUFFED, instruction
 from gazerig.sim_mock.replies import Instruction
 
+HEADER = b"\xff\xff\xfd\x00"
+RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
+STATUS = 0x55
 SHORTEST = 10
 LONGEST = 1024
 """Longest packet; a larger length is noise."""
@@ -20,7 +22,9 @@ CRC = struct.Struct("<H")
 
 def status(servo_id: int, error: int, params: bytes) -> bytes:
     """Build a status packet."""
-    return instruction(servo_id, STATUS, b"%c%b" % (error, params))
+    params = params.replace(RAW, STUFFED)
+    packet = HEAD.pack(HEADER, servo_id, len(params) + 4, STATUS) + bytes((error,)) + params
+    return packet + CRC.pack(umts(packet))
 
 
 def find_instructions(data: bytes, before: int) -> tuple[list[Instruction], bytes]:

@@ -7,15 +7,17 @@ parameters may contain a header. Signed numbers are sign and magnitude. Source: 
 communication protocol of the STS/SMS series.
 """
 
-from gazerig.drivers.feetech.protocol import HEADER, instruction
 from gazerig.sim_mock.replies import Instruction
 
+HEADER = b"\xff\xff"
 MOST_PARAMS = 253
 
 
 def status(servo_id: int, error: int, params: bytes) -> bytes:
     """Build a status packet, of at most as many bytes as fit."""
-    return instruction(servo_id, error, params[:MOST_PARAMS])
+    params = params[:MOST_PARAMS]
+    body = bytes((servo_id, len(params) + 2, error)) + params
+    return HEADER + body + bytes((~sum(body) & 0xFF,))
 
 
 def signed(raw: int, bit: int) -> int:

@@ -87,7 +87,7 @@ class Motor(Protocol):
         ...
 
 
-class ServoModel(Motor, Protocol):
+class EmulatedModel(Motor, Protocol):
     """Data of a servo model."""
 
     @property

@@ -14,7 +14,7 @@ from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.physics import (
     STEPS_PER_RAD,
     STEPS_PER_TURN,
-    ServoModel,
+    EmulatedModel,
     ServoSpec,
 )
 from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
@@ -68,7 +68,7 @@ class EmulatedServo(ABC):
     def __init__(
         self,
         spec: ServoSpec,
-        model: ServoModel,
+        model: EmulatedModel,
         memory: ServoMemory,
         now_ms: int,
         make_shaft: ShaftMaker = create_shaft,

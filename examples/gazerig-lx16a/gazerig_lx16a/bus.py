@@ -70,7 +70,7 @@ class Line:
 
 
 class Lx16aBus(PortBus):
-    """The servos; it is its own supervisor, ``engaged`` while it follows goals."""
+    """The servos; ``engaged`` while they follow goals."""
 
     _line: Line
 
@@ -78,7 +78,7 @@ class Lx16aBus(PortBus):
         self._port, self._params = port, params
         self._baud, self._give_up_s = p.BAUD, params.give_up_s
         self._line, self._log = Line(port, params.reply_timeout_ms / 1e3), EventLog()
-        self._supervisor, self.engaged = self, False
+        self.engaged = False
         self._setups = self._target_setups = tuple(setups)
         self._check_setups(setups)
         self._reset()
@@ -95,7 +95,7 @@ class Lx16aBus(PortBus):
         self._volts: list[float | None] = [None] * count
         self._turn = 0
 
-    def stop_supervision(self) -> None:
+    def _stop_supervision(self) -> None:
         self.engaged = False
 
     def open(self) -> None:
