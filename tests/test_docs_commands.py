@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 import pytest
 from command_line import options, parse, typed
-from fakes.pty_bus import PtyBus
 from features_there import needs_all_features
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, spans
 
@@ -206,7 +205,6 @@ def test_python_that_opens_a_head_runs(block: Block) -> None:
 
 def test_python_that_needs_no_rig_runs(capfd: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
-    [code] = [b.text for b in blocks("python") if "with PtyBus" in b.text]
-    names = {}
+    [code] = [b.text for b in blocks("python") if "with PtyBuses" in b.text]
     exec(compile(code, "emulator.md", "exec"), names)
-    assert isinstance(names["bus"], PtyBus) and names["path"]
+    assert names["paths"]["neck"]
