@@ -43,7 +43,7 @@ def test_an_agent_reports_the_turns_of_its_script(scene: str) -> None:
     [
         ("  - {at_s: 99.0, state: idle}", "within the round"),
         ("  - {at_s: 1.0, state: idle}", "order of time"),
-        ("  - {at_s: 57.0, state: idle, person: nobody}", "no person of the script"),
+        ("  - {at_s: 57.0, state: idle, person: nobody}", "no 'nobody' here"),
         ("  - {at_s: 57.0, state: dancing}", "listening"),
         ("  - {at_s: 57.0, state: speaking, seconds: -1}", "seconds"),
     ],

@@ -32,7 +32,7 @@ def begun(*words: str) -> "subprocess.Popen[str]":
     )
     # Registers set at start-up are reported once torque is on.
     assert process.stderr is not None
-    assert any("Indirect Addresses set" in line for line in iter(process.stderr.readline, ""))
+    assert any("Return Delay Time" in line for line in iter(process.stderr.readline, ""))
     return process
 
 

@@ -122,12 +122,13 @@ class Server:
             now_s = time.monotonic()
             if stop in ready:
                 return
+            for line in lines:
+                line.serve(ready, now_s)
+            # Afterwards, as a command may close terminals that were ready.
             if commands in ready and not self._take_commands(commands):
                 if self._until_eof:
                     return
                 commands = None
-            for line in lines:
-                line.serve(ready, now_s)
             if self.surroundings is not None:
                 self.surroundings.serve(any([line.heard for line in lines]))
 

@@ -87,7 +87,7 @@ def timed_acts(
 def name_faults(
     script: SceneScript, places: Collection[str], robot: tuple[str, ...] = (HEAD,)
 ) -> Iterator[Fault]:
-    """Find names of people, places and things that do not exist."""
+    """Find names that do not exist, and reports of the agent that would never come."""
     named: list[tuple[str, str, Collection[str]]] = []
     targets = {*robot, *script.people, *places}
     for name, person in script.people.items():
@@ -102,7 +102,11 @@ def name_faults(
             if act.do == "pass":
                 named += [(f"{own}.thing", act.thing, script.things)]
             named += [(f"{own}.via", place, places) for place in act.via]
+    before_s = 0.0
     for i, report in enumerate(script.agent):
+        if not before_s <= report.at_s < script.round_s:
+            yield f"agent.{i}.at_s", "reports are in the order of time, within the round"
+        before_s = report.at_s
         named += [(f"agent.{i}.person", report.person, ("", *script.people))]
     for i, look in enumerate(script.expected or ()):
         named += [(f"expected.{i}.at", look.at, places)]
