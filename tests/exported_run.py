@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
 from fakes.runs import play
 
 from gazerig.config.schema import load_rig
@@ -37,6 +36,3 @@ class Run:
         self.trace: GazeAngles = collect_gaze_angles(ticks)
         self.labels: Labels = label_samples(self.trace)
         self.stretches: tuple[LabelledInterval, ...] = find_intervals(self.trace, self.labels)
-
-    def onsets_s(self, event: str) -> np.ndarray:
-        return np.array([s.onset_s for s in self.stretches if s.event == event])

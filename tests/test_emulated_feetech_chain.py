@@ -47,11 +47,6 @@ def test_signs_stand_in_one_bit(raw, bit, value):
 # --- memory
 
 
-def test_a_model_that_is_not_feetechs_is_refused():
-    with pytest.raises(ValueError, match=r"model 'xl330-m288': Feetech servos are sts3215"):
-        FeetechBench((1, "xl330-m288", 0.0))
-
-
 def test_read_only_registers_stay_and_nobody_complains(bench):
     for address in (0, 3, 56, 62, 65):
         before = bench.read(1, address)
@@ -121,10 +116,3 @@ def test_an_overload_lowers_the_torque_after_its_time_until_a_new_goal():
     assert bench.error() == OVERLOAD
     bench.write(1, 42, 2990, 2)
     assert bench.ask(1, PING)[0][1] == 0
-
-
-def test_a_torque_limit_below_it_never_overloads():
-    bench = jammed()
-    bench.write(1, 48, 790, 2)
-    bench.wait(10.0)
-    assert (bench.error(), bench.read(1, 60, 2, 10)) == (0, 790)

@@ -21,7 +21,7 @@ LARGEST = {
     "features/lab": 53_400,
     "features/study": 10_200,
     "features/world": 48_300,
-    "tests": 480_100,
+    "tests": 480_000,
 }
 TOKEN = re.compile(
     r"""(?P<comment>\#[^\n]*)
