@@ -49,7 +49,6 @@ class HobbyBoardBus(PortBus):
     """
 
     holding_text = "pulses still on"
-    unconfirmed_text = "end of pulses not confirmed"
 
     def __init__(self, board: Board, setups: Sequence[ServoConfig]) -> None:
         self._board = self._line = board

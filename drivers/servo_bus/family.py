@@ -241,10 +241,6 @@ class Family:
     fault_cure: str
     jump_cure: str
 
-    def __deepcopy__(self, memo: object) -> "Family":
-        """Return itself: it is immutable, and its codec is a module."""
-        return self
-
     def request(self, ids: Sequence[int], address: int, length: int) -> bytes:
         """Return a request for the same registers of some servos; of one if each is read alone."""
         ask, asked = (self.codec.sync_read, ids) if self.sync_read else (self.codec.read, ids[0])
