@@ -19,16 +19,18 @@ from gazerig.gaze.mouth.loudness import FRAME_S, WINDOW_S
 from gazerig.gaze.turning_points import turning_points
 from gazerig.gaze.types import Floats
 
-CLOSED_PHONEMES = ("p", "b", "m")
 _PEAK_SPEED, _PEAK_ACCELERATION = 15.0 / 8.0, 10.0 / sqrt(3.0)
 _LEAST_TURN = 0.1
 _SMOOTH = np.hanning(7)[1:-1] / np.hanning(7).sum()
 _SILENT, _SILENT_S = 0.03, 0.06
 _DIP_SHARE, _DIP_FRAMES = 0.4, 15
 _LEAST_GAP_S = 0.02
+_LEAST_OPEN_S = 0.05
 _P_CLOSED_S = 0.055
 _LONGEST_PHONEME, _LONGEST_LETTER_S = 2, 0.09
-_B_SHARE, _M_SHARE = 0.5, 0.65
+LONGEST_CLOSURE_S = 0.12
+"""Lips part between an m and the next b; a person holds neither longer than this."""
+_CLOSED_SHARE = {"b": 0.5, "m": 0.65}
 
 
 @dataclass(frozen=True)
@@ -87,10 +89,14 @@ def phoneme_closures(spoken: Sequence[tuple[str, float]], end_s: float) -> tuple
             at_s = begin_s + i * length_s
             if letter == "p":
                 closures.append(Closure(max(0.0, at_s - _P_CLOSED_S), at_s))
-            elif letter in CLOSED_PHONEMES:
-                share = _B_SHARE if letter == "b" else _M_SHARE
+            elif share := _CLOSED_SHARE.get(letter):
                 closures.append(Closure(at_s, at_s + share * length_s))
-    return tuple(closures)
+    joined: list[Closure] = []
+    for begin_s, last_s in closures:
+        if joined and begin_s - joined[-1].end_s < _LEAST_OPEN_S:
+            begin_s = joined.pop().begin_s
+        joined.append(Closure(max(begin_s, last_s - LONGEST_CLOSURE_S), last_s))
+    return tuple(joined)
 
 
 def estimated_closures(opening: Floats) -> tuple[Closure, ...]:
@@ -141,6 +147,11 @@ def mouth_keys(
         at_s = frame_s(i)
         if not any(c.begin_s - _LEAST_GAP_S < at_s < c.end_s + _LEAST_GAP_S for c in shut):
             keys.append((at_s, float(opening[i]), False))
+    for before, after in pairwise(shut):
+        vowel = opening[round(before.end_s / FRAME_S) : round(after.begin_s / FRAME_S)]
+        if len(vowel) * FRAME_S > 2 * _LEAST_GAP_S:
+            middle_s = 0.5 * (before.end_s + after.begin_s)
+            keys.append((middle_s, float(vowel.max()), False))
     for closure in shut:
         keys.append((max(_LEAST_GAP_S, closure.begin_s), 0.0, True))
         if closure.end_s - closure.begin_s >= _LEAST_GAP_S:
@@ -164,16 +175,11 @@ def _limit(keys: list[tuple[float, float, bool]], limits: JawLimits) -> tuple[Mo
     """Return the keys with strokes that the jaw can follow: lower maxima, higher minima."""
     values = [value for _, value, _ in keys]
     strokes = [limits.stroke(b[0] - a[0]) for a, b in pairwise(keys)]
-    for order in (range(1, len(keys)), range(len(keys) - 2, -1, -1)):
-        step = 1 if order.step > 0 else -1
-        for i in order:
-            other = i - step
-            if not keys[i][2]:
-                values[i] = min(values[i], values[other] + strokes[min(i, other)])
-    for order in (range(1, len(keys)), range(len(keys) - 2, -1, -1)):
-        step = 1 if order.step > 0 else -1
-        for i in order:
-            other = i - step
-            if not keys[i][2]:
-                values[i] = max(values[i], values[other] - strokes[min(i, other)])
+    for sign in (1.0, -1.0):
+        for step, order in ((1, range(1, len(keys))), (-1, range(len(keys) - 2, -1, -1))):
+            for i in order:
+                other = i - step
+                if not keys[i][2]:
+                    farthest = sign * values[other] + strokes[min(i, other)]
+                    values[i] = sign * min(sign * values[i], farthest)
     return tuple(MouthKey(key[0], value) for key, value in zip(keys, values, strict=True))
