@@ -11,7 +11,6 @@ from mixed_rig import mixed_text
 
 from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
-from gazerig.drivers.serial.list_ports import Host
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
@@ -45,9 +44,7 @@ def rig_files(folder: Path) -> dict[str, str]:
     return paths
 
 
-def hide_real_ports(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+def hide_real_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let bring-up see none of this computer's ports."""
     ports = pytest.importorskip("gazerig.features.bringup.cli.ports")
-    host = Host(folder / "latency", folder / "by-id", folder / "processes")
-    monkeypatch.setattr(ports, "host", host)
-    monkeypatch.setattr(ports, "serial_ports", lambda host: ())
+    monkeypatch.setattr(ports, "serial_ports", lambda: ())

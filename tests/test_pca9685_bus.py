@@ -277,7 +277,7 @@ def test_an_adapter_that_goes_comes_back_and_holds(world, kernel):
     ("code", "reported"),
     [
         (errno.ENOENT, "no I2C bus /dev/i2c-7: switch I2C on"),
-        (errno.EACCES, "'sudo usermod -aG i2c [$]USER'"),
+        (errno.EACCES, "join its group with 'sudo usermod"),
         (errno.EBUSY, "is busy: close the other program"),
         (errno.ENOTTY, "cannot open .* as I2C bus"),
     ],

@@ -23,8 +23,8 @@ pytestmark = pytest.mark.usefixtures("simulated_wires")
 
 
 @pytest.fixture
-def no_real_ports(monkeypatch, tmp_path):
-    hide_real_ports(monkeypatch, tmp_path)
+def no_real_ports(monkeypatch):
+    hide_real_ports(monkeypatch)
 
 
 @pytest.fixture

@@ -15,12 +15,7 @@ from typing import Protocol
 from serial import Serial, SerialException
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.serial.list_ports import (
-    HOST,
-    is_i2c,
-    open_failure_text,
-    persistent_name,
-)
+from gazerig.drivers.serial.list_ports import BY_ID, is_i2c, open_failure_text, persistent_name
 
 BITS_PER_BYTE = 10
 
@@ -101,7 +96,7 @@ class BlockingPort:
         port_name: str,
         exclusive: bool = True,
         on_traffic: Callable[[], None] | None = None,
-        by_id: Path = HOST.by_id,
+        by_id: Path = BY_ID,
     ) -> None:
         self.port_name = self.opened_as = port_name
         self.baudrate = 0

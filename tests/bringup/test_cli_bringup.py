@@ -23,8 +23,8 @@ ROW = r"(\d) +[│|] ([\w-]+) +[│|] ([\d.]+) +[│|] (\d+) +[│|] "
 
 
 @pytest.fixture(autouse=True)
-def no_real_ports(monkeypatch, tmp_path):
-    hide_real_ports(monkeypatch, tmp_path)
+def no_real_ports(monkeypatch):
+    hide_real_ports(monkeypatch)
 
 
 @pytest.fixture
@@ -69,10 +69,10 @@ def test_what_is_asked_wrongly(words, says):
 
 def test_scan_asks_which_port_where_there_are_several(monkeypatch):
     two = [SerialPort(f"/dev/ttyACM{i}", "board", "1:2", None) for i in range(2)]
-    monkeypatch.setattr(ports, "serial_ports", lambda host: two)
+    monkeypatch.setattr(ports, "serial_ports", lambda: two)
     code, _, err = invoked("scan")
     assert code == 2 and "which port?" in err and "/dev/ttyACM1 (board)" in err
-    monkeypatch.setattr(ports, "serial_ports", lambda host: two[:1])
+    monkeypatch.setattr(ports, "serial_ports", lambda: two[:1])
     assert "no serial port /dev/ttyACM0" in invoked("scan").err
 
 
@@ -216,7 +216,7 @@ def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
     with PtyBus() as bus:
         path = bus.start_device(MaestroLine(crc=True))
         board = SerialPort(path, "Pololu Mini Maestro", "1ffb:008a", None)
-        monkeypatch.setattr(ports, "serial_ports", lambda host: (board,))
+        monkeypatch.setattr(ports, "serial_ports", lambda: (board,))
         for words in (
             ("scan", "--port", path, "--kind", "feetech"),
             ("scan", "--port", path, "--kind", "dynamixel"),

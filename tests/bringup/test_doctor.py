@@ -18,7 +18,7 @@ from gazerig.drivers.pca9685.board import (
     pulse_registers,
 )
 from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
+from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
@@ -30,12 +30,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
     Fix,
     worst_level,
 )
-from gazerig.features.bringup.doctor.examination import (
-    UDEV_RULE,
-    PortFacts,
-    examine_latency,
-    examine_port,
-)
+from gazerig.features.bringup.doctor.examination import examine_port
 from gazerig.features.bringup.doctor.servo_checks import CHECKS
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, KINDS
@@ -295,46 +290,16 @@ def test_a_servo_that_does_not_take_it_is_said(kind, value, fault, says):
 
 # --- ports
 
-USB = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-FTDI-if00")
 
+def test_a_port_that_cannot_be_opened_is_a_finding(tmp_path):
+    port = BlockingPort(str(tmp_path / "ttyUSB0"))
 
-def facts(access, holders=()):
-    return PortFacts("/dev/ttyUSB0", access, holders, (USB,))
+    def examine():
+        port.setBaudRate(BAUD)
+        return []
 
-
-@pytest.mark.parametrize(
-    ("access", "holders", "words", "cure"),
-    [
-        (Access(False, False, False, "", False), (), "no such port", "by-id/usb-FTDI-if00 (U2D2)"),
-        (Access(True, False, True, "root", True), (), "no serial port", "gazerig scan"),
-        (Access(True, True, False, "dialout", False), (), "the group dialout only",
-         "sudo usermod -aG dialout $USER"),
-        (Access(True, True, False, "dialout", True), (), "the group dialout only",
-         "log out and in again"),
-        (Access(True, True, True, "dialout", True), ("minicom (process 12)",),
-         "held open by minicom (process 12)", "end it"),
-    ],
-)  # fmt: skip
-def test_a_port_that_cannot_be_used(access, holders, words, cure):
-    (only,) = examine_port(facts(access, holders))
-    assert only.level == "error" and words in only.what and cure in only.remedy
-
-
-def test_latency_timer(tmp_path):
-    host = Host(latency=tmp_path)
-    assert examine_latency("/dev/ttyUSB0", host) == []
-    file = tmp_path / "ttyUSB0" / "latency_timer"
-    file.parent.mkdir()
-    file.write_text("16\n")
-    (slow,) = examine_latency("/dev/ttyUSB0", host)
-    assert slow.level == "warn" and "16 ms" in slow.what
-    assert UDEV_RULE in slow.remedy and str(file) in slow.remedy
-    file.write_text("1\n")
-    (good,) = examine_latency("/dev/ttyUSB0", host)
-    assert good.level == "ok"
-    file.write_text("what?")
-    (unread,) = examine_latency("/dev/ttyUSB0", host)
-    assert unread.level == "note"
+    (only,) = examine_port(port, examine)
+    assert only.level == "error" and "no serial port" in only.what
 
 
 # --- words

@@ -30,7 +30,7 @@ YAW = "neck_yaw (servo 7)"
 
 @pytest.fixture(autouse=True)
 def no_real_ports(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    hide_real_ports(monkeypatch, tmp_path)
+    hide_real_ports(monkeypatch)
 
 
 TEXTS: dict[str, Callable[[], str]] = {

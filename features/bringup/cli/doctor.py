@@ -115,7 +115,7 @@ def _examine_buses(
             examine = partial(
                 checkup.examine_bus, line, kind, setups, config.section.baud, progress, far
             )
-        findings[bus] = checkup.examine_ports(line, bench.host, examine)
+        findings[bus] = checkup.examine_port(line, examine)
         if can_be_released(rig, bus):
             findings[bus].append(checkup.examine_guardian(release_plan(rig, bus, line.port_name)))
         clear_progress()

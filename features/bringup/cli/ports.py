@@ -10,7 +10,7 @@ import typer
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PortError, SetupError
 from gazerig.drivers.plugins import BUS, find, is_ours
-from gazerig.drivers.serial.list_ports import Host, SerialPort, check_owner, serial_ports, usb_id_of
+from gazerig.drivers.serial.list_ports import SerialPort, check_owner, serial_ports, usb_id_of
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
@@ -21,16 +21,13 @@ from gazerig.robot.guardian.guardian import Guardian
 from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.client import PtyBuses
 
-host = Host()
-"""Source of data about the ports of this computer."""
-
 YesOption = Annotated[bool, typer.Option("--yes", help="Answer yes to every question.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one line of JSON instead of text.")]
 
 
 def list_ports() -> tuple[SerialPort, ...]:
     """List the serial ports of this computer."""
-    return serial_ports(host)
+    return serial_ports()
 
 
 def usb_id(path: str) -> str:

@@ -10,20 +10,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import DriverError, PortError, ServoFault, ServoMissing, SetupError
-from gazerig.drivers.serial.list_ports import (
-    ABSENT_I2C_REMEDY,
-    RECOMMENDED_LATENCY_MS,
-    Access,
-    Host,
-    SerialPort,
-    access,
-    i2c_names_text,
-    is_i2c,
-    latency_file,
-    latency_ms,
-    port_users,
-    serial_ports,
-)
+from gazerig.drivers.serial.list_ports import SerialPort, persistent_name
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (
     ANSWERS,
@@ -34,7 +21,7 @@ from gazerig.drivers.servo_bus.discovery import (
 )
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix, worst_level
+from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix
 from gazerig.features.bringup.doctor.servo_checks import CHECKS
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.servo_kinds import ServoKind, Tell
@@ -91,28 +78,26 @@ class Presence(NamedTuple):
     spare: Spare | None
 
 
-def examine_ports(
-    port: BusPort, host: Host, examine: Callable[[], list[Diagnostic]]
-) -> list[Diagnostic]:
-    """Examine a port and, if it can be used, its servos; the port is closed at the end.
+def examine_port(port: BusPort, examine: Callable[[], list[Diagnostic]]) -> list[Diagnostic]:
+    """Examine the devices on a port; the port is closed at the end.
 
     A failure of the examination is one of the findings.
 
-    examine: queries the devices on the port
+    examine: opens the port and queries the devices on it
     """
     device = port.port_name
-    findings = examine_port(port_facts(device, host))
-    if worst_level(findings) == "error":
-        return findings
     try:
         behind = examine()
-        # While it is open: the program itself sets the adaptor to low latency then.
-        return [*findings, *examine_latency(device, host), *behind]
     except DriverError as error:
         # The message has the port and the remedy.
         return [Diagnostic("error", str(error).removeprefix(device).lstrip(": "), device)]
     finally:
         port.closePort()
+    lasting = persistent_name(device)
+    findings = [PORT_ADVICE["well"].at(device)]
+    if lasting not in (None, device):
+        findings.append(PORT_ADVICE["name"].at(device, name=lasting))
+    return [*findings, *behind]
 
 
 def examine_bus(
@@ -274,98 +259,16 @@ def examine_guardian(plan: ReleasePlan) -> Diagnostic:
     )
 
 
-# --- Faults of a serial port, as the operating system reports them. It is not opened
-# Source of the latency timer: ROBOTIS e-Manual, U2D2 (FTDI adaptors wait 16 ms by default).
-
-
-UDEV_FILE = "/etc/udev/rules.d/99-servo-bus.rules"
-UDEV_RULE = (
-    'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", '
-    f'ATTR{{latency_timer}}="{RECOMMENDED_LATENCY_MS}"'
-)
-
-
 # fmt: off
 PORT_ADVICE = {
-    "well": Advice("ok", "is there and may be opened"),
+    "well": Advice("ok", "can be opened"),
     "name": Advice("note", "may be called otherwise after replugging",
         "write {name} into the YAML's bus.port"),
-    "absent": Advice("error", "there is no such port", "plug the adaptor in; ports here: {ports}; "
-        "then name one with --port or in the YAML's bus.port"),
-    "no bus": Advice("error", "there is no such I2C bus", "{switch}; buses here: {buses}; then name "
-        "one with --port or in the YAML's bus.port"),
-    "no port": Advice("error", "is no serial port", "name one of gazerig scan"),
-    "joined": Advice("error", "may be used by the group {group} only",
-        "log out and in again, this session began before you joined the group"),
-    "group": Advice("error", "may be used by the group {group} only",
-        "sudo usermod -aG {group} $USER, then log out and in"),
-    "held": Advice("error", "is held open by {holders}", "end it first"),
-    "unread": Advice("note", "its latency timer cannot be read", "look into {file}"),
-    "quick": Advice("ok", "hands answers over after {ms} ms (latency timer)"),
-    "slow": Advice("warn", "keeps short answers back for {ms} ms (latency timer): about {rate} "
-        "readings a second at most",
-        f"now: echo {RECOMMENDED_LATENCY_MS} | sudo tee {{file}}; for good, in {UDEV_FILE}: "
-        "{rule}"),
 }
 # fmt: on
-
-
-class PortFacts(NamedTuple):
-    """Properties of one port, from the operating system.
-
-    holders: other programs that use it; other_ports: the existing ports
-    """
-
-    device: str
-    access: Access
-    holders: tuple[str, ...]
-    other_ports: Sequence[SerialPort]
-
-
-def port_facts(device: str, host: Host) -> PortFacts:
-    """Return the operating system's properties of a port."""
-    return PortFacts(device, access(device), port_users(device, host), serial_ports(host))
-
-
-def examine_port(facts: PortFacts) -> list[Diagnostic]:
-    """Return the findings about a port; with an error among them it cannot be used."""
-    device, access = facts.device, facts.access
-    trouble = ""
-    if not access.exists:
-        if is_i2c(device):
-            return [
-                PORT_ADVICE["no bus"].at(device, switch=ABSENT_I2C_REMEDY, buses=i2c_names_text())
-            ]
-        trouble = "absent"
-    elif not access.is_device:
-        trouble = "no port"
-    elif not access.allowed:
-        trouble = "joined" if access.is_member else "group"
-    elif facts.holders:
-        trouble = "held"
-    if trouble:
-        here, holders = name_ports(facts.other_ports), ", ".join(facts.holders)
-        return [PORT_ADVICE[trouble].at(device, ports=here, group=access.group, holders=holders)]
-    lasting = next((p.by_id for p in facts.other_ports if p.device == device and p.by_id), None)
-    findings = [PORT_ADVICE["well"].at(device)]
-    if lasting is not None:
-        findings.append(PORT_ADVICE["name"].at(device, name=lasting))
-    return findings
 
 
 def name_ports(ports: Sequence[SerialPort]) -> str:
     """Format a list of ports for people."""
     named = [f"{port.by_id or port.device} ({port.description})" for port in ports]
     return ", ".join(named) or "none"
-
-
-def examine_latency(device: str, host: Host) -> list[Diagnostic]:
-    """Return the finding about an adaptor's latency timer, none without such a timer."""
-    file = latency_file(device, host)
-    if file is None:
-        return []
-    ms = latency_ms(file)
-    if ms is None:
-        return [PORT_ADVICE["unread"].at(device, file=file)]
-    advice = PORT_ADVICE["quick" if ms <= RECOMMENDED_LATENCY_MS else "slow"]
-    return [advice.at(device, ms=ms, file=file, rate=1000 // (ms or 1), rule=UDEV_RULE)]
