@@ -13,8 +13,8 @@ from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
-from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.maestro.board import MaestroParams
+from gazerig.drivers.pca9685.board import Pca9685Params
 from gazerig.drivers.sound.params import SoundParams
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams

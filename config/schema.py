@@ -18,7 +18,7 @@ from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
 from gazerig.config.validation import suggestion_text
 from gazerig.drivers.bus.servo_models import BUS_KINDS, SERVOS
-from gazerig.drivers.hobby_board.params import HobbyBoardParams
+from gazerig.drivers.hobby_board.board import HobbyBoardParams
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.scanpath.scanpath import Walk

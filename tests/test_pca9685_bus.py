@@ -109,17 +109,6 @@ def test_a_measured_oscillator_makes_true_pulses(believed_hz, room):
     assert (world.widths()[0] < 0.96 * 6000) == (believed_hz < 26e6)
 
 
-def test_two_boards_are_one_bus():
-    params = Pca9685Params(further_addresses=(0x43,))
-    world = World((2, 17), params, (0x40, 0x43))
-    assert probe(world.port, BOARD) == (0x40, 0x43)
-    world.held().run(1.0, [5000, 7000])
-    assert world.widths() == pytest.approx([5000, 7000], abs=GRAIN / 2)
-    assert world.device.chips[0x43].counts(1) and not world.device.chips[0x43].counts(2)
-    world.bus.disable_torque()
-    assert world.widths() == [0, 0]
-
-
 # --- moving
 
 
@@ -163,7 +152,7 @@ def test_what_another_program_changes_is_set_right(world):
 def test_what_cannot_be_used_is_named_and_nothing_moves(world, command, reported):
     world.command(command)
     before = bytes(world.registers())
-    assert probe(world.port, BOARD) == ()
+    assert probe(world.port) == ()
     with pytest.raises(ServoMissing, match=reported) as caught:
         world.bus.open()
     assert "\n" not in str(caught.value) and str(caught.value).startswith("emulated: ")
@@ -172,11 +161,12 @@ def test_what_cannot_be_used_is_named_and_nothing_moves(world, command, reported
     world.held()
 
 
-def test_another_chip_at_the_address_is_refused(world):
-    world.registers()[MODE2] = 0xA5
-    with pytest.raises(ServoMissing, match="is not a PCA9685: another chip"):
+@pytest.mark.parametrize(("register", "byte"), [(MODE2, 0xA5), (MODE1, 0x60)])
+def test_another_chip_or_one_with_an_external_clock_is_refused(world, register, byte):
+    world.registers()[register] = byte
+    with pytest.raises(ServoMissing, match="is not a PCA9685, or noise .*: switch .* off and on"):
         world.bus.open()
-    assert probe(world.port, BOARD) == ()
+    assert probe(world.port) == ()
 
 
 def test_only_own_channels_stop_unless_they_do_not(world):
@@ -211,8 +201,6 @@ def test_a_guardian_stops_pulses_whatever_the_board_was_set_to(world, monkeypatc
 
 
 def test_what_no_board_can_have_is_refused(world):
-    with pytest.raises(ValueError, match="two boards have the same address"):
-        Pca9685Params(further_addresses=(0x40,))
     for wrong, reported in (
         (setup(16), "the board has channels 0 to 15"),
         (setup(0, min_steps=1000), "within 500..2500 us"),

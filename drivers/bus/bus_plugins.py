@@ -8,10 +8,8 @@ from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
-from gazerig.drivers.maestro.board import MaestroBoard
-from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.board import Pca9685Board
-from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
+from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus

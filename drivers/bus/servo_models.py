@@ -15,8 +15,7 @@ from gazerig.drivers.feetech.memory_table import (
     SCS_STEPS,
 )
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
-from gazerig.drivers.hobby_board import params as hobby
-from gazerig.drivers.hobby_board.params import HOBBY
+from gazerig.drivers.hobby_board import board as hobby
 from gazerig.drivers.servo_bus.family import ServoModel
 
 if TYPE_CHECKING:
@@ -27,6 +26,10 @@ BusKind = str
 BUS_KINDS: tuple[BusKind, ...] = ("dynamixel", "feetech", "maestro", "pca9685")
 HOBBY_KINDS: tuple[BusKind, ...] = ("maestro", "pca9685")
 """Our boards that send pulses to hobby servos; each moves every hobby servo."""
+
+
+HOBBY = "hobby"
+"""Name of a hobby servo as a model: its shaft turns with the pulse width, without feedback."""
 
 
 class ServoModelInfo(NamedTuple):
@@ -112,8 +115,8 @@ SERVOS: dict[str, ServoModelInfo] = {
     HOBBY: ServoModelInfo(
         "maestro",
         hobby.STEPS_PER_TURN,
-        hobby.LOWEST,
-        hobby.HIGHEST,
+        500 * hobby.US_STEPS,  # to 2500 us: what most servos accept
+        2500 * hobby.US_STEPS,
         "us",
         hobby.US_STEPS,
         1500,

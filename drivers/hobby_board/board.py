@@ -1,4 +1,4 @@
-"""A board that sends pulses to hobby servos: its line, and what a kind of board defines.
+"""A board that sends pulses to hobby servos: its parameters, its line, and what a kind defines.
 
 A board either ramps its pulses to their goals itself, within limits armed in it (Maestro), or
 applies pulses immediately, and the driver ramps them (PCA9685). This module imports no more than
@@ -8,19 +8,25 @@ the guardian needs in an emergency.
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, ClassVar
 
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import PortError, ServoMissing
-from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.hobby_board.channel import Channel
     from gazerig.drivers.types import ServoConfig
+
+US_STEPS = 4
+"""Steps per microsecond: pulse widths are counted in quarter microseconds."""
+
+STEPS_PER_TURN = 1000 * US_STEPS * 4.0
+"""1000..2000 us are usually 90 deg."""
 
 TRIES = 3
 """Number of attempts of operations that must not fail."""
@@ -31,12 +37,44 @@ ALIKE_STEPS = 400
 """Largest difference between two readings of a pulse that is moving."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HobbyBoardParams:
+    """Properties of a board.
+
+    baud: rate of its port: USB accepts any, and a bridge to I2C has this one
+    pulse_range_us: shortest and longest pulse that may be sent, us, and the origin of both
+    """
+
+    baud: ClassVar[int] = 115_200
+    pulse_range_us: ClassVar[tuple[float, float, str]]
+
+    @property
+    def channels(self) -> int:
+        """Return the number of channels."""
+        raise NotImplementedError
+
+    def check_servo(self, setup: "ServoConfig") -> None:
+        """Reject a servo that no channel can have.
+
+        Raises:
+            ValueError: no channel can have it; the message names the channel and the valid range.
+        """
+        if not 0 <= setup.id < self.channels:
+            raise ValueError(f"channel {setup.id}: the board has channels 0 to {self.channels - 1}")
+        low, high = setup.min_steps / US_STEPS, setup.max_steps / US_STEPS
+        least, most, decided = self.pulse_range_us
+        if not least <= low <= high <= most:
+            raise ValueError(
+                f"channel {setup.id}: its range {low:g}..{high:g} us must be within "
+                f"{least:g}..{most:g} us ({decided}): narrow the joint's range"
+            )
+
+
 class Board(ABC):
-    """One board, or several on one line; all methods that send may raise BusLost.
+    """One board; all methods that send may raise BusLost.
 
     tx_bytes, rx_bytes, errors: counts since creation
     lateness: delays of this computer
-    name: name for messages
     remedy: remedy if channels output other pulses than commanded
     longest_ramp_s: longest time for which the driver's ramps advance while nothing is sent; inf:
         the board itself ramps pulses
@@ -47,7 +85,6 @@ class Board(ABC):
         timing: Times of the bus.
     """
 
-    name = "the board"
     remedy: ClassVar[str]
     longest_ramp_s: ClassVar[float] = inf
 
@@ -141,12 +178,9 @@ class Board(ABC):
             first, again = self.read_pulses(ids), self.read_pulses(ids)
             if first is not None and again is not None and all(map(are_alike, first, again)):
                 return again
-        fault, remedy = f"{self.port.port_name}: answers are lost", CHECK_SUPPLY
-        for setup in setups:
-            if self.read_pulses((setup.id,)) is None:
-                fault = f"{self.port.port_name}: {setup.label('channel')} does not answer"
-                remedy += f"; has the board {self.params.channels} channels?"
-                break
+        silent = (s.label("channel") for s in setups if self.read_pulses((s.id,)) is None)
+        fault = f"{self.port.port_name}: {next(silent, 'a channel')} does not answer"
+        remedy = f"{CHECK_SUPPLY}; has the board {self.params.channels} channels?"
         raise ServoMissing(self.blame(fault, remedy))
 
     def blame(self, fault: str, remedy: str) -> str:

@@ -3,7 +3,7 @@
 from math import inf
 
 from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
-from gazerig.drivers.hobby_board.params import STEPS_PER_TURN, US_STEPS
+from gazerig.drivers.hobby_board.board import STEPS_PER_TURN, US_STEPS
 from gazerig.drivers.types import ServoConfig
 
 BEHIND_S = 0.1

@@ -9,13 +9,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil, inf
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
 
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.hobby_board.board import TRIES, Board
-from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.hobby_board.board import TRIES, Board, HobbyBoardParams
 from gazerig.drivers.serial.port import BusPort
+from gazerig.params import Choices
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.hobby_board.channel import Channel
@@ -56,6 +56,18 @@ ACCEL_STEPS_S2 = SPEED_STEPS_S / 0.08
 """Unit of its acceleration limit: that change of speed in 80 ms."""
 
 MOST_ACCEL = 255
+
+
+@dataclass(frozen=True, slots=True)
+class MaestroParams(HobbyBoardParams):
+    """Communication parameters of one board on its USB command port."""
+
+    # fmt: off
+    crc: Annotated[bool, "Whether the board is set up for a CRC byte after every command; it ignores damaged commands then."] = False
+    channels: Annotated[int, Choices(6, 12, 18, 24), "Number of channels of the board; the Micro Maestro has 6."] = 12
+    # fmt: on
+    pulse_range_us: ClassVar[tuple[float, float, str]] = (64.0, 4080.0, "the range of a Maestro")
+
 
 USB_CHANNELS = {"1ffb:0089": 6, "1ffb:008a": 12, "1ffb:008b": 18, "1ffb:008c": 24}
 """Channels by USB vendor and product id."""

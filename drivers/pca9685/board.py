@@ -1,27 +1,20 @@
-"""PCA9685 boards as a board of hobby servos: sixteen channels each, ramped by the driver.
+"""A PCA9685 as a board of hobby servos: sixteen channels, ramped by the driver.
 
-They hold pulses without any speed limit: each goal is sent as a series of intermediate pulses, and
-the last one stays. A servo's id is sixteen times the number of its board plus its channel. Source:
-NXP, PCA9685 data sheet, rev. 4 (16 April 2015), section 7.3.
+It holds pulses without any speed limit: each goal is sent as a series of intermediate pulses, and
+the last one stays. Source: NXP, PCA9685 data sheet, rev. 4 (16 April 2015), section 7.3.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import ceil, floor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.hobby_board.board import TRIES, Board
-from gazerig.drivers.hobby_board.params import US_STEPS
+from gazerig.drivers.hobby_board.board import TRIES, US_STEPS, Board, HobbyBoardParams
 from gazerig.drivers.i2c.transfers import OK, READ_STATUS, read, write
-from gazerig.drivers.pca9685.params import (
-    ADDRESSES,
-    CHANNELS,
-    COUNTS,
-    LEAST_PRESCALE,
-    Pca9685Params,
-)
 from gazerig.drivers.serial.port import BusPort, wait_until
+from gazerig.params import Bounds
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.hobby_board.channel import Channel
@@ -48,6 +41,49 @@ START_S = 0.001
 (7.3.1.1)."""
 
 
+CHANNELS, COUNTS = 16, 4096
+LEAST_PRESCALE = 3
+
+PULSES_HZ = 50.0
+"""Analogue servos need 50 pulses per second."""
+
+RESERVED = (0x70, *range(0x78, 0x80))
+"""All boards answer at 70 after power-up; from 78 on addresses have another meaning on I2C."""
+
+ADDRESSES = tuple(address for address in range(0x40, 0x80) if address not in RESERVED)
+
+
+@dataclass(frozen=True, slots=True)
+class Pca9685Params(HobbyBoardParams):
+    """Address and timing of a board."""
+
+    # fmt: off
+    address: Annotated[int, Bounds(0x40, 0x77), "I2C address of the board; 0x40 (64) unless address jumpers are closed."] = 0x40
+    oscillator_hz: Annotated[float, Bounds(22_000_000, 28_000_000),
+        "Frequency of the board's oscillator. It differs from board to board by some percent, and the pulse widths with it."] = 25e6
+    # fmt: on
+    pulse_range_us: ClassVar[tuple[float, float, str]] = (500.0, 2500.0, "what most servos accept")
+
+    def __post_init__(self) -> None:
+        """Check the address.
+
+        Raises:
+            ValueError: no board can have it.
+        """
+        if self.address in RESERVED:
+            raise ValueError(f"address {self.address:#x} is reserved: boards have 0x40 to 0x77")
+
+    @property
+    def prescale(self) -> int:
+        """Return the divider of the oscillator for the rate of the pulses."""
+        return max(LEAST_PRESCALE, round(self.oscillator_hz / (COUNTS * PULSES_HZ)) - 1)
+
+    @property
+    def channels(self) -> int:
+        """Return the number of channels."""
+        return CHANNELS
+
+
 def pulse_registers(counts: int) -> bytes:
     """Return the registers of a channel for a pulse; 0: none."""
     return bytes((0, 0, counts & 0xFF, counts >> 8)) if counts else bytes((0, 0, 0, FULL_OFF))
@@ -63,8 +99,13 @@ def counts_of(registers: bytes) -> int:
     return ((off_low | (off_high & 0x0F) << 8) - (on_low | (on_high & 0x0F) << 8)) % COUNTS
 
 
+def channel_register(channel: int) -> int:
+    """Return the first register of a channel."""
+    return LED0 + BYTES * channel
+
+
 class Pca9685Board(Board):
-    """The boards of one I2C bus.
+    """The board at one address of an I2C bus.
 
     The port is a gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge.
 
@@ -77,67 +118,56 @@ class Pca9685Board(Board):
 
     def __init__(self, port: BusPort, params: Pca9685Params, timing: BusTiming = TIMING) -> None:
         super().__init__(port, params, timing)
-        self.name = "board " + " and ".join(f"{address:#x}" for address in params.addresses)
         self.failure = ""
         # Length of one 4096th of the period, quarter microseconds.
         self._grain_steps = (params.prescale + 1) / params.oscillator_hz * 1e6 * US_STEPS
 
-    def _place(self, servo_id: int) -> tuple[int, int]:
-        """Return the address of a servo's board, and the first register of its channel."""
-        board, channel = divmod(servo_id, CHANNELS)
-        return self.params.addresses[board], LED0 + BYTES * channel
-
-    def _addresses(self, ids: Sequence[int]) -> list[int]:
-        """Return the addresses of the boards of servos."""
-        return list(dict.fromkeys(self._place(servo_id)[0] for servo_id in ids))
-
     # --- detection and setup
 
     def find(self, setups: "Sequence[ServoConfig]") -> tuple[int, ...]:
-        """Check that the boards answer and return the pulses of these servos; nothing changes.
+        """Check that the board answers and return the pulses of these servos; nothing changes.
 
         Raises:
-            ServoMissing: a board does not answer, or another chip does.
+            ServoMissing: the board does not answer, or another chip does.
         """
-        for address in self._addresses([setup.id for setup in setups]):
-            found = self.is_pca9685(address)
-            where = f"{self.port.port_name}: "
-            if found is False:
-                raise ServoMissing(
-                    f"{where}the chip at {address:#x} is not a PCA9685: another chip has this "
-                    "address; close a jumper and write the new one under bus.pca9685.address"
-                )
-            if found is None:
-                fault = f"{where}no PCA9685 answers at {address:#x}"
-                remedy = (
-                    "does the board have its logic supply (VCC, not only V+)? check SDA, SCL and "
-                    "ground; its jumpers set the address"
-                )
-                if self.failure != NOT_ACKNOWLEDGED:
-                    fault = f"{where}no answer as an I2C bus ({self.failure})"
-                    remedy = (
-                        "a PCA9685 is reached over an I2C bus such as /dev/i2c-1: write it under "
-                        "bus.port"
-                    )
-                raise ServoMissing(self.blame(fault, remedy))
-        return self.read_all(setups)
+        found, address = self.is_pca9685(), f"{self.params.address:#x}"
+        if found:
+            return self.read_all(setups)
+        fault = f"no PCA9685 answers at {address}"
+        remedy = (
+            "does the board have its logic supply (VCC, not only V+)? check SDA, SCL and ground; "
+            "its jumpers set the address"
+        )
+        if found is False:
+            fault = f"the chip at {address} is not a PCA9685, or noise has changed its settings"
+            remedy = (
+                "switch its logic supply off and on; if that does not help, another chip has this "
+                "address: close a jumper and write the new one under bus.pca9685.address"
+            )
+        elif self.failure != NOT_ACKNOWLEDGED:
+            fault = f"no answer as an I2C bus ({self.failure})"
+            remedy = (
+                "a PCA9685 is reached over an I2C bus such as /dev/i2c-1: write it under bus.port"
+            )
+        raise ServoMissing(self.blame(f"{self.port.port_name}: {fault}", remedy))
 
-    def is_pca9685(self, address: int) -> bool | None:
-        """Return whether the chip at an address can be one; None without an answer.
+    def is_pca9685(self) -> bool | None:
+        """Return whether the chip at the address can be one of ours; None without an answer.
 
-        Reserved bits of its registers are 0.
+        Reserved bits of its registers are 0. An external clock, once set, ends with the supply.
         """
         for _ in range(TRIES):
-            found = self._read_single(address, (*range(LED0), PRESCALE))
+            found = self._read_single((*range(LED0), PRESCALE))
             if found is not None:
-                wrong = found[MODE2] & 0xE0 or any(byte & 1 for byte in found[2:LED0])
-                return not wrong and found[-1] >= LEAST_PRESCALE
+                wrong = found[MODE1] & EXTCLK or found[MODE2] & 0xE0
+                is_odd = any(byte & 1 for byte in found[2:LED0])
+                return not wrong and not is_odd and found[-1] >= LEAST_PRESCALE
         return None
 
-    def _ensure_set_up(self, address: int) -> bool:
-        """Set a board up if it is not, which stops all its pulses; return whether it is set up."""
+    def _ensure_set_up(self) -> bool:
+        """Set the board up if it is not, which stops all pulses; return whether it is set up."""
         wanted = bytes((AWAKE, TOTEM_POLE, self.params.prescale))
-        modes = self._read_single(address, (MODE1, MODE2, PRESCALE))
+        modes = self._read_single((MODE1, MODE2, PRESCALE))
         if modes in (None, wanted):
             return modes == wanted
         # From any state: no pulses, sleep, prescaler, then wake. Channels that slept with pulses on
@@ -150,10 +180,10 @@ class Pca9685Board(Board):
             (MODE1, AWAKE),
             (MODE1, RESTART | AWAKE),
         ):
-            if self._ask(write(address, register, bytes((byte,))), 0) is None:
+            if self._ask(write(self.params.address, register, bytes((byte,))), 0) is None:
                 return False
             wait_until(self.port, self.port.now_s() + START_S)
-        return self._read_single(address, (MODE1, MODE2, PRESCALE)) == wanted
+        return self._read_single((MODE1, MODE2, PRESCALE)) == wanted
 
     # --- reading
 
@@ -171,11 +201,11 @@ class Pca9685Board(Board):
         self.errors.update([self.failure] if self.failure else ())
         return None if self.failure else answer[:-1]
 
-    def _read_single(self, address: int, registers: Sequence[int]) -> bytes | None:
+    def _read_single(self, registers: Sequence[int]) -> bytes | None:
         """Read registers one by one, which needs no particular setting; None after a failure."""
         found = b""
         for register in registers:
-            byte = self._ask(read(address, register, 1), 1)
+            byte = self._ask(read(self.params.address, register, 1), 1)
             if byte is None:
                 return None
             found += byte
@@ -186,9 +216,9 @@ class Pca9685Board(Board):
 
         A board that was reset sleeps and outputs no pulses, with any content of its registers.
         """
-        address, register = self._place(channel)
-        mode = self._read_single(address, (MODE1,))
-        output = None if mode is None else self._ask(read(address, register, BYTES), BYTES)
+        mode = self._read_single((MODE1,))
+        transfer = read(self.params.address, channel_register(channel), BYTES)
+        output = None if mode is None else self._ask(transfer, BYTES)
         if mode is None or output is None:
             return None
         return (round(counts_of(output) * self._grain_steps) if mode[0] == AWAKE else 0), ()
@@ -196,9 +226,9 @@ class Pca9685Board(Board):
     def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Read pulses, quarter microseconds, 0 for none; None without an answer."""
         pulses = []
-        for address, register in map(self._place, channels):
+        for register in map(channel_register, channels):
             outputs = range(register, register + BYTES)
-            found = self._read_single(address, (MODE1, PRESCALE, *outputs))
+            found = self._read_single((MODE1, PRESCALE, *outputs))
             if found is None:
                 return None
             grain_steps = self._grain_steps * (found[1] + 1) / (self.params.prescale + 1)
@@ -209,10 +239,10 @@ class Pca9685Board(Board):
     # --- sending
 
     def send_limits(self, channels: "Sequence[Channel]") -> bool:
-        """Set the speed limits of channels; return whether their boards are configured."""
+        """Set the speed limits of channels; return whether the board is set up."""
         for channel in channels:
             channel.speed_steps_s = channel.top_speed_steps_s
-        return all(map(self._ensure_set_up, self._addresses([one.id for one in channels])))
+        return self._ensure_set_up()
 
     def send_goals(self, channels: "Sequence[Channel]") -> None:
         """Send the intermediate pulses of channels towards their goals."""
@@ -223,28 +253,28 @@ class Pca9685Board(Board):
         counts = round(steps / grain)
         if setup.min_steps <= steps <= setup.max_steps:  # then the pulse sent is inside, too
             counts = max(min(counts, floor(setup.max_steps / grain)), ceil(setup.min_steps / grain))
-        return write(*self._place(channel.id), pulse_registers(counts))
+        register = channel_register(channel.id)
+        return write(self.params.address, register, pulse_registers(counts))
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
-        """Stop pulses, each by one register, in any state; on the last try all of a board."""
-        places = [*map(self._place, channels)]
-        if last_try:
-            places += [(address, ALL_LED) for address in self._addresses(channels)]
-        off = bytes((FULL_OFF,))
-        self.send(b"".join([write(address, at + BYTES - 1, off) for address, at in places]))
+        """Stop pulses, each by one register, in any state; on the last try all of the board."""
+        registers = [*map(channel_register, channels), *([ALL_LED] if last_try else [])]
+        off, address = bytes((FULL_OFF,)), self.params.address
+        self.send(b"".join([write(address, at + BYTES - 1, off) for at in registers]))
 
 
-def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
+def probe(port: BusPort) -> tuple[int, ...]:
     """Return the addresses of the boards on a bus; nothing changes, and the port stays open.
 
     Raises:
         PortError: the port cannot be opened.
         BusLost: the port is lost.
     """
-    board, found = Pca9685Board(port, params), []
-    board.open_port()
+    found = []
+    Pca9685Board(port, Pca9685Params()).open_port()
     for address in ADDRESSES:
-        if board.is_pca9685(address):
+        board = Pca9685Board(port, Pca9685Params(address))
+        if board.is_pca9685():
             found.append(address)
         elif board.failure not in ("", NOT_ACKNOWLEDGED):
             break  # no I2C bus

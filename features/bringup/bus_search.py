@@ -21,8 +21,7 @@ from dataclasses import dataclass
 
 from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.servo_models import BusKind
-from gazerig.drivers.maestro.board import USB_CHANNELS, DetectedMaestro, probe
-from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.maestro.board import USB_CHANNELS, DetectedMaestro, MaestroParams, probe
 from gazerig.drivers.serial.list_ports import POLOLU
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (

@@ -11,9 +11,8 @@ kept in multiples of 16 us) and 4.e (serial settings).
 from collections.abc import Iterator, Sequence
 from math import ceil, floor
 
-from gazerig.drivers.hobby_board.params import US_STEPS
-from gazerig.drivers.maestro.board import accel_units, speed_units
-from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.hobby_board.board import US_STEPS
+from gazerig.drivers.maestro.board import MaestroParams, accel_units, speed_units
 from gazerig.drivers.types import ServoConfig
 
 FACTORY_US = (992, 2000)

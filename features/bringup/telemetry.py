@@ -9,11 +9,9 @@ from collections.abc import Callable, Collection, Mapping
 from math import degrees
 from typing import NamedTuple, Protocol
 
-from gazerig.drivers.hobby_board.params import US_STEPS
-from gazerig.drivers.maestro.board import MOST_INPUT, MaestroBoard
-from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.board import Pca9685Board
-from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.hobby_board.board import US_STEPS
+from gazerig.drivers.maestro.board import MOST_INPUT, MaestroBoard, MaestroParams
+from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.servo_kinds import ServoKind

@@ -121,7 +121,7 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
         ids,
         board.crc,
         board.channels,
-        config.pca9685.addresses,
+        config.pca9685.address,
         SERVOS[rig.joints[joints_on(rig, name)[0]].model].family,
         "" if ours else pickle_params(config.section),
     )

@@ -186,7 +186,7 @@ CHAINS: dict[str, type[DynamixelLine] | type[FeetechLine]] = {
 BOARDS: dict[str, Callable[[BusConfig, tuple[HobbySpec, ...]], Emulated]] = {
     "maestro": lambda bus, servos: MaestroLine(bus.maestro.channels, bus.maestro.crc, servos),
     "pca9685": lambda bus, servos: Pca9685Line(
-        bus.pca9685.addresses, bus.pca9685.oscillator_hz, servos
+        (bus.pca9685.address,), bus.pca9685.oscillator_hz, servos
     ),
 }
 """Emulated boards with their hobby servos by the kind of bus."""

@@ -12,7 +12,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
-from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.params import choices_of
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.rig_command import RigCommand

@@ -25,7 +25,7 @@ from typing import Any
 
 from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import DriverError
-from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.process.visible_text import visible
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, HangDetector, Heartbeat
@@ -75,11 +75,9 @@ def _maestro(plan: ReleasePlan) -> Releaser:
 
 def _pca9685(plan: ReleasePlan) -> Releaser:
     from gazerig.drivers.hobby_board.board import stop_pulses
-    from gazerig.drivers.pca9685.board import Pca9685Board
-    from gazerig.drivers.pca9685.params import Pca9685Params
+    from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 
-    first, *more = plan.addresses
-    params = Pca9685Params(first, tuple(more))
+    params = Pca9685Params(plan.address)
     return lambda port: stop_pulses(Pca9685Board(port, params), plan.ids)
 
 

@@ -14,8 +14,8 @@ class ReleasePlan(NamedTuple):
     port: path of the serial port
     baud: bit/s
     ids: ids of the servos; channels of a Maestro
-    crc, channels: settings of a Maestro, as in gazerig.drivers.maestro.params
-    addresses: addresses of PCA9685 boards
+    crc, channels: settings of a Maestro, as in gazerig.drivers.maestro.board
+    address: address of a PCA9685
     family: name of the family of smart servos
     settings: parameters of a package's bus, from ``pickle_params``
     """
@@ -26,7 +26,7 @@ class ReleasePlan(NamedTuple):
     ids: tuple[int, ...]
     crc: bool = False
     channels: int = 12
-    addresses: tuple[int, ...] = ()
+    address: int = 0x40
     family: str = ""
     settings: str = ""
 
@@ -44,9 +44,7 @@ def encode(plans: tuple[ReleasePlan, ...]) -> str:
 def decode(text: str) -> tuple[ReleasePlan, ...]:
     """Return the plans from the text of ``encode``."""
     plans = [ReleasePlan(*fields) for fields in json.loads(text)]
-    return tuple(
-        plan._replace(ids=tuple(plan.ids), addresses=tuple(plan.addresses)) for plan in plans
-    )
+    return tuple(plan._replace(ids=tuple(plan.ids)) for plan in plans)
 
 
 def describe(plan: ReleasePlan) -> str:

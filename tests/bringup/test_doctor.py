@@ -8,16 +8,16 @@ from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one
 from present import present
 
 from gazerig.drivers.i2c.transfers import write
-from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.pca9685.board import (
     AWAKE,
     LED0,
     MODE1,
     PRESCALE,
     SLEEP,
+    Pca9685Params,
     pulse_registers,
 )
-from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.registers import Registers

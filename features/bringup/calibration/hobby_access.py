@@ -7,13 +7,10 @@ board has no watchdog: a guardian stops the pulses if this program is killed.
 from collections.abc import Callable
 
 from gazerig.drivers.errors import BusLost
-from gazerig.drivers.hobby_board.board import Board
+from gazerig.drivers.hobby_board.board import US_STEPS, Board
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
-from gazerig.drivers.hobby_board.params import US_STEPS
-from gazerig.drivers.maestro.board import MaestroBoard
-from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.board import Pca9685Board
-from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
+from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped

@@ -14,9 +14,8 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.hobby_board.params import US_STEPS
+from gazerig.drivers.hobby_board.board import US_STEPS
 from gazerig.drivers.pca9685.board import probe
-from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.features.bringup.bus_search import (
@@ -121,7 +120,7 @@ def _boards(path: str, as_json: bool) -> bool:
     A serial port is searched only if the user named it: for a Maestro such bytes are commands.
     """
     with bench.unopened_port(path) as line:
-        found = [f"{address:#x}" for address in probe(line, Pca9685Params())]
+        found = [f"{address:#x}" for address in probe(line)]
     if as_json:
         boards = [{"kind": "pca9685", "address": address} for address in found]
         print(json.dumps({"port": path, "servos": [], "boards": boards}))

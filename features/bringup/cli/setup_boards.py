@@ -13,7 +13,6 @@ from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.maestro.board import USB_CHANNELS, MaestroBoard
 from gazerig.drivers.pca9685.board import Pca9685Board
-from gazerig.drivers.pca9685.params import CHANNELS
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.maestro_settings import instructions
@@ -95,11 +94,11 @@ def set_up_maestro(task: SetupTask) -> None:
 
 
 def set_up_pca9685(task: SetupTask) -> None:
-    """Print how boards are wired, and check that they answer.
+    """Print how the board is wired, and check that it answers.
 
     Raises:
         PortError: the port cannot be opened.
-        ServoMissing: a board does not answer.
+        ServoMissing: the board does not answer.
         BusLost: the port has disappeared.
     """
     params, setups = task.config.pca9685, task.setups
@@ -109,11 +108,9 @@ def set_up_pca9685(task: SetupTask) -> None:
         bench.unopened_port(wired.paths[task.bus]) as line,
     ):
         line.setBaudRate(params.baud)
-        for address in params.addresses:
-            closed = [f"A{bit}" for bit in range(6) if address >> bit & 1]
-            say(f"   board {address:#x}: jumpers {', '.join(closed) or 'none'} closed")
+        closed = [f"A{bit}" for bit in range(6) if params.address >> bit & 1]
+        say(f"   board {params.address:#x}: jumpers {', '.join(closed) or 'none'} closed")
         for one in setups:
-            board, channel = divmod(one.id, CHANNELS)
-            say(f"   {one.name}: channel {channel} of board {params.addresses[board]:#x}")
+            say(f"   {one.name}: channel {one.id}")
         Pca9685Board(line, params).find(setups)
     say(_LOOK)

@@ -12,18 +12,17 @@ from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.hobby_board.params import US_STEPS
+from gazerig.drivers.hobby_board.board import US_STEPS
 from gazerig.drivers.maestro.board import (
     MICRO,
     MOST_INPUT,
     USB_CHANNELS,
     DetectedMaestro,
     MaestroBoard,
+    MaestroParams,
     probe,
 )
-from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.board import Pca9685Board
-from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic
@@ -275,8 +274,7 @@ def examine_pca9685(
     except ServoMissing as error:
         what, _, remedy = str(error).removeprefix(f"{port.port_name}: ").partition(": ")
         return [*findings, Diagnostic("error", what, WHERE, remedy)]
-    named = " and ".join(f"{address:#x}" for address in params.addresses)
     read = dict(zip((setup.id for setup in fitting), pulses, strict=True))
     return examine_channels(
-        PCA9685, fitting, read, params.channels, findings, f"answers at {named}"
+        PCA9685, fitting, read, params.channels, findings, f"answers at {params.address:#x}"
     )
