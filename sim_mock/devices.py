@@ -9,7 +9,6 @@ from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, find, load
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec
-from gazerig.sim_mock.smart_servo.head_weight import HeadWeight
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
 
@@ -21,12 +20,10 @@ class _SmartServoLine:
     Attributes:
         servos: specifications of the servos.
         baud: the servos' rate; clients at another rate get no answer; None: any rate works.
-        weight: weight of the head that they move, if it depends on the whole pose.
     """
 
     servos: tuple[ServoSpec, ...]
     baud: int | None = None
-    weight: HeadWeight | None = None
 
 
 class DynamixelLine(_SmartServoLine):
@@ -137,9 +134,7 @@ def build(
         return build_bridge(
             what.addresses, now_s, what.oscillator_hz, seed, what.servos, shafts.make_servo
         )
-    # A world computes the weight on its shafts.
-    weight = what.weight if shafts.make_shaft is create_shaft else None
-    options: dict[str, Any] = {"seed": seed, "make_shaft": shafts.make_shaft, "weight": weight}
+    options: dict[str, Any] = {"seed": seed, "make_shaft": shafts.make_shaft}
     if isinstance(what, FeetechLine):
         from gazerig.sim_mock.feetech.chain import build_feetech
 

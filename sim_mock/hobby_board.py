@@ -6,7 +6,6 @@ Time passes in whole steps of 10 ms; a servo gets a new pulse every second step.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 
-from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.faults.hobby import HobbyFaults
 from gazerig.sim_mock.hobby_servo import STEP_S, HobbyServo
@@ -16,12 +15,7 @@ STEPS_S = round(1.0 / STEP_S)
 
 
 class HobbyBoard(ABC):
-    """One board, or several on one line.
-
-    servo_power: whether the servos have their supply, which the board does not detect
-    """
-
-    check_baud = False
+    """One board, or several on one line."""
 
     def __init__(
         self,
@@ -32,9 +26,7 @@ class HobbyBoard(ABC):
     ) -> None:
         self.now_s = now_s
         self.servos = tuple(servos)
-        self.servo_power = True
         self.faults = HobbyFaults(self, commands, seed)
-        self._wire = self.faults.wire
         self._step = self._step_number()
 
     # --- what a kind of board defines
@@ -56,18 +48,10 @@ class HobbyBoard(ABC):
         return True
 
     @abstractmethod
-    def execute(self, data: bytes) -> Iterator[tuple[int, Piece | None]]:
-        """Execute the commands in bytes; yield the end of each command, and its answer."""
-
-    def status(self) -> dict[str, object]:
-        """Return further entries of the fault command ``status``."""
-        return {}
+    def execute(self, data: bytes) -> Iterator[Piece]:
+        """Execute the commands in bytes; yield their answers."""
 
     # --- device interface
-
-    def understands_baud(self, client_baud: int) -> bool:
-        """Return whether a client at this baud rate is understood: every one is."""
-        return True
 
     def find_servo(self, channel: int) -> HobbyServo:
         """Return the servo of a channel, advanced to the present time."""
@@ -81,19 +65,14 @@ class HobbyBoard(ABC):
         self.advance()
         return tuple(servo.place_steps for servo in self.servos)
 
-    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
-        """Process received bytes; return the reply to each command in them."""
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Piece]:
+        """Process received bytes; return the answers to the commands in them."""
         self.advance()
-        replies = []
-        for end, piece in self.execute(data):
-            if piece is not None and not self.is_struck("lose", piece.servo_id):
-                pieces = self._wire.spoil_pieces([piece], False, self.now_s())
-                replies.append(DeviceReply(end, pieces))
-        return self.faults.add_line_noise(replies, data) if self._wire.has_any else replies
-
-    def is_struck(self, kind: str, channel: int | None = None) -> bool:
-        """Return whether a fault of this kind strikes now, and count it."""
-        return self._wire.use_fault(kind, channel, self.now_s()) is not None
+        return [
+            piece
+            for piece in self.execute(data)
+            if not self.faults.use_fault("lose", piece.servo_id)
+        ]
 
     # --- time
 
@@ -107,7 +86,7 @@ class HobbyBoard(ABC):
             self._step += 1
             is_resting = self.step_outputs()
             for channel, servo in enumerate(self.servos):
-                pulse = self.pulse_steps(channel) if self.servo_power else 0
+                pulse = self.pulse_steps(channel)
                 if self._step % 2 == 0:
                     servo.width_steps = pulse
                 servo.step()

@@ -1,8 +1,10 @@
-"""Instructions to emulated servos, and the timed pieces of bytes that carry their answers."""
+"""Instructions to emulated devices, and the timed pieces of bytes that carry their answers."""
 
 from typing import NamedTuple
 
 BROADCAST = 0xFE
+NO_DEVICE = -1
+"""Id of pieces that no servo sent: the host's echo, or a board's own answer."""
 
 
 class Instruction(NamedTuple):
@@ -21,11 +23,13 @@ class Instruction(NamedTuple):
 class Piece(NamedTuple):
     """Bytes that one servo sends without a pause, after its delays.
 
+    end: position in the host's bytes after the instruction that they answer
     delay_s applies only on a line with wire time, late_s always.
     """
 
     servo_id: int
     data: bytes
+    end: int = 0
     delay_s: float = 0.0
     late_s: float = 0.0
 

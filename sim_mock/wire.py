@@ -14,7 +14,7 @@ of 10 bits in Feetech's and Pololu's manuals. The turnaround of the electronics,
 
 from collections import deque
 
-from gazerig.sim_mock.device import Device, DeviceReply
+from gazerig.sim_mock.device import Device
 
 BITS_PER_BYTE = 10
 
@@ -56,45 +56,23 @@ class ServoLine:
 
     def send(self, data: bytes, baud: int, now_s: float | None = None) -> bytes:
         """Send the host's bytes now, or at ``now_s``; return the bytes that arrive immediately."""
-        wire = self.device.faults.wire
-        if wire.has_any:
-            data = wire.add_noise(data, self.device.now_s())
-        replies = self.device.exchange(data, baud)
-        if wire.has_any:
-            noise_s = self.device.now_s()
-            replies = [
-                DeviceReply(
-                    r.end, [p._replace(data=wire.add_noise(p.data, noise_s)) for p in r.pieces]
-                )
-                for r in replies
-            ]
-        if self.wire_time:
-            self._queue_on_line(
-                data, replies, baud, self.device.now_s() if now_s is None else now_s
-            )
-        elif wire.has_any or self._late:
-            # The only delays are those of faults.
-            sent_s = self.device.now_s()
-            due_s = max(sent_s, self._late[-1][0] if self._late else sent_s)
-            for reply in replies:
-                for piece in reply.pieces:
-                    due_s += piece.late_s
-                    self._late.append((due_s, piece.data))
-        else:
-            return b"".join([piece[1] for reply in replies for piece in reply[1]])
-        return self.take_arrived()
-
-    def _queue_on_line(
-        self, data: bytes, replies: list[DeviceReply], baud: int, now_s: float
-    ) -> None:
-        """Queue answers with their time on the line."""
-        byte_s = BITS_PER_BYTE / baud
+        faults = self.device.faults
+        if faults.has_any:
+            data = faults.add_noise(data)
+        pieces = self.device.exchange(data, baud)
+        if faults.has_any:
+            pieces = faults.disturb(pieces, data)
+        elif not (self.wire_time or self._late):
+            return b"".join([piece[1] for piece in pieces])
+        now_s = self.device.now_s() if now_s is None else now_s
+        byte_s = BITS_PER_BYTE / baud if self.wire_time else 0.0
         start_s = max(now_s, self._host_free_s)
         self._host_free_s = start_s + len(data) * byte_s
         at_s = max(self._line_free_s, now_s)
-        for reply in replies:
-            at_s = max(at_s, start_s + reply.end * byte_s)
-            for piece in reply.pieces:
-                at_s += piece.delay_s + piece.late_s + len(piece.data) * byte_s
-                self._late.append((at_s, piece.data))
+        for _, answer, end, delay_s, late_s in pieces:
+            at_s = max(at_s, start_s + end * byte_s) + late_s + len(answer) * byte_s
+            if self.wire_time:
+                at_s += delay_s
+            self._late.append((at_s, answer))
         self._line_free_s = at_s
+        return self.take_arrived()

@@ -209,8 +209,8 @@ def in_process(name: str, wire_time: bool = False) -> Bench:
 LINE_FAULTS = ("lose {i}", "lose all", "delay {i} 8", "delay all 15", "truncate {i} 5",
                "corrupt {i}", "corrupt all", "unplug")  # fmt: skip
 SERVO_FAULTS = ("brown-out {i}", "echo on", "static 2", "overload {i}", "collide {i}", "stick {i}")
-BOARD_FAULTS = ("brown-out", "lose-writes 5", "power off", "stick {i}")
-END_OF = {"unplug": "plug", "stick {i}": "free {i}", "power off": "power on"}
+BOARD_FAULTS = ("brown-out", "lose-writes 5", "stick {i}")
+END_OF = {"unplug": "plug", "stick {i}": "free {i}"}
 """Ends of faults that ``clear`` does not end."""
 
 
@@ -270,7 +270,7 @@ class Struck:
     def strike(self, faults: Sequence[str], seconds: float) -> bool:
         """Let faults last for a while; return whether all came back, or else check its name."""
         setup = self.bench.setups[self.victim]
-        own_speed = any(word in text for text in faults for word in ("stick", "power", "static"))
+        own_speed = any(word in text for text in faults for word in ("stick", "static"))
         for text in faults:
             self.bench.command(text.format(i=setup.id))
         for _ in range(round(seconds / TICK_S)):

@@ -7,9 +7,10 @@ from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.maestro.board import ERRORS, build_board
+from gazerig.sim_mock.maestro.board import PROTOCOL as PROTOCOL_BIT
+from gazerig.sim_mock.maestro.board import build_board
 
-PROTOCOL = 1 << ERRORS.index("protocol")
+PROTOCOL = 1 << PROTOCOL_BIT
 TICK_S = 0.01
 SETUPS = (
     ServoConfig(0, "hobby", 4400, 7600, 12_000.0, "eyes", rest_steps=6100),
@@ -61,7 +62,7 @@ class World:
     def ask(self, data):
         """Send bytes, or text in hex; return the answers."""
         data = bytes.fromhex(data) if isinstance(data, str) else data
-        return b"".join(p.data for reply in self.board.exchange(data) for p in reply.pieces)
+        return b"".join(piece.data for piece in self.board.exchange(data))
 
     def position(self, channel=0):
         return int.from_bytes(self.ask(bytes((0x90, channel))), "little")

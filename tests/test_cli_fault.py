@@ -25,9 +25,9 @@ def test_a_command_reaches_the_emulated_servos_and_says_what_it_did(rig: TickedR
     assert "xl330-m077" in SERVOS
     device = build(line_of("1-2:xl330-m077", 57600), lambda: 0.0)
     with_faults(rig, device.faults.command)
-    assert not device.faults.wire.has_any
+    assert not device.faults.has_any
     said = gazerig("ctl", "fault", "lose", "2", "count", "3")
-    assert device.faults.wire.has_any and "servo 2" in said
+    assert device.faults.has_any and "servo 2" in said
     assert "usage: lose" in gazerig("ctl", "fault", "lose", "many")
     assert "turn ID STEPS" in gazerig("ctl", "fault", "help")
     gazerig("ctl", "fault", "turn", "2", "-30")  # a negative number is no option

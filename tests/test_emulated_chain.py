@@ -25,8 +25,7 @@ def pings(bench, servo_id, baud=None):
 def answered(bench, *ids):
     """Return the pieces that a group read of the position is answered with."""
     span = bench.span_of("present_position")
-    replies = bench.chain.exchange(bench.instruction(ALL, SYNC_READ, span, *ids))
-    return [piece for reply in replies for piece in reply.pieces]
+    return bench.chain.exchange(bench.instruction(ALL, SYNC_READ, span, *ids))
 
 
 # --- framing

@@ -83,7 +83,7 @@ def test_voltage_stands_in_every_answer_as_long_as_it_is_wrong(bench, volts, bit
 
 def test_heat_takes_the_torque_until_it_has_cooled_and_someone_switches_it_on(bench):
     bench.enable_torque()
-    bench.chain.faults.command("overheat 1")
+    bench.chain.faults.command("temperature 1 75")
     bench.wait(0.04)
     assert (bench.error(), bench.read(1, 40), bench.read(1, 63)) == (HEAT, 0, 75)
     bench.write(1, 40, 1)

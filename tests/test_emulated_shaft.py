@@ -12,12 +12,14 @@ from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Physics
 from gazerig.sim_mock.smart_servo.shaft import Shaft
 
 P, D = 800 / 128 / 885, 800 / 16 / 885
+PD = Loop(p=P, d=D)
 SMOOTH: dict[str, Any] = {"coulomb_share": 0.0, "viscous_share": 0.0}
 
 
-def shaft(model: str = "xl330-m077", loop: Loop = Loop(p=P, d=D), **physics) -> Shaft:  # noqa: B008
+def shaft(model: str = "xl330-m077", loop: Loop = PD, weight_nm: float = 0.0, **physics) -> Shaft:
     made = Shaft(MODELS[model], Physics(**physics), 0.0)
     made.drive(loop)
+    made.set_weight(weight_nm / MODELS[model].stall_torque_nm)
     return made
 
 
@@ -94,10 +96,10 @@ def test_full_pwm_reaches_the_no_load_speed_of_the_data_sheet(model):
 @pytest.mark.parametrize("gain", [1.0, 4.0])
 def test_the_steady_error_under_load_is_the_load_over_p_and_i_removes_it(gain):
     # 0.05 Nm of 0.215 Nm, no friction: PWM 0.2326, of which P makes one share per step.
-    made = shaft(loop=Loop(p=gain * P, d=D), load_nm=-0.05, **SMOOTH)
+    made = shaft(loop=Loop(p=gain * P, d=D), weight_nm=-0.05, **SMOOTH)
     end = go(made, 300, 4000)[-1]
     assert 300 - end == pytest.approx(0.05 / 0.215 / (gain * P), rel=1e-3)
-    with_i = shaft(loop=Loop(p=gain * P, i=P / 200.0, d=D), load_nm=-0.05)
+    with_i = shaft(loop=Loop(p=gain * P, i=P / 200.0, d=D), weight_nm=-0.05)
     assert abs(go(with_i, 300, 4000)[-1] - 300) < 1.0
 
 
@@ -143,8 +145,8 @@ def test_without_torque_friction_takes_the_speed_and_never_adds_any():
 
 
 def test_a_load_below_friction_is_held_without_torque_and_a_larger_one_falls_to_the_stop():
-    held = shaft(loop=DISABLED, load_nm=0.006)
-    falls = shaft(loop=DISABLED, load_nm=0.02, stop_high_steps=500.0)
+    held = shaft(loop=DISABLED, weight_nm=0.006)
+    falls = shaft(loop=DISABLED, weight_nm=0.02, stop_high_steps=500.0)
     assert run(held, 1000)[-1] == 0.0
     assert run(falls, 1000)[-1] == 500.0
     assert falls.quiet and falls.v == 0.0

@@ -84,7 +84,7 @@ def test_a_servo_fault_ends_the_loop_with_its_cause() -> None:
     def watch(tick: Tick) -> None:
         seen.append(tick)
         if len(seen) == 100:
-            chain[7].fail("overload")
+            chain[7].overload()
 
     count = run(assembly.robot, assembly.clock, assembly.loop, until(5.0), watch)
     assert count.stopped_by.startswith("fault: ")

@@ -158,7 +158,7 @@ def test_an_error_that_sends_all_home_is_named_and_healed(held):
 
 
 @pytest.mark.parametrize(
-    ("command", "named"), [("brown-out", "restarted"), ("error crc", "error .serial CRC error.")]
+    ("command", "named"), [("brown-out", "restarted"), ("error 3", "error .serial CRC error.")]
 )
 def test_a_board_that_loses_its_pulses_again_soon_stays_without(held, command, named):
     for _ in range(2):
@@ -198,7 +198,7 @@ def test_a_channel_that_cannot_be_enabled_again_is_named(held):
 
 def test_a_channel_whose_answers_are_damaged_is_not_held_by_a_guess(held):
     held.run(0.5, GOALS)
-    held.do("error script-stack")
+    held.do("error 6")
     held.do("corrupt 1 9 for 1")
     assert held.run(0.9, GOALS)[-1].missing == (0, 1, 2)
     assert held.positions(IDS)[::2] == [GOALS[0], GOALS[2]]
@@ -276,7 +276,7 @@ def test_a_pulse_in_the_place_of_the_error_register_is_damage():
 
 def test_a_search_finds_pulses_and_errors_and_moves_nothing():
     world = World()
-    world.do("error protocol")
+    world.do("error 4")
     world.ask(target(0, 6000) + target(4, 5000))
     found = present(probe(world.port, MaestroParams()))
     assert found == (False, ("serial protocol error",), (6000, 0, 0, 0, 5000, 0))

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import degrees, radians
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,12 +18,9 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of, sag_compensation, statics_of
 from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.app.rig_weight import rest_park_deg, weight_findings
-from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.robot.control.body import Body
 from gazerig.robot.description.mjcf import mjcf
-from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.mass_params import CounterweightParams, LinkMassParams, MassParams
-from gazerig.sim_mock.devices import build
 
 REAL = MassParams(head=LinkMassParams(com_mm=(40.0, 0.0, 30.0)))
 """A realistic skull and jaw."""
@@ -100,33 +96,6 @@ def test_impossible_masses_are_refused(lines: str, key: str, rule: str, tmp_path
     (fault,) = caught.value.faults
     assert (fault.key, fault.line is not None) == (key, True)
     assert rule in fault.rule, fault
-
-
-@pytest.mark.parametrize("coupled", [False, True])
-def test_emulated_servos_carry_the_weight_of_the_whole_pose(coupled: bool) -> None:
-    """A head that is tilted ahead and aside loads all servos of its neck."""
-    rig = heavy("desk", MassParams(head=LinkMassParams(com_mm=(40.0, 8.0, 30.0))))
-    pair = CouplingParams("neck_pitch", "neck_roll")
-    if coupled:
-        rig = replace(rig, couplings={"neck": pair})
-    angles = {"neck_yaw": 0.3, "neck_pitch": -0.5, "neck_roll": 0.2}
-    turned = dict(angles)
-    if coupled:
-        both = pair.servo_rad((angles["neck_pitch"], angles["neck_roll"]))
-        turned |= dict(zip(("neck_pitch", "neck_roll"), both, strict=True))
-    (line,) = emulated_lines(rig).values()
-    now_s = 0.0
-    chain: Any = build(line, lambda: now_s)
-    for name, joint in rig.joints.items():
-        chain.servos[servo_index(rig, name)].shaft.place(joint.steps(turned.get(name, 0.0)))
-    now_s = 0.01
-    chain.positions_steps()
-    for name, share in statics_of(rig).drive_shares(angles).items():
-        joint = rig.joints[name]
-        expected = share if joint.make_linkage().rising else -share
-        carried = chain.servos[servo_index(rig, name)].shaft._weight
-        assert carried == pytest.approx(expected, rel=0.02, abs=1e-3), name
-        assert abs(carried) > 0.005 or name not in ("neck_pitch", "neck_roll")
 
 
 class Neck:

@@ -48,7 +48,7 @@ def test_a_stranger_is_named_where_a_servo_is_missing():
 @pytest.mark.parametrize(
     ("spoil", "error", "told"),
     [
-        (lambda chain: chain[3].fail("overload"), ServoFault, "servo 3: overload: let it cool"),
+        (lambda chain: chain[3].overload(), ServoFault, "servo 3: overload: let it cool"),
         (lambda chain: chain[2].restart(), ServoMissing, "no answer from servo 2: check its cable"),
     ],
     ids=["latched", "silent"],
@@ -224,9 +224,9 @@ def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(xl):
 
 def test_an_alert_is_named_though_its_cause_comes_later_and_is_asked_about_seldom():
     rig = DynamixelRig(direct=True)
-    rig.chain[3].fail("overheating")
+    rig.chain[3].set_temperature(90.0)
     rig.open()
-    for _ in range(3):
+    for _ in range(8):
         rig.tick()
     assert rig.bus.faults() == ("servo 3: overheating",)
     before, ticks = rig.bus.health().tx_bytes, 50
@@ -316,7 +316,7 @@ def test_overload_is_named_and_goes(sts):
 
 def test_one_that_is_too_hot_keeps_no_other_without_torque_after_a_replug(sts):
     sts.run(0.5, [2000] * 4)
-    sts.command("overheat 2")
+    sts.command("temperature 2 90")
     sts.command("unplug for 0.1")
     sts.run(0.3, [2000] * 4)
     for servo_id in IDS:

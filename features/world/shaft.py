@@ -230,10 +230,6 @@ class WorldShaft(Shaft):
         """Jam the shaft at its position, or free it."""
         self.axis.jam(stuck)
 
-    def set_load(self, share: float) -> None:
-        """Set a constant torque on the shaft as a share of the stall torque."""
-        self.axis.load(share * self._stall_nm)
-
     # --- from the servo
 
     def run(self, ms: int) -> None:

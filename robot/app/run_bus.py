@@ -24,12 +24,10 @@ from gazerig.robot.app.bus_wiring import (
 )
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of
-from gazerig.robot.description.statics import Weight, joint_weights, moving_bodies
+from gazerig.robot.description.statics import Weight, joint_weights
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling import pair_setups
 from gazerig.robot.model.frames import CameraMount, PoseHistory
-from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.mass_params import MassParams
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
     DynamixelLine,
@@ -43,8 +41,7 @@ from gazerig.sim_mock.devices import (
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.ideal.bus import IdealBus
 from gazerig.sim_mock.pty.client import PtyBuses
-from gazerig.sim_mock.smart_servo.head_weight import HeadWeight, TurnedJoints
-from gazerig.sim_mock.smart_servo.physics import STEPS_PER_RAD, STEPS_PER_TURN, Physics, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 TrueSteps = Callable[[], Mapping[str, float]]
 """Function that returns the present true positions of the servos in steps, by joint."""
@@ -100,21 +97,15 @@ def ideal_bus(rig: Rig, now_s: Callable[[], float]) -> IdealBus:
     )
 
 
-def _emulated_servo(rig: Rig, name: str, weight: Weight, has_own_weight: bool) -> ServoSpec:
-    """Return the smart servo of one joint.
-
-    Args:
-        rig: its rig.
-        name: its joint.
-        weight: weight on the joint with all others at 0.
-        has_own_weight: whether the servo carries this weight; else its chain has the whole head's.
-    """
+def _emulated_servo(rig: Rig, name: str, weight: Weight) -> ServoSpec:
+    """Return the smart servo of one joint with this weight on it; coupled servos carry none."""
     joint = rig.joints[name]
     start, (low, high) = _start_step(rig, name), _mechanical_stops(rig, name)
-    turns = _steepest_turns(joint)
+    turns = joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
+    is_coupled = any(name in pair.joints for pair in rig.couplings.values())
     physics = Physics(
         load_kg_m2=weight.inertia_kg_m2 / turns**2,
-        gravity_nm=weight.nm / turns if has_own_weight else 0.0,
+        gravity_nm=0.0 if is_coupled else weight.nm / turns,
         upright_steps=joint.steps(weight.upright_rad),
         gravity_turns=1.0 / turns,
         stop_low_steps=low,
@@ -122,25 +113,6 @@ def _emulated_servo(rig: Rig, name: str, weight: Weight, has_own_weight: bool) -
         play_deg=JOINT_PLAY_DEG * turns,
     )
     return ServoSpec(joint.id, joint.model, start, physics=physics)
-
-
-def _steepest_turns(joint: JointParams) -> float:
-    return joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
-
-
-def _turned_joints(rig: Rig, name: str) -> TurnedJoints:
-    """Return the joints that a servo turns, near angle 0."""
-    joint = rig.joints[name]
-    shares: tuple[tuple[str, float], ...] = ((name, 1.0),)
-    for pair in rig.couplings.values():
-        if name in pair.joints:
-            turn = (1.0, 0.0) if name == pair.first else (0.0, 1.0)
-            shares = tuple(zip(pair.joints, pair.joint_rad(turn), strict=True))
-    per_rad = _steepest_turns(joint) * STEPS_PER_RAD
-    if not joint.make_linkage().rising:
-        per_rad = -per_rad
-    zero = joint.steps(0.0) * STEPS_PER_TURN / joint.model_facts.steps_per_turn
-    return TurnedJoints(zero, tuple((turned, share / per_rad) for turned, share in shares))
 
 
 def servo_index(rig: Rig, joint: str) -> int:
@@ -153,16 +125,9 @@ def servo_index(rig: Rig, joint: str) -> int:
 def _emulated_line(rig: Rig, name: str) -> Emulated:
     config, joints = rig.bus_named(name), joints_on(rig, name)
     if config.kind in CHAINS:
-        description = description_of(rig, looks=False)
-        weights = joint_weights(description, rig.joints)
-        # Estimated masses are nearly balanced; then each joint has the weight with all others at 0.
-        whole = rig.mass != MassParams() or bool(rig.couplings)
-        specs = tuple(_emulated_servo(rig, one, weights[one], not whole) for one in joints)
-        weight = None
-        if whole:
-            bodies = moving_bodies(description, rig.joints)
-            weight = HeadWeight(bodies, tuple(_turned_joints(rig, one) for one in joints))
-        return CHAINS[config.kind](specs, config.section.baud, weight)
+        weights = joint_weights(description_of(rig, looks=False), rig.joints)
+        specs = tuple(_emulated_servo(rig, one, weights[one]) for one in joints)
+        return CHAINS[config.kind](specs, config.section.baud)
     if config.kind in BOARDS:
         return BOARDS[config.kind](config, tuple(_hobby_spec(rig, one) for one in joints))
     servos = tuple(

@@ -12,16 +12,12 @@ from fastcrc.crc16 import umts
 from gazerig.sim_mock.dynamixel.packets import CRC, HEAD, HEADER, STATUS, find_instructions, status
 from gazerig.sim_mock.dynamixel.servo import INSTRUCTION_ERROR, DynamixelServo
 from gazerig.sim_mock.replies import BROADCAST, Piece, merge
-from gazerig.sim_mock.smart_servo.chain import (
-    FAST_BULK_READ,
-    FAST_SYNC_READ,
-    Read,
-    ServoChain,
-    sync_reads,
-)
+from gazerig.sim_mock.smart_servo.chain import Read, ServoChain, sync_reads
 from gazerig.sim_mock.smart_servo.faults import commands_of
 
 BULK_READ, BULK_WRITE = 0x92, 0x93
+FAST_SYNC_READ, FAST_BULK_READ = 0x8A, 0x9A
+"""Group reads with one answer of all servos."""
 
 _ROW = struct.Struct("<BHH")
 _MARKS = [bytes((0, servo_id)) for servo_id in range(256)]
@@ -59,13 +55,13 @@ class DynamixelChain(ServoChain):
     def _answer_fast(self, reads: Sequence[Read]) -> list[Piece]:
         """Return one packet of all answers, in pieces if faults may affect it.
 
-        A missing block ends it; a refused read has zeros. The CRC of a block counts for the next
-        piece, as its sender continues from it.
+        A missing or cut block ends it; a refused read has zeros. The CRC of a block counts for the
+        next piece, as its sender continues from it.
         """
         length = 1 + sum([4 + read[2] for read in reads])
         before, crc, pack = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0, CRC.pack
         parts, delays_s, now_ms, fed_ms = list[bytes](), list[float](), self._now_ms, self._fed_ms
-        find, faulty = self._by_id.get, self._wire.has_any
+        find, faults = self._by_id.get, self.faults
         for servo_id, address, size in reads:
             data = after = b""
             following = 0
@@ -84,18 +80,22 @@ class DynamixelChain(ServoChain):
                     following = umts(own, crc)
                 data, after = own, end
                 delays_s.append(servo.delay_s)
-            if not data or (faulty and self._is_muted(servo_id)):
+            if not data or faults.use_fault("lose", servo_id):
                 break
             crc, before = following, after
             parts.append(data)
+            if faults.is_on("truncate", servo_id):
+                break
         if not parts:
             return []
         parts[-1] += before
-        if not faulty:
-            return [Piece(reads[0][0], b"".join(parts), delays_s[0])]
-        firsts = [read[0] for read in reads]
+        if not faults.has_any:
+            parts = [b"".join(parts)]
         waits_s = [delays_s[0], *[0.0] * len(parts)]
-        return [Piece(*one) for one in zip(firsts, parts, waits_s, strict=False)]
+        return [
+            Piece(read[0], part, self._end, wait_s)
+            for read, part, wait_s in zip(reads, parts, waits_s, strict=False)
+        ]
 
 
 build_dynamixel = DynamixelChain.build

@@ -12,7 +12,6 @@ profile's state read 0.
 import struct
 from collections.abc import Callable
 from math import inf
-from typing import ClassVar
 
 from gazerig.drivers.dynamixel.control_table import (
     ACCELERATION_UNIT_STEPS_S2,
@@ -20,7 +19,6 @@ from gazerig.drivers.dynamixel.control_table import (
     EEPROM_END,
     FAST_READ_SINCE,
     GAINS,
-    HARDWARE_ERRORS,
     MODELS,
     PWM_FULL,
     VELOCITY_UNIT_STEPS_S,
@@ -125,7 +123,6 @@ class DynamixelServo(EmulatedServo):
 
     restart_ms = 400
     read_level, answer_level = 1, 2
-    error_bits: ClassVar = {name: 1 << bit for bit, name in HARDWARE_ERRORS.items()}
     model: DynamixelModel
     memory: DynamixelMemory
 

@@ -2,15 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from gazerig.sim_mock.faults.grammar import CommandTable, Verb
 from gazerig.sim_mock.faults.line import LineFaults
 from gazerig.sim_mock.faults.verbs import ADAPTER_VERBS, CLOSING_VERBS, LINE_VERBS, loss_verb
 from gazerig.sim_mock.hobby_servo import HobbyServo
-
-if TYPE_CHECKING:
-    from gazerig.sim_mock.hobby_board import HobbyBoard
 
 
 class HobbyFaults(LineFaults):
@@ -18,20 +14,10 @@ class HobbyFaults(LineFaults):
 
     noun = "channel"
 
-    def __init__(self, board: "HobbyBoard", commands: CommandTable, seed: int) -> None:
-        super().__init__(board, commands, seed)
-        self.board = board
-
     def brown_out(self) -> str:
         """Restart the board as after a dip of the supply, which no answer shows."""
-        self.board.restart()
+        self.chain.restart()
         return "the board restarts"
-
-    def power(self, on: str = "on") -> str:
-        """Switch the servos' supply on or off, which the board does not detect."""
-        self.board.advance()
-        self.board.servo_power = on == "on"
-        return f"the servos have {'their' if on == 'on' else 'no'} supply"
 
     def jam(self, channel: int | None, stuck: bool = True) -> str:
         """Jam a servo at its position, or free it."""
@@ -51,44 +37,37 @@ class HobbyFaults(LineFaults):
 
     def _servos(self, channel: int | None) -> Sequence[HobbyServo]:
         """Return a servo, or all (None), advanced to the present time."""
-        self.board.advance()
-        return self.board.servos if channel is None else [self.board.find_servo(channel)]
-
-    def board_status(self) -> dict[str, object]:
-        """Return the board's own entries of ``status``."""
-        return self.board.status()
+        self.chain.advance()
+        servos: Sequence[HobbyServo] = self.chain.servos
+        return servos if channel is None else [self.chain.find_servo(channel)]
 
     def reports(self) -> list[dict[str, object]]:
         """Return every channel's commanded pulse and its servo's true position."""
-        places = self.board.positions_steps()
+        places = self.chain.positions_steps()
         return [
-            {
-                "id": nth,
-                "target": self.board.target_steps(nth),
-                "place": round(place, 1),
-            }
+            {"id": nth, "target": self.chain.target_steps(nth), "place": round(place, 1)}
             for nth, place in enumerate(places)
         ]
 
 
 # fmt: off
-def hobby_commands(highest: int, writes: str, own: Mapping[str, Verb]) -> CommandTable:
+def hobby_commands(
+    highest: int, writes: str, own: Mapping[str, Verb] | None = None
+) -> CommandTable:
     """Return the fault commands of a board of hobby servos.
 
     Args:
         highest: its highest channel.
         writes: name of its commands without an answer.
-        own: verbs of its kind alone.
+        own: verbs of its kind alone; None: it has none.
     """
     verbs = {
         **LINE_VERBS,
         "lose-writes": loss_verb("lose_writes", writes),
         **ADAPTER_VERBS,
-        **own,
+        **(own or {}),
         "brown-out": Verb(HobbyFaults.brown_out, "",
                           "the board restarts as a dip of its supply makes it"),
-        "power": Verb(HobbyFaults.power, "[on|off]",
-                      "supply of the servos; the board does not detect it"),
         "stick": Verb(HobbyFaults.jam, "ID", "jam the servo at its position"),
         "free": Verb(partial(HobbyFaults.jam, stuck=False), "ID", "free a jammed servo"),
         "turn": Verb(HobbyFaults.turn, "ID STEPS",

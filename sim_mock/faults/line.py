@@ -7,16 +7,37 @@ every servo.
 
 import json
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import log
+from random import Random
 from typing import Any
 
-from gazerig.sim_mock.device import DeviceReply
-from gazerig.sim_mock.faults.active import NO_DEVICE, ActiveFaults, LineFault
 from gazerig.sim_mock.faults.grammar import CommandTable
-from gazerig.sim_mock.replies import Piece
+from gazerig.sim_mock.replies import NO_DEVICE, Piece
+
+
+@dataclass
+class LineFault:
+    """One active fault.
+
+    servo_id: servo with the affected answers; None: all servos
+    values: parameters of the kind (milliseconds, byte counts)
+    remaining_answers: remaining answers, until_s: end time; None: no such end
+    """
+
+    kind: str
+    servo_id: int | None = None
+    values: tuple[float, ...] = ()
+    remaining_answers: int | None = None
+    until_s: float | None = None
 
 
 class LineFaults(ABC):
-    """Faults of a line and the device at its end; a device adds its own."""
+    """Faults of a line and the device at its end; a device adds its own.
+
+    ``has_any`` is False while no fault of the line is active, which saves further calls.
+    """
 
     noun = "servo"
     """Name of the object of an id, for messages."""
@@ -24,18 +45,22 @@ class LineFaults(ABC):
     def __init__(self, chain: Any, commands: CommandTable, seed: int) -> None:
         self.chain = chain
         self.commands = commands
-        self.wire = ActiveFaults(seed)
+        self._faults: list[LineFault] = []
+        self._rng = Random(seed)
+        self.has_any = False
 
     @abstractmethod
     def reports(self) -> list[dict[str, object]]:
         """Return the state of every servo, for ``status``."""
 
-    def board_status(self) -> dict[str, object]:
-        """Return further entries of ``status``, for devices that are more than servos."""
-        return {}
+    # --- commands
 
     def command(self, text: str) -> str:
-        """Run a command such as ``lose 3 count 2``; return a description of the effect."""
+        """Run a command such as ``lose 3 count 2``; return a description of the effect.
+
+        Raises:
+            ValueError: the command is invalid; the message names the wrong word and valid ones.
+        """
         return self.commands.obey(self, text)
 
     def label(self, servo_id: int | None) -> str:
@@ -67,31 +92,102 @@ class LineFaults(ABC):
         if servo_id is not None:
             self.chain.find_servo(servo_id)
         until_s = None if seconds is None else self.chain.now_s() + seconds
-        self.wire.add(LineFault(kind, servo_id, numbers, count, until_s))
+        self._keep([*self._faults, LineFault(kind, servo_id, numbers, count, until_s)])
         span = "" if count is None else f" {count} times"
         span += "" if seconds is None else f" for {seconds:g} s"
         return text + (span or " until cleared")
 
-    # --- all
-
-    def is_on(self, kind: str) -> bool:
-        """Return whether echo or unplug is active."""
-        return self.wire.is_on(kind, self.chain.now_s())
+    def end(self, kind: str) -> None:
+        """End the faults of a kind."""
+        self._keep(fault for fault in self._faults if fault.kind != kind)
 
     def clear(self, servo_id: int | None = None) -> str:
         """End every fault of the line (or of one servo's answers); faults of servos stay."""
-        return f"{self.wire.remove(None, servo_id)} faults cleared"
+        before = len(self._faults)
+        self._keep(f for f in self._faults if servo_id is not None and f.servo_id != servo_id)
+        return f"{before - len(self._faults)} faults cleared"
 
     def status(self) -> str:
         """Return all servos and the active faults as one line of JSON."""
         faults = [
             f"{fault.kind} {'all' if fault.servo_id is None else fault.servo_id}"
-            for fault in self.wire.active_faults(self.chain.now_s())
+            for fault in self._active()
         ]
-        return json.dumps({"servos": self.reports(), **self.board_status(), "faults": faults})
+        return json.dumps({"servos": self.reports(), "faults": faults})
 
-    def add_line_noise(self, replies: list[DeviceReply], data: bytes) -> list[DeviceReply]:
-        """Add the host's echo to replies, if the line has such a fault."""
+    # --- effects
+
+    def is_on(self, kind: str, servo_id: int | None = None) -> bool:
+        """Return whether a fault of this kind affects this servo, or the line, now."""
+        return self.has_any and self._find(kind, servo_id) is not None
+
+    def use_fault(self, kind: str, servo_id: int | None = None) -> LineFault | None:
+        """Find a fault that affects this servo now and count one use of it."""
+        fault = self._find(kind, servo_id) if self.has_any else None
+        if fault is not None and fault.remaining_answers is not None:
+            fault.remaining_answers -= 1
+        return fault
+
+    def disturb(self, pieces: list[Piece], sent: bytes) -> list[Piece]:
+        """Return what arrives of answers, after the echo of the host's own bytes."""
+        disturbed = [self._spoil(piece) for piece in pieces]
         if self.is_on("echo"):
-            replies.insert(0, DeviceReply(len(data), [Piece(NO_DEVICE, data)]))
-        return replies
+            disturbed.insert(0, Piece(NO_DEVICE, sent, len(sent)))
+        return [piece._replace(data=self.add_noise(piece.data)) for piece in disturbed]
+
+    def add_noise(self, data: bytes) -> bytes:
+        """Return bytes after a noisy line: some changed, lost or inserted.
+
+        The fault's number is the percentage of bytes that are hit. Of four such bytes two are
+        changed, one is lost, and one gets another byte inserted before it.
+        """
+        noise = self.use_fault("static")
+        if noise is None:
+            return data
+        rng, out, share, at = self._rng, bytearray(), noise.values[0] / 100.0, 0
+        while True:
+            # One draw for the distance to the next byte hit, instead of a draw for each byte.
+            ahead = int(log(1.0 - rng.random()) / log(1.0 - share)) if share < 1.0 else 0
+            out += data[at : at + ahead]
+            at += ahead
+            if at >= len(data):
+                return bytes(out)
+            how = rng.randrange(4)
+            if how < 2:
+                out.append(data[at] ^ rng.randrange(1, 256))
+            elif how == 3:
+                out += bytes((rng.randrange(256), data[at]))
+            at += 1
+
+    def _spoil(self, piece: Piece) -> Piece:
+        """Change a bit, the end and the time of an answer."""
+        data, late_s = bytearray(piece.data), piece.late_s
+        if data and (flip := self.use_fault("corrupt", piece.servo_id)) is not None:
+            bit = int(flip.values[0]) if flip.values else self._rng.randrange(len(data) * 8)
+            bit %= len(data) * 8
+            data[bit // 8] ^= 1 << bit % 8
+        if (cut := self.use_fault("truncate", piece.servo_id)) is not None:
+            del data[int(cut.values[0]) :]
+        if (late := self.use_fault("delay", piece.servo_id)) is not None:
+            late_s += late.values[0] / 1000.0
+        return piece._replace(data=bytes(data), late_s=late_s)
+
+    def _find(self, kind: str, servo_id: int | None) -> LineFault | None:
+        """Return the oldest active fault of a kind that affects a servo."""
+        return next(
+            (f for f in self._active() if f.kind == kind and f.servo_id in (None, servo_id)), None
+        )
+
+    def _active(self) -> list[LineFault]:
+        """Return the active faults, oldest first; forget the others."""
+        now_s = self.chain.now_s()
+        self._keep(
+            fault
+            for fault in self._faults
+            if fault.remaining_answers != 0 and (fault.until_s is None or now_s < fault.until_s)
+        )
+        return self._faults
+
+    def _keep(self, faults: Iterable[LineFault]) -> None:
+        self._faults = list(faults)
+        self.has_any = bool(self._faults)

@@ -34,7 +34,7 @@ def switch_command(kind: str, text: str) -> Do:
     """Return a command that switches a fault of the whole line on or off."""
 
     def run_command(faults: LineFaults, on: str = "on", seconds: float | None = None) -> str:
-        faults.wire.remove(kind)
+        faults.end(kind)
         if on == "off":
             return f"no longer: {text}"
         return faults.begin(kind, None, text, None, seconds)

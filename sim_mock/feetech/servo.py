@@ -24,7 +24,7 @@ torque.
 """
 
 import struct
-from typing import ClassVar, Literal
+from typing import Literal
 
 from gazerig.drivers.feetech.memory_table import (
     ACCELERATION_UNIT_STEPS_S2,
@@ -37,7 +37,6 @@ from gazerig.drivers.feetech.memory_table import (
     SCS_MODELS,
     SCS_STEPS,
     SET_MIDDLE,
-    STATUS_ERRORS,
     TORQUE_FULL,
     Register,
     registers_of,
@@ -148,7 +147,6 @@ class FeetechServo(EmulatedServo):
     """
 
     restart_ms = 800
-    error_bits: ClassVar = {name: bit for bit, name in STATUS_ERRORS.items()}
     model: ServoModel
     memory: FeetechMemory
 

@@ -8,13 +8,12 @@ reactions to errors. Source: Pololu Maestro User's Guide (0J40), section 5; [A] 
 
 from collections.abc import Callable, Iterator, Sequence
 
-from gazerig.sim_mock.faults.active import NO_DEVICE
 from gazerig.sim_mock.faults.grammar import CommandTable, Verb
 from gazerig.sim_mock.faults.hobby import HobbyFaults, hobby_commands
 from gazerig.sim_mock.hobby_board import HobbyBoard
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec, build_servos
 from gazerig.sim_mock.maestro.channel import EmulatedChannel
-from gazerig.sim_mock.replies import Piece
+from gazerig.sim_mock.replies import NO_DEVICE, Piece
 
 SET_TARGET, SET_TARGETS, SET_SPEED, SET_ACCELERATION = 0x84, 0x9F, 0x87, 0x89
 GET_POSITION, GET_ERRORS, STOP_SCRIPT = 0x90, 0xA1, 0xA4
@@ -36,18 +35,8 @@ SETTERS = {
 }
 """Commands with a number for a channel; set-targets has several for adjacent channels."""
 
-ERRORS = (
-    "signal",
-    "overrun",
-    "buffer-full",
-    "crc",
-    "protocol",
-    "timeout",
-    "script-stack",
-    "script-call-stack",
-    "script-counter",
-)
-"""Names by the bits of the error register."""
+PROTOCOL, CRC = 4, 3
+"""Bits of the error register: a command that does not exist, and one with a wrong CRC."""
 
 SIZES = (6, 12, 18, 24)
 RESTART_S = 0.1
@@ -82,17 +71,13 @@ class EmulatedMaestro(HobbyBoard):
         self._unread = b""
         self._awake_s = now_s()
 
-    def fail(self, error: str) -> None:
-        """Register an error by its name; every channel stops its pulses."""
-        self.errors |= 1 << ERRORS.index(error)
+    def fail(self, bit: int) -> None:
+        """Set a bit of the error register; every channel stops its pulses."""
+        self.errors |= 1 << bit
         for channel in self.channels:
             channel.set_target(0)
 
     # --- parts of HobbyBoard
-
-    def status(self) -> dict[str, object]:
-        """Return the unread errors."""
-        return {"errors": [name for bit, name in enumerate(ERRORS) if self.errors >> bit & 1]}
 
     def restart(self) -> None:
         """Restart as after a dip of the supply, with an empty error register."""
@@ -117,8 +102,8 @@ class EmulatedMaestro(HobbyBoard):
             channel.step()
         return not any(channel.is_moving for channel in self.channels)
 
-    def execute(self, data: bytes) -> Iterator[tuple[int, Piece | None]]:
-        """Execute the commands in bytes; yield the end of each command, and its answer."""
+    def execute(self, data: bytes) -> Iterator[Piece]:
+        """Execute the commands in bytes; yield their answers."""
         if self.now_s() < self._awake_s - 1e-9:
             return
         kept, at = len(self._unread), 0
@@ -127,17 +112,19 @@ class EmulatedMaestro(HobbyBoard):
             command = text[at : at + self._size(text[at:])]
             begun = next((k for k, byte in enumerate(command) if k and byte >= 0x80), 0)
             if begun or not command:
-                self.fail("protocol")  # an unfinished command, or none
+                self.fail(PROTOCOL)  # an unfinished command, or none
                 at += begun or 1
                 continue
             if len(command) < self._size(text[at:]):
                 break
             at += len(command)
             if self._crc and crc7(command[:-1]) != command[-1]:
-                self.fail("crc")
-            elif command[0] not in SETTERS or not self.is_struck("lose_writes"):
+                self.fail(CRC)
+            elif command[0] not in SETTERS or not self.faults.use_fault("lose_writes"):
                 body = command[1:-1] if self._crc else command[1:]
-                yield at - kept, self._answer(command[0], body)
+                answer = self._answer(command[0], body)
+                if answer is not None:
+                    yield Piece(*answer, at - kept)
         self._unread = text[at:]
 
     def _size(self, text: bytes) -> int:
@@ -148,43 +135,41 @@ class EmulatedMaestro(HobbyBoard):
         targets = text[1] if code == SET_TARGETS and len(text) > 1 else 0
         return 1 + DATA_BYTES[code] + 2 * targets + self._crc
 
-    def _answer(self, code: int, data: bytes) -> Piece | None:
-        """Execute one command; an unknown channel is a protocol error [A]."""
+    def _answer(self, code: int, data: bytes) -> tuple[int, bytes] | None:
+        """Execute one command; return the channel that answers, and its bytes.
+
+        An unknown channel is a protocol error [A].
+        """
         if code in SETTERS:
             first, *numbers = data[1:] if code == SET_TARGETS else data
             words = [low | high << 7 for low, high in zip(numbers[::2], numbers[1::2], strict=True)]
             channels = self.channels[first : first + len(words)]
             if len(channels) < len(words):
-                self.fail("protocol")
+                self.fail(PROTOCOL)
                 return None
             for channel, word in zip(channels, words, strict=True):
                 SETTERS[code](channel, word)
         elif code == GET_POSITION:
             if data[0] < len(self.channels):
-                return Piece(data[0], self.channels[data[0]].position.to_bytes(2, "little"))
-            self.fail("protocol")
+                return data[0], self.channels[data[0]].position.to_bytes(2, "little")
+            self.fail(PROTOCOL)
         elif code == GET_ERRORS:
             errors, self.errors = self.errors, 0
-            return Piece(NO_DEVICE, errors.to_bytes(2, "little"))
+            return NO_DEVICE, errors.to_bytes(2, "little")
         else:
             self.is_script_running = False
         return None
 
 
-def _error(faults: HobbyFaults, name: str) -> str:
-    board = faults.board
-    assert isinstance(board, EmulatedMaestro)
-    board.advance()
-    board.fail(name)
-    return f"the board has found an error: {name}"
+def _error(faults: HobbyFaults, bit: int) -> str:
+    faults.chain.advance()
+    faults.chain.fail(bit)
+    return f"the board has set bit {bit} of its errors"
 
 
-# fmt: off
-COMMANDS: CommandTable = hobby_commands(23, "targets and limits", {
-    "error": Verb(_error, "|".join(ERRORS),
-                  f"the board finds an error: {', '.join(ERRORS)}"),
-})
-# fmt: on
+COMMANDS: CommandTable = hobby_commands(
+    23, "targets and limits", {"error": Verb(_error, "BIT", "the board sets a bit of its errors")}
+)
 
 
 def build_board(

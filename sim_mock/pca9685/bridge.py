@@ -9,25 +9,17 @@ SC18IM700 data sheet, rev. 2 (10 August 2007).
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from gazerig.sim_mock.faults.active import NO_DEVICE
-from gazerig.sim_mock.faults.grammar import TIME, Verb
 from gazerig.sim_mock.faults.hobby import hobby_commands
-from gazerig.sim_mock.faults.verbs import counted_command
 from gazerig.sim_mock.hobby_board import HobbyBoard
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec, build_servos
 from gazerig.sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
-from gazerig.sim_mock.replies import Piece
+from gazerig.sim_mock.replies import NO_DEVICE, Piece
 
 START, STOP, READ_REGISTER = ord("S"), ord("P"), ord("R")
 OK, NO_ACKNOWLEDGE = 0xF0, 0xF1
 US_STEPS = 4
 
-# fmt: off
-COMMANDS = hobby_commands(255, "transfers that only write", {
-    "nack": Verb(counted_command("nack", "transfers are not acknowledged"), "[N]",
-                 "the next N transfers are not acknowledged", TIME),
-})
-# fmt: on
+COMMANDS = hobby_commands(255, "transfers that only write")
 
 
 class TransferPart(NamedTuple):
@@ -70,7 +62,7 @@ class Bridge(HobbyBoard):
         width_s = tuple(self.chips.values())[board].width_s(nth)
         return round(width_s * 1e6 * US_STEPS)
 
-    def execute(self, data: bytes) -> Iterator[tuple[int, Piece | None]]:
+    def execute(self, data: bytes) -> Iterator[Piece]:
         """Execute every complete command; an incomplete one waits for the rest."""
         kept, at = len(self._unread), 0
         text = self._unread + data
@@ -79,39 +71,40 @@ class Bridge(HobbyBoard):
                 end = at + 3
                 if len(text) < end:
                     break
-                yield end - kept, Piece(NO_DEVICE, bytes((self._status,)))
+                yield Piece(NO_DEVICE, bytes((self._status,)), end - kept)
             elif text[at] == START:
                 found = _parse_transfer(text, at)
                 if found is None:
                     break
                 end, parts = found
-                yield end - kept, self._answer(parts)
+                answer = self._answer(parts)
+                if answer:
+                    yield Piece(self._channel_of(parts[0]), answer, end - kept)
             else:
                 end = at + 1  # not a command: skip the byte
             at = end
         self._unread = text[at:]
 
-    def _answer(self, parts: Sequence[TransferPart]) -> Piece | None:
-        """Execute one transfer; return the bytes that it reads, which can be one channel's."""
+    def _answer(self, parts: Sequence[TransferPart]) -> bytes:
+        """Execute one transfer; return the bytes that it reads."""
         is_write = all(part.length is None for part in parts)
         self._status = OK
-        if is_write and self.is_struck("lose_writes"):
-            return None
+        if is_write and self.faults.use_fault("lose_writes"):
+            return b""
         found = self.transfer(parts)
         if found is None:
             self._status = NO_ACKNOWLEDGE
-        if not found:
-            return None
-        (address, data, _), channel = parts[0], NO_DEVICE
-        if data and LED0 <= data[0] < LED0 + 4 * CHANNELS:
-            channel = [*self.chips].index(address) * CHANNELS + (data[0] - LED0) // 4
-        return Piece(channel, found)
+        return found or b""
+
+    def _channel_of(self, first: TransferPart) -> int:
+        """Return the channel whose registers a transfer selects first."""
+        if first.data and LED0 <= first.data[0] < LED0 + 4 * CHANNELS:
+            return [*self.chips].index(first.address) * CHANNELS + (first.data[0] - LED0) // 4
+        return NO_DEVICE
 
     def transfer(self, parts: Sequence[TransferPart]) -> bytes | None:
         """Execute one transfer; return the bytes that it reads, None if it is not acknowledged."""
         self.advance()
-        if self.is_struck("nack"):
-            return None
         found = b""
         for address, data, length in parts:
             chip = self.chips.get(address)

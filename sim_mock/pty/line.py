@@ -80,7 +80,7 @@ class TerminalLine:
         due_s = self.line.next_due_s()
         if due_s is not None:
             return max(0.0, due_s - self._now_s())
-        return LOOK_S if self.device.faults.wire.has_any else IDLE_S
+        return LOOK_S if self.device.faults.has_any else IDLE_S
 
     def serve(self, ready: Collection[int], now_s: float) -> None:
         """Process all that is due; ``ready``: the files that are readable since ``now_s``."""

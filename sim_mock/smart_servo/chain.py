@@ -9,14 +9,11 @@ from collections.abc import Callable, Iterable
 from functools import lru_cache
 from typing import Self
 
-from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.replies import BROADCAST, Instruction, Piece, merge
 from gazerig.sim_mock.smart_servo.faults import ServoFaults
-from gazerig.sim_mock.smart_servo.head_weight import HeadWeight
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.servo import (
-    LONGEST_MS,
     PING,
     READ,
     REBOOT,
@@ -32,13 +29,8 @@ PACKET_GAP_S = 0.0015
 """Pause in a packet that real servos tolerate [A]."""
 
 MIN_WATCHDOG_MS = 20
-WEIGH_MS = 10
-"""Time for which the torques of the head's weight are constant."""
 TWIN_AWAY_STEPS = 257
 """Distance of a second servo with a taken id from the first, so that they differ."""
-
-FAST = FAST_SYNC_READ, FAST_BULK_READ = 0x8A, 0x9A
-"""Dynamixel's group reads with one answer of all servos."""
 
 Read = tuple[int, int, int]
 """Id, address and length of one servo's part of a group read."""
@@ -61,7 +53,6 @@ class ServoChain(ABC):
         now_s: the chain's clock.
         check_baud: whether only clients at a servo's baud rate get answers, instead of all.
         seed: seed of the random numbers of faults.
-        weight: weight of the head on the servos; None: each has its own load.
 
     Attributes:
         packet_gap_s: time after which an unfinished packet is dropped.
@@ -84,47 +75,22 @@ class ServoChain(ABC):
         now_s: Callable[[], float],
         check_baud: bool = False,
         seed: int = 0,
-        weight: HeadWeight | None = None,
     ) -> None:
         self.servos = tuple(servos)
-        self._weight = weight
         self.now_s = now_s
         self.check_baud = check_baud
         self.faults = ServoFaults(self, self.commands, seed)
-        self._wire = self.faults.wire
-        self._now_s = now_s()
-        self._now_ms = self._fed_ms = self._weighed_ms = whole_ms(self._now_s)
-        self.packet_gap_s, self._unfinished, self._arrived_s = PACKET_GAP_S, b"", self._now_s
+        self._arrived_s = now_s()
+        self._now_ms = self._fed_ms = whole_ms(self._arrived_s)
+        self.packet_gap_s, self._unfinished, self._end = PACKET_GAP_S, b"", 0
         self._client_baud: int | None = None
         self.refresh()
-        if weight is not None:
-            self._apply_weight(weight)
-
-    # --- time
-
-    def _advance(self, servos: Iterable[EmulatedServo], now_ms: int) -> None:
-        """Advance servos; the head's weight is applied every 10 ms to all."""
-        weight = self._weight
-        if weight is not None:
-            # Of a long pause only the end matters; servos skip the rest, too.
-            self._weighed_ms = max(self._weighed_ms, now_ms - LONGEST_MS)
-            while self._weighed_ms + WEIGH_MS <= now_ms:
-                self._weighed_ms += WEIGH_MS
-                for servo in self.servos:
-                    servo.advance(self._weighed_ms, self._fed_ms)
-                self._apply_weight(weight)
-        for servo in servos:
-            servo.advance(now_ms, self._fed_ms)
-
-    def _apply_weight(self, weight: HeadWeight) -> None:
-        servos = self.servos[: len(weight.shafts)]
-        loads = weight.loads_nm([servo.shaft.x for servo in servos])
-        for servo, load in zip(servos, loads, strict=True):
-            servo.shaft.set_weight(load / servo.model.stall_torque_nm)
 
     def positions_steps(self) -> tuple[float, ...]:
         """Return the true positions now, in the order of ``servos``."""
-        self._advance(self.servos, whole_ms(self.now_s()))
+        now_ms = whole_ms(self.now_s())
+        for servo in self.servos:
+            servo.advance(now_ms, self._fed_ms)
         return tuple([servo.position_steps for servo in self.servos])
 
     # --- addresses
@@ -142,10 +108,6 @@ class ServoChain(ABC):
         """Read addresses again before the next instruction; the old ones are valid until then."""
         self._stale = True
 
-    def understands_baud(self, client_baud: int) -> bool:
-        """Return whether any servo understands a client at this baud rate."""
-        return not self.check_baud or any(servo.baud == client_baud for servo in self.servos)
-
     def __getitem__(self, servo_id: int) -> EmulatedServo:
         """Return a servo by its id, without advancing it."""
         for servo in self.servos:
@@ -156,7 +118,7 @@ class ServoChain(ABC):
     def find_servo(self, servo_id: int) -> EmulatedServo:
         """Return a servo by its id, advanced to the present time."""
         servo = self[servo_id]
-        self._advance((servo,), whole_ms(self.now_s()))
+        servo.advance(whole_ms(self.now_s()), self._fed_ms)
         return servo
 
     def ids(self) -> tuple[int, ...]:
@@ -179,31 +141,25 @@ class ServoChain(ABC):
 
     def receive(self, data: bytes, client_baud: int | None = None) -> bytes:
         """Process received bytes and return all answers as bytes."""
-        replies = self.exchange(data, client_baud)
-        return b"".join([piece[1] for reply in replies for piece in reply[1]])
+        return b"".join([piece[1] for piece in self.exchange(data, client_baud)])
 
-    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
-        """Process received bytes and return the answer to each instruction in them."""
-        now_s = self._now_s = self.now_s()
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Piece]:
+        """Process received bytes and return the answers to the instructions in them."""
+        now_s = self.now_s()
         self._now_ms = whole_ms(now_s)
-        if self._weight is not None:
-            self._advance((), self._now_ms)
         if client_baud != self._client_baud:
             self._client_baud = client_baud
             self._unfinished = b""
             self._stale = True
         if self._stale:
             self.refresh()
-        if not self._by_id:
-            return []
-        replies = list[DeviceReply]()
-        for instruction in self._feed(data, now_s):
-            if self._stale:
-                self.refresh()
-            pieces = self._execute(instruction)
-            if pieces:
-                replies.append(DeviceReply(instruction[3], pieces))
-        return self.faults.add_line_noise(replies, data) if self._wire.has_any else replies
+        pieces = list[Piece]()
+        if self._by_id:
+            for instruction in self._feed(data, now_s):
+                if self._stale:
+                    self.refresh()
+                pieces += self._execute(instruction)
+        return pieces
 
     def _feed(self, data: bytes, now_s: float) -> list[Instruction]:
         """Return the instructions that these bytes complete; they arrive now."""
@@ -221,15 +177,11 @@ class ServoChain(ABC):
             for servo in self.servos:
                 servo.advance(self._now_ms, self._fed_ms)
         self._fed_ms = self._now_ms
-        servo_id, code, params, _ = instruction
+        servo_id, code, params, self._end = instruction
         if servo_id == BROADCAST:
-            pieces = self._execute_group(code, params)
-        else:
-            answer = self._answer_all(servo_id, code, params)
-            pieces = [] if answer is None else [answer]
-        if not self._wire.has_any:
-            return pieces
-        return self._wire.spoil_pieces(pieces, code in FAST, self._now_s)
+            return self._execute_group(code, params)
+        answer = self._answer_all(servo_id, code, params)
+        return [] if answer is None else [answer]
 
     def _execute_group(self, code: int, params: bytes) -> list[Piece]:
         """Execute an instruction to all servos."""
@@ -240,10 +192,6 @@ class ServoChain(ABC):
             return []
         answers = [self._answer_all(servo_id, code, params) for servo_id in sorted(self._by_id)]
         return [one for one in answers if one is not None] if code == PING else []
-
-    def _is_muted(self, servo_id: int) -> bool:
-        """Return whether a fault keeps this servo from answering."""
-        return self._wire.has_any and bool(self._wire.use_fault("lose", servo_id, self._now_s))
 
     # --- one id
 
@@ -260,7 +208,9 @@ class ServoChain(ABC):
             if said is not None and answers:
                 own = self.status(servo_id, said[0] | flag, said[1])
                 packet = merge(packet, own) if packet else own
-        return None if not packet or self._is_muted(servo_id) else Piece(servo_id, packet, delay_s)
+        if not packet or self.faults.use_fault("lose", servo_id):
+            return None
+        return Piece(servo_id, packet, self._end, delay_s)
 
     def _carry_out(self, servo: EmulatedServo, code: int, params: bytes) -> Result | None:
         """Execute an instruction on a servo; return its answer, None for silence."""
@@ -281,7 +231,7 @@ class ServoChain(ABC):
     def _answer_reads(self, reads: Iterable[Read]) -> list[Piece]:
         """Answer a group read with one status per servo, up to the first silent one."""
         pieces, now_ms, fed_ms = list[Piece](), self._now_ms, self._fed_ms
-        find, faulty = self._by_id.get, self._wire.has_any
+        find, lost, end = self._by_id.get, self.faults.use_fault, self._end
         for servo_id, address, length in reads:
             packet, delay_s = b"", 0.0
             for servo in find(servo_id, ()):
@@ -289,9 +239,9 @@ class ServoChain(ABC):
                     error, data = servo.read(address, length)
                     own = self.status(servo_id, error | servo.error_flag, data)
                     packet, delay_s = merge(packet, own) if packet else own, servo.delay_s
-            if not packet or (faulty and self._is_muted(servo_id)):
+            if not packet or lost("lose", servo_id):
                 break
-            pieces.append(Piece(servo_id, packet, delay_s))
+            pieces.append(Piece(servo_id, packet, end, delay_s))
         return pieces
 
     def _write_each(self, params: bytes) -> None:
@@ -319,7 +269,6 @@ class ServoChain(ABC):
         baud: int | None = None,
         seed: int = 0,
         make_shaft: ShaftMaker = create_shaft,
-        weight: HeadWeight | None = None,
     ) -> Self:
         """Build servos and their bus.
 
@@ -330,7 +279,6 @@ class ServoChain(ABC):
                 rate get answers; None: any rate works.
             seed: seed of the random numbers of faults.
             make_shaft: creates the shaft of each servo.
-            weight: weight of a head on these servos.
 
         Raises:
             ValueError: the model is unknown, or does not support this baud rate.
@@ -340,4 +288,4 @@ class ServoChain(ABC):
         if baud is not None:
             for servo in servos:
                 servo.set_baud(baud)
-        return cls(servos, now_s, baud is not None, seed, weight)
+        return cls(servos, now_s, baud is not None, seed)

@@ -23,7 +23,6 @@ class Physics(NamedTuple):
         to 5 steps short, as XL430 do (4-10) [R].
     viscous_share: share of the stall torque lost at no-load speed [A]. With both frictions
         the servo still reaches the no-load speed of its data sheet.
-    load_nm: Nm; constant torque on the joint, e.g. a cable [A: none].
     gravity_nm: Nm; weight times lever: the torque is gravity_nm * sin(x - upright_steps), so
         it drives the joint away from ``upright_steps`` if positive, towards it if negative.
     upright_steps: steps of the encoder at which gravity has no lever.
@@ -38,7 +37,6 @@ class Physics(NamedTuple):
     load_kg_m2: float = 0.0
     coulomb_share: float = GEAR_FRICTION
     viscous_share: float = 0.02
-    load_nm: float = 0.0
     gravity_nm: float = 0.0
     upright_steps: float = 2048.0
     gravity_turns: float = 1.0

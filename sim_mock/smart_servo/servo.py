@@ -5,9 +5,8 @@ effects of writing and reading its registers, and of errors.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from math import sin
-from typing import ClassVar
 
 from gazerig.robot.model.assumed_servo import AMBIENT_C
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
@@ -29,8 +28,6 @@ LONGEST_MS = 10_000
 """Only the end of a longer time without a packet is simulated."""
 OVERLOAD_SHARE, OVERLOAD_S = 0.8, 2.0
 """Share of the stall torque that latches an overload, and its duration; [A: in no data sheet]."""
-TOO_HOT_C = 5.0
-"""Temperature above the limit of a motor that a fault has overheated."""
 Result = tuple[int, bytes]
 """Error number and parameters of an answer."""
 VOLTAGE, HEAT, OVERLOAD = 1, 4, 32
@@ -59,8 +56,6 @@ class EmulatedServo(ABC):
     read_level = 0
     answer_level = 1
     """Lowest Status Return Levels at which it answers reads, and all other instructions."""
-    error_bits: ClassVar[Mapping[str, int]]
-    """Bits of the errors that can be triggered, by name."""
     baud_rates: tuple[int, ...]
     group_reads, fast_reads = True, False
     """Whether it answers its part of a group read, and of a fast one."""
@@ -304,11 +299,9 @@ class EmulatedServo(ABC):
             "voltage_01v": round(self._supply_v * 10.0),
         }
 
-    def fail(self, error: str) -> None:
-        """Trigger an error by name, as the servo's own protection does."""
-        if error == "overheating":
-            self.set_temperature(self.memory.get("temperature_limit") + TOO_HOT_C)
-        self._protect_from(self.errors | self.error_bits[error])
+    def overload(self) -> None:
+        """Trigger the overload protection."""
+        self._protect_from(self.errors | OVERLOAD)
 
     def reset_all(self) -> None:
         """Restore factory settings, id 1, and restart."""
@@ -322,10 +315,6 @@ class EmulatedServo(ABC):
     def jam(self, stuck: bool = True) -> None:
         """Jam the joint at its position, or free it."""
         self.shaft.jam(stuck)
-
-    def set_load(self, load_nm: float) -> None:
-        """Apply a constant torque to the joint from now on, as a cable does."""
-        self.shaft.set_load(load_nm / self.model.stall_torque_nm)
 
     def set_voltage(self, volts: float) -> None:
         """Set the supply voltage."""

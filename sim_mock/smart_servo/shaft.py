@@ -43,7 +43,7 @@ class Shaft:
 
     __slots__ = (
         "_built", "_cruise", "_high", "_integral", "_load", "_loop", "_low", "_ramp", "_rv",
-        "_set_load", "_stops", "_stuck", "_weight",
+        "_stops", "_stuck", "_weight",
         "effort", "goal", "led", "quiet", "r", "r_v", "u", "v", "x",
     )  # fmt: skip
 
@@ -51,10 +51,9 @@ class Shaft:
 
     def __init__(self, model: Motor, physics: Physics, position_steps: float) -> None:
         self._built = mechanics_of(model, physics)
-        self._set_load, self._weight = physics.load_nm / model.stall_torque_nm, 0.0
+        self._weight = self._load = 0.0
         self._stops = self._low, self._high = physics.stop_low_steps, physics.stop_high_steps
         self._loop, self._stuck, self._cruise, self._ramp = DISABLED, False, 0.0, 0.0
-        self._change_load()
         self.place(position_steps)
 
     # --- external events
@@ -83,20 +82,11 @@ class Shaft:
         self._low, self._high = (self.x, self.x) if stuck else self._stops
         self.resume()
 
-    def set_load(self, share: float) -> None:
-        """Set the constant torque on the joint as a share of the stall torque."""
-        self._set_load = share
-        self._change_load()
-
     def set_weight(self, share: float) -> None:
         """Set the torque of the weight on the joint as a share of the stall torque."""
         if abs(share - self._weight) > LEAST_WEIGHT:
-            self._weight = share
-            self._change_load()
-
-    def _change_load(self) -> None:
-        self._load = self._built.accel * (self._set_load + self._weight)
-        self.resume()
+            self._weight, self._load = share, self._built.accel * share
+            self.resume()
 
     # --- calls of the servo
 

@@ -95,7 +95,7 @@ def test_doctor_finds_and_fixes():
 
 def test_doctor_examines_every_bus_and_says_which(mixed):
     with served(mixed) as (ports, paths, command):
-        command("error protocol")
+        command("error 4")
         command("overload 7", "neck")
         command("voltage 1 12.0", "tilt")
         code, out, _ = invoked("doctor", mixed, "--port", ports)
@@ -225,8 +225,8 @@ def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
         ):
             code, _, err = invoked(*words)
             assert code == 2 and "board of Pololu" in err and "would move" in err, words
-        # Any packet of theirs would have been an error to it.
-        assert json.loads(bus.command("status"))["errors"] == []
         code, out, _ = invoked("scan", "--port", path)
         assert code == 0 and "12 channels" in out
-        assert invoked("doctor", "maker", "--port", path).code == 0
+        done = invoked("doctor", "maker", "--port", path)
+        # Any packet of theirs would have been an error to it.
+        assert done.code == 0 and "held an error" not in done.out

@@ -375,15 +375,15 @@ def test_a_board_with_fewer_channels_than_the_rig():
 
 
 @pytest.mark.parametrize(
-    ("name", "says", "level", "cure"),
+    ("bit", "says", "level", "cure"),
     [
-        ("signal", "serial signal error", "warn", "check ground and cable"),
-        ("timeout", "serial timeout", "note", "while no program runs"),
+        (0, "serial signal error", "warn", "check ground and cable"),
+        (5, "serial timeout", "note", "while no program runs"),
     ],
 )
-def test_errors_that_it_held(name, says, level, cure):
+def test_errors_that_it_held(bit, says, level, cure):
     rig = BoardRig()
-    rig.board.faults.command(f"error {name}")
+    rig.board.faults.command(f"error {bit}")
     found = one(rig.check(), level, "the board", f"cleared now: {says}")
     assert cure in found.remedy
     assert not any("cleared now" in f.what for f in rig.check())

@@ -339,7 +339,7 @@ def test_a_servo_set_up_in_another_way_is_refused(
     ("joint", "fault", "says"),
     [
         (EYE, "overload {id}", "overload: .*switch its power off and on"),
-        (STS, "overheat {id}", "overheating: let it cool"),
+        (STS, "temperature {id} 90", "overheating: let it cool"),
     ],
 )
 def test_a_servo_that_suffers_or_is_silent_is_named(

@@ -84,7 +84,7 @@ def test_the_neck_goes_limp_and_falls_when_its_load_is_heavier_than_friction() -
     bench = _armed("desk", "neck_pitch")
     servo = bench.servos["neck_pitch"]
     before = servo.position_steps
-    servo.set_load(-0.15)
+    servo.shaft.axis.load(-0.15)
     bench.pass_ms(300)
     held = servo.position_steps
     assert abs(held - before) < 40 and servo.shaft.effort > 0.05

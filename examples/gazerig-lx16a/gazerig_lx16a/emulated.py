@@ -6,7 +6,6 @@ What the documents leave open is taken to be the worse case: a move switches the
 from collections.abc import Callable, Mapping
 
 from gazerig.drivers.plugins import EmulatedJoint
-from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.grammar import CommandTable, Verb
 from gazerig.sim_mock.faults.line import LineFaults
 from gazerig.sim_mock.faults.verbs import ADAPTER_VERBS, CLOSING_VERBS, LINE_VERBS, loss_verb
@@ -53,8 +52,6 @@ class EmulatedLx16a:
 class Lx16aChain:
     """The device at the end of the line; what can befall a line is gazerig's."""
 
-    check_baud = False
-
     def __init__(
         self, servos: list[EmulatedLx16a], now_s: Callable[[], float], seed: int = 0
     ) -> None:
@@ -70,29 +67,24 @@ class Lx16aChain:
         servo.advance(self.now_s())
         return servo
 
-    def understands_baud(self, client_baud: int) -> bool:
-        return True
-
     def positions_steps(self) -> tuple[float, ...]:
         return tuple(self.find_servo(servo_id).place for servo_id in self.servos)
 
-    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
-        """Carry out the commands in these bytes; return what is answered."""
-        before, whole_data, wire = len(self._rest), self._rest + data, self.faults.wire
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Piece]:
+        """Carry out the commands in these bytes; return their answers."""
+        before, whole_data, faults = len(self._rest), self._rest + data, self.faults
         found, rest = p.frames(whole_data)
-        self._rest, replies = whole_data[rest:], []
+        self._rest, answers = whole_data[rest:], []
         for servo_id, command, params, end in found:
-            if command == p.MOVE and wire.use_fault("lose_writes", None, self.now_s()):
+            if command == p.MOVE and faults.use_fault("lose_writes"):
                 continue
             for one in self.servos if servo_id == p.BROADCAST else {servo_id} & set(self.servos):
                 said = self.find_servo(one).answer(command, params)
                 if said is None or servo_id == p.BROADCAST:
                     continue
-                if wire.use_fault("lose", one, self.now_s()) is None:
-                    pieces = [Piece(one, p.frame(one, command, said))]
-                    spoilt = wire.spoil_pieces(pieces, False, self.now_s())
-                    replies.append(DeviceReply(max(0, end - before), spoilt))
-        return self.faults.add_line_noise(replies, data) if wire.has_any else replies
+                if not faults.use_fault("lose", one):
+                    answers.append(Piece(one, p.frame(one, command, said), max(0, end - before)))
+        return answers
 
 
 class ChainFaults(LineFaults):
