@@ -306,3 +306,7 @@ class HeadGeometry(Protocol):
     ) -> tuple[Angles2, Angles2]:
         """Return the left and right eye angles that fixate a point from a head pose."""
         ...
+
+    def convergence_rad(self, distance_m: float) -> float:
+        """Return the angle by which each eye turns in for a point straight ahead."""
+        ...

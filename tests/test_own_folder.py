@@ -48,7 +48,7 @@ def test_a_voice_begins_with_removing_what_a_killed_run_has_said(
     left = tmp_path / f"{PREFIX}voice-left"
     left.mkdir()
     (left / "held").touch()
-    given: Any = (None, lambda: load_rig("desk"), None, tmp_path, tuple, False)
+    given: Any = (None, lambda: load_rig("desk"), None, tmp_path, tuple, False, None)
     RunVoice(*given)
     assert not left.exists()
 

@@ -1,6 +1,7 @@
 """Goals kept inside the limits of their servos."""
 
 from collections.abc import Sequence
+from math import isnan
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # the guardian starts without numpy
@@ -15,10 +16,13 @@ def clip_goals(steps: Sequence[float], lowest: Sequence[int], highest: Sequence[
     """
     if len(steps) != len(lowest):
         raise ValueError(f"{len(steps)} goals for {len(lowest)} servos")
-    if any(goal != goal for goal in steps):
+    if isnan(sum(steps)):
         raise ValueError("a goal is not a number: every goal must be a whole number of steps")
     ranges = zip(steps, lowest, highest, strict=True)
-    return [round(min(max(goal, low), high)) for goal, low, high in ranges]
+    return [
+        round(goal if low <= goal <= high else min(max(goal, low), high))
+        for goal, low, high in ranges
+    ]
 
 
 ENTRY_DEG_S = 30.0

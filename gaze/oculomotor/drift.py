@@ -81,9 +81,9 @@ class Drift:
             for octave in octaves:
                 if t_s >= octave.end_s:
                     octave.move_on(t_s, self._rng)
-                s = (t_s - octave.begin_s) / (octave.end_s - octave.begin_s)
+                s = (t_s - octave.begin_s) / octave.lasts_s
                 share = s * s * s * (10.0 + s * (6.0 * s - 15.0))  # eq 2, as in min_jerk
-                total += octave.start + share * (octave.goal - octave.start)
+                total += octave.start + share * octave.way
             angles.append(size * total)
         return angles
 
@@ -93,12 +93,13 @@ class _Octave:
 
     def __init__(self, period_s: float, t_s: float) -> None:
         self._period_s = period_s
-        self.start = self.goal = 0.0
+        self.start = self.way = self._goal = self.lasts_s = 0.0
         self.begin_s = self.end_s = t_s
 
     def move_on(self, t_s: float, rng: np.random.Generator) -> None:
         """Begin the movement at a time; times must not decrease."""
         while t_s >= self.end_s:
-            self.start, self.goal = self.goal, float(rng.uniform(-1.0, 1.0))
+            self.start, self._goal = self._goal, float(rng.uniform(-1.0, 1.0))
             self.begin_s = self.end_s
             self.end_s += self._period_s * float(rng.uniform(0.5, 1.5))
+        self.way, self.lasts_s = self._goal - self.start, self.end_s - self.begin_s

@@ -44,8 +44,6 @@ from gazerig.gaze.types import (
 )
 
 _AT_END = "at the end of its range"
-_ORIGIN: Vec3 = (0.0, 0.0, 0.0)
-_LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _NEARER = 1.5
 """Range of an eye that a near target takes, as a multiple of each eye's convergence: eyes ahead of
 the neck's axis see it farther aside, by half the convergence at 25 deg, whatever its distance."""
@@ -235,8 +233,7 @@ class Oculomotor:
 
     def _both_eyes_rad(self, distance_m: float) -> float:
         """Return the eccentricity up to which both eyes converge on a point at a distance."""
-        left, right = self._geometry.eye_angles_to((distance_m, 0.0, 0.0), _LEVEL, _ORIGIN)
-        return self._yaw_limit_rad - _NEARER * 0.5 * (right[0] - left[0])
+        return self._yaw_limit_rad - _NEARER * self._geometry.convergence_rad(distance_m)
 
     def _record_shift(
         self, target: Target, aside_rad: float, off_rad: float, both_rad: float, t_s: float

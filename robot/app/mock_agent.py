@@ -32,10 +32,16 @@ class MockAgent:
     Args:
         command: queues commands for the next tick.
         scene: the scene whose script contains its own agent; None: only ``play`` begins reports.
+        scene_start_s: returns the start of the scene; None: the first tick.
     """
 
-    def __init__(self, command: CommandTaker, scene: AgentScene | None = None) -> None:
-        self._command, self._scene = command, scene
+    def __init__(
+        self,
+        command: CommandTaker,
+        scene: AgentScene | None = None,
+        scene_start_s: Callable[[], float | None] = lambda: None,
+    ) -> None:
+        self._command, self._scene, self._scene_start_s = command, scene, scene_start_s
         self._acts: Sequence[AgentAct] = () if scene is None else scene.agent
         self._round_s = 0.0 if scene is None else scene.round_s
         self._start_s: float | None = None
@@ -46,18 +52,13 @@ class MockAgent:
         """Begin a script at the next tick, once; a person in it is the nearest one. Thread-safe."""
         self._asked = acts
 
-    def update(self, tick: Tick, start_s: Callable[[], float | None] = lambda: None) -> None:
-        """Report what has become due.
-
-        Args:
-            tick: the newest tick.
-            start_s: returns the start of the scene; None: the first tick.
-        """
+    def update(self, tick: Tick) -> None:
+        """Report what has become due at the newest tick."""
         if self._asked:
             self._scene, self._acts, self._round_s = None, self._asked, 0.0
             self._start_s, self._next, self._asked = tick.t_s, 0, ()
         if self._start_s is None:
-            begun_s = start_s()
+            begun_s = self._scene_start_s()
             self._start_s = tick.t_s if begun_s is None else begun_s
         while self._next < len(self._acts):
             act = self._acts[self._next]

@@ -96,6 +96,7 @@ class RunObservers:
         self._agent = MockAgent(
             assembly.robot.command,
             assembly.scene if isinstance(assembly.scene, AgentScene) else None,
+            self._scene_start_s,
         )
         self._states = 0
         self._figures: LoopFigures | None = None
@@ -219,7 +220,7 @@ class RunObservers:
         elif self._publisher is not None:
             observers.add("the page", self._stream.update)
         if self._emulated:
-            observers.add("the simulated voice agent", self._report_talk)
+            observers.add("the simulated voice agent", self._agent.update)
         if not self._fast:
             observers.add("the loop's time", self._record_time)
         if self._page is not None:
@@ -229,7 +230,7 @@ class RunObservers:
         if self._live is not None:
             observers.add("the remote control", self._live.update)
         if self._voice is not None:
-            observers.add("the voice", self._follow_tracks)
+            observers.add("the voice", self._voice.update)
 
     def update(self, tick: Tick) -> None:
         """Update all observers with a tick; called by a loop that does not update them itself."""
@@ -331,10 +332,6 @@ class RunObservers:
         if self._publisher is not None:
             self._publisher.depth = on
 
-    def _report_talk(self, tick: Tick) -> None:
-        """Let the simulated voice agent report its turns."""
-        self._agent.update(tick, self._scene_start_s)
-
     def _scene_start_s(self) -> float | None:
         """Return the start of the scene, None before or without one."""
         room = self._made.room
@@ -346,12 +343,6 @@ class RunObservers:
             return "refused: only a head with emulated servos plays a conversation"
         self._agent.play(load_scene("interview").agent)
         return "the head listens, thinks, answers and is interrupted, for a minute"
-
-    def _follow_tracks(self, tick: Tick) -> None:
-        """Let the sound follow the tracks, and report its messages."""
-        assert self._voice is not None
-        for line in self._voice.update(tick):
-            self._made.robot.report(line)
 
     def _record_time(self, tick: Tick) -> None:
         """Record the time of a tick."""

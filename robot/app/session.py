@@ -133,6 +133,7 @@ def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> Compose
         tuning.confined.folder,
         assembly.robot.joint_latencies_s,
         options.fast,
+        assembly.robot.report,
     )
     return ComposedRun(options, assembly, tuning, recorder, voice)
 
@@ -184,7 +185,7 @@ class Session:
         summarised: bool = True,
     ) -> None:
         options, assembly = composed.options, composed.assembly
-        self._options, self._made, self._stopped = options, assembly, stopped
+        self._options, self._made = options, assembly
 
         def tried(line: str) -> None:  # a failed message must not end the run
             with contextlib.suppress(Exception):
@@ -234,7 +235,7 @@ class Session:
     def _stop_reason(self, seconds: float) -> str | None:
         """Return the reason for ending the run now, None while it continues."""
         over = self._longest_s is not None and seconds >= self._longest_s - 1e-9
-        return self._stopped() or self._interrupts() or (SECONDS if over else None)
+        return self._interrupts() or (SECONDS if over else None)
 
     def run(self) -> dict[str, object]:
         """Run from torque on to torque off; return the figures."""

@@ -89,6 +89,7 @@ class RunVoice:
         folder: Folder of the rig's file, for relative paths.
         latencies_s: Returns the latencies of all joints.
         fast: Whether time is simulated: nothing is played.
+        report: Takes a line for the events of the next tick; called in ``update``.
     """
 
     def __init__(
@@ -99,8 +100,9 @@ class RunVoice:
         folder: Path,
         latencies_s: Callable[[], Sequence[float]],
         fast: bool,
+        report: Callable[[str], object],
     ) -> None:
-        self._command, self._rig, self._clock = command, rig, clock
+        self._command, self._rig, self._clock, self._report = command, rig, clock, report
         self._folder, self._latencies_s, self._fast = folder, latencies_s, fast
         self._player: SoundPlayer | None = None
         self._device = rig().sound.device
@@ -343,8 +345,8 @@ class RunVoice:
 
     # --- the loop's thread
 
-    def update(self, tick: Tick) -> tuple[str, ...]:
-        """Store a tick, and return lines for its events; called by the loop."""
+    def update(self, tick: Tick) -> None:
+        """Store a tick, and report lines for its events; called by the loop."""
         self._tick = tick
         ends = [(one.number, one.end_reason) for one in tick.tracks] if tick.tracks else []
         seen = (tick.stopped, ends)
@@ -355,10 +357,8 @@ class RunVoice:
             ):
                 self._start_thread()
                 self._wake.set()
-        lines = []
         while self._lines:
-            lines.append(self._lines.popleft())
-        return tuple(lines)
+            self._report(self._lines.popleft())
 
     def stop(self) -> None:
         """Stop all sound, as the head parks."""

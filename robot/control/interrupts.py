@@ -55,8 +55,8 @@ class Interrupts:
 
     @classmethod
     def from_stop(cls, stopped: Callable[[], str | None]) -> "Interrupts":
-        """Return ``stopped`` if it is an Interrupts, otherwise a new one."""
-        return stopped if isinstance(stopped, Interrupts) else cls()
+        """Return ``stopped`` if it is an Interrupts, otherwise a new one that calls it."""
+        return stopped if isinstance(stopped, Interrupts) else cls(also=stopped)
 
     def __enter__(self) -> Self:
         """Start recording; signals are recorded only in the main thread.

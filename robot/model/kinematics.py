@@ -204,6 +204,10 @@ class Kinematics:
             left, right = (left[0], pitch), (right[0], pitch)
         return left, right
 
+    def convergence_rad(self, distance_m: float) -> float:
+        """Return the angle by which each eye turns in for a point straight ahead."""
+        return 0.0 if self.one_pan else atan2(self._half, distance_m)
+
     def forward(self, joints: JointState) -> GazeState:
         """Return the poses of head and eyes at measured joints."""
         (
