@@ -120,5 +120,5 @@ def _section_type(group: str, name: str) -> type:
     if isinstance(part, BusPlugin):
         if "baud" not in declarations(part.params):
             raise PluginError(f"{label}: its params need a field baud")
-        add_models(name, part.models, part.moves, label)
+        add_models(name, part.models, label)
     return cast(type, part.params)

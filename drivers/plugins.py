@@ -145,7 +145,6 @@ class BusPlugin(Plugin):
 
     Attributes:
         models: Its servo models, by the name used in a joint.
-        moves: Models of other kinds that it moves too, as a board moves any "hobby" servo.
         device: Creates the emulated device (``gazerig.sim_mock.device.Device``) for --mock from the
             parameters, the servos, a clock and a seed; None if there is none.
         release: Switches the torque of servos off, given the port, the parameters and the ids.
@@ -154,7 +153,6 @@ class BusPlugin(Plugin):
     """
 
     models: "Mapping[str, ServoModelInfo]" = field(default_factory=dict)
-    moves: tuple[str, ...] = ()
     device: "Callable[[Any, tuple[EmulatedJoint, ...], Callable[[], float], int], Any] | None" = (
         None
     )

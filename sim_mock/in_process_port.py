@@ -60,10 +60,6 @@ class InProcessPort:
     def closePort(self) -> None:
         """Do nothing: there is nothing to free."""
 
-    def clearPort(self) -> None:
-        """Discard received bytes."""
-        self.drain()
-
     def write(self, data: bytes) -> None:
         """Send bytes; answers wait to be read.
 
@@ -91,7 +87,7 @@ class InProcessPort:
         taken, self._waiting = self._waiting[:length], self._waiting[length:]
         return taken
 
-    def drain(self) -> int:
+    def drain(self, quiet_s: float = 0.0) -> int:
         """Discard received bytes; return their number."""
         self._fetch_arrived()
         dropped = len(self._waiting)

@@ -59,4 +59,3 @@ def _forget() -> None:
     plugins._package_parts.cache_clear()
     for name in set(servo_models.SERVOS) - OURS:
         del servo_models.SERVOS[name]
-    servo_models._ALSO_MOVED.clear()

@@ -46,7 +46,7 @@ def port_at(path):
 def found(port):
     """Return whether the servo answers."""
     # A shared machine may stall a process for seconds.
-    port.clearPort()
+    port.drain(0.0)
     port.write(PING)
     return len(port.read_until(14, port.now_s() + WAIT_S)) == 14
 

@@ -47,7 +47,7 @@ def test_drain_empties_the_line(line):
     assert port.drain() == 100
     assert port.drain() == 0
     os.write(master, b"y")
-    port.clearPort()
+    assert port.drain(0.0) == 1
     assert port.read_until(1, port.now_s()) == b""
 
 
@@ -64,7 +64,6 @@ def test_a_hang_up_is_a_lost_bus(line):
     for use in (
         lambda: port.read_until(1, port.now_s() + 5.0),
         port.drain,
-        port.clearPort,
         lambda: port.write(b"x"),
     ):
         with pytest.raises(BusLost, match=f"{port.port_name} is gone .*: check USB cable"):

@@ -45,4 +45,4 @@ def _plugin(kind: str, **facts: Any) -> BusPlugin:
 DYNAMIXEL = _plugin("dynamixel", make=_create_smart_bus, params=DynamixelParams)
 FEETECH = _plugin("feetech", make=_create_smart_bus, params=FeetechParams)
 MAESTRO = _plugin("maestro", make=_create_maestro_bus, params=MaestroParams)
-PCA9685 = _plugin("pca9685", make=_create_pca9685_bus, params=Pca9685Params, moves=("hobby",))
+PCA9685 = _plugin("pca9685", make=_create_pca9685_bus, params=Pca9685Params)

@@ -2,13 +2,13 @@
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Sequence
-from typing import ClassVar, Protocol
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port import BusPort, open_port
 from gazerig.drivers.types import BusHealth, ServoConfig
 
 CUT = "cut the servo power"
@@ -22,10 +22,7 @@ class Exchange(Protocol):
 
     tx_bytes: int
     rx_bytes: int
-
-    @property
-    def errors(self) -> Counter[str]:
-        """Return the error counts by kind; other parts of the bus may add to them."""
+    errors: Counter[str]
 
 
 class PortBus(ABC):
@@ -33,17 +30,16 @@ class PortBus(ABC):
 
     A bus creates its parts before any of these methods is called, and may replace them.
 
+    _labels: labels of servos for messages, by id
     _give_up_s: longest loss of the port, seconds
     _is_down: whether the port is lost
     _release_due: whether torque must be switched off as soon as the port is open
-    holding_text: message for a servo whose torque is not off
     """
-
-    holding_text: ClassVar[str] = "torque still on"
 
     _port: BusPort
     _line: Exchange
     _log: EventLog
+    _labels: Mapping[int, str]
     _setups: tuple[ServoConfig, ...]
     _target_setups: tuple[ServoConfig, ...]
     _baud: int
@@ -70,14 +66,6 @@ class PortBus(ABC):
         Raises:
             BusLost: the port is lost.
         """
-
-    @abstractmethod
-    def _servo_label(self, servo_id: int) -> str:
-        """Return a servo's label for messages."""
-
-    @abstractmethod
-    def _cannot_release(self) -> str:
-        """Return the text about servos whose torque cannot be switched off."""
 
     @abstractmethod
     def _reset_after_reconnect(self) -> None:
@@ -117,7 +105,7 @@ class PortBus(ABC):
             return
         if self._is_down and not self._reopen():
             self._release_due = True
-            raise BusLost(self._cannot_release())
+            raise self._release_failure()
         self._switch_all_off()
 
     def close(self) -> None:
@@ -153,9 +141,8 @@ class PortBus(ABC):
     def _reopen(self) -> bool:
         """Try to open the port; return whether it is open."""
         try:
-            if not self._port.setBaudRate(self._baud):
-                return False
-            self._port.clearPort()
+            open_port(self._port, self._baud)
+            self._port.drain(0.0)
         except (PortError, BusLost):
             self._port.closePort()
             return False
@@ -170,15 +157,21 @@ class PortBus(ABC):
         except BusLost as lost:
             self._record_loss(lost)
             self._release_due = True
-            raise BusLost(self._cannot_release()) from lost
+            raise self._release_failure() from lost
         if self._release_due:
             self._log.add("torque switched off, as requested while the port was gone")
         self._release_due = False
         self._line.errors["refused"] += len(released.holding_ids)
         for servo_id in (*released.holding_ids, *released.unconfirmed_ids):
             holds = servo_id in released.holding_ids
-            what = self.holding_text if holds else "torque-off not confirmed"
-            self._log.add(f"{self._servo_label(servo_id)}: {what}: {CUT}")
+            what = "torque still on" if holds else "torque-off not confirmed"
+            self._log.add(f"{self._labels[servo_id]}: {what}: {CUT}")
+
+    def _release_failure(self) -> BusLost:
+        return BusLost(
+            f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
+            f"power hold their position or last goal: {CUT} to free them"
+        )
 
     def _record_loss(self, lost: BusLost) -> None:
         """Record that the port is lost."""

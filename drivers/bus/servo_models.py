@@ -1,6 +1,6 @@
 """Servo models that a joint can have, with their kind of bus and their steps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,7 +15,6 @@ from gazerig.drivers.feetech.memory_table import (
     SCS_STEPS,
 )
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
-from gazerig.drivers.hobby_board import board as hobby
 from gazerig.drivers.servo_bus.family import ServoModel
 
 if TYPE_CHECKING:
@@ -27,6 +26,12 @@ BUS_KINDS: tuple[BusKind, ...] = ("dynamixel", "feetech", "maestro", "pca9685")
 HOBBY_KINDS: tuple[BusKind, ...] = ("maestro", "pca9685")
 """Our boards that send pulses to hobby servos; each moves every hobby servo."""
 
+
+US_STEPS = 4
+"""Steps of a hobby servo per microsecond: its pulse width is counted in quarter microseconds."""
+
+HOBBY_STEPS_PER_TURN = 1000 * US_STEPS * 4.0
+"""1000..2000 us are usually 90 deg."""
 
 HOBBY = "hobby"
 """Name of a hobby servo as a model: its shaft turns with the pulse width, without feedback."""
@@ -77,13 +82,14 @@ class ServoModelInfo(NamedTuple):
 
     def fits_bus(self, kind: str) -> bool:
         """Return whether it can be on a bus of this kind; any board moves a hobby servo."""
-        if kind == self.bus or self.bus in _ALSO_MOVED.get(kind, ()):
-            return True
-        return self.bus in HOBBY_KINDS and kind in HOBBY_KINDS
+        return kind == self.bus or (self.bus in HOBBY_KINDS and kind in HOBBY_KINDS)
 
 
 def _smart_servo(bus: BusKind, family: str, model: ServoModel, steps: int) -> ServoModelInfo:
     """Return the model information of a smart servo."""
+    gain, full_steps = FACTORY_P_GAIN, P_FULL_STEPS * model.steps_per_turn / STEPS_PER_TURN
+    if isinstance(model, DynamixelModel):
+        gain, full_steps = model.gains[4], P_UNIT * PWM_FULL
     return ServoModelInfo(
         bus,
         model.steps_per_turn,
@@ -96,16 +102,9 @@ def _smart_servo(bus: BusKind, family: str, model: ServoModel, steps: int) -> Se
         family=family,
         stall_torque_nm=model.stall_torque_nm,
         stall_current_a=model.stall_current_a,
-        p_gain=model.gains[4] if isinstance(model, DynamixelModel) else FACTORY_P_GAIN,
-        full_steps=_full_steps(model),
+        p_gain=gain,
+        full_steps=full_steps,
     )
-
-
-def _full_steps(model: ServoModel) -> float:
-    """Return the steps of error times P gain at which a servo's drive is full."""
-    if isinstance(model, DynamixelModel):
-        return P_UNIT * PWM_FULL
-    return P_FULL_STEPS * model.steps_per_turn / STEPS_PER_TURN
 
 
 SERVOS: dict[str, ServoModelInfo] = {
@@ -114,30 +113,24 @@ SERVOS: dict[str, ServoModelInfo] = {
     **{n: _smart_servo("feetech", "feetech scs", m, SCS_STEPS) for n, m in SCS_MODELS.items()},
     HOBBY: ServoModelInfo(
         "maestro",
-        hobby.STEPS_PER_TURN,
-        500 * hobby.US_STEPS,  # to 2500 us: what most servos accept
-        2500 * hobby.US_STEPS,
+        HOBBY_STEPS_PER_TURN,
+        500 * US_STEPS,  # to 2500 us: what most servos accept
+        2500 * US_STEPS,
         "us",
-        hobby.US_STEPS,
+        US_STEPS,
         1500,
         False,
     ),
 }
 """Servo models by their name in a rig's YAML; those of a package are added when its bus is used."""
 
-_ALSO_MOVED: dict[BusKind, tuple[BusKind, ...]] = {}
-"""Kind of a package -> other kinds whose servos it moves too."""
 
-
-def add_models(
-    kind: BusKind, models: Mapping[str, ServoModelInfo], moves: Sequence[str], label: str
-) -> None:
+def add_models(kind: BusKind, models: Mapping[str, ServoModelInfo], label: str) -> None:
     """Add the servo models of a package's bus to ``SERVOS``.
 
     Args:
         kind: Kind of bus.
         models: Models by name.
-        moves: Models of other kinds that it moves too.
         label: Name of the package in messages.
 
     Raises:
@@ -148,11 +141,7 @@ def add_models(
             raise PluginError(f"{label}: its servo model {name!r} is not a ServoModelInfo")
         if SERVOS.get(name, model._replace(bus=kind)) != model._replace(bus=kind):
             raise PluginError(f"{label}: another servo model is already named {name!r}")
-    for name in moves:
-        if name not in SERVOS:
-            raise PluginError(f"{label}: no servo model {name!r} exists that it could move too")
     SERVOS.update({name: m._replace(bus=kind) for name, m in models.items()})
-    _ALSO_MOVED[kind] = tuple(SERVOS[name].bus for name in moves)
 
 
 def servo_label(setup: "ServoConfig") -> str:

@@ -13,20 +13,15 @@ from math import inf
 from typing import TYPE_CHECKING, ClassVar
 
 from gazerig.drivers.bus.release_result import ReleaseResult
+from gazerig.drivers.bus.servo_models import US_STEPS
 from gazerig.drivers.bus.timing import TIMING, BusTiming
-from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.process.host_lateness import HostLateness
-from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
+from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort, open_port
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.hobby_board.channel import Channel
     from gazerig.drivers.types import ServoConfig
-
-US_STEPS = 4
-"""Steps per microsecond: pulse widths are counted in quarter microseconds."""
-
-STEPS_PER_TURN = 1000 * US_STEPS * 4.0
-"""1000..2000 us are usually 90 deg."""
 
 TRIES = 3
 """Number of attempts of operations that must not fail."""
@@ -133,9 +128,7 @@ class Board(ABC):
         Raises:
             PortError: it cannot be opened.
         """
-        if not self.port.setBaudRate(self.params.baud):
-            where = self.port.port_name
-            raise PortError(f"{where} cannot run at {self.params.baud} bit/s: choose 115200")
+        open_port(self.port, self.params.baud)
 
     def send(self, packet: bytes) -> None:
         """Send commands that are not answered."""
@@ -155,7 +148,7 @@ class Board(ABC):
             self._owed_bytes = 0
         wire_s = (len(packet) + length) * BITS_PER_BYTE / self.params.baud
         deadline_s = port.now_s() + wire_s + self.timing.reply_timeout_s
-        port.clearPort()
+        port.drain(0.0)
         port.write(packet)
         answer = port.read_until(length, deadline_s)
         self.tx_bytes += len(packet)

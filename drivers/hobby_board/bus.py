@@ -17,7 +17,7 @@ from collections.abc import Collection, Sequence
 from math import inf
 
 from gazerig.drivers.bus.goal_limits import clip_goals
-from gazerig.drivers.bus.port_bus import CUT, PortBus
+from gazerig.drivers.bus.port_bus import PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.event_log import EventLog
@@ -48,19 +48,17 @@ class HobbyBoardBus(PortBus):
         ValueError: a servo has a channel or a pulse width that the board does not have.
     """
 
-    holding_text = "pulses still on"
-
     def __init__(self, board: Board, setups: Sequence[ServoConfig]) -> None:
         self._board = self._line = board
         self._port, self._baud = board.port, board.params.baud
         self._give_up_s = board.timing.give_up_s
         self._check_setups(setups)
         self._target_setups = tuple(setups)
-        self._ids = tuple(setup.id for setup in setups)
-        if len(set(self._ids)) < len(self._ids):
-            raise ValueError(f"channels {self._ids}: each can move one servo only")
+        self._labels = {setup.id: setup.label("channel") for setup in setups}
+        if len(self._labels) < len(setups):
+            raise ValueError("two servos have one channel: each can move one servo only")
         self._log = EventLog()
-        self._nothing = Feedback.create_missing(len(self._ids))
+        self._nothing = Feedback.create_missing(len(setups))
         self._create_parts()
 
     def _create_parts(self) -> None:
@@ -69,7 +67,6 @@ class HobbyBoardBus(PortBus):
         self._channels = tuple(Channel(setup, self._board.longest_ramp_s) for setup in self._setups)
         # Whether goals are followed, and whether the board has kept its settings.
         self._engaged, self._may_send = False, True
-        self._limp = set[Channel]()
         # Channels without a known position, until they are held again.
         self._pending: list[Channel] = []
         self._failed_tries, self._trouble_s, self._fault = 0, -inf, ""
@@ -90,7 +87,7 @@ class HobbyBoardBus(PortBus):
         self._create_parts()
         self._board.open_port()
         try:
-            self._port.clearPort()
+            self._port.drain(0.0)
             pulses = self._board.find(self._setups)
         except (ServoMissing, BusLost):
             self._port.closePort()
@@ -127,7 +124,6 @@ class HobbyBoardBus(PortBus):
             raise
         self._engaged = self._may_send = True
         self._release_due, self._trouble_s, self._fault = False, -inf, ""
-        self._limp.clear()
         self._pending.clear()
         return tuple(channel.goal_steps for channel in self._channels)
 
@@ -185,17 +181,16 @@ class HobbyBoardBus(PortBus):
         Their first pulse is the last one before: a joint that was moved by hand returns there at
         the servo's own speed, as its position is not known. A channel that does not stop, is held.
         """
-        if not self._engaged or self._is_down:
+        if not self._engaged or self._is_down or self._fault:
             return
         wanted = [self._channels[i] for i in servos]
-        off = [channel for channel in wanted if channel.held]
+        held = [channel for channel in self._channels if channel.held]
         try:
-            if off:
+            if off := [channel for channel in wanted if channel.held]:
                 self._switch_off(off)
-                self._limp.update(channel for channel in off if not channel.held)
-            for channel in self._limp.difference(wanted):
-                self._limp.discard(channel)
-                if self._hold(channel):
+            for channel in self._channels:
+                is_limp = channel not in (*held, *self._pending, *wanted)
+                if is_limp and self._hold(channel):
                     self._pending.append(channel)
         except BusLost as lost:
             self._record_loss(lost)
@@ -381,16 +376,6 @@ class HobbyBoardBus(PortBus):
             if channel.id not in (*released.holding_ids, *released.unconfirmed_ids):
                 channel.record_stop()
         return released
-
-    def _servo_label(self, servo_id: int) -> str:
-        return next(c.label for c in self._channels if c.id == servo_id)
-
-    def _cannot_release(self) -> str:
-        """Return the text about servos whose pulses cannot be switched off."""
-        return (
-            f"{self._port.port_name} is gone: pulses could not be stopped; the board keeps its "
-            f"last ones while it has power: {CUT} to free them"
-        )
 
     def _reset_after_reconnect(self) -> None:
         """Mark every channel that was held to be enabled again."""

@@ -3,7 +3,7 @@
 from math import inf
 
 from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
-from gazerig.drivers.hobby_board.board import STEPS_PER_TURN, US_STEPS
+from gazerig.drivers.bus.servo_models import HOBBY_STEPS_PER_TURN, US_STEPS
 from gazerig.drivers.types import ServoConfig
 
 BEHIND_S = 0.1
@@ -53,7 +53,7 @@ class Channel:
     def top_speed_steps_s(self) -> float:
         """Return the present speed limit of its pulses, low while it enters its limits."""
         if self.entering:
-            return entry_speed_steps_s(self.setup, STEPS_PER_TURN)
+            return entry_speed_steps_s(self.setup, HOBBY_STEPS_PER_TURN)
         return self.setup.max_speed_steps_s
 
     def adopt_pulse(self, pulse_steps: int) -> None:

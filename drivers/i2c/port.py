@@ -123,12 +123,8 @@ class I2cPort:
         taken, self._waiting = self._waiting[:length], self._waiting[length:]
         return taken
 
-    def clearPort(self) -> None:
-        """Discard received bytes."""
-        self.drain()
-
-    def drain(self) -> int:
-        """Discard received bytes; return their number."""
+    def drain(self, quiet_s: float = 0.0) -> int:
+        """Discard received bytes, without waiting; return their number."""
         dropped, self._waiting = len(self._waiting), b""
         return dropped
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from math import ceil, floor
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from gazerig.drivers.bus.servo_models import US_STEPS
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.hobby_board.board import TRIES, US_STEPS, Board, HobbyBoardParams
+from gazerig.drivers.hobby_board.board import TRIES, Board, HobbyBoardParams
 from gazerig.drivers.i2c.transfers import OK, READ_STATUS, read, write
 from gazerig.drivers.serial.port import BusPort, wait_until
 from gazerig.params import Bounds

@@ -5,7 +5,6 @@ It owns the host clock of the servo bus (monotonic seconds).
 
 import os
 import select
-import termios
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -63,15 +62,8 @@ class BusPort(Protocol):
             BusLost: the port is lost.
         """
 
-    def clearPort(self) -> None:
-        """Discard received bytes, without waiting.
-
-        Raises:
-            BusLost: the port is lost.
-        """
-
-    def drain(self) -> int:
-        """Discard bytes until the line is quiet; return their number.
+    def drain(self, quiet_s: float = QUIET_S) -> int:
+        """Discard bytes until none arrives for ``quiet_s``; return their number.
 
         Raises:
             BusLost: the port is lost.
@@ -161,15 +153,15 @@ class BlockingPort:
             raise self._lost("it was unplugged")
         return got
 
-    def drain(self) -> int:
-        """Discard bytes until none arrives for 3 ms; return their number.
+    def drain(self, quiet_s: float = QUIET_S) -> int:
+        """Discard bytes until none arrives for ``quiet_s``; return their number.
 
         Raises:
             BusLost: the port is lost.
         """
         end_s, dropped = time.monotonic() + BABBLE_S, 0
         while (now_s := time.monotonic()) < end_s:
-            more = self.read_until(1, now_s + QUIET_S)
+            more = self.read_until(1, now_s + quiet_s)
             if not more:
                 break
             dropped += len(more) + len(self.read_until(4096, now_s))
@@ -213,16 +205,19 @@ class BlockingPort:
             self._serial.close()
         self._serial, self._fd, self._poll = None, -1, _raise_closed
 
-    def clearPort(self) -> None:
-        """Discard received bytes."""
-        try:
-            termios.tcflush(self._fd, termios.TCIFLUSH)
-        except (OSError, ValueError, termios.error) as error:
-            raise self._lost(error) from error
-
 
 def _raise_closed(timeout_ms: int) -> object:
     raise ValueError("it is closed")
+
+
+def open_port(port: BusPort, baud: int) -> None:
+    """Open a port.
+
+    Raises:
+        PortError: it cannot be opened, or not at this baud rate.
+    """
+    if not port.setBaudRate(baud):
+        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 115200 or 1000000")
 
 
 def wait_until(port: BusPort, until_s: float) -> None:

@@ -4,12 +4,12 @@ from collections.abc import Collection, Mapping, Sequence
 from math import ceil, inf
 
 from gazerig.drivers.bus.goal_limits import clip_goals
-from gazerig.drivers.bus.port_bus import CUT, PortBus
+from gazerig.drivers.bus.port_bus import PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.bus.timing import TIMING, BusTiming
-from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
+from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port import BusPort, open_port
 from gazerig.drivers.servo_bus.discovery import find
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
@@ -148,9 +148,8 @@ class SmartServoBus(PortBus):
             PortError: the port cannot be opened.
             ServoMissing: servos are absent, of another model or refuse a setting.
         """
-        where, baud = self._port.port_name, self._baud
-        if not self._port.setBaudRate(baud):
-            raise PortError(f"{where} cannot run at {baud} bit/s: choose 115200 or 1000000")
+        where = self._port.port_name
+        open_port(self._port, self._baud)
         try:
             self._assemble(find(self._line, self._setups))
             # A servo may be set to answer only reads; this write needs no answer.
@@ -304,20 +303,6 @@ class SmartServoBus(PortBus):
 
     def _switch_off(self) -> ReleaseResult:
         return switch_off(self._line, self._ids)
-
-    def _servo_label(self, servo_id: int) -> str:
-        return self._line.label(servo_id)
-
-    def _cannot_release(self) -> str:
-        rest = "continue to their last goal, as this kind has no bus watchdog, and hold it"
-        if self._watchdog:
-            rest = (
-                f"are stopped by their bus watchdog within {_WATCHDOG_S} s and hold their position"
-            )
-        return (
-            f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
-            f"power {rest}: {CUT} to free them"
-        )
 
     def _reset_after_reconnect(self) -> None:
         """Reset the state after the port reconnects."""

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
 from gazerig.drivers.bus.release_result import ReleaseResult
-from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
+from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.event_log import register_label
-from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port import BusPort, open_port
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.transaction import Transactions
 
@@ -232,8 +232,7 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
         PortError: the port cannot be opened.
         BusLost: the port is lost.
     """
-    if not port.setBaudRate(baud):
-        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 115200 or 1000000")
+    open_port(port, baud)
     released = switch_off(Transactions(port, family, LEAST_S, MOST_S, baud), ids)
     return (*released.holding_ids, *released.unconfirmed_ids)
 

@@ -241,7 +241,7 @@ class Transactions:
         timeout_s = self.most_s if self.tries > 1 else min(self.most_s, HURRIED * self.timeout_s)
         for asked in [tuple(ids)] if self.family.sync_read else [(one,) for one in ids]:
             request = self.family.request(asked, address, length)
-            self.port.clearPort()
+            self.port.drain(0.0)
             self.send(request)
             answer_bytes = len(asked) * (length + self.family.codec.STATUS_OVERHEAD)
             deadline_s = self._free_s + answer_bytes * self._byte_s + timeout_s

@@ -11,7 +11,7 @@ kept in multiples of 16 us) and 4.e (serial settings).
 from collections.abc import Iterator, Sequence
 from math import ceil, floor
 
-from gazerig.drivers.hobby_board.board import US_STEPS
+from gazerig.drivers.bus.servo_models import US_STEPS
 from gazerig.drivers.maestro.board import MaestroParams, accel_units, speed_units
 from gazerig.drivers.types import ServoConfig
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Mapping
 from math import degrees
 from typing import NamedTuple, Protocol
 
-from gazerig.drivers.hobby_board.board import US_STEPS
+from gazerig.drivers.bus.servo_models import US_STEPS
 from gazerig.drivers.maestro.board import MOST_INPUT, MaestroBoard, MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.serial.port import BusPort

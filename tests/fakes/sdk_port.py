@@ -11,10 +11,12 @@ class SdkPort:
     def __init__(self, port: BusPort) -> None:
         self._port = port
         self._give_up_s = 0.0
-        self.clearPort = port.clearPort
 
     def getBaudRate(self) -> int:
         return 1_000_000
+
+    def clearPort(self) -> None:
+        self._port.drain(0.0)
 
     def writePort(self, packet: list[int]) -> int:
         self._port.write(bytes(packet))

@@ -10,9 +10,9 @@ from gazerig.drivers.bus.plausibility import Plausibility
 from gazerig.drivers.bus.port_bus import CUT, PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.bus.servo_models import ServoModelInfo
-from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port import BusPort, open_port
 from gazerig.drivers.types import Feedback, ServoConfig
 from gazerig.params import Bounds, Choices
 from gazerig_lx16a import protocol as p
@@ -53,7 +53,7 @@ class Line:
     def ask(self, servo_id: int, command: int) -> int | None:
         """Return the first parameter of a servo's answer, None where none came."""
         shape, wait_s = p.ANSWERS[command], 10.0 * 20 / p.BAUD + self.timeout_s
-        self.port.clearPort()
+        self.port.drain(0.0)
         self.send(p.frame(servo_id, command))
         data, deadline_s = b"", self.port.now_s() + wait_s
         while len(data) < 256:  # more is noise
@@ -80,6 +80,7 @@ class Lx16aBus(PortBus):
         self._line, self._log = Line(port, params.reply_timeout_ms / 1e3), EventLog()
         self.engaged = False
         self._setups = self._target_setups = tuple(setups)
+        self._labels = {setup.id: setup.label() for setup in setups}
         self._check_setups(setups)
         self._reset()
 
@@ -100,8 +101,7 @@ class Lx16aBus(PortBus):
 
     def open(self) -> None:
         self._setups = self._target_setups
-        if not self._port.setBaudRate(p.BAUD):
-            raise PortError(f"{self._port.port_name} cannot run at {p.BAUD} bit/s")
+        open_port(self._port, p.BAUD)
         self._reset()
         try:
             for setup in self._setups:
@@ -247,12 +247,6 @@ class Lx16aBus(PortBus):
     def _switch_off(self) -> ReleaseResult:
         return release_all(self._line, [setup.id for setup in self._setups])
 
-    def _servo_label(self, servo_id: int) -> str:
-        return next(setup for setup in self._setups if setup.id == servo_id).label()
-
-    def _cannot_release(self) -> str:
-        return f"{self._port.port_name} is gone: torque could not be switched off: {CUT}"
-
 
 def _speed(setup: ServoConfig, steps: float) -> float:
     """Return the speed of a servo: slow until it is within its limits."""
@@ -283,7 +277,6 @@ def release_all(line: Line, ids: Sequence[int]) -> ReleaseResult:
 
 def release(port: BusPort, params: Lx16aParams, ids: tuple[int, ...]) -> tuple[int, ...]:
     """Switch torque off for the guardian; return the ids that did not confirm."""
-    if not port.setBaudRate(p.BAUD):
-        raise PortError(f"{port.port_name} cannot run at {p.BAUD} bit/s")
+    open_port(port, p.BAUD)
     result = release_all(Line(port, params.reply_timeout_ms / 1e3), ids)
     return (*result.holding_ids, *result.unconfirmed_ids)

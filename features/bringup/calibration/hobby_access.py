@@ -6,8 +6,9 @@ board has no watchdog: a guardian stops the pulses if this program is killed.
 
 from collections.abc import Callable
 
+from gazerig.drivers.bus.servo_models import US_STEPS
 from gazerig.drivers.errors import BusLost
-from gazerig.drivers.hobby_board.board import US_STEPS, Board
+from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params

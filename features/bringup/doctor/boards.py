@@ -10,9 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from gazerig.drivers.bus.servo_models import servo_label
+from gazerig.drivers.bus.servo_models import US_STEPS, servo_label
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.hobby_board.board import US_STEPS
 from gazerig.drivers.maestro.board import (
     MICRO,
     MOST_INPUT,
