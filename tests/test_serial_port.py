@@ -93,8 +93,3 @@ def test_what_is_not_a_serial_port_is_named(tmp_path):
     plain.write_bytes(b"")
     with pytest.raises(PortError, match=f"cannot open {plain}"):
         BlockingPort(str(plain)).setBaudRate(1_000_000)
-
-
-def test_an_impossible_baud_rate_is_refused_before_opening(line):
-    _, port = line
-    assert not port.setBaudRate(12345)

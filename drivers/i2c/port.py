@@ -6,7 +6,6 @@ line is held low, if its driver can.
 
 import errno
 import fcntl
-import os
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -42,7 +41,7 @@ class I2cPort:
         on_traffic: Callable[[], None] | None = None,
     ) -> None:
         self.port_name = port_name
-        self._exclusive, self._on_traffic = exclusive, on_traffic
+        self._exclusive, self._on_traffic = exclusive, on_traffic or (lambda: None)
         self._bus: Any = None
         self._status, self._waiting = OK, b""
 
@@ -93,8 +92,7 @@ class I2cPort:
                 self._status = self._execute(messages)
 
     def _begin(self) -> None:
-        if self._on_traffic is not None:
-            self._on_traffic()
+        self._on_traffic()
         if self._bus is None:
             raise self._lost("it is closed")
 
@@ -103,8 +101,7 @@ class I2cPort:
         try:
             self._bus.i2c_rdwr(*messages)
         except OSError as error:
-            unplugged = self._bus.fd is not None and not os.path.exists(self.port_name)
-            if error.errno in _GONE or unplugged:
+            if error.errno in _GONE:
                 raise self._lost(error) from error
             return NO_ACKNOWLEDGE
         self._waiting += b"".join([bytes(one) for one in messages if one.flags & READ_FLAG])

@@ -24,12 +24,6 @@ QUIET_S = 0.003
 BABBLE_S = 0.06
 """Longest time to drain a line that never falls silent."""
 
-RATES = (
-    *(9600, 19_200, 38_400, 57_600, 76_800, 115_200, 128_000, 250_000, 500_000),
-    *(1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000),
-)
-"""Bit/s of servos."""
-
 WRITE_S = 0.05
 """Longest time to pass a packet to the adapter."""
 
@@ -95,7 +89,7 @@ class BlockingPort:
         self._lasting: str | None = None
         self._by_id = by_id
         self._exclusive = exclusive
-        self._on_traffic = on_traffic
+        self._on_traffic = on_traffic or (lambda: None)
         self._serial: Serial | None = None
         self._fd = -1
         self._poll: Callable[[int], object] = _raise_closed
@@ -109,8 +103,7 @@ class BlockingPort:
         Raises:
             BusLost: the port is lost or accepts no bytes.
         """
-        if self._on_traffic is not None:
-            self._on_traffic()
+        self._on_traffic()
         deadline_s = 0.0
         while data:
             try:
@@ -133,8 +126,7 @@ class BlockingPort:
         Raises:
             BusLost: the port is lost.
         """
-        if self._on_traffic is not None:
-            self._on_traffic()
+        self._on_traffic()
         got = b""
         while len(got) < length:
             left_s = deadline_s - time.monotonic()
@@ -176,8 +168,6 @@ class BlockingPort:
         Raises:
             PortError: absent, busy or not permitted.
         """
-        if baudrate not in RATES:
-            return False
         self.closePort()
         # Another adaptor may have the path of one that was unplugged.
         where = self._lasting or self.port_name
