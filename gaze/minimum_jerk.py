@@ -32,6 +32,8 @@ class Quintic:
     """Fifth-order polynomial to a resting goal from any position, speed and acceleration.
 
     From rest it is eq 8, theta0 + (goal - theta0) (6 s^5 - 15 s^4 + 10 s^3).
+
+    coefficients: factors of the powers 0 to 5 of the time since the start
     """
 
     def __init__(self, start: tuple[float, float, float], goal: float, duration_s: float) -> None:
@@ -39,7 +41,7 @@ class Quintic:
         T = duration_s
         d = goal - p
         self._goal, self._T = goal, T
-        self._c = (
+        self.coefficients = (
             p,
             v,
             0.5 * a,
@@ -52,7 +54,7 @@ class Quintic:
         """Return position, speed and acceleration at a time since the start."""
         if t_s >= self._T:
             return (self._goal, 0.0, 0.0)
-        c0, c1, c2, c3, c4, c5 = self._c
+        c0, c1, c2, c3, c4, c5 = self.coefficients
         t = t_s if t_s > 0.0 else 0.0
         return (
             c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
@@ -64,7 +66,7 @@ class Quintic:
         """Return the position alone, the first value of ``state_at``."""
         if t_s >= self._T:
             return self._goal
-        c0, c1, c2, c3, c4, c5 = self._c
+        c0, c1, c2, c3, c4, c5 = self.coefficients
         t = t_s if t_s > 0.0 else 0.0
         return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
 

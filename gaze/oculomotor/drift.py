@@ -14,12 +14,13 @@ target. The goal of a neck servo moves by about a tenth of an encoder step (.088
 5 ms.
 """
 
+from collections.abc import Sequence
 from math import pi, radians, sin, sqrt
 from typing import Literal
 
 import numpy as np
 
-from gazerig.gaze.minimum_jerk import MinimumJerkBlend, min_jerk
+from gazerig.gaze.minimum_jerk import MinimumJerkBlend, Quintic, min_jerk
 from gazerig.gaze.types import Angles3
 
 DriftLaw = Literal["people", "none"]
@@ -49,14 +50,13 @@ class Drift:
     def __init__(self, law: DriftLaw, rng: np.random.Generator) -> None:
         self._rng = rng
         self._law = law
-        self._share = MinimumJerkBlend((float(law == "people"),), _GLIDE_S)
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Start at the centre; the depth of a breath grows from 0 within the first one."""
-        self._start_s = t_s
-        self._share.reset((float(self._law == "people"),))
-        self._axes = [[_Octave(period_s, t_s) for period_s in _PERIODS_S] for _ in _STILL]
+        self._start_s = self._until_s = t_s
+        self._share = MinimumJerkBlend((float(self._law == "people"),), _GLIDE_S)
+        self._axes = [[_Octave(size, s, t_s) for s in _PERIODS_S] for size in _SIZES_RAD]
 
     def retune(self, law: DriftLaw) -> None:
         """Begin or end gradually."""
@@ -74,32 +74,32 @@ class Drift:
         return (share * yaw, share * (breath_rad + pitch), share * roll)
 
     def _wander(self, t_s: float) -> list[float]:
-        """Return the sum of all octaves; in one loop, as it is computed in every tick."""
-        angles = []
-        for size, octaves in zip(_SIZES_RAD, self._axes, strict=True):
-            total = 0.0
-            for octave in octaves:
-                if t_s >= octave.end_s:
-                    octave.move_on(t_s, self._rng)
-                s = (t_s - octave.begin_s) / octave.lasts_s
-                share = s * s * s * (10.0 + s * (6.0 * s - 15.0))  # eq 2, as in min_jerk
-                total += octave.start + share * octave.way
-            angles.append(size * total)
-        return angles
+        """Return the sum of the octaves of each axis: one polynomial until any of them ends."""
+        if t_s >= self._until_s:
+            rows = [[one.rest(t_s, self._rng) for one in octaves] for octaves in self._axes]
+            self._sums = [[*map(sum, zip(*row, strict=True))] for row in rows]
+            self._from_s = t_s
+            self._until_s = min(one.end_s for octaves in self._axes for one in octaves)
+        s = t_s - self._from_s
+        return [
+            c0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+            for c0, c1, c2, c3, c4, c5 in self._sums
+        ]
 
 
 class _Octave:
-    """Movements between random values -1..1, each within half to one and a half of a period."""
+    """Movements between random values, each within half to one and a half of a period."""
 
-    def __init__(self, period_s: float, t_s: float) -> None:
-        self._period_s = period_s
-        self.start = self.way = self._goal = self.lasts_s = 0.0
-        self.begin_s = self.end_s = t_s
+    def __init__(self, size_rad: float, period_s: float, t_s: float) -> None:
+        self._size_rad, self._period_s = size_rad, period_s
+        self._goal, self.end_s = 0.0, t_s
 
-    def move_on(self, t_s: float, rng: np.random.Generator) -> None:
-        """Begin the movement at a time; times must not decrease."""
+    def rest(self, t_s: float, rng: np.random.Generator) -> Sequence[float]:
+        """Return the polynomial of the rest of the present movement; times must not decrease."""
         while t_s >= self.end_s:
-            self.start, self._goal = self._goal, float(rng.uniform(-1.0, 1.0))
-            self.begin_s = self.end_s
+            start = self._goal, 0.0, 0.0
+            self._goal, self._begin_s = self._size_rad * float(rng.uniform(-1.0, 1.0)), self.end_s
             self.end_s += self._period_s * float(rng.uniform(0.5, 1.5))
-        self.way, self.lasts_s = self._goal - self.start, self.end_s - self.begin_s
+            self._move = Quintic(start, self._goal, self.end_s - self._begin_s)
+        state = self._move.state_at(t_s - self._begin_s)
+        return Quintic(state, self._goal, self.end_s - t_s).coefficients

@@ -152,10 +152,6 @@ class GazePoint:
         self._trigger.record_shift(shift, wait_s, lands_s, t_s)
         self._refixations.reset()
 
-    @property
-    def _may_refixate(self) -> bool:
-        return self._refixates and not self._exact
-
     def postpone(self, wait_s: float) -> None:
         """Delay the saccade to a new target further."""
         self._trigger.postpone(wait_s)
@@ -187,7 +183,11 @@ class GazePoint:
                 slip = self._pursuit.slip(self.point_m, point, velocity, p_head)
                 if trigger.is_due(slip, t_s, self._pursuit.refractory_s):
                     shift_rad = self._start_saccade(point, p_head, t_s)
-            elif self._may_refixate and self._refixations.is_due(t_s, norm(velocity) <= MOVING_M_S):
+            elif (
+                self._refixates
+                and not self._exact
+                and self._refixations.is_due(t_s, norm(velocity) <= MOVING_M_S)
+            ):
                 trigger.refixate(t_s)
             if shift_rad is None:
                 if dt_s > 0.0 and self._pursuit.controller is None:

@@ -225,6 +225,7 @@ class HeadModel:
 
     share: the share of the head for distant targets
     foresees_s: time ahead for which pursuit needs the target's direction; 0: not needed
+    range_rad: the neck's ((yaw low, high), (pitch low, high))
 
     Args:
         params: constants of start, goal and motion.
@@ -255,7 +256,7 @@ class HeadModel:
     ) -> None:
         """Change constants and ranges; a movement in progress continues as planned."""
         self._params = params
-        self._neck, self._roll = neck_limit_rad, roll_limit_rad
+        self.range_rad, self._roll = neck_limit_rad, roll_limit_rad
         self.share = self._share = HeadShare(params, eye_limit_rad)
         self._people = params.goal_model == "stahl"
         # The papers' heads leave an eye aside; only an urgent target is recentred, to the trigger.
@@ -300,16 +301,11 @@ class HeadModel:
 
     def clip_to_range(self, head_rad: Angles3) -> Angles3:
         """Return head angles with yaw and pitch clipped to the neck's range."""
-        (yaw_low, yaw_high), (pitch_low, pitch_high) = self._neck
+        (yaw_low, yaw_high), (pitch_low, pitch_high) = self.range_rad
         yaw, pitch, roll = head_rad
         if yaw_low <= yaw <= yaw_high and pitch_low <= pitch <= pitch_high:
             return head_rad
         return (min(max(yaw, yaw_low), yaw_high), min(max(pitch, pitch_low), pitch_high), roll)
-
-    @property
-    def range_rad(self) -> tuple[Angles2, Angles2]:
-        """Return the neck's ((yaw low, high), (pitch low, high))."""
-        return self._neck
 
     def _share_for(self, target: Target, both_eyes_rad: float) -> HeadShare:
         """Return the share for a target on which both eyes converge up to an eccentricity.

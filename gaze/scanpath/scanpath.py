@@ -136,7 +136,11 @@ def _replace_target(
 
 
 class Scanpath:
-    """Scanpath: replaces a face as target by the point of the face to fixate."""
+    """Scanpath: replaces a face as target by the point of the face to fixate.
+
+    rests_until_s: end of the gaze's rest on a part of a face; inf while it is moving there, -inf if
+        no end is drawn or the target is not a face
+    """
 
     def __init__(self, params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> None:
         self._rng = rng
@@ -156,7 +160,7 @@ class Scanpath:
         self._face: Face | None = None
         self._searched: Percept | None = None
         self._shift = 0
-        self._rests_until_s = -inf
+        self.rests_until_s = -inf
         self.looks.enter()
 
     def wander(
@@ -184,17 +188,8 @@ class Scanpath:
         if face is not None:
             look = self.looks.step(face, p_world_head_m, t_s, settled)
             self._shift += look.has_moved
-        self._rests_until_s = self._until_s(look, settled)
+        self.rests_until_s = self._until_s(look, settled)
         return _replace_target(target, face, look, self._shift)
-
-    @property
-    def rests_until_s(self) -> float:
-        """Return the end of the gaze's rest on a part of a face.
-
-        The result is inf while it is moving there, and -inf if no end is drawn or the target is not
-        a face.
-        """
-        return self._rests_until_s
 
     def _until_s(self, look: ScanpathStep | None, settled: bool) -> float:
         if look is None:
