@@ -2,27 +2,24 @@
 
 from collections import Counter, defaultdict, deque
 from collections.abc import Mapping
-from math import degrees, radians
+from math import degrees, inf, radians
 
 import numpy as np
 
 from gazerig.gaze.angles import add, angle_between, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.types import GazeState, Target, Vec3
+from gazerig.gaze.types import Vec3
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick
 
 _FIXATION_RAD_S = radians(40.0)
-"""Largest speed of a fixation; 30 is usual, and a servo step in a 5 ms tick is already 18 deg/s."""
+"""Largest speed of a fixation; 30 is usual, and a servo step in 20 ms is already 4.4 deg/s."""
 
 _EVENTS_KEPT = 100
 """Number of newest values stored; a rig that runs for weeks must not fill the memory."""
 
-_TOGETHER = 16
-"""Ticks counted together: few enough for the rest of a period, also on a slow machine."""
-
-_TickPart = tuple[float, GazeState, Target, str, tuple[str, ...]]
-"""Counted values of a tick: its time, pose, target, phase, and the guard's reasons."""
+_PERIOD_S = 0.02
+"""Least time between two samples of the gaze, as those of an eye tracker at 50 Hz."""
 
 
 class Summary:
@@ -37,53 +34,44 @@ class Summary:
         self._errors_mdeg: Counter[int] = Counter()
         self._first_s: float | None = None
         self._last: Tick | None = None
-        self._waiting: list[_TickPart] = []
-        self._counted_s: float | None = None
+        self._sampled_s = -inf
         self._gaze: Vec3 | None = None
 
     def update(self, tick: Tick) -> None:
-        """Add one tick; ticks are counted in batches, at a fraction of the cost of single ones."""
+        """Add one tick."""
         if self._first_s is None:
             self._first_s = tick.t_s
         self._last = tick
         for event in tick.events:
             self._events.append((tick.t_s - self._first_s, event))
-        self._waiting.append(
-            (tick.t_s, tick.pose, tick.target, tick.gaze.phase, tick.guard_result.reasons)
-        )
-        if len(self._waiting) >= _TOGETHER:
-            self._count_waiting_ticks()
+        for reason in tick.guard_result.reasons:
+            self._limited[reason.partition(": ")[2]] += 1
+        if tick.t_s - self._sampled_s >= _PERIOD_S - 1e-9:
+            self._sample(tick)
 
-    def _count_waiting_ticks(self) -> None:
-        """Count the waiting ticks."""
-        for t_s, pose, target, phase, reasons in self._waiting:
-            dt_s = t_s - self._counted_s if self._counted_s is not None else 0.0
-            self._counted_s = t_s
-            self._target_s[target.kind] += dt_s
-            if target.part is not None:
-                self._part_s[target.part] += dt_s
-            for reason in reasons:
-                self._limited[reason.partition(": ")[2]] += 1
-            left, right = line_of_sight(pose, True), line_of_sight(pose, False)
-            before, self._gaze = self._gaze, unit(add(left, right))
-            if before is None or dt_s <= 0.0 or phase == "saccade":
-                continue
-            # As in an eye tracker, the speed of the gaze defines a fixation.
-            if angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s:
-                # Eyes that one linkage turns sideways stay parallel: the remaining error counts
-                # too.
-                point = add(
-                    target.p_world_m, scale(target.v_world_m_s, max(0.0, t_s - target.at_s))
-                )
-                off_left = angle_between(left, sub(point, pose.p_world_eye_left_m))
-                off_right = angle_between(right, sub(point, pose.p_world_eye_right_m))
-                error_rad = 0.5 * (off_left + off_right)
-                self._errors_mdeg[round(1000.0 * degrees(error_rad))] += 1
-        self._waiting.clear()
+    def _sample(self, tick: Tick) -> None:
+        """Count the target, and the error of the gaze during a fixation."""
+        t_s, pose, target = tick.t_s, tick.pose, tick.target
+        left, right = line_of_sight(pose, True), line_of_sight(pose, False)
+        before, self._gaze = self._gaze, unit(add(left, right))
+        dt_s, self._sampled_s = t_s - self._sampled_s, t_s
+        if before is None:
+            return
+        self._target_s[target.kind] += dt_s
+        if target.part is not None:
+            self._part_s[target.part] += dt_s
+        # As in an eye tracker, the speed of the gaze defines a fixation.
+        still = angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s
+        if still and tick.gaze.phase != "saccade":
+            # Eyes that one linkage turns sideways stay parallel: the remaining error counts too.
+            point = add(target.p_world_m, scale(target.v_world_m_s, max(0.0, t_s - target.at_s)))
+            off_left = angle_between(left, sub(point, pose.p_world_eye_left_m))
+            off_right = angle_between(right, sub(point, pose.p_world_eye_right_m))
+            error_rad = 0.5 * (off_left + off_right)
+            self._errors_mdeg[round(1000.0 * degrees(error_rad))] += 1
 
     def figures(self) -> dict[str, object]:
         """Return the figures of the ticks; the caller adds bus, loop and frames."""
-        self._count_waiting_ticks()
         last = self._last
         return {
             "seconds": round(last.t_s - (self._first_s or 0.0), 6) if last else 0.0,
