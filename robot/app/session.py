@@ -211,7 +211,8 @@ class Session:
         self._run_observers.attach(observers)
         if self._score is not None:
             observers.add("the scene's score", self._score.behaviours.update)
-            observers.add("the planner's score", self._score.planner.update)
+            if scene is not None and scene.behaviours:
+                observers.add("the planner's score", self._score.planner.update)
         observers.add("the log", self._print_events)
         if watch is not None:
             observers.add("the program", watch)

@@ -218,16 +218,11 @@ class Body:
         Raises:
             ValueError: An angle is not a number, or the number of angles is wrong.
         """
+        steps = self._steps(command_rad)
         if self._sag is not None:
-            steps = self._steps(command_rad)
             for i, offset in self._sag.offsets(command_rad, self._read_s):
                 steps[i] += round(offset)
-            self.bus.write(steps)
-        elif self._bent or self._coupled is not None or len(command_rad) != len(self._zeros):
-            self.bus.write(self._steps(command_rad))
-        else:
-            lines = map(add, self._zeros, map(mul, self._slopes, command_rad))
-            self.bus.write([*map(round, lines)])
+        self.bus.write(steps)
 
     def _steps(self, angles_rad: JointAngles) -> list[int]:
         """Return the servo positions of joint angles."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.types import JointAngles, JointState
 
-_BATCH, _EVERY = 128, 4
+_BATCH, _EVERY = 256, 4
 """Ticks that are evaluated together, and those between two readings that are used."""
 _STEP_S = 0.008
 _LAGS_S = np.arange(16) * _STEP_S
