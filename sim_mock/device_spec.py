@@ -34,15 +34,11 @@ def line_of(text: str, baud: int) -> DynamixelLine | FeetechLine:
             raise SetupError(f"--servos {part!r}: not IDS:MODEL, for example {EXAMPLE}")
         first, last = int(found[1]), int(found[2] or found[1])
         model, start = found[3].lower(), int(found[4] or MIDDLE)
-        if model not in _MODELS:
-            known = ", ".join(_MODELS)
-            raise SetupError(f"--servos {part!r}: unknown model; known models: {known}")
-        kind = kind or _MODELS[model]
-        if _MODELS[model] != kind:
-            raise SetupError(
-                f"--servos {part!r}: the servos before it are of kind {kind}; one line carries one "
-                "protocol: start a second `gazerig emulate`"
-            )
+        known = [name for name in _MODELS if kind in (None, _MODELS[name])]
+        if model not in known:
+            line = f"a line of kind {kind}" if kind else "a line"
+            raise SetupError(f"--servos {part!r}: {line} has no such model, but {', '.join(known)}")
+        kind = _MODELS[model]
         if not first <= last <= _HIGHEST_ID[kind]:
             raise SetupError(f"--servos {part!r}: ids must increase, from 0 to {_HIGHEST_ID[kind]}")
         for servo_id in range(first, last + 1):

@@ -1,9 +1,7 @@
 """Motor and controller of a hobby servo with mechanics, which no data sheet contains [A]."""
 
-from typing import NamedTuple
-
 from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.smart_servo.physics import STEPS_PER_TURN, Loop, Physics
+from gazerig.sim_mock.smart_servo.physics import STEPS_PER_TURN, HobbyMotor, Loop, Physics
 
 HOBBY_PHYSICS = Physics(rotor_s=0.008, coulomb_share=0.04, viscous_share=0.0, play_deg=0.0)
 """A small motor that reaches full speed in 8 ms without a load; friction of cheap gears."""
@@ -11,15 +9,6 @@ HOBBY_PHYSICS = Physics(rotor_s=0.008, coulomb_share=0.04, viscous_share=0.0, pl
 DAMPING = 1.0
 """Share of the duty that its controller takes back at full speed, so that a load overshoots only a
 little."""
-
-
-class HobbyMotor(NamedTuple):
-    """Motor and gear of a hobby servo."""
-
-    stall_torque_nm: float
-    no_load_rpm: float
-    stall_current_a: float = 0.0
-    rated_v: float = 5.0
 
 
 def hobby_motor(spec: HobbySpec, steps_per_turn: float) -> tuple[HobbyMotor, Loop]:

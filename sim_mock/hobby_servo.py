@@ -69,14 +69,9 @@ class HobbyServo:
         self.place_steps = self._next_steps()
 
     def turn(self, steps: float) -> None:
-        """Turn it by hand, as far as its stops allow; a servo with pulses returns.
-
-        Raises:
-            ValueError: it is stuck.
-        """
-        if self.stuck:
-            raise ValueError(f"channel {self.spec.channel} is stuck; free it first")
-        self.place_steps = self._clip_to_stops(self.place_steps + steps)
+        """Turn it by hand, as far as its stops allow; a servo with pulses returns."""
+        if not self.stuck:
+            self.place_steps = self._clip_to_stops(self.place_steps + steps)
 
     def _next_steps(self) -> float:
         way = self.width_steps - self.place_steps

@@ -125,9 +125,9 @@ def hand_held_pose(number: int, lens: Intrinsics, board: CharucoBoard) -> BoardP
     a, b, c = ((number + 0.5) * g % 1.0 for g in (0.7548776662, 0.5698402910, 0.6180339887))
     fills = 0.38 + 0.34 * c
     tilt, about = radians(12.0 + 26.0 * ((number * 0.41) % 1.0)), 2.0 * pi * c + number * pi / 2
-    turn, _ = cv2.Rodrigues(tilt * np.array((cos(about), sin(about), 0.0)))
-    spin, _ = cv2.Rodrigues(np.array((0.0, 0.0, radians(15.0) * (2.0 * b - 1.0))))
-    R = np.asarray(turn @ spin, float)
+    spin = radians(15.0) * (2.0 * b - 1.0)
+    turn, _ = cv2.Rodrigues(np.array((tilt * cos(about), tilt * sin(about), spin)))
+    R = np.asarray(turn, float)
     size_px, board_m = np.array(SIZE_PX), np.array(board.size_m)
     away_m = lens.fx_px * board_m[0] / (fills * size_px[0])
     # Sometimes a part of it is out of the frame.

@@ -62,6 +62,7 @@ class DynamixelChain(ServoChain):
         before, crc, pack = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0, CRC.pack
         parts, delays_s, now_ms, fed_ms = list[bytes](), list[float](), self._now_ms, self._fed_ms
         find, faults = self._by_id.get, self.faults
+        faulty = faults.has_any
         for servo_id, address, size in reads:
             data = after = b""
             following = 0
@@ -80,16 +81,16 @@ class DynamixelChain(ServoChain):
                     following = umts(own, crc)
                 data, after = own, end
                 delays_s.append(servo.delay_s)
-            if not data or faults.use_fault("lose", servo_id):
+            if not data or (faulty and faults.use_fault("lose", servo_id)):
                 break
             crc, before = following, after
             parts.append(data)
-            if faults.is_on("truncate", servo_id):
+            if faulty and faults.is_on("truncate", servo_id):
                 break
         if not parts:
             return []
         parts[-1] += before
-        if not faults.has_any:
+        if not faulty:
             parts = [b"".join(parts)]
         waits_s = [delays_s[0], *[0.0] * len(parts)]
         return [

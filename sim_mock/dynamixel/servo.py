@@ -46,8 +46,6 @@ WATCHDOG_UNIT_MS, TRIPPED = 20, 255
 """Unit of Bus Watchdog, and its value after it has stopped the servo."""
 
 POSITION, EXTENDED = POSITION_MODES = 3, 4
-MODES_WITHOUT_CURRENT = 1, POSITION, EXTENDED, 16
-MODES = 0, 5, *MODES_WITHOUT_CURRENT
 
 REVERSE = 1
 """Bit of Drive Mode (10)."""
@@ -228,10 +226,7 @@ class DynamixelServo(EmulatedServo):
         """Return the error number of a write that the servo's state forbids, 0 if it may be."""
         name = register.name
         if register.address < EEPROM_END:
-            if self.torque:
-                return ACCESS
-            known = MODES_WITHOUT_CURRENT if self.model.current_limit is None else MODES
-            return DATA_RANGE if name == "operating_mode" and value not in known else 0
+            return ACCESS if self.torque else 0
         if not name.startswith("goal_"):
             return 0
         if self.memory.bytes[WATCHDOG_AT] == TRIPPED:

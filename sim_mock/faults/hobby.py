@@ -26,11 +26,7 @@ class HobbyFaults(LineFaults):
         return f"{self.label(channel)} is {'stuck' if stuck else 'free'}"
 
     def turn(self, channel: int | None, steps: float) -> str:
-        """Turn a servo by hand.
-
-        Raises:
-            ValueError: it is stuck.
-        """
+        """Turn a servo by hand, unless it is stuck."""
         for servo in self._servos(channel):
             servo.turn(steps)
         return f"{self.label(channel)} was turned by {steps:g} quarter us"

@@ -231,7 +231,7 @@ class ServoChain(ABC):
     def _answer_reads(self, reads: Iterable[Read]) -> list[Piece]:
         """Answer a group read with one status per servo, up to the first silent one."""
         pieces, now_ms, fed_ms = list[Piece](), self._now_ms, self._fed_ms
-        find, lost, end = self._by_id.get, self.faults.use_fault, self._end
+        find, faults, end = self._by_id.get, self.faults, self._end
         for servo_id, address, length in reads:
             packet, delay_s = b"", 0.0
             for servo in find(servo_id, ()):
@@ -239,7 +239,7 @@ class ServoChain(ABC):
                     error, data = servo.read(address, length)
                     own = self.status(servo_id, error | servo.error_flag, data)
                     packet, delay_s = merge(packet, own) if packet else own, servo.delay_s
-            if not packet or lost("lose", servo_id):
+            if not packet or (faults.has_any and faults.use_fault("lose", servo_id)):
                 break
             pieces.append(Piece(servo_id, packet, end, delay_s))
         return pieces

@@ -8,8 +8,9 @@ voltage, PWM a share of full PWM.
 """
 
 from math import inf, pi
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
+from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.robot.model.assumed_servo import GEAR_FRICTION
 
 
@@ -61,37 +62,14 @@ STEPS_PER_RAD = STEPS_PER_TURN / (2.0 * pi)
 MS_S = 0.001
 
 
-class Motor(Protocol):
-    """Data of a servo's motor and gear that the shaft needs."""
+class HobbyMotor(NamedTuple):
+    """Motor and gear of a hobby servo."""
 
-    @property
-    def stall_torque_nm(self) -> float:
-        """Return the torque at stall."""
-        ...
-
-    @property
-    def stall_current_a(self) -> float:
-        """Return the current at stall."""
-        ...
-
-    @property
-    def no_load_rpm(self) -> float:
-        """Return the speed without load."""
-        ...
-
-    @property
-    def rated_v(self) -> float:
-        """Return the voltage of these data."""
-        ...
+    stall_torque_nm: float
+    no_load_rpm: float
 
 
-class EmulatedModel(Motor, Protocol):
-    """Data of a servo model."""
-
-    @property
-    def name(self) -> str:
-        """Return its name in a rig file."""
-        ...
+Motor = ServoModel | HobbyMotor
 
 
 class Loop(NamedTuple):

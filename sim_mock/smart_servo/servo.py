@@ -8,12 +8,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import sin
 
+from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.robot.model.assumed_servo import AMBIENT_C
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.physics import (
     STEPS_PER_RAD,
     STEPS_PER_TURN,
-    EmulatedModel,
     ServoSpec,
 )
 from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
@@ -63,7 +63,7 @@ class EmulatedServo(ABC):
     def __init__(
         self,
         spec: ServoSpec,
-        model: EmulatedModel,
+        model: ServoModel,
         memory: ServoMemory,
         now_ms: int,
         make_shaft: ShaftMaker = create_shaft,
