@@ -163,7 +163,7 @@ def test_bad_input_is_one_clear_line(options, says, monkeypatch):
     ("text", "says"),
     [
         ("1:xl330-m077,", "not IDS:MODEL"),
-        ("1:sts3215,7:xc330-m288", "the servos before it are of kind feetech"),
+        ("1:sts3215,7:xc330-m288", "a line of kind feetech has no such model"),
         ("1:xl331", "a line has no such model, but xl330-m077"),
         ("1-3:xl330-m077,2:xc330-m288", "id 2 is taken"),
     ],
