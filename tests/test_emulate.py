@@ -138,7 +138,7 @@ def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monke
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--servos", "1:sts3215,2:xl330-m077"), "start a second `gazerig emulate`"),
+        (("--servos", "1:sts3215,2:xl330-m077"), "a line of kind feetech has no such model"),
         (("--maestro", "7"), "--maestro 7: a board has 6, 12, 18, 24 channels"),
         (("--servos", "1:xl330-m077", "--baud", "12"), "--baud 12: servos of this kind know 9600"),
         (("--servos", "1:xl330-m077", "--link", "README.md"), "File exists"),
