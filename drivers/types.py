@@ -6,7 +6,7 @@ converts steps to joint angles. Times are host monotonic seconds.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, nan
 from typing import Final, NamedTuple, Protocol, runtime_checkable
 
@@ -212,24 +212,25 @@ class FaceSigns(NamedTuple):
     mouth_opening_m: float
 
 
-class DetectionInCamera(NamedTuple):
-    """One detection with its position in the camera's axes (x right, y down, z forward).
+class Located(NamedTuple):
+    """One detection with its position, in the camera's axes (x right, y down, z forward).
 
-    All fields depend only on the image and the calibration.
+    Perception places it in the world, where the same fields are along the world's axes. All fields
+    depend only on the image and the calibration.
 
-    R_camera_face: axes of a face, otherwise None
+    R_face: axes of a face, None for a thing and for a person without a visible face
     confidence: 0..1
     face_length: length of a face, in lengths of the canonical one
     depth_measured: whether the camera measured the distance; otherwise a face's is from its size
         and a thing's is assumed
     across_sd_m, along_sd_m: standard deviations of the position, across and along the view
-    v_camera_m_s: velocity over ground, None if only the position is known; across_sd_m_s,
-        along_sd_m_s: its standard deviations
+    v_m_s: velocity over ground, None if only the position is known; across_sd_m_s, along_sd_m_s:
+        its standard deviations
     size_depth: for a face, ratio of its distance at an adult's size to the measured distance; None
         if the camera measured none
     detector_id: the detector's own id, None if it has none
     turn_sd_rad: for a face, standard deviation of its orientation
-    gaze_camera: for a face, unit vector along which the eyes look, None if unknown
+    gaze: for a face, unit vector along which the eyes look, None if unknown
     fastest_m, fastest_m_s: for a moving thing, position and velocity of its fastest part, None if
         unknown
     signs: for a face, state of eyes and mouth, None if they are not found
@@ -242,22 +243,22 @@ class DetectionInCamera(NamedTuple):
     """
 
     kind: str
-    p_camera_m: tuple[float, float, float]
-    R_camera_face: tuple[_Row, _Row, _Row] | None
+    p_m: tuple[float, float, float]
+    R_face: tuple[_Row, _Row, _Row] | None
     radius_m: float
-    spin_rad_s: float
-    confidence: float
-    face_length: float
-    depth_measured: bool
-    across_sd_m: float
-    along_sd_m: float
-    v_camera_m_s: tuple[float, float, float] | None
-    across_sd_m_s: float
-    along_sd_m_s: float
-    size_depth: float | None
-    detector_id: int | None
+    spin_rad_s: float = 0.0
+    confidence: float = 1.0
+    face_length: float = 1.0
+    depth_measured: bool = False
+    across_sd_m: float = 0.002
+    along_sd_m: float = 0.08
+    v_m_s: tuple[float, float, float] | None = None
+    across_sd_m_s: float = 0.1
+    along_sd_m_s: float = 0.5
+    size_depth: float | None = None
+    detector_id: int | None = None
     turn_sd_rad: float = 0.0
-    gaze_camera: tuple[float, float, float] | None = None
+    gaze: tuple[float, float, float] | None = None
     fastest_m: tuple[float, float, float] | None = None
     fastest_m_s: tuple[float, float, float] | None = None
     signs: FaceSigns | None = None
@@ -273,14 +274,14 @@ class LocatedFrame(NamedTuple):
 
     intrinsics: the calibration; things: moving things with a position
     faces: visible faces, then heads of people without a visible face, which have no
-        ``R_camera_face``
+        ``R_face``
     palms: palms of the nearest person, None in a frame that was not searched for them
     """
 
     intrinsics: Intrinsics
-    faces: tuple[DetectionInCamera, ...]
-    things: tuple[DetectionInCamera, ...]
-    palms: tuple[DetectionInCamera, ...] | None = None
+    faces: tuple[Located, ...]
+    things: tuple[Located, ...]
+    palms: tuple[Located, ...] | None = None
 
 
 class FaceMesh(NamedTuple):
@@ -442,24 +443,7 @@ class Detections:
         self, locate: "Callable[[Detections], LocatedFrame] | None"
     ) -> "Detections":
         """Return a copy with its contents located in the camera's axes; unchanged for None."""
-        if locate is None:
-            return self
-        return Detections(
-            self.captured_s,
-            self.number,
-            self.width_px,
-            self.height_px,
-            self.faces,
-            self.blobs,
-            self.image,
-            self.depth_m,
-            self.lens,
-            locate(self),
-            self.scene,
-            self.people,
-            self.palms,
-            self.conditions,
-        )
+        return self if locate is None else replace(self, located=locate(self))
 
 
 class Camera(Protocol):

@@ -2,13 +2,7 @@
 
 import numpy as np
 
-from gazerig.robot.perception.data_association import (
-    FORBIDDEN,
-    DetectionRow,
-    TrackRow,
-    assign,
-    pair_costs,
-)
+from gazerig.robot.perception.data_association import FORBIDDEN, assign
 
 
 def test_nobody_and_nothing_are_no_pairs() -> None:
@@ -38,19 +32,3 @@ def test_a_pair_too_many_is_not_made_at_the_cost_of_others() -> None:
     assert assign(costs) == [(0, 1), (1, 0)]
     assert assign(costs, unpaired=30.0) == [(0, 0)]
     assert assign([[28.0]], unpaired=30.0) == [(0, 0)]
-
-
-def test_a_pair_among_many_costs_what_it_costs_alone() -> None:
-    rng = np.random.default_rng(5)
-    tracks, found = [], []
-    for k in range(9):
-        y = 0.05 * k + 0.02 * rng.random()
-        tracks.append(TrackRow(k % 2, -1, 1.0, y, 0.0, 2.0, 1e-4, 1e-2, 0.1, 1.0, 0.0, False))
-        found.append(DetectionRow(k % 2, -1, 1.0, y + 0.01, 0.0, 2.1, 0.01, 0.1, 0.1, 1))
-    # The detector has followed one of them.
-    tracks[2] = tracks[2]._replace(mark=3)
-    found[4] = found[4]._replace(mark=3)
-    many = pair_costs(tracks, found)
-    alone = [[pair_costs([t], [d])[0][0] for d in found] for t in tracks]
-    np.testing.assert_allclose(many, alone, rtol=1e-12)
-    assert 9 < sum(cost < FORBIDDEN for row in alone for cost in row) < 81

@@ -14,7 +14,6 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.types import Percept
 from gazerig.robot.model.frames import LensParams
-from gazerig.robot.perception import frame_locator
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -99,4 +98,5 @@ def test_a_patch_as_wide_as_high_that_fills_its_box_is_compact(
     height_px: float, area_px: float, compact: bool
 ) -> None:
     patch = replace(BALL, box_px=(9.0, 9.0, 50.0, height_px), area_px=area_px)
-    assert present(frame_locator.thing_in_camera(patch)).compact is compact
+    (thing,) = LOCATOR(picture(1, blobs=(patch,))).things
+    assert thing.compact is compact

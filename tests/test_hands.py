@@ -1,17 +1,16 @@
 """Hands from pixels: what moves otherwise than a person, within reach; and whose hand waves."""
 
-from dataclasses import replace
 from math import dist
 
 import numpy as np
 import pytest
 from seeing.drawn_scene import frames, off_deg
 
+from gazerig.drivers.types import Located
 from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.perception.hands import HAND, Hands, Known
-from gazerig.robot.perception.track import LocalisedDetection
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 
 EYE: Vec3 = (0.0, 0.0, 0.0)
@@ -22,9 +21,9 @@ BESIDE: Vec3 = (2.0, 0.7, -0.2)
 
 
 def patch(p: Vec3 = BESIDE, v: Vec3 = (0.0, 1.2, 0.0), radius_m: float = 0.25, mark: int = 7,
-          **more: object) -> LocalisedDetection:  # fmt: skip
-    made = LocalisedDetection("thing", p, None, radius_m, 0.0, 1.0, v_world_m_s=v, mark=mark)
-    return replace(made, **{"fastest_m": p, "fastest_m_s": v, **more})  # type: ignore[arg-type]
+          **more: object) -> Located:  # fmt: skip
+    made = Located("thing", p, None, radius_m, 0.0, 1.0, v_m_s=v, detector_id=mark)
+    return made._replace(**{"fastest_m": p, "fastest_m_s": v, **more})  # type: ignore[arg-type]
 
 
 def level(p: Vec3) -> float:
@@ -32,7 +31,7 @@ def level(p: Vec3) -> float:
     return dist(p[:2], EYE[:2])
 
 
-def kinds(hands: Hands, *seen: LocalisedDetection, faces: tuple[Known, ...] = (FACE,)) -> list[str]:
+def kinds(hands: Hands, *seen: Located, faces: tuple[Known, ...] = (FACE,)) -> list[str]:
     """Return what the patches of successive frames are called."""
     return [hands.label([one], list(faces), EYE, k / 30)[0].kind for k, one in enumerate(seen)]
 
@@ -49,13 +48,13 @@ def test_what_moves_within_reach_is_a_hand_from_the_second_frame_on() -> None:
     ids=["hardly moves", "out of reach", "a leg", "a person who passes", "something known",
          "a head that turns", "measured far behind"],
 )  # fmt: skip
-def test_what_is_no_hand_is_none(seen: LocalisedDetection) -> None:
+def test_what_is_no_hand_is_none(seen: Located) -> None:
     assert HAND not in kinds(Hands(), *[seen] * 5)
-    assert HAND not in kinds(Hands(), *[replace(patch(), mark=None)] * 5)
+    assert HAND not in kinds(Hands(), *[patch()._replace(detector_id=None)] * 5)
     assert HAND not in kinds(Hands(), *[patch()] * 5, faces=())
 
 
-def led(tip: Vec3, middle: Vec3, **more: object) -> LocalisedDetection:
+def led(tip: Vec3, middle: Vec3, **more: object) -> Located:
     """Return a patch that is fastest at its tip."""
     return patch(p=middle, fastest_m=tip, **more)  # type: ignore[arg-type]
 
@@ -70,7 +69,7 @@ CURTAIN = led((2.0, 1.3, 0.1), (2.0, 1.5, -0.1), radius_m=0.45, thickness_m=0.5)
     ids=["a curtain", "a thing aside", "an elbow", "too small for an arm"],
 )  # fmt: skip
 def test_what_moves_within_reach_is_a_thing_without_evidence_of_a_hand(
-    seen: LocalisedDetection,
+    seen: Located,
 ) -> None:
     assert kinds(Hands(), *[seen] * 6) == ["thing"] * 6
 
@@ -96,9 +95,7 @@ def test_a_hand_that_has_come_to_rest_is_still_there_and_one_that_went_is_not(
     for k in range(90):
         speed = 1.2 if k < 10 else last_m_s
         seen = [patch(v=(0.0, speed, 0.0))] if k < 12 else []
-        there.append(
-            [(one.kind, one.v_world_m_s) for one in hands.label(seen, [FACE], EYE, k / 30)]
-        )
+        there.append([(one.kind, one.v_m_s) for one in hands.label(seen, [FACE], EYE, k / 30)])
     assert there[11][0][0] == HAND
     assert there[12:71] == [[(HAND, (0.0, 0.0, 0.0))] if stays else []] * 59
     assert there[-1] == [] and not hands.has_resting
@@ -110,11 +107,9 @@ def test_a_hand_is_as_far_as_the_person_unless_its_distance_is_measured() -> Non
         hands, seen = Hands(), patch(p=p, depth_measured=measured, along_sd_m=0.02)
         for k in range(3):
             (found,) = hands.label([seen], [FACE], EYE, k / 30)
-        assert level(found.p_world_m) == pytest.approx(far, abs=0.01)
-        assert found.v_world_m_s is not None
-        assert found.v_world_m_s[1] == pytest.approx(
-            1.2 * dist(found.p_world_m, EYE) / dist(p, EYE)
-        )
+        assert level(found.p_m) == pytest.approx(far, abs=0.01)
+        assert found.v_m_s is not None
+        assert found.v_m_s[1] == pytest.approx(1.2 * dist(found.p_m, EYE) / dist(p, EYE))
 
 
 def test_between_two_people_the_arm_tells_whose_hand_it_is_and_it_stays_theirs() -> None:
@@ -125,9 +120,9 @@ def test_between_two_people_the_arm_tells_whose_hand_it_is_and_it_stays_theirs()
         seen = patch(p=(2.0, 0.62 + side, -0.4), fastest_m=tip)
         for k in range(3):
             (found,) = hands.label([seen], [FACE, OTHER], EYE, k / 30)
-        assert level(found.p_world_m) == pytest.approx(level(face[0]))
+        assert level(found.p_m) == pytest.approx(level(face[0]))
         (found,) = hands.label([patch(p=tip)], [FACE, OTHER], EYE, 0.1)
-        assert level(found.p_world_m) == pytest.approx(level(face[0]))
+        assert level(found.p_m) == pytest.approx(level(face[0]))
 
 
 def test_e91_a_waving_hand_is_found_from_pixels_and_whose_it_is() -> None:
@@ -161,7 +156,7 @@ def test_e92_who_walks_by_or_sits_still_has_no_hands(scene: str, start_s: float)
         assert frame.seen(HAND) == []
 
 
-def coming(growth_1_s: float, sd_1_s: float = 0.3, radius_m: float = 0.2) -> LocalisedDetection:
+def coming(growth_1_s: float, sd_1_s: float = 0.3, radius_m: float = 0.2) -> Located:
     """Return a patch at 2 m that grows at this rate and hardly moves across the view."""
     way = np.array(BESIDE)
     far = float(np.linalg.norm(way))
@@ -175,46 +170,46 @@ def coming(growth_1_s: float, sd_1_s: float = 0.3, radius_m: float = 0.2) -> Loc
      (coming(5.0, radius_m=0.05), "thing")],
     ids=["comes", "slowly", "uncertain", "too small"],
 )  # fmt: skip
-def test_what_comes_at_the_camera_is_a_hand_at_once(seen: LocalisedDetection, first: str) -> None:
+def test_what_comes_at_the_camera_is_a_hand_at_once(seen: Located, first: str) -> None:
     assert kinds(Hands(), seen)[0] == first
 
 
-FIST: LocalisedDetection = patch(radius_m=0.13 * 2.0, compact=True)
+FIST: Located = patch(radius_m=0.13 * 2.0, compact=True)
 """Too large for a hand at the person's distance of 1 m."""
 
 
 def test_what_is_too_large_for_a_hand_at_the_persons_distance_is_as_near_as_makes_it_one() -> None:
     hands, far = Hands(), []
     for k in range(12):
-        (found,) = hands.label([replace(FIST, radius_m=0.26 + 0.01 * k)], [FACE], EYE, k / 30)
-        far.append(level(found.p_world_m))
-    size_m = (0.26 + 0.11) * 1.0 / level(FIST.p_world_m)  # as far away as the person
+        (found,) = hands.label([FIST._replace(radius_m=0.26 + 0.01 * k)], [FACE], EYE, k / 30)
+        far.append(level(found.p_m))
+    size_m = (0.26 + 0.11) * 1.0 / level(FIST.p_m)  # as far away as the person
     assert far[-1] == pytest.approx(0.065 / size_m, rel=0.1)
-    assert far[-1] < 0.45 and found.v_world_m_s is not None
-    assert found.v_world_m_s[1] == pytest.approx(1.2 * far[-1] / level(FIST.p_world_m))
+    assert far[-1] < 0.45 and found.v_m_s is not None
+    assert found.v_m_s[1] == pytest.approx(1.2 * far[-1] / level(FIST.p_m))
     # A hand that is drawn back, or goes on as an arm, is at the person's distance again.
     for k in range(12, 20):
         (found,) = hands.label([patch(radius_m=0.2)], [FACE], EYE, k / 30)
-    assert level(found.p_world_m) == pytest.approx(1.0, abs=0.02)
+    assert level(found.p_m) == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(
     "seen",
-    [replace(FIST, compact=False), replace(FIST, radius_m=0.19),
-     replace(FIST, p_world_m=(0.9, 0.2, -0.1), fastest_m=(0.9, 0.2, -0.1), radius_m=0.13,
+    [FIST._replace(compact=False), FIST._replace(radius_m=0.19),
+     FIST._replace(p_m=(0.9, 0.2, -0.1), fastest_m=(0.9, 0.2, -0.1), radius_m=0.13,
              depth_measured=True, along_sd_m=0.02)],
     ids=["an arm", "a large hand", "its distance is measured"],
 )  # fmt: skip
-def test_other_hands_are_as_far_as_the_person_or_as_measured(seen: LocalisedDetection) -> None:
+def test_other_hands_are_as_far_as_the_person_or_as_measured(seen: Located) -> None:
     hands = Hands()
     for k in range(6):
         (found,) = hands.label([seen], [FACE], EYE, k / 30)
-    assert level(found.p_world_m) == pytest.approx(
-        level(seen.p_world_m) if seen.depth_measured else 1.0, abs=0.02
+    assert level(found.p_m) == pytest.approx(
+        level(seen.p_m) if seen.depth_measured else 1.0, abs=0.02
     )
 
 
-def reaching(wide_m: float, **more: object) -> LocalisedDetection:
+def reaching(wide_m: float, **more: object) -> Located:
     """Return an arm from aside, as wide as given if it were as far away as the person of FACE."""
     said: dict[str, object] = {
         "from_side": True,
@@ -228,9 +223,7 @@ def reaching(wide_m: float, **more: object) -> LocalisedDetection:
 def test_an_arm_that_comes_in_at_the_side_is_as_near_as_makes_it_as_wide_as_a_hand() -> None:
     hands = Hands()
     seen = [reaching(0.17)] * 3 + [reaching(0.06)] * 3 + [reaching(0.25)] * 2
-    away = [
-        level(hands.label([one], [FACE], EYE, k / 30)[0].p_world_m) for k, one in enumerate(seen)
-    ]
+    away = [level(hands.label([one], [FACE], EYE, k / 30)[0].p_m) for k, one in enumerate(seen)]
     assert away[1:] == pytest.approx([0.5] * 7, abs=0.03), "and stays there as less of it moves"
 
 
@@ -238,7 +231,7 @@ def test_an_arm_that_moved_before_it_touched_the_side_does_not_reach_in() -> Non
     hands = Hands()
     for k, one in enumerate([reaching(0.17, from_side=False)] * 2 + [reaching(0.17)] * 4):
         (found,) = hands.label([one], [FACE], EYE, k / 30)
-    assert found.kind == HAND and level(found.p_world_m) == pytest.approx(1.0, abs=0.02)
+    assert found.kind == HAND and level(found.p_m) == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(
@@ -250,12 +243,12 @@ def test_an_arm_that_moved_before_it_touched_the_side_does_not_reach_in() -> Non
     ids=["as wide as an arm is there", "within the image", "from the shoulder", "measured"],
 )  # fmt: skip
 def test_other_arms_are_as_far_as_the_person_or_as_measured_however_wide(
-    seen: LocalisedDetection,
+    seen: Located,
 ) -> None:
     hands = Hands()
     for k, one in enumerate([patch(from_side=True)] * 2 + [seen] * 4):
         (found,) = hands.label([one], [FACE], EYE, k / 30)
-    assert found.kind == HAND and level(found.p_world_m) == pytest.approx(1.0, abs=0.07)
+    assert found.kind == HAND and level(found.p_m) == pytest.approx(1.0, abs=0.07)
 
 
 @pytest.mark.parametrize(("start_s", "side"), [(23.3, 1.0), (35.8, -1.0)])

@@ -12,7 +12,7 @@ from desk import GAZE_JOINTS, LIDS
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
-from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
+from gazerig.drivers.types import DetectedFace, Detections, Located, MovingBlob
 from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import PARTS
 from gazerig.robot.app.assemble import Assembly, assemble
@@ -26,7 +26,6 @@ from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.track import LocalisedDetection
 from gazerig.robot.perception.tracker import Tracker
 
 
@@ -211,7 +210,7 @@ def test_e56_own_parts_move_and_turn_with_the_face(turn_deg: float, aside_m: flo
     own = {code: (-0.03, 0.02 * i - 0.07, 0.05 - 0.015 * i) for i, code in enumerate(PARTS)}
     perception = Perception(MOUNT, 69.0, Tracker(), own)
     nose, R = (1.0, aside_m, 0.25), rotation((radians(180.0 + turn_deg), 0.0, 0.0))
-    detection = LocalisedDetection("face", nose, R, 0.1, 0.0, 0.9)
+    detection = Located("face", nose, R, 0.1, 0.0, 0.9)
     (track,) = Tracker().step([detection], (0.0, 0.0, 0.2), 0.0)
     face = perception._face(track)
     eye = (0.0, 0.0, 0.2)

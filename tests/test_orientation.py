@@ -115,7 +115,7 @@ def test_e100_a_person_is_at_one_place_however_the_camera_is_mounted_and_whateve
         assert shot is not None and shot.image.shape == (height, width, 3)
         found = analyzer.analyze(shot)
         assert found.located is not None and (found.width_px, found.height_px) == (width, height)
-        x, y, z = found.located.faces[0].p_camera_m
+        x, y, z = found.located.faces[0].p_m
         assert (x / z, y / z) == pytest.approx((0.2, -0.12), abs=4.0 / width)
     source.close()
     assert source.events() == ()

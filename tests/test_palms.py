@@ -24,7 +24,7 @@ from gazerig.drivers.vision.people import anchors
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.perception.frame_locator import FrameLocator, Reading
+from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -121,11 +121,10 @@ P_FACE: Vec3 = (0.0, 0.0, 1.5)
 P_PALM: Vec3 = (0.35, 0.2, 1.1)
 
 
-def hands(*palms: DetectedPalm, frames: int = 30, depth: Reading | None = None) -> list[Percept]:
+def hands(*palms: DetectedPalm, frames: int = 30, depth_m: float | None = None) -> list[Percept]:
     """See a face, and palms in every sixth frame."""
-    depth_at = None if depth is None else (lambda image, box: depth)
-    perception = Perception(STILL, 69.0, Tracker(), depth_at=depth_at)
-    more = {} if depth is None else {"depth_m": np.ones((HEIGHT, WIDTH), np.float32)}
+    perception = Perception(STILL, 69.0, Tracker())
+    more = {} if depth_m is None else {"depth_m": np.full((HEIGHT, WIDTH), depth_m, np.float32)}
     return [
         percept_at(
             perception,
@@ -154,7 +153,7 @@ def test_a_hand_that_is_held_still_is_one_hand_where_its_size_puts_it() -> None:
 def test_a_palm_is_no_farther_than_its_person_unless_it_is_measured() -> None:
     (aside,) = places(hands(palm_at((0.6, 0.3, 2.4)), frames=1)[-1])
     assert np.hypot(*aside[:2]) == pytest.approx(1.5, abs=0.02)
-    (measured,) = places(hands(palm_at(P_PALM), frames=1, depth=(0.9, 0.01, 1.0))[-1])
+    (measured,) = places(hands(palm_at(P_PALM), frames=1, depth_m=0.9)[-1])
     assert measured[0] == pytest.approx(0.9, abs=0.02)
 
 

@@ -29,7 +29,7 @@ from gazerig.gaze.angles import norm
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.dashboard.feed.camera_overlay import draw_detections
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.perception.frame_locator import FrameLocator, Reading
+from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -141,7 +141,7 @@ def test_frames_carry_people_between_processes() -> None:
     found = frames.analyze(Shot(0.0, 1, shown))
     assert pickle.loads(pickle.dumps(found.people)) == found.people and len(found.people) == 1
     (head,) = present(found.located).faces
-    assert head.kind == "face" and head.R_camera_face is None
+    assert head.kind == "face" and head.R_face is None
     assert frames.analyze(Shot(0.03, 2, shown)).people == ()
     drawn = draw_detections(shown, found, None, present(found.located).intrinsics)
     assert (drawn != shown).any()
@@ -182,9 +182,8 @@ def person_at(p_camera_m: Vec3) -> DetectedPerson:
     return DetectedPerson((x - 50.0, y - 0.1 * trunk, 100.0, trunk), (x, y), trunk, 0.9)
 
 
-def seeing(depth: Reading | None = None) -> Perception:
-    depth_at = None if depth is None else (lambda image, box: depth)
-    return Perception(STILL, 69.0, Tracker(), depth_at=depth_at)
+def seeing() -> Perception:
+    return Perception(STILL, 69.0, Tracker())
 
 
 def at_30_hz(perception: Perception, first: int, count: int, **found: object) -> Percept:
@@ -206,8 +205,8 @@ def test_a_person_who_is_turned_away_is_a_body_where_the_head_is_and_no_face(p_m
 
 @pytest.mark.parametrize(("sd_m", "far_m"), [(0.02, 1.5), (0.5, 2.0)])
 def test_a_measured_depth_places_the_head(sd_m: float, far_m: float) -> None:
-    percept = at_30_hz(seeing((1.4, sd_m, 1.0)), 1, 1, people=(person_at((0.0, 0.0, 2.0)),),
-                       depth_m=np.ones((HEIGHT, WIDTH), np.float32))  # fmt: skip
+    noise = np.random.default_rng(1).normal(1.4, sd_m, (HEIGHT, WIDTH))
+    percept = at_30_hz(seeing(), 1, 1, people=(person_at((0.0, 0.0, 2.0)),), depth_m=noise)
     assert percept.bodies.p_world_m[0, 0] == pytest.approx(far_m, abs=0.01)
 
 

@@ -1,27 +1,23 @@
 """Identities and velocities from picture to picture."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.drivers.types import Clothing
+from gazerig.drivers.types import Clothing, Located
 from gazerig.gaze.types import FIRST_THING, body_name
 from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.perception import covariance
-from gazerig.robot.perception.track import BodyTrack, LocalisedDetection
+from gazerig.robot.perception.track import BodyTrack
 from gazerig.robot.perception.tracker import Tracker
 
 CAMERA = (0.0, 0.0, 0.2)
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def face(x: float, y: float, kind: str = "face") -> LocalisedDetection:
-    return LocalisedDetection(
-        kind, (x, y, 0.2), IDENTITY if kind == "face" else None, 0.1, 0.0, 0.9
-    )
+def face(x: float, y: float, kind: str = "face") -> Located:
+    return Located(kind, (x, y, 0.2), IDENTITY if kind == "face" else None, 0.1, 0.0, 0.9)
 
 
 @pytest.fixture
@@ -80,8 +76,8 @@ def test_far_apart_is_somebody_else_and_kinds_never_mix(tracker: Tracker) -> Non
     assert {track.detection.kind for track in after if track.id != one.id} == {"face", "hand"}
 
 
-def across(y: float, x: float = 1.5, kind: str = "face") -> LocalisedDetection:
-    return LocalisedDetection(
+def across(y: float, x: float = 1.5, kind: str = "face") -> Located:
+    return Located(
         kind,
         (x, y, 0.2),
         IDENTITY if kind == "face" else None,
@@ -137,10 +133,10 @@ def test_who_is_hidden_is_not_whoever_appears_nearby(tracker: Tracker) -> None:
 def test_what_the_detector_follows_stays_itself_beside_something_nearer(tracker: Tracker) -> None:
     """A patch whose middle jumps by half a metre keeps the number that the detector gave it."""
     near, far = across(0.0, 1.9, "thing"), across(0.05, 2.0, "thing")
-    near.mark, far.mark = 1, 2
+    near, far = near._replace(detector_id=1), far._replace(detector_id=2)
     for k in range(10):
         tracks = tracker.step([near, far], CAMERA, k / 30)
-    jumped = replace(far, p_world_m=(2.0, 0.5, 0.2))
+    jumped = far._replace(p_m=(2.0, 0.5, 0.2))
     after = tracker.step([near, jumped], CAMERA, 10 / 30)
     assert [track.id for track in after] == [track.id for track in tracks]
 
@@ -153,10 +149,10 @@ def test_a_distance_known_badly_is_no_reason_to_be_somebody_else(tracker: Tracke
     (one,) = tracker.step([across(0.0, 3.0)], CAMERA, 0.0)
     (same,) = tracker.step([across(0.0, 3.4)], CAMERA, 0.033)
     assert same.id == one.id
-    exact = LocalisedDetection("thing", (3.0, 0.0, 0.2), None, 0.1, 0.0, 0.9, along_sd_m=0.01)
+    exact = Located("thing", (3.0, 0.0, 0.2), None, 0.1, 0.0, 0.9, along_sd_m=0.01)
     tracker = Tracker()
     (one,) = tracker.step([exact], CAMERA, 0.0)
-    moved = replace(exact, p_world_m=(9.0, 0.0, 0.2))
+    moved = exact._replace(p_m=(9.0, 0.0, 0.2))
     assert {track.id for track in tracker.step([moved], CAMERA, 0.033)} != {one.id}
 
 
@@ -187,7 +183,7 @@ def test_the_covariance_tells_how_far_off_the_track_is() -> None:
         rng, tracker = np.random.default_rng(seed), Tracker()
         for k in range(40):
             noisy = across(rng.normal(0.0, 2e-3), 1.0 + rng.normal(0.0, 0.1))
-            noisy.p_world_m = (*noisy.p_world_m[:2], 0.2 + rng.normal(0.0, 2e-3))
+            noisy = noisy._replace(p_m=(*noisy.p_m[:2], 0.2 + rng.normal(0.0, 2e-3)))
             (track,) = tracker.step([noisy], CAMERA, k / 30)
         off = np.subtract(track.p_world_m, (1.0, 0.0, 0.2))
         errors.append(off @ np.linalg.solve(cov_of(track)[:3, :3], off))
@@ -196,14 +192,14 @@ def test_the_covariance_tells_how_far_off_the_track_is() -> None:
 
 def test_a_velocity_that_was_measured_is_taken_over_at_once() -> None:
     blob = across(0.0, 2.0, "thing")
-    blob.v_world_m_s, blob.across_sd_m_s, blob.along_sd_m_s = (0.0, 1.0, 0.0), 0.05, 0.3
+    blob = blob._replace(v_m_s=(0.0, 1.0, 0.0), across_sd_m_s=0.05, along_sd_m_s=0.3)
     (track,) = Tracker().step([blob], CAMERA, 0.0)
     assert track.v_world_m_s == pytest.approx((0.0, 1.0, 0.0), abs=0.02)
 
 
 def test_the_size_of_a_face_is_learned_from_depth_and_used_in_its_holes(tracker: Tracker) -> None:
     """A child's face looks 20 % farther than it is; through a hole it stays where it is."""
-    by_depth = replace(across(0.0, 1.0), depth_measured=True, along_sd_m=0.01, size_depth=1.25)
+    by_depth = across(0.0, 1.0)._replace(depth_measured=True, along_sd_m=0.01, size_depth=1.25)
     for k in range(20):
         (track,) = tracker.step([by_depth], CAMERA, k / 30)
     assert track.depth_from == "camera" and track.face_size == pytest.approx(0.8)
@@ -239,10 +235,10 @@ def test_nothing_makes_it_give_what_is_no_number(
             assert np.linalg.eigvalsh(cov_of(track)).min() > -1e-9
 
 
-def dressed(found: LocalisedDetection, *bins: int) -> LocalisedDetection:
+def dressed(found: Located, *bins: int) -> Located:
     """Return the same in clothes of one colour or of several in equal parts."""
     colours = tuple(len(bins) ** -0.5 * (k in bins) for k in range(24))
-    return replace(found, clothing=Clothing(colours, 1.0))
+    return found._replace(clothing=Clothing(colours, 1.0))
 
 
 @pytest.mark.parametrize(("worn", "same"), [(3, True), (7, False)])
@@ -267,7 +263,7 @@ def test_who_returns_after_the_time_of_memory_is_somebody_new() -> None:
         tracker.step([], CAMERA, t_s + 25.0)
 
 
-def visit(tracker: Tracker, start_s: float, *found: LocalisedDetection) -> list[int]:
+def visit(tracker: Tracker, start_s: float, *found: Located) -> list[int]:
     """Show a person in consecutive frames, then no one for 2 s; return the numbers."""
     tracker.step([], CAMERA, start_s - 1.0)
     shown = [
@@ -287,19 +283,19 @@ def test_people_and_things_count_separately(tracker: Tracker) -> None:
 def test_a_person_who_comes_back_at_the_other_side_keeps_the_number(tracker: Tracker) -> None:
     assert {*visit(tracker, 0.0, *[across(0.5)] * 15)} == {1}
     assert {*visit(tracker, 40.0, *[across(-0.9)] * 15)} == {1}
-    taller = replace(across(0.5), p_world_m=(1.5, 0.5, 0.6))
+    taller = across(0.5)._replace(p_m=(1.5, 0.5, 0.6))
     assert {*visit(tracker, 80.0, *[taller] * 15)} == {2}
 
 
 def test_nobody_is_faster_than_a_walker(tracker: Tracker) -> None:
     visit(tracker, 0.0, *[across(0.0, 3.0)] * 15)
-    far = replace(across(0.0), p_world_m=(1.5, 20.0, 0.2))
+    far = across(0.0)._replace(p_m=(1.5, 20.0, 0.2))
     assert {*visit(tracker, 4.0, *[far] * 15)} == {2}
 
 
 def test_a_false_detection_gives_its_number_back(tracker: Tracker) -> None:
     visit(tracker, 0.0, *[across(0.5)] * 3)
-    taller = replace(across(0.5), p_world_m=(1.5, 0.5, 0.9))
+    taller = across(0.5)._replace(p_m=(1.5, 0.5, 0.9))
     assert {*visit(tracker, 10.0, *[taller] * 15)} == {1}
 
 
@@ -307,7 +303,7 @@ def test_clothes_that_are_seen_later_settle_the_number(tracker: Tracker) -> None
     visit(tracker, 0.0, *[dressed(across(0.5), 3)] * 15)
     stranger = visit(tracker, 30.0, across(0.4), *[dressed(across(0.4), 7)] * 15)
     assert stranger[0] == 1 and stranger[-1] == 2
-    low = replace(across(0.4), p_world_m=(1.5, 0.4, 0.0))
+    low = across(0.4)._replace(p_m=(1.5, 0.4, 0.0))
     known = visit(tracker, 60.0, low, *[dressed(low, 3)] * 15)
     assert known[0] != 1 and known[-1] == 1
 
@@ -331,7 +327,7 @@ def test_two_whose_numbers_were_exchanged_while_hidden_get_them_back_by_their_cl
 
 def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people(tracker: Tracker) -> None:
     for k in range(12):
-        up = replace(across(0.0, 2.0), p_world_m=(2.0, 0.2 * k, 0.2 + 0.03 * k))
+        up = across(0.0, 2.0)._replace(p_m=(2.0, 0.2 * k, 0.2 + 0.03 * k))
         (one,) = tracker.step([up], CAMERA, k / 30)
     assert np.linalg.norm(one.v_world_m_s) <= 4.0
     before = one.p_world_m[2]
@@ -341,10 +337,12 @@ def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people(tracker: Tra
 
 
 def test_a_thing_that_turns_out_to_be_a_hand_keeps_its_identity(tracker: Tracker) -> None:
-    moving = replace(face(2.0, 0.9, "thing"), mark=7)
+    moving = face(2.0, 0.9, "thing")._replace(detector_id=7)
     (thing,) = tracker.step([moving], CAMERA, 0.0)
-    hand = replace(moving, kind="hand", p_world_m=(0.6, 0.27, 0.2))
-    other = replace(face(1.0, -0.5, "hand"), mark=8)
-    found = {track.detection.mark: track for track in tracker.step([hand, other], CAMERA, 0.03)}
+    hand = moving._replace(kind="hand", p_m=(0.6, 0.27, 0.2))
+    other = face(1.0, -0.5, "hand")._replace(detector_id=8)
+    found = {
+        track.detection.detector_id: track for track in tracker.step([hand, other], CAMERA, 0.03)
+    }
     assert found[7].id == thing.id != found[8].id
-    assert found[7].p_world_m == pytest.approx(hand.p_world_m)
+    assert found[7].p_world_m == pytest.approx(hand.p_m)

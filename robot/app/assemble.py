@@ -11,7 +11,6 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
 from gazerig.config.shipped_files import shipped_names
 from gazerig.config.tracks import tracks_of
-from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.sound.player import SoundError
 from gazerig.drivers.sound.sound_file import check_sound
 from gazerig.drivers.types import Camera
@@ -263,7 +262,6 @@ def _build_components(
             tracker,
             face_parts_m(rig),
             placed.lens,
-            depth_at,
             kinematics.body_volumes,
         ),
         tracker=tracker,

@@ -5,50 +5,42 @@ accurate to about a pixel. Along it, the accuracy is that of the camera's depth 
 measures one there; otherwise it is limited by the spread of face sizes.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from heapq import nlargest
 from math import degrees, hypot, isfinite, sqrt
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gazerig.drivers.camera import depth_roi
 from gazerig.drivers.camera.capture_loop import is_off_frame
+from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import (
     DetectedFace,
     DetectedPalm,
     DetectedPerson,
-    DetectionInCamera,
     Detections,
+    Located,
     LocatedFrame,
     MovingBlob,
 )
 from gazerig.gaze.angles import norm, scale
-from gazerig.gaze.types import Vec3
+from gazerig.gaze.types import Vec3, vec
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fault, rays
 from gazerig.robot.perception.face_pose import FacePose, face_pose
 from gazerig.robot.perception.mesh_reading import read_mesh
 
-Box = tuple[float, float, float, float]
-"""x, y, width, height in pixels."""
-Reading = tuple[float | None, float, float]
-"""Distance along the optical axis (m), its spread (m), and the share of pixels with a distance."""
-DepthAt = Callable[[NDArray[Any], Box], Reading]
-"""Reads the distance of a box of pixels from a depth image."""
-
 _FACE_RADIUS_M = 0.1
-# Length from the hips of a person to the top of the head as the detector defines it, its spread
-# over people and postures, and the error of the head's centre. Measured on three people in front of
-# webcams, by the distance of their eyes: .76 to .87 m, and 2 cm.
-_TRUNK_M, _TRUNK_SPREAD, _HEAD_SD_M = 0.83, 0.15, 0.05
-# Length from the wrist of an adult to the root of the middle finger, its spread over people and
-# postures, and the error of its centre; radius of a hand.
-_PALM_M, _PALM_SPREAD, _PALM_SD_M, _HAND_RADIUS_M = 0.088, 0.15, 0.03, 0.07
+# Length from the hips of a person to the top of the head as the detector defines it, and the error
+# of the head's centre. Measured on three people in front of webcams, by the distance of their eyes:
+# .76 to .87 m, and 2 cm.
+_TRUNK_M, _HEAD_SD_M = 0.83, 0.05
+# Length from the wrist of an adult to the root of the middle finger, the error of its centre, and
+# the radius of a hand.
+_PALM_M, _PALM_SD_M, _HAND_RADIUS_M = 0.088, 0.03, 0.07
+# Spread of both lengths over people and postures.
+_LENGTH_SPREAD = 0.15
 # A head outside the image is placed inside it by this fraction of its width: over the visible body.
 _EDGE = 0.02
 # A face this near to the centre of a person's head, in trunk lengths, is that person's.
@@ -67,12 +59,17 @@ SIZE_SPREAD = 0.06
 # Depth of a face: rejected if too few of its pixels have one, or if they spread over more than a
 # face; its error is at least a fraction of the depth.
 _LEAST_SHARE, _MOST_SPREAD_M, _LEAST_SD = 0.3, 0.12, 0.01
-# Accepted sizes of a face, relative to an adult's.
-_SMALLEST, _LARGEST = 0.3, 3.0
+# Largest ratio between the measured distance of a face and the one at an adult's size, either way;
+# beyond it the depth is that of a hand before the face, or of the background. The distance at an
+# adult's size is calibrated by a distance of the pupils of 61.9 mm (Mitake et al. table 1) and the
+# proportions of averaged photographs. Pupils of adults are 45 to 80 mm apart, of children from the
+# age of five at least 40 mm (Dodgson, "Variation and extrema of human interpupillary distance",
+# 2004): ratios of 1.29 and 1.55 at most.
+_MOST_DEPTH_RATIO = 1.6
 # The centre of a patch wanders within it; the error of its flow is proportional to the flow and to
 # the search range.
 _MIDDLE_OF_RADIUS, _PLACED_M = 0.3, 0.002
-_FLOW_SHARE, _FLOW_RAD_S, _LOOM_SD_1_S = 0.1, 0.03, 0.5
+_FLOW_SHARE, _FLOW_RAD_S, _LOOM_SD_1_S, _MOST_LOOM_SD_1_S = 0.1, 0.03, 0.5, 10.0
 # Striding legs and people who part make a patch grow and shrink although it does not approach;
 # growth that no measured distance confirms gets less weight.
 _SHAPE_1_S = 0.3
@@ -84,8 +81,6 @@ _MOST_THINGS = 24
 # A patch is compact if its aspect ratio and the filled share of its box (of a disc's: .79) are
 # above these.
 _LEAST_ASPECT, _LEAST_FILL = 0.87, 0.6
-# A face has no measured velocity; these fields are errors of a velocity.
-_NO_SPEED_SDS = (0.1, 0.5)
 
 
 @dataclass(frozen=True)
@@ -93,12 +88,10 @@ class FrameLocator:
     """Locates faces and things in the camera's axes by one calibration; picklable.
 
     lens: measured lens; field_rad: horizontal field of view, used without a measured lens
-    depth_at: reads depth images; None: distances come from the size of faces
     """
 
     lens: LensParams | None
     field_rad: float
-    depth_at: DepthAt | None = depth_roi.depth_at
 
     def __call__(self, found: Detections) -> LocatedFrame:
         """Return a frame's contents in the camera's axes."""
@@ -131,139 +124,150 @@ class FrameLocator:
             if not is_off_frame(face, found.width_px, found.height_px)
             and not any(_is_on_chest(face, other) for other in found.faces)
         ]
-        faces = [self._face(face, found, intrinsics) for face in inside]
+        faces = [_face(face, found, intrinsics) for face in inside]
         faces += [
-            self._person(person, found, intrinsics)
+            _person(person, found, intrinsics)
             for person in found.people
             if not any(_is_face_of(person, face) for face in inside)
         ]
         blobs = found.blobs
         if len(blobs) > _MOST_THINGS:
             blobs = tuple(nlargest(_MOST_THINGS, blobs, key=_swept_m))
-        things = [thing_in_camera(blob, intrinsics) for blob in blobs]
+        things = [_thing(blob, intrinsics) for blob in blobs]
         return LocatedFrame(
             intrinsics,
             tuple([face for face in faces if face is not None]),
             tuple([thing for thing in things if thing is not None]),
             None
             if found.palms is None
-            else tuple([self._palm(palm, found, intrinsics) for palm in found.palms]),
+            else tuple([_palm(palm, found, intrinsics) for palm in found.palms]),
         )
 
-    def _face(
-        self, face: DetectedFace, found: Detections, lens: Intrinsics
-    ) -> DetectionInCamera | None:
-        """Locate a face, None if its landmarks are not those of a face from its front."""
-        reading = read_mesh(face.mesh, lens) if face.mesh is not None else None
-        pose = face_pose(face.landmarks_px, lens) if reading is None else reading.pose
-        if pose is None:
-            return None
-        gaze, signs = face.gaze_camera, face.signs
-        if reading is not None:
-            gaze, signs = reading.gaze_camera or gaze, reading.signs
-        focal_px = sqrt(lens.fx_px * lens.fy_px)
-        eyes_px = focal_px * PUPIL_DISTANCE_M / pose.p_camera_m[2]
-        far = norm(pose.p_camera_m)
-        measured = self._depth_ratio(face, pose, found)
-        share, sd = (
-            measured if measured is not None else (1.0, hypot(_SIZE_PX / eyes_px, _SIZE_OF_EYES))
-        )
-        return DetectionInCamera(
-            "face",
-            scale(pose.p_camera_m, share),
-            pose.R_camera_face,
-            _FACE_RADIUS_M,
-            0.0,
-            face.confidence,
-            pose.length,
-            measured is not None,
-            share * far * hypot(_CENTRE_PX, _CENTRE_OF_EYES * eyes_px) / focal_px,
-            share * far * sd,
-            None,
-            *_NO_SPEED_SDS,
-            None if measured is None else 1.0 / share,
-            None,
-            pose.turn_sd_rad,
-            gaze,
-            signs=signs,
-            clothing=face.clothing,
-        )
 
-    def _person(
-        self, person: DetectedPerson, found: Detections, lens: Intrinsics
-    ) -> DetectionInCamera:
-        """Locate the head of a person without a visible face, or the visible part nearest to it."""
-        (x, y), edge = person.head_px, _EDGE * found.width_px
-        at_px = (
-            min(max(x, edge), found.width_px - edge),
-            min(max(y, edge), found.height_px - edge),
-        )
-        z, sd = sqrt(lens.fx_px * lens.fy_px) * _TRUNK_M / person.trunk_px, _TRUNK_SPREAD
-        depth = self._depth_about(found, at_px, person.trunk_px * _FACE_RADIUS_M / _TRUNK_M)
-        if depth is not None:
-            z, sd = depth[0] + _FACE_RADIUS_M, hypot(_LEAST_SD, 0.5 * depth[1] / depth[0])
-        p_m = _point_at_depth(at_px, z, lens)
-        return DetectionInCamera(
-            "face", p_m, None, _FACE_RADIUS_M, 0.0, person.confidence, 1.0, depth is not None,
-            _HEAD_SD_M, norm(p_m) * sd, None, *_NO_SPEED_SDS, None, None, clothing=person.clothing,
-        )  # fmt: skip
-
-    def _palm(self, palm: DetectedPalm, found: Detections, lens: Intrinsics) -> DetectionInCamera:
-        """Locate a palm, by its size if its depth is not measured."""
-        z, sd = sqrt(lens.fx_px * lens.fy_px) * _PALM_M / palm.size_px, _PALM_SPREAD
-        depth = self._depth_about(found, palm.centre_px, 0.25 * palm.size_px)
-        if depth is not None:
-            z, sd = depth[0], hypot(_LEAST_SD, 0.5 * depth[1] / depth[0])
-        p_m = _point_at_depth(palm.centre_px, z, lens)
-        return DetectionInCamera(
-            "hand", p_m, None, _HAND_RADIUS_M, 0.0, palm.confidence, 1.0, depth is not None,
-            _PALM_SD_M, norm(p_m) * sd, None, *_NO_SPEED_SDS, None, None,
-        )  # fmt: skip
-
-    def _depth_about(
-        self, found: Detections, at_px: tuple[float, float], half_px: float
-    ) -> tuple[float, float] | None:
-        """Return the measured depth in a square with a centre and half side; see _depth."""
-        (x, y), side = at_px, 2.0 * half_px
-        return self._depth(found, (x - half_px, y - half_px, side, side))
-
-    def _depth(self, found: Detections, box: Box) -> tuple[float, float] | None:
-        """Return the measured depth in a box and its spread, None if it is uncertain."""
-        if found.depth_m is None or self.depth_at is None:
-            return None
-        z, spread, valid = self.depth_at(found.depth_m, box)
-        if z is None or not (isfinite(z) and z > 0.0 and valid >= _LEAST_SHARE):
-            return None
-        return (z, spread) if spread <= _MOST_SPREAD_M else None
-
-    def _depth_ratio(
-        self, face: DetectedFace, pose: FacePose, found: Detections
-    ) -> tuple[float, float] | None:
-        """Return the ratio of measured distance to distance from size, and its relative deviation.
-
-        Return None if the camera's depth does not give the distance of this face.
-        """
-        if found.depth_m is None:
-            return None
-        low, high = face.landmarks_px.min(axis=0), face.landmarks_px.max(axis=0)
-        (x, y), (width, height) = low.tolist(), (high - low).tolist()
-        depth = self._depth(found, (x, y, width, height))
-        if depth is None:
-            return None
-        z, spread = depth
-        # Between eyes and mouth the surface is behind the tip of the nose, which defines the
-        # position.
-        behind = float((LANDMARKS_FACE_M @ np.array(pose.R_camera_face).T)[:, 2].mean())
-        share = (z - behind) / pose.p_camera_m[2]
-        if not _SMALLEST < share < _LARGEST:
-            return None
-        return share, hypot(_LEAST_SD, 0.5 * spread / z)
+def _face(face: DetectedFace, found: Detections, lens: Intrinsics) -> Located | None:
+    """Locate a face, None if its landmarks are not those of a face from its front."""
+    reading = read_mesh(face.mesh, lens) if face.mesh is not None else None
+    pose = face_pose(face.landmarks_px, lens) if reading is None else reading.pose
+    if pose is None:
+        return None
+    gaze, signs = face.gaze_camera, face.signs
+    if reading is not None:
+        gaze, signs = reading.gaze_camera or gaze, reading.signs
+    focal_px = sqrt(lens.fx_px * lens.fy_px)
+    eyes_px = focal_px * PUPIL_DISTANCE_M / pose.p_camera_m[2]
+    measured = _depth_ratio(face, pose, found)
+    share, sd = measured or (1.0, hypot(_SIZE_PX / eyes_px, _SIZE_OF_EYES))
+    far = share * norm(pose.p_camera_m)
+    return Located(
+        "face",
+        scale(pose.p_camera_m, share),
+        pose.R_camera_face,
+        _FACE_RADIUS_M,
+        confidence=face.confidence,
+        face_length=pose.length,
+        depth_measured=measured is not None,
+        across_sd_m=far * hypot(_CENTRE_PX, _CENTRE_OF_EYES * eyes_px) / focal_px,
+        along_sd_m=far * sd,
+        size_depth=None if measured is None else 1.0 / share,
+        turn_sd_rad=pose.turn_sd_rad,
+        gaze=gaze,
+        signs=signs,
+        clothing=face.clothing,
+    )
 
 
-def _point_at_depth(at_px: tuple[float, float], z_m: float, lens: Intrinsics) -> Vec3:
-    """Return the position of a pixel at a depth along the optical axis."""
-    x, y, z = rays(np.array([at_px]), lens)[0].tolist()
-    return scale((x, y, z), z_m)
+def _person(person: DetectedPerson, found: Detections, lens: Intrinsics) -> Located:
+    """Locate the head of a person without a visible face, or the visible part nearest to it."""
+    (x, y), edge = person.head_px, _EDGE * found.width_px
+    at_px = (
+        min(max(x, edge), found.width_px - edge),
+        min(max(y, edge), found.height_px - edge),
+    )
+    head = Located(
+        "face",
+        (0.0, 0.0, 0.0),
+        None,
+        _FACE_RADIUS_M,
+        confidence=person.confidence,
+        across_sd_m=_HEAD_SD_M,
+        clothing=person.clothing,
+    )
+    half_px = person.trunk_px * _FACE_RADIUS_M / _TRUNK_M
+    return _by_length(head, at_px, _TRUNK_M / person.trunk_px, half_px, found, lens)
+
+
+def _palm(palm: DetectedPalm, found: Detections, lens: Intrinsics) -> Located:
+    """Locate a palm."""
+    hand = Located(
+        "hand",
+        (0.0, 0.0, 0.0),
+        None,
+        _HAND_RADIUS_M,
+        confidence=palm.confidence,
+        across_sd_m=_PALM_SD_M,
+    )
+    half_px = 0.25 * palm.size_px
+    return _by_length(hand, palm.centre_px, _PALM_M / palm.size_px, half_px, found, lens)
+
+
+def _by_length(
+    part: Located,
+    at_px: tuple[float, float],
+    m_per_px: float,
+    half_px: float,
+    found: Detections,
+    lens: Intrinsics,
+) -> Located:
+    """Return a part of a body at its depth, measured or by its length.
+
+    Args:
+        part: the part.
+        at_px: its centre.
+        m_per_px: usual length of the part over its length in the image.
+        half_px: half side of the square around the centre whose depth is read.
+        found: the frame.
+        lens: lens of the frame.
+    """
+    (x, y), side = at_px, 2.0 * half_px
+    depth = _depth(found, (x - half_px, y - half_px, side, side))
+    z, sd = sqrt(lens.fx_px * lens.fy_px) * m_per_px, _LENGTH_SPREAD
+    if depth is not None:
+        z, sd = depth[0], hypot(_LEAST_SD, 0.5 * depth[1] / depth[0])
+        z += _FACE_RADIUS_M if part.kind == "face" else 0.0  # the middle of a head
+    p_m = scale(vec(rays([at_px], lens)[0]), z)
+    return part._replace(p_m=p_m, depth_measured=depth is not None, along_sd_m=norm(p_m) * sd)
+
+
+def _depth(found: Detections, box: tuple[float, float, float, float]) -> tuple[float, float] | None:
+    """Return the measured depth in a box and its spread, None if it is uncertain."""
+    if found.depth_m is None:
+        return None
+    z, spread, valid = depth_at(found.depth_m, box)
+    if z is None or valid < _LEAST_SHARE or spread > _MOST_SPREAD_M:
+        return None
+    return z, spread
+
+
+def _depth_ratio(
+    face: DetectedFace, pose: FacePose, found: Detections
+) -> tuple[float, float] | None:
+    """Return the ratio of measured distance to distance from size, and its relative deviation.
+
+    Return None if the camera's depth does not give the distance of this face.
+    """
+    low, high = face.landmarks_px.min(axis=0), face.landmarks_px.max(axis=0)
+    (x, y), (width, height) = low.tolist(), (high - low).tolist()
+    depth = _depth(found, (x, y, width, height))
+    if depth is None:
+        return None
+    z, spread = depth
+    # Between eyes and mouth the surface is behind the tip of the nose, which defines the
+    # position.
+    behind = float((LANDMARKS_FACE_M @ np.array(pose.R_camera_face).T)[:, 2].mean())
+    share = (z - behind) / pose.p_camera_m[2]
+    if not 1.0 / _MOST_DEPTH_RATIO < share < _MOST_DEPTH_RATIO:
+        return None
+    return share, hypot(_LEAST_SD, 0.5 * spread / z)
 
 
 def _is_face_of(person: DetectedPerson, face: DetectedFace) -> bool:
@@ -284,45 +288,35 @@ def _is_on_chest(face: DetectedFace, other: DetectedFace) -> bool:
     return aside < _ASIDE * its_high and near * its_high < below < far * its_high
 
 
-def thing_in_camera(blob: MovingBlob, lens: Intrinsics | None = None) -> DetectionInCamera | None:
-    """Return a moving thing with the errors of its position, None if it has no position.
-
-    Args:
-        blob: the detected patch.
-        lens: lens of the frame; None: the upper end stays unknown.
-    """
-    far = norm(blob.p_camera_m)
-    if not (isfinite(far) and isfinite(blob.radius_m)):
+def _thing(blob: MovingBlob, lens: Intrinsics) -> Located | None:
+    """Return a moving thing with the errors of its position, None if a number is not finite."""
+    far, speed = norm(blob.p_camera_m), norm(blob.v_camera_m_s or (0.0, 0.0, 0.0))
+    fastest = *(blob.fastest_m or ()), *(blob.fastest_m_s or ())
+    numbers = far, speed, blob.radius_m, blob.spin_rad_s, blob.depth_sd_m, blob.thickness_m
+    if not all(map(isfinite, (*numbers, *fastest))):
         return None
-    drawn = blob.box_px is not None
-    v = blob.v_camera_m_s
-    if v is not None and not isfinite(norm(v)):
-        v = None
-    across = hypot(_FLOW_SHARE * (norm(v) if v else 0.0), far * _FLOW_RAD_S)
+    # The error of the growth may be infinite.
     shape = 0.0 if blob.depth_known else _SHAPE_1_S
-    loom_sd = blob.loom_sd_1_s if blob.loom_sd_1_s > 0.0 else _LOOM_SD_1_S
-    return DetectionInCamera(
+    loom_sd = min(hypot(blob.loom_sd_1_s or _LOOM_SD_1_S, shape), _MOST_LOOM_SD_1_S)
+    return Located(
         blob.kind,
         blob.p_camera_m,
         None,
         blob.radius_m,
-        blob.spin_rad_s if isfinite(blob.spin_rad_s) else 0.0,
-        1.0,
-        1.0,
-        blob.depth_known,
-        hypot(_PLACED_M, _MIDDLE_OF_RADIUS * blob.radius_m if drawn else 0.0),
-        hypot(_LEAST_SD * far, blob.depth_sd_m if isfinite(blob.depth_sd_m) else far),
-        v,
-        across,
-        far * (min(hypot(loom_sd, shape), 10.0) if isfinite(loom_sd) else 10.0),
-        None,
-        blob.id,
-        fastest_m=_finite(blob.fastest_m),
-        fastest_m_s=_finite(blob.fastest_m_s),
+        blob.spin_rad_s,
+        depth_measured=blob.depth_known,
+        across_sd_m=hypot(_PLACED_M, _MIDDLE_OF_RADIUS * blob.radius_m if blob.box_px else 0.0),
+        along_sd_m=hypot(_LEAST_SD * far, blob.depth_sd_m),
+        v_m_s=blob.v_camera_m_s,
+        across_sd_m_s=hypot(_FLOW_SHARE * speed, far * _FLOW_RAD_S),
+        along_sd_m_s=far * loom_sd,
+        detector_id=blob.id,
+        fastest_m=blob.fastest_m,
+        fastest_m_s=blob.fastest_m_s,
         compact=_is_compact(blob),
-        thickness_m=blob.thickness_m if isfinite(blob.thickness_m) else 0.0,
+        thickness_m=blob.thickness_m,
         from_side=blob.from_side,
-        upper_m=None if lens is None else _upper_end(blob, lens, far),
+        upper_m=_upper_end(blob, lens, far),
     )
 
 
@@ -333,8 +327,8 @@ def _upper_end(blob: MovingBlob, lens: Intrinsics, far_m: float) -> Vec3 | None:
     x, y, width, height = blob.box_px
     if not height > _UPRIGHT * width > 0.0:
         return None
-    x_ray, y_ray, z_ray = rays([(x + 0.5 * width, y + _HEAD_DOWN * height)], lens)[0].tolist()
-    return scale((x_ray, y_ray, z_ray), far_m / norm((x_ray, y_ray, z_ray)))
+    ray = vec(rays([(x + 0.5 * width, y + _HEAD_DOWN * height)], lens)[0])
+    return scale(ray, far_m / norm(ray))
 
 
 def _swept_m(blob: MovingBlob) -> float:
@@ -351,8 +345,3 @@ def _is_compact(blob: MovingBlob) -> bool:
         min(width, height) > _LEAST_ASPECT * max(width, height) > 0.0
         and blob.area_px > _LEAST_FILL * width * height
     )
-
-
-def _finite(vector: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
-    """Return a vector, None if it is missing or not finite."""
-    return vector if vector is not None and isfinite(norm(vector)) else None

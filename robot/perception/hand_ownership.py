@@ -13,14 +13,14 @@ differs.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from math import hypot
 
+from gazerig.drivers.types import Located
 from gazerig.gaze.angles import add, norm, perpendicular, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.kinematics import Capsule
 from gazerig.robot.perception.hands import Known
-from gazerig.robot.perception.track import UNNAMED, LocalisedDetection
+from gazerig.robot.perception.track import UNNAMED
 
 _HEAD_M, _HALF_WIDTH_M, _BELOW_M, _ABOVE_M = 0.25, 0.35, 1.7, 0.25
 # Tolerance in depth, in addition to two standard deviations.
@@ -29,18 +29,18 @@ _ALONG_WITH_M_S, _ALONG_WITH_SHARE = 0.3, 0.5
 
 
 def without_own_motion(
-    faces: list[LocalisedDetection],
-    things: Iterable[LocalisedDetection],
+    faces: list[Located],
+    things: Iterable[Located],
     before: Iterable[Known],
     p_camera: Vec3,
-) -> tuple[list[LocalisedDetection], list[LocalisedDetection]]:
+) -> tuple[list[Located], list[Located]]:
     """Return the faces with the spin of their own motion, and the things that belong to no face.
 
     before: tracked faces at their positions predicted for now
     """
     spins = [0.0] * len(faces)
     known = known_faces(faces, before)
-    others: list[LocalisedDetection] = []
+    others: list[Located] = []
     for thing in things:
         owner = _owner(thing, known, p_camera)
         if owner is None:
@@ -50,26 +50,26 @@ def without_own_motion(
             if off is not None and hypot(*off) < _HEAD_M:
                 spins[owner] = max(spins[owner], thing.spin_rad_s, key=abs)
     turned = [
-        replace(face, spin_rad_s=spin) if spin != 0.0 else face
+        face._replace(spin_rad_s=spin) if spin != 0.0 else face
         for face, spin in zip(faces, spins, strict=True)
     ]
     return turned, others
 
 
-def known_faces(faces: list[LocalisedDetection], before: Iterable[Known]) -> list[Known]:
+def known_faces(faces: list[Located], before: Iterable[Known]) -> list[Known]:
     """Return the faces of a frame with the velocities of their tracks, and those tracks.
 
     A face that the detector has just missed still owns its body's motion.
     """
     tracked, found = list(before), []
     for face in faces:
-        near = [(norm(sub(p, face.p_world_m)), v) for p, v in tracked]
+        near = [(norm(sub(p, face.p_m)), v) for p, v in tracked]
         away, v = min(near, key=lambda pair: pair[0], default=(1.0, None))
-        found.append((face.p_world_m, v if away < _HEAD_M else None))
+        found.append((face.p_m, v if away < _HEAD_M else None))
     return [*found, *tracked]
 
 
-def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int | None:
+def _owner(thing: Located, faces: list[Known], p_camera: Vec3) -> int | None:
     """Return the index of the face to which a patch belongs, None without one."""
     if thing.kind != UNNAMED:
         return None
@@ -84,15 +84,13 @@ def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int
     return None
 
 
-def _offset_from_face(
-    thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3
-) -> tuple[float, float] | None:
+def _offset_from_face(thing: Located, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] | None:
     """Return the sideways and upward offset of a patch from a face; None if its depth differs.
 
     A patch whose distance is only assumed is placed at the face's distance.
     """
     far = norm(sub(p_face, p_camera))
-    way = sub(thing.p_world_m, p_camera)
+    way = sub(thing.p_m, p_camera)
     if thing.depth_measured and abs(norm(way) - far) > _DEEP_M + 2.0 * thing.along_sd_m:
         return None
     place = add(p_camera, scale(unit(way), far))
@@ -100,14 +98,12 @@ def _offset_from_face(
     return hypot(x, y), z
 
 
-def _moves_along(
-    thing: LocalisedDetection, p_face: Vec3, v_face: Vec3 | None, p_camera: Vec3
-) -> bool:
+def _moves_along(thing: Located, p_face: Vec3, v_face: Vec3 | None, p_camera: Vec3) -> bool:
     """Return whether a patch moves across the view as the face does; also if unknown."""
-    if thing.v_world_m_s is None or v_face is None:
+    if thing.v_m_s is None or v_face is None:
         return True
-    way = sub(thing.p_world_m, p_camera)
-    v = thing.v_world_m_s
+    way = sub(thing.p_m, p_camera)
+    v = thing.v_m_s
     if not thing.depth_measured:
         v = scale(v, norm(sub(p_face, p_camera)) / max(norm(way), 1e-6))
     across = norm(perpendicular(sub(v, v_face), unit(way)))
@@ -123,8 +119,8 @@ _MARGIN_M = 0.05
 
 
 def label_own_body(
-    things: list[LocalisedDetection], parts: Sequence[Capsule], p_camera: Vec3
-) -> list[LocalisedDetection]:
+    things: list[Located], parts: Sequence[Capsule], p_camera: Vec3
+) -> list[Located]:
     """Return the things, with the kind OWN for parts of the robot's own body.
 
     Args:
@@ -136,16 +132,16 @@ def label_own_body(
     if not seen:
         return things
     return [
-        replace(thing, kind=OWN)
+        thing._replace(kind=OWN)
         if thing.kind == UNNAMED and any(_is_part(thing, part, p_camera) for part in seen)
         else thing
         for thing in things
     ]
 
 
-def _is_part(thing: LocalisedDetection, part: Capsule, p_camera: Vec3) -> bool:
+def _is_part(thing: Located, part: Capsule, p_camera: Vec3) -> bool:
     """Return whether a thing is a part of the head."""
-    way = sub(thing.p_world_m, p_camera)
+    way = sub(thing.p_m, p_camera)
     hit_m = part.hit_m(p_camera, unit(way))
     if hit_m is None:
         return False

@@ -20,14 +20,15 @@ as a hand.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import hypot, inf
 from typing import NamedTuple
 
+from gazerig.drivers.types import Located
 from gazerig.gaze.angles import add, dot, norm, perpendicular, scale, sub, unit
 from gazerig.gaze.types import Vec3
-from gazerig.robot.perception.track import UNNAMED, LocalisedDetection
+from gazerig.robot.perception.track import UNNAMED
 
 HAND = "hand"
 Known = tuple[Vec3, Vec3 | None]
@@ -92,7 +93,7 @@ class _MovingPatch:
 
     at_s: float
     p_face: Vec3
-    hand: LocalisedDetection
+    hand: Located
     entered: bool
     frames: int = 0
     large_frames: int = 0
@@ -100,7 +101,7 @@ class _MovingPatch:
     distance_share: float = 1.0
     palm_s: float = -inf
 
-    def update_distance(self, thing: LocalisedDetection, arm: "_Arm") -> None:
+    def update_distance(self, thing: Located, arm: "_Arm") -> None:
         """Update the distance from the size.
 
         Args:
@@ -132,7 +133,7 @@ class _MovingPatch:
 class _RestingHand(NamedTuple):
     """A hand at rest, and the time until which it is kept."""
 
-    hand: LocalisedDetection
+    hand: Located
     until_s: float
 
 
@@ -146,12 +147,12 @@ class Hands:
 
     def label(
         self,
-        things: Iterable[LocalisedDetection],
+        things: Iterable[Located],
         faces: list[Known],
         p_camera: Vec3,
         t_s: float,
-        palms: Sequence[LocalisedDetection] | None = None,
-    ) -> list[LocalisedDetection]:
+        palms: Sequence[Located] | None = None,
+    ) -> list[Located]:
         """Return the things; hands get the kind HAND and the position of the hand.
 
         Hands at rest are at the end of the list.
@@ -175,8 +176,8 @@ class Hands:
         if not self._resting:
             return found
         # Only hands at rest without motion; the detector finds moving hands again itself.
-        marks = {thing.mark for thing in found}
-        moving = [thing for thing in found if thing.mark in self._moving]
+        marks = {thing.detector_id for thing in found}
+        moving = [thing for thing in found if thing.detector_id in self._moving]
         self._resting = {
             mark: one
             for mark, one in self._resting.items()
@@ -191,8 +192,8 @@ class Hands:
         return bool(self._resting)
 
     def _accept_palms(
-        self, palms: Sequence[LocalisedDetection], faces: list[Known], p_camera: Vec3
-    ) -> list[LocalisedDetection]:
+        self, palms: Sequence[Located], faces: list[Known], p_camera: Vec3
+    ) -> list[Located]:
         """Return the accepted palms, no farther away than the nearest person.
 
         A hand that is turned aside looks smaller. A palm on the head (often a neck) or of low
@@ -207,21 +208,19 @@ class Hands:
         for palm in palms:
             there = _place_at_distance(palm, far, p_camera)
             on_head = hypot(*_offset_from_face(there, p_face)) < _HEAD_M
-            if _horizontal_distance_m(palm.p_world_m, p_camera) > far:
-                palm = replace(palm, p_world_m=there)
+            if _horizontal_distance_m(palm.p_m, p_camera) > far:
+                palm = palm._replace(p_m=there)
             if (palm.confidence >= _SURE and not on_head) or self._is_recent(palm, p_camera):
                 found.append(palm)
         return found
 
-    def _is_recent(self, thing: LocalisedDetection, p_camera: Vec3) -> bool:
+    def _is_recent(self, thing: Located, p_camera: Vec3) -> bool:
         """Return whether something is at the position of a recent hand."""
         hands = [one.hand for one in self._moving.values() if one.frames >= _FRAMES]
         hands += [one.hand for one in self._resting.values()]
         return any(_distance_from_hand(thing, hand, p_camera) < _AGAIN_M for hand in hands)
 
-    def _keep_palm(
-        self, palm: LocalisedDetection, found: list[LocalisedDetection], p_camera: Vec3, t_s: float
-    ) -> None:
+    def _keep_palm(self, palm: Located, found: list[Located], p_camera: Vec3, t_s: float) -> None:
         """Keep a palm without a patch until the next search, under the number of its hand."""
         if any(_is_at(palm, thing, p_camera) for thing in found if thing.kind == HAND):
             return
@@ -229,21 +228,21 @@ class Hands:
         if mark is None:
             self._palm_mark -= 1
             mark = self._palm_mark
-        hand = replace(palm, mark=mark, v_world_m_s=(0.0, 0.0, 0.0))
+        hand = palm._replace(detector_id=mark, v_m_s=(0.0, 0.0, 0.0))
         self._resting[mark] = _RestingHand(hand, t_s + _PALM_S)
 
     def _label(
         self,
-        thing: LocalisedDetection,
+        thing: Located,
         faces: list[Known],
         p_camera: Vec3,
         t_s: float,
-        palms: list[LocalisedDetection],
-    ) -> LocalisedDetection:
+        palms: list[Located],
+    ) -> Located:
         """Return a patch with its kind; its palm, if any, is removed from the given palms."""
-        if thing.kind != UNNAMED or thing.mark is None or not faces:
+        if thing.kind != UNNAMED or thing.detector_id is None or not faces:
             return thing
-        known = self._moving.get(thing.mark)
+        known = self._moving.get(thing.detector_id)
         arm = _arm_of(thing, faces, p_camera, None if known is None else known.p_face)
         if arm is None:
             return thing
@@ -264,23 +263,23 @@ class Hands:
             or speed > (_STAYS_M_S if named else max(begins, norm(v_face)))
         ):
             new = _MovingPatch(t_s, p_face, thing, thing.from_side)
-            known = self._moving.setdefault(thing.mark, new)
+            known = self._moving.setdefault(thing.detector_id, new)
             before_s, known.at_s, known.p_face = known.at_s, t_s, p_face
             if palm is not None:
                 palms.remove(palm)
                 known.palm_s = t_s
                 known.distance_share = _horizontal_distance_m(
-                    palm.p_world_m, p_camera
+                    palm.p_m, p_camera
                 ) / _horizontal_distance_m(arm.tip_m, p_camera)
             elif t_s - known.palm_s > _PALM_S:
                 known.update_distance(thing, arm)
             hand = _as_hand(thing, arm, known.distance_share, p_camera)
             if palm is not None:
-                hand = replace(hand, p_world_m=palm.p_world_m, along_sd_m=palm.along_sd_m)
+                hand = hand._replace(p_m=palm.p_m, along_sd_m=palm.along_sd_m)
             elif t_s - known.palm_s <= _PALM_S:
                 # The palm that was seen is more certain than the end of the arm.
-                way = scale(hand.v_world_m_s or (0.0, 0.0, 0.0), t_s - before_s)
-                hand = replace(hand, p_world_m=add(known.hand.p_world_m, way))
+                way = scale(hand.v_m_s or (0.0, 0.0, 0.0), t_s - before_s)
+                hand = hand._replace(p_m=add(known.hand.p_m, way))
             known.hand = hand
             if comes or palm is not None:
                 known.frames += _FRAMES
@@ -289,7 +288,7 @@ class Hands:
         if known is None or known.frames < _FRAMES:
             return thing
         if speed >= _AT_REST_M_S:
-            self._resting.pop(thing.mark, None)
+            self._resting.pop(thing.detector_id, None)
             return known.hand
         # A patch that hardly moves may be the whole person: the hand stays at its last motion, and
         # is kept no longer than a palm if palms are searched.
@@ -297,13 +296,13 @@ class Hands:
         if t_s - self._searched_s < _HELD_S:
             until_s = max(known.at_s, known.palm_s) + _PALM_S
         if t_s > until_s:
-            self._resting.pop(thing.mark, None)
+            self._resting.pop(thing.detector_id, None)
             return thing
-        still = replace(known.hand, v_world_m_s=(0.0, 0.0, 0.0))
-        self._resting[thing.mark] = _RestingHand(still, until_s)
+        still = known.hand._replace(v_m_s=(0.0, 0.0, 0.0))
+        self._resting[thing.detector_id] = _RestingHand(still, until_s)
         return known.hand if known.at_s == t_s else still
 
-    def _is_arm(self, thing: LocalisedDetection, arm: "_Arm", p_camera: Vec3) -> bool:
+    def _is_arm(self, thing: Located, arm: "_Arm", p_camera: Vec3) -> bool:
         """Return whether a patch is an arm, at a palm, or the remainder of a recent hand."""
         if arm.attached or arm.comes_in:
             return True
@@ -313,38 +312,31 @@ class Hands:
         )
 
 
-def _is_at(palm: LocalisedDetection, thing: LocalisedDetection, p_camera: Vec3) -> bool:
+def _is_at(palm: Located, thing: Located, p_camera: Vec3) -> bool:
     """Return whether a patch or a hand is at a palm."""
-    far = _horizontal_distance_m(palm.p_world_m, p_camera)
-    if (
-        thing.depth_measured
-        and abs(_horizontal_distance_m(thing.p_world_m, p_camera) - far) > _REACH_M
-    ):
+    far = _horizontal_distance_m(palm.p_m, p_camera)
+    if thing.depth_measured and abs(_horizontal_distance_m(thing.p_m, p_camera) - far) > _REACH_M:
         return False
-    radius_m = thing.radius_m * far / _horizontal_distance_m(thing.p_world_m, p_camera)
+    radius_m = thing.radius_m * far / _horizontal_distance_m(thing.p_m, p_camera)
     if _distance_from_hand(thing, palm, p_camera) < _AT_PALM_M + radius_m:
         return True
     if thing.kind != UNNAMED or thing.fastest_m is None:
         return False
-    return (
-        _distance_from_hand(replace(thing, p_world_m=thing.fastest_m), palm, p_camera) < _AT_PALM_M
-    )
+    return _distance_from_hand(thing._replace(p_m=thing.fastest_m), palm, p_camera) < _AT_PALM_M
 
 
-def _distance_from_hand(
-    thing: LocalisedDetection, hand: LocalisedDetection, p_camera: Vec3
-) -> float:
+def _distance_from_hand(thing: Located, hand: Located, p_camera: Vec3) -> float:
     """Return the distance of a thing from a hand; unmeasured depth counts as the hand's."""
-    place = _place_at_distance(thing, _horizontal_distance_m(hand.p_world_m, p_camera), p_camera)
-    return norm(sub(place, hand.p_world_m))
+    place = _place_at_distance(thing, _horizontal_distance_m(hand.p_m, p_camera), p_camera)
+    return norm(sub(place, hand.p_m))
 
 
-def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection], p_camera: Vec3) -> bool:
+def _moves_again(hand: Located, found: list[Located], p_camera: Vec3) -> bool:
     """Return whether a hand moves at the position of one at rest, as far as known."""
     for one in found:
         if one.kind == HAND:
             nearer, farther = sorted(
-                (hand, one), key=lambda each: _horizontal_distance_m(each.p_world_m, p_camera)
+                (hand, one), key=lambda each: _horizontal_distance_m(each.p_m, p_camera)
             )
             if _distance_from_hand(nearer, farther, p_camera) < _AGAIN_M:
                 return True
@@ -371,15 +363,13 @@ class _Arm(NamedTuple):
     comes_in: bool
 
 
-def _arm_of(
-    thing: LocalisedDetection, faces: list[Known], p_camera: Vec3, last: Vec3 | None
-) -> _Arm | None:
+def _arm_of(thing: Located, faces: list[Known], p_camera: Vec3, last: Vec3 | None) -> _Arm | None:
     """Return a patch as an arm of its likely person, None without one.
 
     last: face of the owner in the previous frame, who remains the owner
     """
-    p_tip = thing.p_world_m if thing.fastest_m is None else thing.fastest_m
-    v_tip = thing.v_world_m_s if thing.fastest_m_s is None else thing.fastest_m_s
+    p_tip = thing.p_m if thing.fastest_m is None else thing.fastest_m
+    v_tip = thing.v_m_s if thing.fastest_m_s is None else thing.fastest_m_s
     away = _horizontal_distance_m(p_tip, p_camera)
     best, least = None, inf
     for face in faces:
@@ -394,14 +384,14 @@ def _arm_of(
         if large or not -_BELOW_M < up < _ABOVE_M or hypot(aside, up) >= _REACH_M:
             continue
         # The arm continues from the hand through the patch's centre to the shoulder.
-        middle = add(p_camera, scale(sub(thing.p_world_m, p_camera), ratio))
+        middle = add(p_camera, scale(sub(thing.p_m, p_camera), ratio))
         shoulder_m = _off_shoulder(sub(scale(middle, 2.0), tip), face[0])
         off_m = shoulder_m
         if last is not None and norm(sub(last, face[0])) < _SAME_M:
             off_m -= _REACH_M
         if off_m < least:
             v = (0.0, 0.0, 0.0) if v_tip is None else scale(v_tip, ratio)
-            slower_m_s = _AS_FAST * ratio * norm(thing.v_world_m_s or (0.0, 0.0, 0.0))
+            slower_m_s = _AS_FAST * ratio * norm(thing.v_m_s or (0.0, 0.0, 0.0))
             attached = (
                 shoulder_m < _ATTACHED_M
                 and ratio * thing.radius_m > _SMALLEST_M
@@ -422,9 +412,7 @@ def _off_shoulder(p_m: Vec3, p_face: Vec3) -> float:
     return hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
 
 
-def _as_hand(
-    thing: LocalisedDetection, arm: _Arm, nearer: float, p_camera: Vec3
-) -> LocalisedDetection:
+def _as_hand(thing: Located, arm: _Arm, nearer: float, p_camera: Vec3) -> Located:
     """Return a patch as a hand at its fastest part.
 
     Args:
@@ -433,11 +421,10 @@ def _as_hand(
         nearer: its distance relative to the person's.
         p_camera: position of the camera.
     """
-    return replace(
-        thing,
+    return thing._replace(
         kind=HAND,
-        p_world_m=add(p_camera, scale(sub(arm.tip_m, p_camera), nearer)),
-        v_world_m_s=scale(arm.tip_m_s, nearer),
+        p_m=add(p_camera, scale(sub(arm.tip_m, p_camera), nearer)),
+        v_m_s=scale(arm.tip_m_s, nearer),
         radius_m=_HAND_RADIUS_M,
         spin_rad_s=0.0,
         across_sd_m=_ACROSS_SD_M,
@@ -447,12 +434,12 @@ def _as_hand(
     )
 
 
-def _place_at_distance(thing: LocalisedDetection, far_m: float, p_camera: Vec3) -> Vec3:
+def _place_at_distance(thing: Located, far_m: float, p_camera: Vec3) -> Vec3:
     """Return the position of a thing at a distance, or at its own distance if that was measured."""
     if thing.depth_measured:
-        return thing.p_world_m
-    ratio = far_m / _horizontal_distance_m(thing.p_world_m, p_camera)
-    return add(p_camera, scale(sub(thing.p_world_m, p_camera), ratio))
+        return thing.p_m
+    ratio = far_m / _horizontal_distance_m(thing.p_m, p_camera)
+    return add(p_camera, scale(sub(thing.p_m, p_camera), ratio))
 
 
 def _horizontal_distance_m(p_m: Vec3, p_camera: Vec3) -> float:
@@ -466,10 +453,10 @@ def _offset_from_face(p_m: Vec3, p_face: Vec3) -> tuple[float, float]:
     return hypot(x, y), z
 
 
-def _approaches(thing: LocalisedDetection, p_camera: Vec3) -> bool:
+def _approaches(thing: Located, p_camera: Vec3) -> bool:
     """Return whether a patch certainly grows as fast as an approaching hand."""
-    if thing.v_world_m_s is None:
+    if thing.v_m_s is None:
         return False
-    way = sub(thing.p_world_m, p_camera)
-    closing_m_s = -dot(thing.v_world_m_s, unit(way)) - _SURE_SD * thing.along_sd_m_s
+    way = sub(thing.p_m, p_camera)
+    closing_m_s = -dot(thing.v_m_s, unit(way)) - _SURE_SD * thing.along_sd_m_s
     return closing_m_s > _COMES_1_S * norm(way)

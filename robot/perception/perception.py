@@ -6,7 +6,6 @@ its present pose. Motion of a person's own body is separated from that of other 
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from math import cos, hypot, radians, sqrt
 
 import numpy as np
@@ -18,7 +17,7 @@ from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
+from gazerig.robot.perception.frame_locator import SIZE_SPREAD, FrameLocator
 from gazerig.robot.perception.hand_ownership import (
     OwnParts,
     known_faces,
@@ -52,7 +51,6 @@ class Perception:
         parts_face_m: measured positions of one person's face parts in the face frame, instead of
             the average ones (Nakamoto & Tsuruno 3.7).
         lens: calibrated lens, used for frames with the aspect ratio of the calibration.
-        depth_at: reads depth images; without it, distances come from the size of faces.
         own_parts: positions of the robot's own head and neck; None: they count as other things.
     """
 
@@ -63,14 +61,13 @@ class Perception:
         tracker: Tracker,
         parts_face_m: Mapping[str, Vec3] | None = None,
         lens: LensParams | None = None,
-        depth_at: DepthAt | None = None,
         own_parts: OwnParts | None = None,
     ) -> None:
         self._mount = mount
         self._own_parts = own_parts
         own = parts_face_m or {}
         self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
-        self._locator = FrameLocator(lens, radians(horizontal_field_deg), depth_at)
+        self._locator = FrameLocator(lens, radians(horizontal_field_deg))
         self._tracker = tracker
         self._hands = Hands()
         self._tracks: tuple[BodyTrack, ...] = ()
@@ -120,7 +117,7 @@ class Perception:
             things = [
                 thing
                 if thing.kind != UNNAMED or thing.upper_m is None
-                else replace(thing, p_world_m=thing.upper_m)
+                else thing._replace(p_m=thing.upper_m)
                 for thing in things
             ]
         tracked = self._tracker.step([*faces, *things], p, t_s)
@@ -171,9 +168,9 @@ class Perception:
             if track.seen_s == t_s:
                 track.speech = track.speech.advance(signs.mouth_opening_m, t_s)
                 if signs.eye_opening is not None:
-                    track.eyes = EyeObservation(found.gaze_world, signs.eye_opening, t_s)
+                    track.eyes = EyeObservation(found.gaze, signs.eye_opening, t_s)
             eyes = None if track.eyes is None else track.eyes.at(t_s)
-        gaze = found.gaze_world if eyes is None else eyes.gaze_world
+        gaze = found.gaze if eyes is None else eyes.gaze_world
         off_rad = angle_off_head_rad(R, gaze, sub(self._p_head, p))
         # A blink does not end a look at the head.
         blinks = eyes is not None and eyes.opening < EYES_SHUT

@@ -6,137 +6,33 @@ relative to these uncertainties (data_association), and a Kalman filter of direc
 (kalman) updates each track with its detection.
 
 If people are confused while hidden, the colours of their clothes, learned over many frames, restore
-their numbers. People are numbered from 1; a person who returns keeps the number (returning_people).
+their numbers. People are numbered from 1; a person who returns keeps the number (identities).
 Things are numbered separately.
 """
 
-from math import inf, sqrt
+from math import inf
 
-from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
+from gazerig.drivers.types import Located
+from gazerig.gaze.angles import add, cross, scale, sub, unit
 from gazerig.gaze.types import FIRST_THING, Mat3, Vec3
 from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.data_association import (
-    FORBIDDEN,
-    GATE_M,
-    NO_MARK,
+    FASTEST_M_S,
     UNPAIRED,
-    DetectionRow,
-    TrackRow,
     assign,
-    clothing_costs,
     pair_costs,
 )
-from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter, view_and_range
-from gazerig.robot.perception.returning_people import SeenPerson, find_returned
+from gazerig.robot.perception.identities import find_returned, resolve_identities
+from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter
 from gazerig.robot.perception.track import (
     FACE,
+    FORGET_S,
+    IN_SIGHT_S,
     UNNAMED,
     BodyTrack,
-    KnownClothes,
-    LocalisedDetection,
+    SeenPerson,
+    clothing_costs,
 )
-
-# Number of frames with clothes after which they identify a person; number below which the person
-# may be one who returned.
-_CLOTHES_PROVED, _OWN = 3, 60
-# A person who is not seen for longer than this is lost.
-_LOST_S = 0.25
-# Number of frames that confirm a person's clothes; largest number that counts; cost above which
-# clothes do not match.
-_CONFIRMED, _MOST_CONFIRMED, _MISFITS = 3.0, 6.0, 2.0
-# Cost below which clothes match; advantage, summed over frames, at which two people exchange their
-# numbers; largest advantage of one frame.
-_FITS, _SURE, _MOST_OF_FRAME = -1.0, 9.0, 6.0
-# Fraction of a doubt that remains after a frame without evidence for it.
-_DOUBT_KEPT = 0.9
-
-
-def resolve_identities(
-    tracks: list[BodyTrack],
-    worn: list[list[float]],
-    column: dict[int, int],
-    detections: list[LocalisedDetection],
-) -> None:
-    """Restore by their clothes the numbers of people who were confused while hidden.
-
-    A person who emerges from behind another shows the face first, and the clothes later.
-
-    Args:
-        tracks: all tracks; one that turns out to be a copy of another is removed.
-        worn: cost of the clothes of each pair of track and detection.
-        column: the detection of each track that has one.
-        detections: detections of the frame.
-    """
-    sure = True
-    for i, j in column.items():
-        track, own = tracks[i], worn[i][j]
-        clothing, known = detections[j].clothing, track.clothes
-        if clothing is None or not track.is_person:
-            continue
-        new = max(own, 0.0) if known.frames < _OWN else own  # may be a person who returned
-        if new < _FITS:
-            known.confirmed = min(known.confirmed + clothing.share, _MOST_CONFIRMED)
-        elif own > _MISFITS:
-            known.confirmed -= clothing.share
-        if known.confirmed >= _CONFIRMED:
-            known.doubts, known.lost_sight = {}, False
-            continue
-        before, known.doubts = known.doubts, {}
-        for k, other in enumerate(tracks):
-            lost = other.at_s - other.seen_s > _LOST_S
-            if not lost and not (k in column and (known.lost_sight or other.clothes.lost_sight)):
-                continue
-            if k != i and other.clothes.frames >= _CLOTHES_PROVED and other.is_person:
-                gain = max((new if lost else own) - worn[k][j], -_MOST_OF_FRAME)
-                gain = min(gain, _MOST_OF_FRAME if worn[k][j] < _FITS else 0.0)
-                doubt = _DOUBT_KEPT * before.get(other.id, 0.0) + gain
-                if doubt > 1.0:
-                    known.doubts[other.id] = doubt
-                    sure = sure and doubt < _SURE
-    if not sure:
-        unsure = [tracks[i] for i in column if tracks[i].clothes.confirmed < _CONFIRMED]
-        _renumber(tracks, [track for track in unsure if track.is_person])
-
-
-def _renumber(tracks: list[BodyTrack], seen: list[BodyTrack]) -> None:
-    """Exchange the numbers of the tracks in sight so that they match all of them best."""
-    people = [
-        track
-        for track in tracks
-        if track.is_person and (track in seen or track.at_s - track.seen_s > _LOST_S)
-    ]
-    costs = [
-        [
-            0.0 if one is other else _SURE - one.clothes.doubts.get(other.id, 0.0)
-            if other.seen_s == other.at_s or _reachable(one, other) else FORBIDDEN
-            for other in people
-        ]
-        for one in seen
-    ]  # fmt: skip
-    persons = [(one.id, one.clothes.colours, one.clothes.frames) for one in people]
-    place = {column: seen[row] for row, column in assign(costs)}
-    free = [one for one in people if one not in place.values()]
-    for k, one in enumerate(people):
-        if k not in place and one in free:
-            place[k] = one
-            free.remove(one)
-    for k, (number, colours, frames) in enumerate(persons):
-        one = place[k] if k in place else free.pop()
-        if one is not people[k]:
-            one.id = number
-            one.clothes = KnownClothes(colours, frames, lost_sight=one.clothes.lost_sight)
-            one.returned_person, one.is_number_final = None, True
-            if one.seen_s < one.at_s and frames < _OWN:
-                tracks.remove(one)  # the supposed new person was this one
-
-
-def _reachable(one: BodyTrack, other: BodyTrack) -> bool:
-    """Return whether a person out of sight can have reached the position of a track."""
-    known = 2.0 * sqrt(one.filter.along.p + other.filter.along.p)
-    gone = _GATE_SPEED_M_S * (other.at_s - other.seen_s)
-    reach = GATE_M * max(1.0, one.filter.range_m) + gone + known
-    return norm(sub(one.p_world_m, other.p_world_m)) < reach
-
 
 _OF_FACES = ProcessNoise(0.12, 10.0)
 """The usual acceleration of faces: smaller values give smoother tracks, larger ones follow changes
@@ -146,18 +42,11 @@ _FIRST_SPEED_M_S = 0.7
 """Standard deviation of the speed of a new track."""
 _TURN_GAIN, _GAIN = 0.3, 0.15
 """Weights of a new frame in the smoothed orientation, and length and size, of a face."""
-_COAST_S, _COAST_PERSON_S = 0.25, 1.2
-"""A track without a detection is still reported for this long; a person whose face is not visible
-for longer, as people are searched rarely."""
-_FORGET_S = 1.5
-"""A track without a detection is deleted after this long; what returns later is a new one."""
+_COAST_PERSON_S = 1.2
+"""A person whose face is not visible is reported for longer, as people are searched rarely."""
 _REMEMBER_FACE_S = 20.0
 """A face that is not visible for longer is remembered for this time: it is recognised within
 ``GATE_M``, and is a target if no face is visible."""
-_GATE_SPEED_M_S = 1.0
-"""Speed at which ``GATE_M`` widens while a track gets no detection."""
-_FASTEST_M_S, _UPRIGHT_M2, _STOOPS_M_S = 4.0, 0.03**2, 0.03
-_PROVED = 3
 # A person in fewer frames than this may be a false detection, whose number is reused. Number of
 # frames with clothes after which the number is final. Largest number of stored people who left.
 _KNOWN, _CLOTHED, _MOST_LEFT = 10, 5, 30
@@ -176,18 +65,17 @@ class Tracker:
         self._next_person, self._next_thing = 1, FIRST_THING
         self._free: set[int] = set()
         self._left: list[SeenPerson] = []
-        self._worn: list[list[float]] | None = None
 
     def forget(self) -> None:
         """End all identities, after a change of the scene. Numbers are not reused."""
         self._tracks, self._left = [], []
 
     def step(
-        self, detections: list[LocalisedDetection], p_world_camera_m: Vec3, t_s: float
+        self, detections: list[Located], p_world_camera_m: Vec3, t_s: float
     ) -> tuple[BodyTrack, ...]:
         """Associate the detections of one frame with the tracks; return the tracks in sight."""
         for track in self._tracks:
-            if not self._is_remembered(track):
+            if not track.is_remembered:
                 track.filter.predict(
                     t_s - track.at_s,
                     track.seen_s == track.at_s,
@@ -196,24 +84,31 @@ class Tracker:
                 )
             track.filter.look_from(p_world_camera_m)
             track.at_s = t_s
-        pairs = assign(self._costs(detections, p_world_camera_m), UNPAIRED)
+        worn = clothing_costs(
+            [track.clothes.colours for track in self._tracks],
+            [found.clothing for found in detections],
+        )
+        costs = pair_costs(self._tracks, detections, p_world_camera_m, worn)
+        pairs = assign(costs, UNPAIRED)
         for i, j in pairs:
             self._update_track(self._tracks[i], detections[j], p_world_camera_m)
-        if self._worn is not None:
+        if worn is not None:
             given = {t.id for t in self._tracks if t.is_person and t.returned_person is None}
-            resolve_identities(self._tracks, self._worn, dict(pairs), detections)
+            resolve_identities(self._tracks, worn, dict(pairs), detections)
             self._free |= given - {t.id for t in self._tracks}
         taken = {j for _, j in pairs}
         renamed = {
-            found.mark for found in detections if found.mark is not None and found.kind != UNNAMED
+            found.detector_id
+            for found in detections
+            if found.detector_id is not None and found.kind != UNNAMED
         }
         # A thing that is later recognised as a hand is not new: it keeps its number.
-        ids = {t.detection.mark: t.id for t in self._tracks if _is_another_now(t, renamed)}
+        ids = {t.detection.detector_id: t.id for t in self._tracks if _is_another_now(t, renamed)}
         for j, detection in enumerate(detections):
             if j not in taken:
                 track = self._begin_track(detection, p_world_camera_m, t_s)
                 if detection.kind not in (UNNAMED, FACE):
-                    track.id = ids.pop(detection.mark, track.id)
+                    track.id = ids.pop(detection.detector_id, track.id)
                 self._tracks.append(track)
         for track in self._tracks:
             if track.is_person and not track.is_number_final and track.clothes.frames >= _CLOTHED:
@@ -222,89 +117,43 @@ class Tracker:
         kept = [
             t
             for t in self._tracks
-            if t_s - t.seen_s <= self._kept_s(t) and not _is_another_now(t, renamed)
+            if t.unseen_s <= self._kept_s(t) and not _is_another_now(t, renamed)
         ]
         for track in self._tracks:
             if track.is_person and track not in kept:
                 self._retire_track(track)
         self._tracks = kept
-        return tuple([t for t in self._tracks if t_s - t.seen_s <= self._coasts_s(t)])
+        return tuple([t for t in self._tracks if t.unseen_s <= self._coasts_s(t)])
 
     def shows_face(self, track: BodyTrack) -> bool:
         """Return whether the face of a person was seen recently."""
-        return track.R_world_face is not None and track.at_s - track.faced_s <= _COAST_S
+        return track.R_world_face is not None and track.at_s - track.faced_s <= IN_SIGHT_S
 
     def _coasts_s(self, track: BodyTrack) -> float:
         """Return the time for which a track without a detection is still reported."""
         by_body = track.is_person and track.seen_s > track.faced_s and track.frames > 1
-        return _COAST_PERSON_S if by_body else _COAST_S
+        return _COAST_PERSON_S if by_body else IN_SIGHT_S
 
     def _kept_s(self, track: BodyTrack) -> float:
         """Return the time for which a track is kept without a detection."""
-        return _REMEMBER_FACE_S if track.is_person and track.frames >= _KNOWN else _FORGET_S
+        return _REMEMBER_FACE_S if track.is_person and track.frames >= _KNOWN else FORGET_S
 
-    def _is_remembered(self, track: BodyTrack) -> bool:
-        """Return whether a track has been out of sight for so long that it is assumed to stay."""
-        return track.at_s - track.seen_s > _FORGET_S
-
-    def _costs(self, detections: list[LocalisedDetection], p_camera: Vec3) -> list[list[float]]:
-        """Return the cost of every pair of track and detection."""
-        kinds: dict[str, int] = {}
-        rows = [
-            DetectionRow(
-                kinds.setdefault(found.kind, len(kinds)),
-                _mark(found),
-                *_sight(found.p_world_m, p_camera),
-                found.across_sd_m,
-                found.along_sd_m,
-                found.radius_m,
-                not found.depth_measured and found.R_world_face is not None,
-            )
-            for found in detections
-        ]
-        tracks = []
-        for track in self._tracks:
-            unseen_s, person = track.at_s - track.seen_s, track.is_person
-            gone_m = _GATE_SPEED_M_S * unseen_s
-            row = TrackRow(
-                kinds.get(track.detection.kind, -1),
-                _mark(track.detection),
-                *track.filter.view,
-                track.filter.range_m,
-                track.filter.across.p,
-                track.filter.along.p,
-                track.detection.radius_m,
-                1.0 if track.depth_s is None else track.face_size,
-                0.0 if self._is_remembered(track) else gone_m,
-                unseen_s <= _COAST_S,
-                gone_m,
-                _FASTEST_M_S * unseen_s if person else inf,
-                _UPRIGHT_M2 + (_STOOPS_M_S * unseen_s) ** 2 if person else inf,
-                track.frames >= _PROVED,
-            )
-            tracks.append(row)
-        self._worn = clothing_costs(
-            [track.clothes.colours for track in self._tracks],
-            [found.clothing for found in detections],
-        )
-        return pair_costs(tracks, rows, self._worn)
-
-    def _begin_track(self, detection: LocalisedDetection, p_camera: Vec3, t_s: float) -> BodyTrack:
+    def _begin_track(self, detection: Located, p_camera: Vec3, t_s: float) -> BodyTrack:
         track = BodyTrack(
             0,
             detection,
             TrackFilter(
-                detection.p_world_m,
+                detection.p_m,
                 p_camera,
                 (detection.across_sd_m, detection.along_sd_m),
                 _FIRST_SPEED_M_S,
                 _OF_FACES if detection.kind == FACE else _OF_THINGS,
             ),
-            detection.R_world_face,
+            detection.R_face,
             t_s,
             t_s,
             detection.face_length,
-            faced_s=t_s if detection.R_world_face is not None else -inf,
+            faced_s=t_s if detection.R_face is not None else -inf,
         )
         self._learn_size(track, detection, 1.0)
         track.clothes.learn(detection.clothing)
@@ -320,9 +169,7 @@ class Tracker:
         if track.returned_person is not None:
             self._left.append(track.returned_person)
         gone = [
-            one
-            for one in self._tracks
-            if one.is_person and one is not track and self._is_remembered(one)
+            one for one in self._tracks if one.is_person and one is not track and one.is_remembered
         ]
         before, known = track.returned_person, [*self._left, *map(_person, gone)]
         recent = [one for one in known if track.at_s - one.seen_s <= self.params.remember_person_s]
@@ -355,20 +202,18 @@ class Tracker:
         else:
             self._free.add(track.id)
 
-    def _update_track(
-        self, track: BodyTrack, detection: LocalisedDetection, p_camera: Vec3
-    ) -> None:
+    def _update_track(self, track: BodyTrack, detection: Located, p_camera: Vec3) -> None:
         """Update a track with a detection."""
-        place = correct_distance(track, detection, p_camera)
+        place = _correct_distance(track, detection, p_camera)
         track.filter.correct(place, detection.across_sd_m, detection.along_sd_m)
         _correct_velocity(track, detection)
         if track.is_person:
-            track.filter.slow_to(_FASTEST_M_S)
-        track.clothes.record_absence(track.at_s - track.seen_s)
+            track.filter.slow_to(FASTEST_M_S)
+        track.clothes.record_absence(track.unseen_s)
         track.seen_s = track.at_s
         track.frames += 1
         track.clothes.learn(detection.clothing)
-        R = detection.R_world_face
+        R = detection.R_face
         if R is None and self.shows_face(track):
             return  # the detector missed the face in this frame
         if R is None:
@@ -378,12 +223,12 @@ class Tracker:
             if before is None:
                 track.R_world_face, track.face_length = R, detection.face_length
             else:
-                track.R_world_face = blend(before, R, _TURN_GAIN)
+                track.R_world_face = _blend(before, R, _TURN_GAIN)
                 track.face_length += _GAIN * (detection.face_length - track.face_length)
         self._learn_size(track, detection, _GAIN)
         track.detection = detection
 
-    def _learn_size(self, track: BodyTrack, detection: LocalisedDetection, gain: float) -> None:
+    def _learn_size(self, track: BodyTrack, detection: Located, gain: float) -> None:
         """Learn the size of a face whose distance is measured."""
         if detection.size_depth is None:
             return
@@ -395,7 +240,7 @@ class Tracker:
 def _person(track: BodyTrack) -> SeenPerson:
     """Return the features of the person of a track."""
     before, worn = track.returned_person, track.clothes.colours
-    size = None if track.depth_s is None else track.face_size
+    size = track.size
     if before is not None:
         size = before.face_size if size is None else size
         worn = before.colours if worn is None else worn
@@ -404,34 +249,25 @@ def _person(track: BodyTrack) -> SeenPerson:
 
 def _is_another_now(track: BodyTrack, renamed: set[int]) -> bool:
     """Return whether the detector's number of a thing now belongs to another known thing."""
-    return track.detection.kind == UNNAMED and track.detection.mark in renamed
+    return track.detection.kind == UNNAMED and track.detection.detector_id in renamed
 
 
-def _correct_velocity(track: BodyTrack, found: LocalisedDetection) -> None:
+def _correct_velocity(track: BodyTrack, found: Located) -> None:
     """Update a track with a velocity that was measured in the image."""
-    if found.v_world_m_s is not None:
+    if found.v_m_s is not None:
         sds = found.across_sd_m_s, found.along_sd_m_s
-        track.filter.correct_velocity(found.p_world_m, found.v_world_m_s, *sds)
+        track.filter.correct_velocity(found.p_m, found.v_m_s, *sds)
 
 
-def _mark(found: LocalisedDetection) -> int:
-    return NO_MARK if found.mark is None else found.mark
-
-
-def _sight(p_m: Vec3, p_camera: Vec3) -> tuple[float, float, float, float]:
-    (x, y, z), range_m = view_and_range(p_m, p_camera)
-    return x, y, z, range_m
-
-
-def correct_distance(track: BodyTrack, detection: LocalisedDetection, p_camera: Vec3) -> Vec3:
+def _correct_distance(track: BodyTrack, detection: Located, p_camera: Vec3) -> Vec3:
     """Return a detection's position with its distance corrected by the learned size of the face."""
-    by_face = detection.R_world_face is not None
+    by_face = detection.R_face is not None
     if detection.depth_measured or track.depth_s is None or not by_face:
-        return detection.p_world_m
-    return add(p_camera, scale(sub(detection.p_world_m, p_camera), track.face_size))
+        return detection.p_m
+    return add(p_camera, scale(sub(detection.p_m, p_camera), track.face_size))
 
 
-def blend(A: Mat3, B: Mat3, share: float) -> Mat3:
+def _blend(A: Mat3, B: Mat3, share: float) -> Mat3:
     """Return the rotation at a fraction of the path from A to B (columns blended, orthonormal)."""
     x = unit(_column(A, B, 0, share))
     z = _column(A, B, 2, share)
