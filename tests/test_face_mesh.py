@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from present import present
 from seeing.material import portrait
 from test_face_pose import CAMERA, angle_between, turned
 from test_gaze_at_head import AT_EYES, standing
@@ -20,7 +21,8 @@ from gazerig.drivers.vision.model_files import FOLDER_VARIABLE
 from gazerig.gaze.types import Face
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception import mesh_reading
-from gazerig.robot.perception.mesh_reading import EYES_SHUT, MeshReading, read_mesh
+from gazerig.robot.perception.face_pose import FacePose
+from gazerig.robot.perception.mesh_reading import EYES_SHUT, read_mesh
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.track import NO_SPEECH
 from gazerig.robot.perception.tracker import Tracker
@@ -66,7 +68,7 @@ def mesh_of(
     )
 
 
-def reading_of(*args: object, **kwargs: object) -> MeshReading:
+def reading_of(*args: object, **kwargs: object) -> FacePose:
     reading = read_mesh(mesh_of(*args, **kwargs), CAMERA)  # type: ignore[arg-type]
     assert reading is not None
     return reading
@@ -79,21 +81,23 @@ def test_pose_and_gaze_come_back(
     R, p = turned(radians(yaw), radians(pitch), radians(roll)), np.array(at)
     gaze = np.array((0.2, -0.1, -1.0)) / np.linalg.norm((0.2, -0.1, -1.0))
     reading = reading_of(R, p, gaze)
-    assert degrees(angle_between(R, np.array(reading.pose.R_camera_face))) < 3.0
-    assert np.linalg.norm(np.array(reading.pose.p_camera_m) - p) < 0.03 * np.linalg.norm(p)
+    assert degrees(angle_between(R, np.array(reading.R_camera_face))) < 3.0
+    assert np.linalg.norm(np.array(reading.p_camera_m) - p) < 0.03 * np.linalg.norm(p)
     assert reading.gaze_camera is not None
     assert degrees(np.arccos(np.clip(np.dot(reading.gaze_camera, gaze), -1, 1))) < 6.0
-    assert reading.pose.length == pytest.approx(1.0, abs=0.05)
-    assert reading.signs.eye_opening == pytest.approx(1.0, abs=0.1)
+    assert reading.length == pytest.approx(1.0, abs=0.05)
+    assert present(reading.signs).eye_opening == pytest.approx(1.0, abs=0.1)
 
 
 def test_shut_eyes_look_nowhere_and_lips_tell_their_gap() -> None:
     R, p = turned(0.1, 0.0, 0.0), np.array((0.0, 0.0, 0.6))
     shut = reading_of(R, p, lids_m=0.0045)
     assert shut.gaze_camera is None
-    assert shut.signs.eye_opening is not None and shut.signs.eye_opening < EYES_SHUT
+    assert present(present(shut.signs).eye_opening) < EYES_SHUT
     for gap in (0.0, 0.005, 0.015):
-        assert reading_of(R, p, lips_m=gap).signs.mouth_opening_m == pytest.approx(gap, abs=0.001)
+        assert present(reading_of(R, p, lips_m=gap).signs).mouth_opening_m == pytest.approx(
+            gap, abs=0.001
+        )
 
 
 def test_points_that_are_no_face_give_none() -> None:
@@ -180,10 +184,10 @@ def test_photographed_people_look_at_the_camera(name: str) -> None:
     assert mesh is not None and mesh.certainty > 0.9
     reading = read_mesh(mesh, lens)
     assert reading is not None and reading.gaze_camera is not None
-    ahead = np.array(reading.pose.R_camera_face)[:, 0]
+    ahead = np.array(reading.R_camera_face)[:, 0]
     for direction in (np.array(reading.gaze_camera), ahead):
         assert degrees(np.arccos(-direction[2])) < 15.0
-    assert reading.signs.eye_opening is not None and 0.6 < reading.signs.eye_opening < 1.7
+    assert 0.6 < present(present(reading.signs).eye_opening) < 1.7
 
 
 @NEEDS_NETWORKS

@@ -133,7 +133,7 @@ def test_a_lens_of_another_shape_is_reported_once_and_the_gaze_goes_on() -> None
 
     assert look(1280, 960) == ()  # the same field, finer
     (line,) = look(640, 400)
-    assert "640 x 480" in line and "640 x 400" in line and "69 deg" in line and "calibrate" in line
+    assert "640 x 480" in line and "640 x 400" in line and "calibrate" in line
     assert look(640, 480) == look(640, 400) == ()
     assert len(look(1280, 720)) == 1  # another size that does not fit
 

@@ -45,7 +45,7 @@ from gazerig.robot.model.frames import (
 )
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
 from gazerig.robot.perception.frame_locator import FrameLocator
-from gazerig.robot.perception.motion_source import motion_finder
+from gazerig.robot.perception.motion_source import MotionSource
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.scenes.scene import Scene
@@ -151,7 +151,7 @@ def scene_camera(
         params = SceneCameraParams(horizontal_field_deg=field_deg)
         return SceneCamera(params, scene, mount, where, rng, locate)
     if clock is not None and not options.fast:
-        motion = partial(motion_finder, rig.motion, rig.camera.lens, radians(field_deg), turns)
+        motion = partial(MotionSource, rig.motion, rig.camera.lens, radians(field_deg), turns)
         return drawn_camera(rig, scene, mount, where, rng, clock, own, motion, locate)
     # Imported here because drawing and detection need OpenCV.
     from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
@@ -228,7 +228,7 @@ def make_borrowed_camera(
     """Return an emulated rig's camera, which a browser's may replace."""
     field_rad = radians(FIELD_DEG)
     detector = partial(face_detector, rig.detector)
-    motion = partial(motion_finder, rig.motion, None, field_rad, None)
+    motion = partial(MotionSource, rig.motion, None, field_rad, None)
     locate = FrameLocator(None, field_rad)
 
     def process(source: Callable[[], FrameSource], before: int) -> CameraProcess:
@@ -257,7 +257,7 @@ def real_camera(
     """
     detector = partial(face_detector, rig.detector)
     field_rad = radians(placed.horizontal_field_deg)
-    motion = partial(motion_finder, rig.motion, placed.lens, field_rad, turns)
+    motion = partial(MotionSource, rig.motion, placed.lens, field_rad, turns)
     locate = frame_locator(placed)
     if own.camera is not None:
         return program_camera(rig, own, clock, motion, locate, options.fast)

@@ -112,7 +112,7 @@ def _track_costs(
     """
     last, known, unseen_s, person = track.detection, track.filter, track.unseen_s, track.is_person
     range_m, gone_m, in_sight = known.range_m, GATE_SPEED_M_S * unseen_s, unseen_s <= IN_SIGHT_S
-    moved_m, size = 0.0 if track.is_remembered else gone_m, track.size or 1.0
+    moved_m, size = 0.0 if track.is_remembered else gone_m, track.face_size or 1.0
     upright_m2 = known.across.p
     if person:
         upright_m2 = min(upright_m2, _UPRIGHT_M2 + (_STOOPS_M_S * unseen_s) ** 2)
@@ -200,12 +200,10 @@ def assign(costs: Sequence[Sequence[float]], unpaired: float = FORBIDDEN) -> lis
         unpaired: cost of leaving a row and a column unpaired; by default so high that the number of
             pairs is maximal.
     """
-    if not len(costs) or not len(costs[0]):
+    if not costs or not costs[0]:
         return []
     finite = [[c if c < FORBIDDEN else unpaired for c in row] for row in costs]
-    if len(finite) == len(finite[0]) == 1:  # usually one person
-        pairs = [(0, 0)]
-    elif len(finite) <= len(finite[0]):
+    if len(finite) <= len(finite[0]):
         pairs = list(enumerate(_shortest_paths(finite)))
     else:
         columns = _shortest_paths([list(column) for column in zip(*finite, strict=True)])
@@ -216,24 +214,16 @@ def assign(costs: Sequence[Sequence[float]], unpaired: float = FORBIDDEN) -> lis
 def _shortest_paths(costs: list[list[float]]) -> list[int]:
     """Return the column of each row in the cheapest pairing; no fewer columns than rows.
 
-    Rows whose cheapest columns differ are paired with them. Each other row is paired along the path
-    of least reduced cost to a free column, which moves the rows on that path to their next columns.
-    Column 0 represents the row being paired.
+    Each row is paired along the path of least reduced cost to a free column, which moves the rows
+    on that path to their next columns. Column 0 represents the row being paired.
 
     Source: Jonker and Volgenant, "A shortest augmenting path algorithm for dense and sparse
     linear assignment problems" (1987).
     """
     n, m = len(costs), len(costs[0])
-    row_price, column_price = [0.0, *map(min, costs)], [0.0] * (m + 1)
+    row_price, column_price = [0.0] * (n + 1), [0.0] * (m + 1)
     row_of = [0] * (m + 1)  # rows count from 1, and 0 is a free column
-    waits = []
     for row in range(1, n + 1):
-        cheapest = costs[row - 1].index(row_price[row]) + 1
-        if row_of[cheapest]:
-            waits.append(row)
-        else:
-            row_of[cheapest] = row
-    for row in waits:
         row_of[0] = row
         column, before = 0, [0] * (m + 1)
         length, waiting = [inf] * (m + 1), set(range(1, m + 1))
@@ -243,16 +233,15 @@ def _shortest_paths(costs: list[list[float]]) -> list[int]:
                 reduced = costs[at - 1][j - 1] - row_price[at] - column_price[j]
                 if reduced < length[j]:
                     length[j], before[j] = reduced, column
-            nearest = min(waiting, key=length.__getitem__)
-            step = length[nearest]
+            column = min(waiting, key=length.__getitem__)
+            step = length[column]
             for j in range(m + 1):
                 if j in waiting:
                     length[j] -= step
                 else:
                     row_price[row_of[j]] += step
                     column_price[j] -= step
-            waiting.remove(nearest)
-            column = nearest
+            waiting.remove(column)
         while column:
             row_of[column] = row_of[before[column]]
             column = before[column]

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import FaceSigns
 from gazerig.gaze.angles import (
     add,
     compose,
@@ -76,18 +77,23 @@ Points = Sequence[tuple[float, float]]
 
 
 class FacePose(NamedTuple):
-    """Position and turn of a face.
+    """Position and turn of a face; of a mesh also the state of eyes and lips.
 
     p_camera_m:    tip of the nose
     R_camera_face: face axes in the camera frame
     length:        length of the face relative to the canonical face
     turn_sd_rad:   standard deviation of its turn, the larger of yaw and pitch
+    gaze_camera:   unit vector of the eyes' gaze; None if the irises are not visible or the eyes are
+        shut
+    signs:         eyes and lips, None if unknown
     """
 
     p_camera_m: Vec3
     R_camera_face: Mat3
     length: float
     turn_sd_rad: float = 0.0
+    gaze_camera: Vec3 | None = None
+    signs: FaceSigns | None = None
 
 
 def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | None:
@@ -110,19 +116,19 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
     try:
         turned = [rotate(towards, ray) for ray in seen]
         found = _fit_face([(x / z, y / z) for x, y, z in turned], noise)
-    except (ArithmeticError, ValueError):  # points too far from a face to determine a pose
+    except (ArithmeticError, ValueError):  # points that determine no pose
         return None
     if found is None:
         return None
-    p = rotate_back(towards, found.p_m)
-    (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = found.R
+    ((r00, r01, r02), (r10, r11, r12), (r20, r21, r22)), p, length = found
+    p = rotate_back(towards, p)
     axes = (-r02, r00, -r01), (-r12, r10, -r11), (-r22, r20, -r21)
     R = compose(transpose(towards), axes)
-    nearest_m = p[2] + min(dot(R[2], (-z, x, -y * found.length)) for x, y, z in _FRONTAL_M)
+    nearest_m = p[2] + min(dot(R[2], (-z, x, -y * length)) for x, y, z in _FRONTAL_M)
     turned_away = dot((R[0][0], R[1][0], R[2][0]), p) > -cos(_MOST_TURNED_RAD) * norm(p)
     if turned_away or not nearest_m > 0.0:
         return None
-    return FacePose(p, R, found.length, _turn_sd_rad(norm(p), noise))
+    return FacePose(p, R, length, _turn_sd_rad(norm(p), noise))
 
 
 def _shows_front(points: Points) -> bool:
@@ -138,18 +144,11 @@ def _shows_front(points: Points) -> bool:
     return (bx - ax) * down_y - (by - ay) * down_x > _LEAST_AREA_PX2
 
 
-class _FittedFace(NamedTuple):
-    """A fitted face: its rotation from one that looks straight into the camera, and its nose."""
-
-    R: Mat3
-    p_m: Vec3
-    length: float
-
-
-def _fit_face(seen: Points, noise: float) -> _FittedFace | None:
+def _fit_face(seen: Points, noise: float) -> tuple[Mat3, Vec3, float] | None:
     """Return the most probable face by Gauss-Newton steps, None if the points determine none.
 
-    Fitted are a rotation, a position and the length of the face. The width of the mouth over the
+    The result is its rotation from a face that looks straight into the camera, the position of its
+    nose, and its length. The width of the mouth over the
     distance of the eyes hardly depends on the turn of the face. It gives the strength of a smile,
     and so the positions of the mouth's corners; their height is free within wide bounds.
 
@@ -190,10 +189,7 @@ def _fit_face(seen: Points, noise: float) -> _FittedFace | None:
         held = pitch * turn[0], yaw * turn[1], 0.0
         pull = add(held, scale(cross(turn, held), 0.5))
         wanted = weighted @ off - (*pull, 0.0, 0.0, 0.0, long * (length - 1.0))
-        try:
-            step = np.linalg.solve(weighted @ rows + prior, wanted).tolist()
-        except np.linalg.LinAlgError:
-            return None
+        step = np.linalg.solve(weighted @ rows + prior, wanted).tolist()
         w = step[0], step[1], step[2]
         turn = add(turn, sub(w, scale(cross(turn, w), 0.5)))
         R, p, length = (
@@ -212,7 +208,7 @@ def _fit_face(seen: Points, noise: float) -> _FittedFace | None:
         shift = max(map(abs, step[3:6])) / away_m
         moved = max(*map(abs, w), shift, abs(step[6]), abs(wider - last))
         if moved * moved < _REMAINS * before:
-            return _FittedFace(R, p, length)
+            return R, p, length
         before = moved
     return None
 

@@ -7,7 +7,7 @@ measures one there; otherwise it is limited by the spread of face sizes.
 
 from dataclasses import dataclass
 from heapq import nlargest
-from math import degrees, hypot, isfinite, sqrt
+from math import hypot, isfinite, sqrt
 
 import numpy as np
 
@@ -93,10 +93,6 @@ class FrameLocator:
     lens: LensParams | None
     field_rad: float
 
-    def __call__(self, found: Detections) -> LocatedFrame:
-        """Return a frame's contents in the camera's axes."""
-        return self.locate(found, self.intrinsics(found))
-
     def intrinsics(self, found: Detections) -> Intrinsics:
         """Return the intrinsics of a frame: measured, the camera's, or from the field of view."""
         size_px = found.width_px, found.height_px
@@ -104,20 +100,17 @@ class FrameLocator:
 
     def fault(self, found: Detections) -> str:
         """Return why the measured lens is not used for a frame, in one line; "" if it is used."""
-        if self.lens is None:
-            return ""
-        why = lens_fault(self.lens, found.width_px, found.height_px)
+        why = "" if self.lens is None else lens_fault(self.lens, found.width_px, found.height_px)
         if not why:
             return ""
-        field = f"the field of view of {degrees(self.field_rad):.0f} deg"
-        instead = "what the camera reports" if found.lens is not None else field
         return (
-            f"camera.lens does not fit: {why}; {instead} is used instead: calibrate the lens at "
-            "this size (gazerig calibrate camera), or ask the camera for that one"
+            f"camera.lens does not fit: {why}; the camera's lens or camera.horizontal_field_deg is "
+            "used instead: calibrate the lens at this size (gazerig calibrate camera)"
         )
 
-    def locate(self, found: Detections, intrinsics: Intrinsics) -> LocatedFrame:
-        """Return the contents of a frame of known intrinsics in the camera's axes."""
+    def __call__(self, found: Detections) -> LocatedFrame:
+        """Return a frame's contents in the camera's axes."""
+        intrinsics = self.intrinsics(found)
         inside = [
             face
             for face in found.faces
@@ -146,13 +139,10 @@ class FrameLocator:
 
 def _face(face: DetectedFace, found: Detections, lens: Intrinsics) -> Located | None:
     """Locate a face, None if its landmarks are not those of a face from its front."""
-    reading = read_mesh(face.mesh, lens) if face.mesh is not None else None
-    pose = face_pose(face.landmarks_px, lens) if reading is None else reading.pose
+    pose = read_mesh(face.mesh, lens) if face.mesh is not None else None
+    pose = pose or face_pose(face.landmarks_px, lens)
     if pose is None:
         return None
-    gaze, signs = face.gaze_camera, face.signs
-    if reading is not None:
-        gaze, signs = reading.gaze_camera or gaze, reading.signs
     focal_px = sqrt(lens.fx_px * lens.fy_px)
     eyes_px = focal_px * PUPIL_DISTANCE_M / pose.p_camera_m[2]
     measured = _depth_ratio(face, pose, found)
@@ -170,8 +160,8 @@ def _face(face: DetectedFace, found: Detections, lens: Intrinsics) -> Located | 
         along_sd_m=far * sd,
         size_depth=None if measured is None else 1.0 / share,
         turn_sd_rad=pose.turn_sd_rad,
-        gaze=gaze,
-        signs=signs,
+        gaze=pose.gaze_camera or face.gaze_camera,
+        signs=pose.signs or face.signs,
         clothing=face.clothing,
     )
 

@@ -1,4 +1,6 @@
-"""Recognition of hands: patches that move relative to a person, within reach, and with evidence.
+"""Whose motion is whose: hands, the bodies of people, and the robot's own head.
+
+A hand is a patch that moves relative to a person, within reach, and with evidence.
 
 A camera without a hand detector shows a moving arm as one patch of flow. The quarter of it that
 moves fastest is taken as the hand, at the distance of the person's face unless the distance was
@@ -17,9 +19,18 @@ Without measured depth the size gives the distance. A compact patch that is not 
 large for a hand at the person's distance is placed where it has the size of a hand. An arm that
 enters at the side of the image, and not from the person's shoulder, is placed where it is as wide
 as a hand.
+
+A person who walks is detected twice, as a face and as a patch of optical flow. The patch would
+compete with the face, and would often win because it is larger. A patch that is no hand therefore
+belongs to the person if it is on the head, or if it is below the head and moves with it.
+
+The positions of the robot's own head and neck in the camera's view are known from the kinematics,
+and both are ignored: a camera on the base sees the head turn, and one on the head may see parts of
+it. A patch in the direction of a part of the head is that part, unless its measured distance
+differs.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import hypot, inf
@@ -27,10 +38,11 @@ from typing import NamedTuple
 
 from gazerig.drivers.types import Located
 from gazerig.gaze.angles import add, dot, norm, perpendicular, scale, sub, unit
-from gazerig.gaze.types import Vec3
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.model.kinematics import Capsule
 from gazerig.robot.perception.track import UNNAMED
 
-HAND = "hand"
+HAND, OWN = "hand", "own"
 Known = tuple[Vec3, Vec3 | None]
 """Position of a face in the world, and its velocity, None if unknown."""
 
@@ -75,6 +87,17 @@ _SHORT_M, _ANOTHERS_SHORT_M = 0.1, 0.11
 # Gain per frame with which a change of this distance is adopted.
 _NEARER_GAIN = 0.5
 _ACROSS_SD_M, _ALONG_SD_M = 0.04, 0.25
+# Half width of a body around the head, and its extent below and above it.
+_BODY_HALF_M, _BODY_BELOW_M, _BODY_ABOVE_M = 0.35, 1.7, 0.25
+# Tolerance of a body's depth, in addition to two standard deviations.
+_DEEP_M = 0.5
+# Speed across the view relative to a person below which a patch moves along: at least this, or this
+# fraction of the person's.
+_ALONG_WITH_M_S, _ALONG_WITH_SHARE = 0.3, 0.5
+OwnParts = Callable[[Mat3, Vec3], Sequence[Capsule]]
+"""Returns the parts of the head in the world for a pose."""
+
+_MARGIN_M = 0.05
 
 
 @dataclass(slots=True)
@@ -334,12 +357,9 @@ def _distance_from_hand(thing: Located, hand: Located, p_camera: Vec3) -> float:
 def _moves_again(hand: Located, found: list[Located], p_camera: Vec3) -> bool:
     """Return whether a hand moves at the position of one at rest, as far as known."""
     for one in found:
-        if one.kind == HAND:
-            nearer, farther = sorted(
-                (hand, one), key=lambda each: _horizontal_distance_m(each.p_m, p_camera)
-            )
-            if _distance_from_hand(nearer, farther, p_camera) < _AGAIN_M:
-                return True
+        nearer, farther = sorted((hand, one), key=lambda h: _horizontal_distance_m(h.p_m, p_camera))
+        if one.kind == HAND and _distance_from_hand(nearer, farther, p_camera) < _AGAIN_M:
+            return True
     return False
 
 
@@ -349,7 +369,6 @@ class _Arm(NamedTuple):
     face: face of the person; tip_m, tip_m_s: position and velocity of its fastest part, at the
         person's distance
     ratio: length at that distance per length of the patch
-    shoulder_m: distance of its line from the person's shoulder
     attached: whether it has an arm's size, points to the shoulder and is fastest at its end
     comes_in: whether it enters at the side, not from the shoulder, too wide for an arm there
     """
@@ -358,7 +377,6 @@ class _Arm(NamedTuple):
     tip_m: Vec3
     tip_m_s: Vec3
     ratio: float
-    shoulder_m: float
     attached: bool
     comes_in: bool
 
@@ -402,7 +420,7 @@ def _arm_of(thing: Located, faces: list[Known], p_camera: Vec3, last: Vec3 | Non
             short = norm(sub(tip, middle)) < _SHORT_M
             anothers = shoulder_m > (_ANOTHERS_SHORT_M if short else _ANOTHERS_M)
             comes_in = thing.from_side and anothers and wide
-            best, least = _Arm(face, tip, v, ratio, shoulder_m, attached, comes_in), off_m
+            best, least = _Arm(face, tip, v, ratio, attached, comes_in), off_m
     return best
 
 
@@ -460,3 +478,112 @@ def _approaches(thing: Located, p_camera: Vec3) -> bool:
     way = sub(thing.p_m, p_camera)
     closing_m_s = -dot(thing.v_m_s, unit(way)) - _SURE_SD * thing.along_sd_m_s
     return closing_m_s > _COMES_1_S * norm(way)
+
+
+def without_own_motion(
+    faces: list[Located], things: Iterable[Located], known: list[Known], p_camera: Vec3
+) -> tuple[list[Located], list[Located]]:
+    """Return the faces with the spin of their own motion, and the things that belong to no face.
+
+    known: the faces from ``known_faces``
+    """
+    spins = [0.0] * len(faces)
+    others: list[Located] = []
+    for thing in things:
+        owner = _owner(thing, known, p_camera)
+        if owner is None:
+            others.append(thing)
+        elif owner < len(faces):
+            off = _offset_of_patch(thing, known[owner][0], p_camera)
+            if off is not None and hypot(*off) < _HEAD_M:
+                spins[owner] = max(spins[owner], thing.spin_rad_s, key=abs)
+    turned = [
+        face._replace(spin_rad_s=spin) if spin != 0.0 else face
+        for face, spin in zip(faces, spins, strict=True)
+    ]
+    return turned, others
+
+
+def known_faces(faces: list[Located], tracked: Sequence[Known]) -> list[Known]:
+    """Return the faces of a frame with the velocities of their tracks, and those tracks.
+
+    A face that the detector has just missed still owns its body's motion.
+
+    tracked: tracked faces at their positions predicted for now
+    """
+    found = []
+    for face in faces:
+        near = [(norm(sub(p, face.p_m)), v) for p, v in tracked]
+        away, v = min(near, key=lambda pair: pair[0], default=(1.0, None))
+        found.append((face.p_m, v if away < _HEAD_M else None))
+    return [*found, *tracked]
+
+
+def _owner(thing: Located, faces: list[Known], p_camera: Vec3) -> int | None:
+    """Return the index of the face to which a patch belongs, None without one."""
+    if thing.kind != UNNAMED:
+        return None
+    for k, (p_face, v_face) in enumerate(faces):
+        if (off := _offset_of_patch(thing, p_face, p_camera)) is None:
+            continue
+        if hypot(*off) < _HEAD_M:
+            return k
+        on_body = off[0] < _BODY_HALF_M and -_BODY_BELOW_M < off[1] < _BODY_ABOVE_M
+        if on_body and _moves_along(thing, p_face, v_face, p_camera):
+            return k
+    return None
+
+
+def _offset_of_patch(thing: Located, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] | None:
+    """Return the sideways and upward offset of a patch from a face; None if its depth differs.
+
+    A patch whose distance is only assumed is placed at the face's distance.
+    """
+    far = norm(sub(p_face, p_camera))
+    way = sub(thing.p_m, p_camera)
+    if thing.depth_measured and abs(norm(way) - far) > _DEEP_M + 2.0 * thing.along_sd_m:
+        return None
+    return _offset_from_face(add(p_camera, scale(unit(way), far)), p_face)
+
+
+def _moves_along(thing: Located, p_face: Vec3, v_face: Vec3 | None, p_camera: Vec3) -> bool:
+    """Return whether a patch moves across the view as the face does; also if unknown."""
+    if thing.v_m_s is None or v_face is None:
+        return True
+    way = sub(thing.p_m, p_camera)
+    v = thing.v_m_s
+    if not thing.depth_measured:
+        v = scale(v, norm(sub(p_face, p_camera)) / max(norm(way), 1e-6))
+    across = norm(perpendicular(sub(v, v_face), unit(way)))
+    return across < max(_ALONG_WITH_M_S, _ALONG_WITH_SHARE * norm(v_face))
+
+
+def label_own_body(
+    things: list[Located], parts: Sequence[Capsule], p_camera: Vec3
+) -> list[Located]:
+    """Return the things, with the kind OWN for parts of the robot's own body.
+
+    Args:
+        things: moving things of a frame.
+        parts: parts of the head at the exposure. A part around the camera is not visible.
+        p_camera: position of the camera.
+    """
+    seen = [part for part in parts if not part.contains(p_camera)]
+    return [
+        thing._replace(kind=OWN)
+        if thing.kind == UNNAMED and any(_is_part(thing, part, p_camera) for part in seen)
+        else thing
+        for thing in things
+    ]
+
+
+def _is_part(thing: Located, part: Capsule, p_camera: Vec3) -> bool:
+    """Return whether a thing is a part of the head."""
+    way = sub(thing.p_m, p_camera)
+    hit_m = part.hit_m(p_camera, unit(way))
+    if hit_m is None:
+        return False
+    if not thing.depth_measured:
+        return True
+    margin_m = _MARGIN_M + 2.0 * thing.along_sd_m
+    return hit_m - margin_m < norm(way) < hit_m + 2.0 * part.radius_m + margin_m

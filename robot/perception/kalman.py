@@ -56,18 +56,31 @@ class Variances(NamedTuple):
     pv: float
     v: float
 
+    def measured(self, index: int, variance: float) -> tuple[float, float, "Variances"]:
+        """Return the gains of position and velocity, and the covariance, of a measurement.
 
-class Offset(NamedTuple):
-    """Offset of a position from the predicted one of a track, as seen from the camera.
+        index: what is measured; 0: the position, 1: the velocity
+        """
+        row = self[index : index + 2]
+        gain_p, gain_v = (one / (row[index] + variance) for one in row)
+        left = self.p - gain_p * row[0], self.pv - gain_p * row[1], self.v - gain_v * row[1]
+        return gain_p, gain_v, Variances(*left)
 
-    across_m: from one line of view to the other, tangent to the sphere around the camera
-    along_m: logarithm of the ratio of the ranges, times the range of the track
-    ratio: range of the track over that of the position
-    """
+    def after(self, dt_s: float, kept: float) -> "Variances":
+        """Return the covariance after a time, given the fraction of the velocity that remains."""
+        p, pv, v = self
+        both = pv + dt_s * v
+        return Variances(p + dt_s * (pv + both), kept * both, kept * kept * v)
 
-    across_m: Vec3
-    along_m: float
-    ratio: float
+    def with_noise(self, accel_m_s2: float, dt_s: float) -> "Variances":
+        """Return the covariance plus the effect of random acceleration over a time."""
+        v = accel_m_s2 * accel_m_s2 * _ACCELERATION_LASTS_S * dt_s
+        more = v * dt_s * dt_s / 3.0, v * dt_s / 2.0, v
+        return Variances(*add(self, more))
+
+    def towards(self, other: "Variances", share: float) -> "Variances":
+        """Return the covariance interpolated towards another by a fraction."""
+        return Variances(*add(scale(self, 1.0 - share), scale(other, share)))
 
 
 class TrackFilter:
@@ -135,8 +148,8 @@ class TrackFilter:
         self._unseen_s += dt_s
         self._accel_m_s2 *= exp(-dt_s / _CHANGES_FOR_S)
         accel = max(self._noise.quiet_m_s2, self._accel_m_s2, 0.0 if seen else _UNSEEN_M_S2)
-        self.across = _add_process_noise(_propagate(self.across, dt_s, kept), accel, dt_s)
-        self.along = _add_process_noise(_propagate(self.along, dt_s, kept), accel, dt_s)
+        self.across = self.across.after(dt_s, kept).with_noise(accel, dt_s)
+        self.along = self.along.after(dt_s, kept).with_noise(accel, dt_s)
 
     def look_from(self, p_camera_m: Vec3) -> None:
         """Move the camera, which mixes the components along and across the view."""
@@ -148,38 +161,29 @@ class TrackFilter:
         turned = 1.0 - ahead * ahead
         if turned > 0.0:
             a, b = self.across, self.along
-            self.across = _interpolate(a, b, 0.5 * turned)
-            self.along = _interpolate(b, a, turned)
-
-    def offset(self, p_m: Vec3) -> Offset:
-        """Return the offset of a position from the predicted one."""
-        view, range_m = view_and_range(p_m, self._camera)
-        ahead = dot(view, self.view)
-        aside = sub(view, scale(self.view, ahead))
-        away = norm(aside)
-        ratio = self.range_m / range_m
-        arc = atan2(away, ahead) / away if away > _TINY_RAD else 1.0
-        across = scale(aside, self.range_m * arc)
-        return Offset(across, -self.range_m * log(ratio), ratio)
+            self.across = a.towards(b, 0.5 * turned)
+            self.along = b.towards(a, turned)
 
     def correct(self, p_m: Vec3, across_sd_m: float, along_sd_m: float) -> None:
         """Update with a measured position and its standard deviations."""
-        off = self.offset(p_m)
-        at = off.ratio
+        view, range_m = view_and_range(p_m, self._camera)
+        at = self.range_m / range_m
         across, along = (at * across_sd_m) ** 2, (at * along_sd_m) ** 2
-        e, l_ = off.across_m, off.along_m
-        aside, deep = dot(e, e), l_ * l_
-        A, B = self.across, self.along
-        if aside / (A.p + across) + deep / (B.p + along) > _SURPRISING:
+        # Offset of the position from the predicted one: from one line of view to the other, tangent
+        # to the sphere around the camera, and the range times the logarithm of the ranges' ratio.
+        ahead = dot(view, self.view)
+        aside_m = sub(view, scale(self.view, ahead))
+        away = norm(aside_m)
+        arc = atan2(away, ahead) / away if away > _TINY_RAD else 1.0
+        aside_m, deep_m = scale(aside_m, self.range_m * arc), -self.range_m * log(at)
+        aside, deep = dot(aside_m, aside_m), deep_m * deep_m
+        if aside / (self.across.p + across) + deep / (self.along.p + along) > _SURPRISING:
             self._adapt(aside, deep, across, along)
-            A, B = self.across, self.along
         self._unseen_s = 0.0
-        of_p, of_v = A.p / (A.p + across), A.pv / (A.p + across)
-        along_p, along_v = B.p / (B.p + along), B.pv / (B.p + along)
-        self.across = Variances(A.p - of_p * A.p, A.pv - of_p * A.pv, A.v - of_v * A.pv)
-        self.along = Variances(B.p - along_p * B.p, B.pv - along_p * B.pv, B.v - along_v * B.pv)
-        self.v_m_s = add(self.v_m_s, add(scale(e, of_v), scale(self.view, along_v * l_)))
-        self._move(scale(e, of_p), along_p * l_)
+        of_p, of_v, self.across = self.across.measured(0, across)
+        along_p, along_v, self.along = self.along.measured(0, along)
+        self.v_m_s = add(self.v_m_s, add(scale(aside_m, of_v), scale(self.view, along_v * deep_m)))
+        self._move(scale(aside_m, of_p), along_p * deep_m)
 
     def _adapt(self, aside: float, deep: float, across: float, along: float) -> None:
         """Raise the noise until an innovation is plausible.
@@ -200,8 +204,8 @@ class TrackFilter:
             before, accel = accel, min(2.0 * accel, most)
             if accel > before:
                 more = sqrt(accel * accel - before * before)
-                self.across = _add_process_noise(self.across, more, self._unseen_s)
-                self.along = _add_process_noise(self.along, more, self._unseen_s)
+                self.across = self.across.with_noise(more, self._unseen_s)
+                self.along = self.along.with_noise(more, self._unseen_s)
             far = aside / (self.across.p + across) + deep / (self.along.p + along)
             if accel >= most or far < _EXPECTED:
                 self._accel_m_s2 = accel
@@ -222,11 +226,8 @@ class TrackFilter:
         other = sub(v, self.v_m_s)
         off = sub(other, scale(here, dot(other, here)))
         deep = at * along - dot(self.v_m_s, here)
-        A, B = self.across, self.along
-        sa, sb = A.v + (at * across_sd_m_s) ** 2, B.v + (at * along_sd_m_s) ** 2
-        of_p, of_v, along_p, along_v = A.pv / sa, A.v / sa, B.pv / sb, B.v / sb
-        self.across = Variances(A.p - of_p * A.pv, A.pv - of_p * A.v, A.v - of_v * A.v)
-        self.along = Variances(B.p - along_p * B.pv, B.pv - along_p * B.v, B.v - along_v * B.v)
+        of_p, of_v, self.across = self.across.measured(1, (at * across_sd_m_s) ** 2)
+        along_p, along_v, self.along = self.along.measured(1, (at * along_sd_m_s) ** 2)
         self.v_m_s = add(self.v_m_s, add(scale(off, of_v), scale(here, along_v * deep)))
         self._move(scale(off, of_p), along_p * deep)
 
@@ -267,8 +268,8 @@ class TrackFilter:
             range_m = max(NEAREST_M, range_m * exp(step))
             grown = range_m / self.range_m
             self.v_m_s = scale(self.v_m_s, grown)
-            self.across = _scale(self.across, grown * grown)
-            self.along = _scale(self.along, grown * grown)
+            self.across = Variances(*scale(self.across, grown * grown))
+            self.along = Variances(*scale(self.along, grown * grown))
             self.range_m = range_m
         self.p_m = add(self._camera, scale(here, range_m))
 
@@ -280,27 +281,3 @@ def view_and_range(p_m: Vec3, p_camera_m: Vec3) -> tuple[Vec3, float]:
     if far == 0.0:
         return (1.0, 0.0, 0.0), NEAREST_M
     return (x / far, y / far, z / far), max(far, NEAREST_M)
-
-
-def _propagate(C: Variances, dt_s: float, kept: float) -> Variances:
-    """Return a covariance after a time, given the fraction of the velocity that remains."""
-    p, pv, v = C
-    both = pv + dt_s * v
-    return Variances(p + dt_s * (pv + both), kept * both, kept * kept * v)
-
-
-def _add_process_noise(C: Variances, accel_m_s2: float, dt_s: float) -> Variances:
-    """Return a covariance plus the effect of random acceleration over a time."""
-    v = accel_m_s2 * accel_m_s2 * _ACCELERATION_LASTS_S * dt_s
-    return Variances(C.p + v * dt_s * dt_s / 3.0, C.pv + v * dt_s / 2.0, C.v + v)
-
-
-def _interpolate(C: Variances, D: Variances, share: float) -> Variances:
-    """Return a covariance interpolated towards another by a fraction."""
-    kept = 1.0 - share
-    return Variances(kept * C.p + share * D.p, kept * C.pv + share * D.pv, kept * C.v + share * D.v)
-
-
-def _scale(C: Variances, factor: float) -> Variances:
-    """Return a covariance in larger or smaller units."""
-    return Variances(factor * C.p, factor * C.pv, factor * C.v)

@@ -10,14 +10,13 @@ Face frame: origin at the tip of the nose, x out of the face, y to the owner's l
 """
 
 from math import hypot, radians, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import FaceMesh, FaceSigns
-from gazerig.gaze.types import Floats, Vec3
+from gazerig.gaze.types import Floats, Vec3, vec
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 from gazerig.robot.model.intrinsics import rays
 from gazerig.robot.perception.face_pose import FacePose
@@ -62,19 +61,7 @@ _MOST_TURNED = 0.25
 _LONGEST = 1.35
 
 
-class MeshReading(NamedTuple):
-    """Pose, gaze, lids and lips from a mesh.
-
-    gaze_camera: unit vector of the eyes' gaze, camera frame; None if the irises are not visible or
-        the eyes are shut
-    """
-
-    pose: FacePose
-    gaze_camera: Vec3 | None
-    signs: FaceSigns
-
-
-def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
+def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> FacePose | None:
     """Return the contents of a mesh, None if its points are not those of a face from its front."""
     points = mesh.points.astype(np.float64)
     if points.shape != (468, 3) or not np.isfinite(points).all():
@@ -102,8 +89,8 @@ def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
     signs = FaceSigns(opening, lips / apart * PUPIL_DISTANCE_M)
     shut = opening is None or opening < EYES_SHUT
     gaze = None if shut else _gaze(mesh, R, p, intrinsics)
-    x, y, z = (_vector(row) for row in R)
-    return MeshReading(FacePose(_vector(p), (x, y, z), length, sd), gaze, signs)
+    x, y, z = (vec(row) for row in R)
+    return FacePose(vec(p), (x, y, z), length, sd, gaze, signs)
 
 
 def _turn(rays: Floats, depth_px: Floats, focal_px: float) -> Floats | None:
@@ -134,11 +121,10 @@ def _rotation_towards(ray: Floats) -> Floats:
 def _position(R: Floats, seen: Floats) -> Floats | None:
     """Return the position of a face of known turn from the rays of its points, by least squares."""
     turned = _RIGID_M @ R.T
-    u, v = seen[:, 0], seen[:, 1]
-    one, none = np.ones_like(u), np.zeros_like(u)
-    rows = np.concatenate([np.column_stack([one, none, -u]), np.column_stack([none, one, -v])])
-    wanted = np.concatenate([u * turned[:, 2] - turned[:, 0], v * turned[:, 2] - turned[:, 1]])
-    found = np.linalg.lstsq(rows, wanted, rcond=None)[0]
+    rows: Floats = np.zeros((len(seen), 2, 3))
+    rows[:, :, :2], rows[:, :, 2] = np.eye(2), -seen[:, :2]
+    wanted: Floats = seen[:, :2] * turned[:, 2:] - turned[:, :2]
+    found = np.asarray(np.linalg.lstsq(rows.reshape(-1, 3), wanted.ravel())[0], np.float64)
     return found if np.isfinite(found).all() and found[2] > 0.0 else None
 
 
@@ -173,9 +159,4 @@ def _gaze(mesh: FaceMesh, R: Floats, p: Floats, intrinsics: Intrinsics) -> Vec3 
         look = way * (along - sqrt(max(short, 0.0))) - centre
         ways += width * width * look / np.linalg.norm(look)
     size = float(np.linalg.norm(ways))
-    return _vector(ways / size) if size > 0.0 and np.isfinite(size) else None
-
-
-def _vector(v: NDArray[np.float64]) -> Vec3:
-    x, y, z = v.tolist()
-    return x, y, z
+    return vec(ways / size) if size > 0.0 and np.isfinite(size) else None

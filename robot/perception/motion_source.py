@@ -1,6 +1,5 @@
 """Motion detection in images, compensated for the camera's turn by the head's pose."""
 
-from gazerig.drivers.camera.capture_loop import Motion
 from gazerig.drivers.camera.double_buffer import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import MovingBlob
@@ -45,10 +44,3 @@ class MotionSource:
         if self._turns is not None and before_s is not None:
             turned = self._turns.rotation_between(shot.captured_s, before_s)
         return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
-
-
-def motion_finder(
-    params: MotionParams, lens: LensParams | None, field_rad: float, turns: PoseBuffer | None
-) -> Motion:
-    """Return the motion detector, for the process that receives the frames."""
-    return MotionSource(params, lens, field_rad, turns)

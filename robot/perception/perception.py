@@ -5,7 +5,7 @@ its present pose. Motion of a person's own body is separated from that of other 
 (hand_ownership). A tracker assigns identities and velocities.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import cos, hypot, radians, sqrt
 
 import numpy as np
@@ -13,24 +13,24 @@ import numpy as np
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
 from gazerig.gaze.angles import add, dot, rotate, rotate_back, scale, sub
-from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
+from gazerig.gaze.types import PARTS, Bodies, Face, Floats, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, FrameLocator
-from gazerig.robot.perception.hand_ownership import (
+from gazerig.robot.perception.hands import (
+    Hands,
     OwnParts,
     known_faces,
     label_own_body,
     without_own_motion,
 )
-from gazerig.robot.perception.hands import Hands
-from gazerig.robot.perception.kalman import Variances
+from gazerig.robot.perception.kalman import TrackFilter
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
 from gazerig.robot.perception.track import (
+    EYES_HELD_S,
     UNNAMED,
     BodyTrack,
-    EyeObservation,
     angle_off_head_rad,
     looks_at_head,
     place_in_world,
@@ -95,9 +95,9 @@ class Perception:
             self._cuts += 1
         # Normally the camera's process has located them. A camera of another package may not do so,
         # and a frame in transit during a change of the lens was located with the former lens.
-        intrinsics, located = self._locator.intrinsics(detections), detections.located
-        if located is None or located.intrinsics != intrinsics:
-            located = self._locator.locate(detections, intrinsics)
+        located = detections.located
+        if located is None or located.intrinsics != self._locator.intrinsics(detections):
+            located = self._locator(detections)
         faces = [place_in_world(face, R, p) for face in located.faces]
         things = [place_in_world(thing, R, p) for thing in located.things]
         palms = (
@@ -106,26 +106,27 @@ class Perception:
         if things or palms or self._hands.has_resting:
             if self._own_parts is not None:
                 things = label_own_body(things, self._own_parts(R_head, self._p_head), p)
-            known = [
+            tracked = [
                 (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
                 for t in self._tracks
                 if t.is_person
             ]
-            things = self._hands.label(things, known_faces(faces, known), p, t_s, palms)
+            known = known_faces(faces, tracked)
+            things = self._hands.label(things, known, p, t_s, palms)
             faces, things = without_own_motion(faces, things, known, p)
             # A patch that may be a walking person is at the position of the head, not at the feet.
             things = [
-                thing
-                if thing.kind != UNNAMED or thing.upper_m is None
-                else thing._replace(p_m=thing.upper_m)
+                thing._replace(p_m=thing.upper_m)
+                if thing.kind == UNNAMED and thing.upper_m is not None
+                else thing
                 for thing in things
             ]
-        tracked = self._tracker.step([*faces, *things], p, t_s)
+        in_sight = self._tracker.step([*faces, *things], p, t_s)
         size_px = detections.width_px, detections.height_px
         self._tracks = tracks = tuple(
             [
                 track
-                for track in tracked
+                for track in in_sight
                 if track.seen_s == t_s
                 or _in_picture(rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, size_px)
             ]
@@ -159,22 +160,23 @@ class Perception:
         assert R is not None  # visible faces are tracked with their pose
         p = track.p_world_m
         across, along = track.filter.across.p, track.filter.along.p
-        unknown_size = 0.0 if track.depth_s is not None else SIZE_SPREAD * track.filter.range_m
+        unknown_size = 0.0 if track.face_size else SIZE_SPREAD * track.filter.range_m
         # The filter covers errors that change; the unknown size of this person's face is constant.
         across_sd, along_sd = sqrt(across), hypot(sqrt(along), unknown_size)
         found = track.detection
-        signs, t_s, eyes = found.signs, track.at_s, None
-        if signs is not None:
-            if track.seen_s == t_s:
-                track.speech = track.speech.advance(signs.mouth_opening_m, t_s)
-                if signs.eye_opening is not None:
-                    track.eyes = EyeObservation(found.gaze, signs.eye_opening, t_s)
-            eyes = None if track.eyes is None else track.eyes.at(t_s)
-        gaze = found.gaze if eyes is None else eyes.gaze_world
+        signs, t_s = found.signs, track.at_s
+        seen = track.seen_s == t_s
+        if signs is not None and seen:
+            track.speech = track.speech.advance(signs.mouth_opening_m, t_s)
+            if signs.eye_opening is not None:
+                track.eyes, track.eyes_s = found, t_s
+        eyes = track.eyes if signs is not None and t_s - track.eyes_s <= EYES_HELD_S else None
+        gaze = found.gaze if eyes is None else eyes.gaze
+        opening = None if eyes is None or eyes.signs is None else eyes.signs.eye_opening
         off_rad = angle_off_head_rad(R, gaze, sub(self._p_head, p))
         # A blink does not end a look at the head.
-        blinks = eyes is not None and eyes.opening < EYES_SHUT
-        if track.seen_s == t_s and not blinks:
+        blinks = opening is not None and opening < EYES_SHUT
+        if seen and not blinks:
             track.looks_at_head = looks_at_head(
                 off_rad,
                 found.turn_sd_rad,
@@ -186,7 +188,7 @@ class Perception:
             p,
             track.v_world_m_s,
             R,
-            self._face_parts(R, p, track.face_size, track.face_length),
+            self._face_parts(R, p, track.face_size or 1.0, track.face_length),
             found.confidence,
             track.depth_from,
             across_sd,
@@ -194,7 +196,7 @@ class Perception:
             off_rad,
             track.looks_at_head,
             gaze,
-            None if eyes is None else eyes.opening,
+            opening,
             None if signs is None else signs.mouth_opening_m,
             None if signs is None else track.speech.speaks(t_s),
         )
@@ -204,29 +206,19 @@ class Perception:
 
         A measured part keeps its measured position; a canonical one is stretched with the face.
         """
-        (a, b, c), (d, e, f), (g, h, i) = R
-        px, py, pz = p
-        tall = size * length
-        a, d, g, b, e, h = a * size, d * size, g * size, b * size, e * size, h * size
-        c, f, i = c * tall, f * tall, i * tall
-        parts = [
-            add(p, rotate(R, at))
-            if own
-            else (
-                px + a * at[0] + b * at[1] + c * at[2],
-                py + d * at[0] + e * at[1] + f * at[2],
-                pz + g * at[0] + h * at[1] + i * at[2],
-            )
-            for at, own in self._parts
-        ]
-        return tuple(parts)
+        return tuple(
+            [
+                add(
+                    p, rotate(R, at if own else (size * at[0], size * at[1], size * length * at[2]))
+                )
+                for at, own in self._parts
+            ]
+        )
 
 
 def _in_picture(p_camera_m: Vec3, lens: Intrinsics, size_px: tuple[int, int]) -> bool:
     """Return whether a position is inside the image; people outside it are only remembered."""
-    if not p_camera_m[2] > 0.0:
-        return False
-    x, y = project([p_camera_m], lens)[0].tolist()
+    x, y = project([p_camera_m], lens)[0].tolist()  # NaN behind the camera
     return bool(0.0 <= x < size_px[0] and 0.0 <= y < size_px[1])
 
 
@@ -234,46 +226,25 @@ def _bodies(tracks: tuple[BodyTrack, ...]) -> Bodies:
     """Return faces and moving things as bodies; a spin in the image is about the view line."""
     if not tracks:
         return Bodies()
-    numbers: list[float] = []
-    for track in tracks:
-        known, found = track.filter, track.detection
-        numbers += known.p_m
-        numbers += known.v_m_s
-        numbers += scale(known.view, found.spin_rad_s)
-        numbers.append(found.radius_m)
-        numbers += covariance(known.view, known.across, known.along)
-    table = np.array(numbers).reshape(-1, 46)
+    found, filters = [track.detection for track in tracks], [track.filter for track in tracks]
     return Bodies(
         tuple([track.id for track in tracks]),
-        tuple([track.detection.kind for track in tracks]),
-        table[:, 0:3],
-        table[:, 3:6],
-        table[:, 6:9],
-        table[:, 9],
-        table[:, 10:].reshape(-1, 6, 6),
+        tuple([one.kind for one in found]),
+        np.array([one.p_m for one in filters]),
+        np.array([one.v_m_s for one in filters]),
+        np.array([scale(track.filter.view, track.detection.spin_rad_s) for track in tracks]),
+        np.array([one.radius_m for one in found]),
+        covariances(filters),
     )
 
 
-def covariance(view: Vec3, across: Variances, along: Variances) -> tuple[float, ...]:
-    """Return the covariance of position and velocity in the world, (6, 6) row by row.
-
-    Args:
-        view: unit vector from the camera to the thing.
-        across: variances of position, of position and velocity, and of velocity, across the view.
-        along: the same along the view.
-    """
-    x, y, z = view
-    xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
-    a, b, c = across
-    d, e, f = along[0] - a, along[1] - b, along[2] - c
-    pxy, pxz, pyz, qxy, qxz, qyz = d * xy, d * xz, d * yz, e * xy, e * xz, e * yz
-    vxy, vxz, vyz = f * xy, f * xz, f * yz
-    qxx, qyy, qzz = b + e * xx, b + e * yy, b + e * zz
-    return (
-        a + d * xx, pxy, pxz, qxx, qxy, qxz,
-        pxy, a + d * yy, pyz, qxy, qyy, qyz,
-        pxz, pyz, a + d * zz, qxz, qyz, qzz,
-        qxx, qxy, qxz, c + f * xx, vxy, vxz,
-        qxy, qyy, qyz, vxy, c + f * yy, vyz,
-        qxz, qyz, qzz, vxz, vyz, c + f * zz,
-    )  # fmt: skip
+def covariances(filters: Sequence[TrackFilter]) -> Floats:
+    """Return the covariances of position and velocity in the world, (n, 6, 6)."""
+    numbers = np.array([(*one.view, *one.across, *one.along) for one in filters])
+    views, blocks = numbers[:, :3], [[0, 1], [1, 2]]
+    across, along = numbers[:, 3:6][:, blocks], numbers[:, 6:][:, blocks]
+    # Across the view a variance is the same in all directions.
+    lines = views[:, :, np.newaxis] * views[:, np.newaxis]
+    out: Floats = np.einsum("nij,xy->nixjy", across, np.eye(3))
+    out += np.einsum("nij,nxy->nixjy", along - across, lines)
+    return out.reshape(-1, 6, 6)

@@ -3,12 +3,10 @@
 from collections.abc import Callable
 from math import hypot, radians
 
-import numpy as np
-
 from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
-from gazerig.gaze.types import Percept, Vec3
+from gazerig.gaze.types import Percept, Vec3, vec
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, rays
 
@@ -52,15 +50,17 @@ class PixelToWorld:
                 a nearby person or thing.
             captured_s: exposure of the frame with the pixel; None: that of the newest frame.
         """
-        newest = captured_s is None or captured_s == found.captured_s
         at_s = found.captured_s if captured_s is None else captured_s
         R, p = self._mount.pose(*self._poses.head_pose(at_s))
         camera, size_px = self._camera(), (found.width_px, found.height_px)
         field_rad = radians(camera.horizontal_field_deg)
         lens = intrinsics_of_lens(camera.lens, field_rad, *size_px, found.lens)
-        x_ray, y_ray, z_ray = rays(np.array([pixel]), lens)[0].tolist()
-        through = rotate(R, (x_ray, y_ray, z_ray))  # 1 m deep: depth is along the optical axis
-        depth_m = _depth_m(found, pixel) if newest and distance_m is None else None
+        through = rotate(
+            R, vec(rays([pixel], lens)[0])
+        )  # 1 m deep: depth is along the optical axis
+        depth_m = (
+            _depth_m(found, pixel) if at_s == found.captured_s and distance_m is None else None
+        )
         if depth_m is not None:
             return add(p, scale(through, depth_m))
         direction = unit(through)
@@ -95,8 +95,6 @@ def _depth_m(found: Detections, pixel: tuple[float, float]) -> float | None:
     if found.depth_m is None:
         return None
     height, width = found.depth_m.shape[:2]
-    x = pixel[0] * width / found.width_px
-    y = pixel[1] * height / found.height_px
     side = max(3.0, _PATCH * hypot(width, height))
-    box = (x - side / 2, y - side / 2, side, side)
+    box = (pixel[0] - side / 2, pixel[1] - side / 2, side, side)
     return depth_at(found.depth_m, box, shrink=1.0).distance_m

@@ -1,7 +1,7 @@
 """Data of tracking: a detection in the world, one person or thing, its eyes, lips and clothes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf, radians, sqrt
 from typing import NamedTuple, Self
 
@@ -12,7 +12,7 @@ from gazerig.gaze.angles import add, angle_between, compose, rotate
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.perception.kalman import TrackFilter
 
-_EYES_HELD_S = 0.12
+EYES_HELD_S = 0.12
 """Time for which a gaze stays valid if the next frames show a mesh, but not the irises."""
 _EYES_SD_RAD = radians(4.0)
 """Usual error of a gaze from images of both eyes."""
@@ -24,23 +24,6 @@ _FACE_AT_HEAD_RAD, _EYES_AT_HEAD_RAD = radians(10.0), radians(6.0)
 to the head."""
 _EDGE_OF_CONE, _EDGE_OF_SD = 0.2, 0.5
 """Distance of inner and outer edge from the cone: fractions of the cone and of the uncertainty."""
-
-
-class EyeObservation(NamedTuple):
-    """State of a person's eyes in the last frame that showed them.
-
-    gaze_world: unit vector of their gaze, None if they were shut
-    opening: opening of the lids relative to the usual one
-    at_s: capture time of that frame
-    """
-
-    gaze_world: Vec3 | None
-    opening: float
-    at_s: float
-
-    def at(self, t_s: float) -> Self | None:
-        """Return the state if it is still valid at a time, else None."""
-        return self if t_s - self.at_s <= _EYES_HELD_S else None
 
 
 def angle_off_head_rad(R_world_face: Mat3, gaze_world: Vec3 | None, from_face_m: Vec3) -> float:
@@ -83,8 +66,7 @@ def looks_at_head(
 _MEAN_S, _LEAST_M, _WINDOW_S, _CROSSINGS = 0.6, 0.0012, 1.5, 4
 
 
-@dataclass(frozen=True, slots=True)
-class Speech:
+class Speech(NamedTuple):
     """Recent motion of the gap between a person's lips; a value.
 
     Speech opens and closes the mouth three to six times a second; a smile, a yawn and a mouth that
@@ -103,14 +85,14 @@ class Speech:
     def advance(self, gap_m: float, t_s: float) -> Self:
         """Return the motion after another frame."""
         if self.mean_m is None:
-            return replace(self, mean_m=gap_m, at_s=t_s)
+            return self._replace(mean_m=gap_m, at_s=t_s)
         share = min(1.0, max(0.0, t_s - self.at_s) / _MEAN_S)
         off_m = gap_m - self.mean_m
         mean_m = self.mean_m + share * off_m
         if abs(off_m) < _LEAST_M or (off_m > 0.0) is self.above:
-            return replace(self, mean_m=mean_m, at_s=t_s)
+            return self._replace(mean_m=mean_m, at_s=t_s)
         crossed = (*self.crossed_s[1 - _CROSSINGS :], t_s)
-        return replace(self, mean_m=mean_m, above=not self.above, crossed_s=crossed, at_s=t_s)
+        return self._replace(mean_m=mean_m, above=not self.above, crossed_s=crossed, at_s=t_s)
 
     def speaks(self, t_s: float) -> bool:
         """Return whether the mouth moves like that of a speaking person."""
@@ -127,6 +109,7 @@ UNNAMED = "thing"
 # below and above it. At .105, one person at two times is as frequent as two people at one time.
 # Measured on people in a square (75 tracks; medians: .044 for one person, .13 for two people).
 _AS_LIKELY, _NEARER_COST, _FARTHER_COST = 0.105, 55.0, 14.0
+_NO_CLOTHING = Clothing((0.0,) * 24, 0.0)
 # Clothes of which this share is visible count as fully visible.
 _ENOUGH = 0.4
 # Gain with which the colours of clothes are learned, and gain if they do not match.
@@ -192,16 +175,15 @@ def clothing_costs(
     Returns:
         n rows of m; None if no pair has known clothes.
     """
-    rows = [k for k, colours in enumerate(tracks) if colours is not None]
-    columns = [j for j, one in enumerate(detections) if one is not None]
-    seen = [one for one in detections if one is not None]
-    if not rows or not columns:
+    if all(colours is None for colours in tracks) or not any(detections):
         return None
-    alike = np.array([tracks[k] for k in rows]) @ np.array([one[0] for one in seen]).T
+    shown = [found or _NO_CLOTHING for found in detections]
+    worn = np.array([_NO_CLOTHING.colours if colours is None else colours for colours in tracks])
+    shares = np.minimum(1.0, np.array([found.share for found in shown]) / _ENOUGH)
+    known = np.outer([colours is not None for colours in tracks], shares)
+    alike = worn @ np.array([found.colours for found in shown]).T
     apart = np.sqrt(np.maximum(0.0, 1.0 - alike)) - _AS_LIKELY
-    shares = np.minimum(1.0, np.array([one[1] for one in seen]) / _ENOUGH)
-    costs = np.zeros((len(tracks), len(detections)))
-    costs[np.ix_(rows, columns)] = shares * np.minimum(_NEARER_COST * apart, _FARTHER_COST * apart)
+    costs = known * np.minimum(_NEARER_COST * apart, _FARTHER_COST * apart)
     out: list[list[float]] = costs.tolist()
     return out
 
@@ -229,12 +211,12 @@ class BodyTrack:
     seen_s, at_s: capture times of its last detection and of its position
     frames: number of frames in which it was detected
     faced_s: of a person, capture time of the last detection of the face
-    face_size: of a face, size relative to an adult's, learned if the camera measures depth
-    depth_s: capture time of the last measured distance, None before the first
+    face_size: of a face, size relative to an adult's, learned if the camera measures depth; None
+        before the first measured distance
     looks_at_head: of a face, whether the person looked at the head in its last frame; None if
         uncertain
     speech: of a face, recent motion of the mouth
-    eyes: of a face, last observed state of the eyes
+    eyes, eyes_s: of a face, last detection that showed the eyes, and its capture time
     clothes: of a person, learned clothes
     returned_person: the person whose number a new track has received, None for a new number;
         is_number_final: whether the number is final because the clothes are known
@@ -247,11 +229,11 @@ class BodyTrack:
     seen_s: float
     at_s: float
     face_length: float
-    face_size: float = 1.0
-    depth_s: float | None = None
+    face_size: float | None = None
     looks_at_head: bool | None = None
     speech: Speech = NO_SPEECH
-    eyes: EyeObservation | None = None
+    eyes: Located | None = None
+    eyes_s: float = -inf
     faced_s: float = -inf
     frames: int = 1
     clothes: KnownClothes = field(default_factory=KnownClothes)
@@ -267,11 +249,6 @@ class BodyTrack:
     def is_remembered(self) -> bool:
         """Return whether it has been out of sight for so long that it is assumed to stay."""
         return self.unseen_s > FORGET_S
-
-    @property
-    def size(self) -> float | None:
-        """Return the size of its face relative to an adult's, None if it was never measured."""
-        return None if self.depth_s is None else self.face_size
 
     @property
     def p_world_m(self) -> Vec3:

@@ -13,7 +13,7 @@ Things are numbered separately.
 from math import inf
 
 from gazerig.drivers.types import Located
-from gazerig.gaze.angles import add, cross, scale, sub, unit
+from gazerig.gaze.angles import add, cross, scale, sub, transpose, unit
 from gazerig.gaze.types import FIRST_THING, Mat3, Vec3
 from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.data_association import (
@@ -204,7 +204,9 @@ class Tracker:
 
     def _update_track(self, track: BodyTrack, detection: Located, p_camera: Vec3) -> None:
         """Update a track with a detection."""
-        place = _correct_distance(track, detection, p_camera)
+        place = detection.p_m
+        if track.face_size and detection.R_face is not None and not detection.depth_measured:
+            place = add(p_camera, scale(sub(place, p_camera), track.face_size))
         track.filter.correct(place, detection.across_sd_m, detection.along_sd_m)
         _correct_velocity(track, detection)
         if track.is_person:
@@ -232,16 +234,14 @@ class Tracker:
         """Learn the size of a face whose distance is measured."""
         if detection.size_depth is None:
             return
-        gain = 1.0 if track.depth_s is None else gain
-        track.face_size += gain * (1.0 / detection.size_depth - track.face_size)
-        track.depth_s = track.at_s
+        size, before = 1.0 / detection.size_depth, track.face_size
+        track.face_size = size if before is None else before + gain * (size - before)
 
 
 def _person(track: BodyTrack) -> SeenPerson:
     """Return the features of the person of a track."""
-    before, worn = track.returned_person, track.clothes.colours
-    size = track.size
-    if before is not None:
+    size, worn = track.face_size, track.clothes.colours
+    if (before := track.returned_person) is not None:
         size = before.face_size if size is None else size
         worn = before.colours if worn is None else worn
     return SeenPerson(track.id, track.p_world_m, track.seen_s, size, worn)
@@ -259,26 +259,11 @@ def _correct_velocity(track: BodyTrack, found: Located) -> None:
         track.filter.correct_velocity(found.p_m, found.v_m_s, *sds)
 
 
-def _correct_distance(track: BodyTrack, detection: Located, p_camera: Vec3) -> Vec3:
-    """Return a detection's position with its distance corrected by the learned size of the face."""
-    by_face = detection.R_face is not None
-    if detection.depth_measured or track.depth_s is None or not by_face:
-        return detection.p_m
-    return add(p_camera, scale(sub(detection.p_m, p_camera), track.face_size))
-
-
 def _blend(A: Mat3, B: Mat3, share: float) -> Mat3:
     """Return the rotation at a fraction of the path from A to B (columns blended, orthonormal)."""
-    x = unit(_column(A, B, 0, share))
-    z = _column(A, B, 2, share)
-    y = unit(cross(z, x))
-    z = cross(x, y)
-    return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]))
-
-
-def _column(A: Mat3, B: Mat3, k: int, share: float) -> Vec3:
-    return (
-        A[0][k] + share * (B[0][k] - A[0][k]),
-        A[1][k] + share * (B[1][k] - A[1][k]),
-        A[2][k] + share * (B[2][k] - A[2][k]),
+    x, _, z = (
+        add(a, scale(sub(b, a), share)) for a, b in zip(transpose(A), transpose(B), strict=True)
     )
+    x = unit(x)
+    y = unit(cross(z, x))
+    return transpose((x, y, cross(x, y)))

@@ -36,7 +36,7 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.scene_view import PinholeView
-from gazerig.robot.perception.motion_source import motion_finder
+from gazerig.robot.perception.motion_source import MotionSource
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import WorldCameraParams
@@ -243,7 +243,7 @@ def world_camera(
         process = None
         if not options.no_pictures:
             field_rad = radians(world.camera.horizontal_field_deg)
-            motion = partial(motion_finder, rig.motion, world.camera.lens, field_rad, turns)
+            motion = partial(MotionSource, rig.motion, world.camera.lens, field_rad, turns)
             source: Callable[[], FrameSource] = partial(
                 DrawnSource, partial(served_pixels, world, poses), poses
             )
