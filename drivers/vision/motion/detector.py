@@ -21,7 +21,6 @@ from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.backprojection import (
     back_project,
     distance,
-    parallax,
     radius_m,
     shrink_depth,
     velocity,
@@ -57,7 +56,6 @@ from gazerig.drivers.vision.motion.lucas_kanade import (
     refine_warp,
 )
 from gazerig.drivers.vision.motion.optical_flow import (
-    Flow,
     FlowSearch,
     ImagePair,
     align_images,
@@ -138,7 +136,6 @@ class MotionDetector:
         lens: Intrinsics,
         R_now_before: NDArray[np.float64] | None,
         depth_m: NDArray[Any] | None = None,
-        t_now_before_m: NDArray[np.float64] | None = None,
     ) -> tuple[MovingBlob, ...]:
         """Find moving things between the last image and this one.
 
@@ -148,15 +145,13 @@ class MotionDetector:
             ``captured_s``; identity for a camera at rest, None if unknown
         depth_m: (any, any) distance along the optical axis, aligned with the image; 0, NaN or
             infinite if unknown
-        t_now_before_m: (3,) position of the lens at ``before_s`` relative to the present one, in
-            present axes; with it and depth, parallax of near things is not mistaken for motion
 
         Raises:
             ValueError: the image has another shape or type.
         """
         now = scale_down(image, self._params.work_px, lens, captured_s)
         before, self._before = self._before, now
-        self.report = self._compare_images(now, before, R_now_before, depth_m, t_now_before_m)
+        self.report = self._compare_images(now, before, R_now_before, depth_m)
         if self._params.gloves:
             gloves = self._gloves.find(image, captured_s, lens, self._params.work_px)
             self.report = self.report._replace(
@@ -176,7 +171,6 @@ class MotionDetector:
         before: SmallImage | None,
         R_now_before: Floats | None,
         depth_m: NDArray[Any] | None,
-        t_now_before_m: Floats | None,
     ) -> MotionReport:
         """Compare two images; return the motion, or the reason why they cannot be compared."""
         if not is_searchable(now.grey):
@@ -188,8 +182,7 @@ class MotionDetector:
         if not 0.0 < dt_s <= _LONGEST_GAP_S:
             return MotionReport(no_result_reason="no frame shortly before")
         depth = shrink_depth(depth_m, now.grey.shape)
-        shift = parallax(depth, now.K, t_now_before_m)
-        pair, ego, still = self._measure_flow(now, before, R_now_before, shift)
+        pair, ego, still = self._measure_flow(now, before, R_now_before)
         turn = float(np.degrees(turn_rad(ego, now.grey, now.K))) / dt_s
         why = self._separation_fault(pair, ego, turn)
         if why:
@@ -201,11 +194,7 @@ class MotionDetector:
         frames = blur_images(pair) if groups else ()
         moving: list[tuple[PixelGroup, Floats, PatchMotion]] = []
         for group in groups:
-            # The map of a still patch there to the older image.
-            off = np.zeros(2)
-            if pair.shift is not None:
-                off = np.median(pair.shift[group.rows, group.columns], axis=0).astype(np.float64)
-            centre, motion = _centre_and_motion(group, frames, BackgroundWarp(ego.B, off))
+            centre, motion = _centre_and_motion(group, frames, BackgroundWarp(ego.B))
             if _motion_px(group, motion, now.grey.shape) > LEAST_FLOW_PX / shrink:
                 moving.append((group, centre, motion))
         follows = self._tracks.step(
@@ -226,18 +215,16 @@ class MotionDetector:
         )
 
     def _measure_flow(
-        self, now: SmallImage, before: SmallImage, R_now_before: Floats | None, shift: Flow | None
+        self, now: SmallImage, before: SmallImage, R_now_before: Floats | None
     ) -> tuple[ImagePair, EgoMotion, ImageDifference | None]:
         """Compute the flow and the camera's own motion; a large unpredicted one is removed first.
 
         If the camera moved as predicted, flow is computed only where the images differ, and their
         difference is returned too.
         """
-        pair = align_images(now, before, turn_homography(R_now_before, now, before))._replace(
-            shift=shift
-        )
+        pair = align_images(now, before, turn_homography(R_now_before, now, before))
         moved_before = now.captured_s - self._moved_s < _SHAKES_ON_S
-        if shift is None and not moved_before:
+        if not moved_before:
             still = image_difference(pair)
             ego = predicted_ego_motion(pair, still.changed_mask)
             if ego is not None:
@@ -248,7 +235,7 @@ class MotionDetector:
             self._moved_s = now.captured_s
         if ego.background_share < _LEAST_BACKGROUND_SHARE or ego.unforeseen_px < _SEARCH_AGAIN_PX:
             return pair, ego, None
-        again = self._search.search(align_images(now, before, ego.total)._replace(shift=shift))
+        again = self._search.search(align_images(now, before, ego.total))
         return again, estimate_ego_motion(again, now.K, True), None
 
     def _separation_fault(self, pair: ImagePair, ego: EgoMotion, turn_deg_s: float) -> str:

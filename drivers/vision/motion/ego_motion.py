@@ -140,8 +140,6 @@ def estimate_ego_motion(
     if len(points) >= _LEAST_POINTS:
         at = points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)
         there = points + pair.flow[at]
-        if pair.shift is not None:
-            there -= pair.shift[at]
         reach = _STANDING_REACH_PX + (_median_shift(_inverse(pair.H), points) if predicted else 0.0)
         need = _AGAINST_JOINTS if predicted else _MOVES if moved_before else _STOOD
         found = _fit_room(points, there, K, pair, reach, need)

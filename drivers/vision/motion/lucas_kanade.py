@@ -71,16 +71,15 @@ def blur_images(pair: ImagePair) -> tuple[PyramidLevel, ...]:
 class BackgroundWarp(NamedTuple):
     """Map of still things to the older image.
 
-    B: (3, 3) present pixels to older ones; shift: (2,) additional, at the distance of the patch
+    B: (3, 3) present pixels to older ones
     """
 
     B: Floats
-    shift: Floats
 
     def linearize(self, centre: Floats) -> tuple[Floats, Floats]:
         """Return (2, 2) and (2,): the map around a position, x -> there + slope (x - centre)."""
         at = warp_points(self.B, centre + _AROUND)
-        return ((at[1:] - at[0]) / _STEP_PX).T, at[0] + self.shift
+        return ((at[1:] - at[0]) / _STEP_PX).T, at[0]
 
 
 def refine_warp(

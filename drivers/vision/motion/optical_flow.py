@@ -40,7 +40,6 @@ class ImagePair(NamedTuple):
     H: (3, 3) pixels of the older image to those of ``before``
     fine_images: the same two images before they were scaled for the search
     windows: parts in which flow was computed; elsewhere it is 0
-    shift: (h, w, 2) flow of still things by parallax; None for none
     """
 
     now: Grey
@@ -50,7 +49,6 @@ class ImagePair(NamedTuple):
     H: Floats
     fine_images: tuple[Grey, Grey]
     windows: tuple[Window, ...] = ()
-    shift: Flow | None = None
 
     def crop(self, window: Window) -> "ImagePair":
         """Return a part of both images with its flow."""
@@ -59,7 +57,6 @@ class ImagePair(NamedTuple):
             before=self.before[window],
             valid_mask=self.valid_mask[window],
             flow=self.flow[window],
-            shift=None if self.shift is None else self.shift[window],
         )
 
 

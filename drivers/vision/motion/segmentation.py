@@ -34,8 +34,6 @@ _NOISE_RATIO, _ROUNDING = 3.0, 1.0
 _BEHIND = 0.03
 # Share of a motion that must be across the edges there.
 _ACROSS = 0.15
-# Distance by which flow smears over an edge.
-_SMEAR_PX = 9
 # Grey level below which relative changes are noise.
 _DARK = np.float32(8.0)
 # A camera that moved the image by less is at rest.
@@ -104,10 +102,8 @@ def segment_motion(
         still: Their difference, if the room keeps its position in the older image.
     """
     there = None
-    if still is None or pair.shift is not None:
+    if still is None:
         there = _background_positions(ego.B, pair.now.shape)
-        if pair.shift is not None:
-            there += pair.shift
         still = image_difference(pair, there)
     threshold = max(LEAST_FLOW_PX / shrink, _NOISE_FACTOR * ego.noise_px)
     if not by_image:
@@ -124,9 +120,7 @@ def segment_motion(
         moves = rest
         if by_image and ego.shift_px > _STANDS_PX:
             moves = rest - _parallax_part(rest, ego, _PARALLAX_SHARE)
-        mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold + _parallax_differences(
-            part.shift
-        )
+        mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold
         mask &= part.valid_mask
         squares = still.mean_squares[window]
         mask &= squares > _NOISE_RATIO * still.noise
@@ -172,14 +166,6 @@ def _cross_edge_mask(now: Grey, moves: Flow, threshold_px: float) -> Mask:
     least = np.maximum(np.float32(0.25 * threshold_px**2), np.float32(_ACROSS**2) * way)
     out: Mask = shown > least * most
     return out
-
-
-def _parallax_differences(shift: Flow | None) -> Plane | float:
-    """Return the relative motion of still neighbours, (h, w): flow there may be the neighbour's."""
-    if shift is None:
-        return 0.0
-    ends = cv2.morphologyEx(shift, cv2.MORPH_GRADIENT, np.ones((_SMEAR_PX, _SMEAR_PX), np.uint8))
-    return np.asarray(ends[..., 0] + ends[..., 1], dtype=np.float32)
 
 
 def _parallax_part(rest: Flow, ego: EgoMotion, most: float) -> Flow:
