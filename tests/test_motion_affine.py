@@ -9,7 +9,6 @@ import pytest
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.detector import MotionDetector
-from gazerig.drivers.vision.motion.lucas_kanade import fit_affine_warp
 from gazerig.drivers.vision.motion.params import MotionParams
 
 WIDTH, HEIGHT, FOCAL, DT_S = 320, 240, 233.0, 1 / 30
@@ -106,9 +105,3 @@ def reaches_edge(blob: MovingBlob) -> bool:
     assert blob.box_px is not None
     x, y, width, height = blob.box_px
     return x <= 1.5 or y <= 1.5 or x + width >= WIDTH - 2.5 or y + height >= HEIGHT - 2.5
-
-
-def test_points_on_a_line_slide_only_wherever_the_line_is() -> None:
-    places = np.column_stack((np.full(9, 8.0), np.arange(9.0)))
-    warp, _ = fit_affine_warp(places, np.ones((9, 2)), np.zeros(2), 576.0)
-    assert warp.shift.tolist() == [-1.0, -1.0] and warp.slope_sd == np.inf

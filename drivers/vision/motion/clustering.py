@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.vision.motion.image import Floats, Grey
-from gazerig.drivers.vision.motion.lucas_kanade import affine_residual
 from gazerig.drivers.vision.motion.optical_flow import Flow, Mask
 from gazerig.drivers.vision.motion.segmentation import MotionMask
 
@@ -31,6 +30,7 @@ MOST_BLOBS = 8
 # Number of patches that are examined per reported one.
 _LOOKED_AT = 3
 _SMOOTH_PX = 3
+_LEAST_FLOW_POINTS = 6
 # Relative change of brightness at the edges of a thing that is not a faint shadow, and the share of
 # the image above which less is enough: near things are large, with soft edges.
 _LEAST_CHANGE, _SMALL_SHARE = 0.13, 0.008
@@ -164,6 +164,15 @@ def _first_thing_mask(group: PixelGroup, threshold_px: float) -> Mask | None:
     rests = [affine_residual(places[side][::step], flow[side][::step]) for side in (sides, ~sides)]
     apart = np.sqrt(share * rests[0] ** 2 + (1.0 - share) * rests[1] ** 2)
     return sides if apart < _BETTER_SHARE * together else None
+
+
+def affine_residual(places: Floats, flow: Floats) -> float:
+    """Return the residual of a flow after one affine motion, root mean square of the lengths."""
+    if len(places) < _LEAST_FLOW_POINTS:
+        return 0.0
+    rows = np.column_stack((places - places.mean(axis=0), np.ones(len(places))))
+    numbers = np.linalg.solve(rows.T @ rows + 1e-9 * np.eye(3), rows.T @ flow)
+    return float(np.sqrt(((flow - rows @ numbers) ** 2).sum(axis=1).mean()))
 
 
 def inscribed_radius_px(group: PixelGroup, shape: tuple[int, ...]) -> float:

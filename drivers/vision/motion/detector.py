@@ -46,15 +46,6 @@ from gazerig.drivers.vision.motion.image import (
     scale_down,
     to_original_px,
 )
-from gazerig.drivers.vision.motion.lucas_kanade import (
-    BackgroundWarp,
-    PatchMotion,
-    PyramidLevel,
-    blur_images,
-    fit_affine_warp,
-    patch_motion,
-    refine_warp,
-)
 from gazerig.drivers.vision.motion.optical_flow import (
     FlowSearch,
     ImagePair,
@@ -64,6 +55,7 @@ from gazerig.drivers.vision.motion.optical_flow import (
     turn_homography,
 )
 from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.drivers.vision.motion.patch_motion import PatchMotion, blur_images, patch_motion
 from gazerig.drivers.vision.motion.segmentation import (
     LEAST_FLOW_PX,
     ImageDifference,
@@ -89,8 +81,6 @@ _LONGEST_GAP_S = 0.3
 _EDGE_SHARE = 0.06
 # Distance from the edge at which a patch continues beyond it.
 _CUT_PX = 1
-# Number of points for an affine fit.
-_SAMPLE = 400
 
 
 class MotionReport(NamedTuple):
@@ -191,10 +181,12 @@ class MotionDetector:
         shrink = now.fine_grey.shape[0] // now.grey.shape[0]
         things = segment_motion(pair, ego, shrink, R_now_before is None, still)
         groups = cluster_motion(things, shrink)
-        frames = blur_images(pair) if groups else ()
+        images = blur_images(pair) if groups else ()
         moving: list[tuple[PixelGroup, Floats, PatchMotion]] = []
         for group in groups:
-            centre, motion = _centre_and_motion(group, frames, BackgroundWarp(ego.B))
+            places = np.column_stack((group.columns, group.rows)).astype(np.float64)
+            centre = places.mean(axis=0)
+            motion = patch_motion(places, group.flow, centre, images, ego.B)
             if _motion_px(group, motion, now.grey.shape) > LEAST_FLOW_PX / shrink:
                 moving.append((group, centre, motion))
         follows = self._tracks.step(
@@ -264,7 +256,7 @@ class MotionDetector:
         p = back_project(point, far.z_m, now.K)
         flow_px_s = motion.slide_px[0] / dt_s, motion.slide_px[1] / dt_s
         # A thing that the edge of the image cuts does not grow when more of it becomes visible.
-        growth_sd = np.inf if _is_cut(group, now.grey.shape) else motion.growth_sd
+        growth_sd = np.inf if _is_cut(group, now.grey.shape) else motion.sd
         loom = _shrink_by_noise(motion.growth, growth_sd) / dt_s
         fastest_px, fastest_flow = fastest_quarter(group)
         at = back_project(fastest_px, far.z_m, now.K)
@@ -277,12 +269,12 @@ class MotionDetector:
             _KIND,
             p,
             radius_m(len(group.columns), far.z_m, now.K),
-            spin_rad_s=_shrink_by_noise(motion.spin_rad, motion.spin_sd) / dt_s,
+            spin_rad_s=_shrink_by_noise(motion.spin_rad, motion.sd) / dt_s,
             loom_1_s=loom,
             v_camera_m_s=velocity(p, flow_px_s, loom, now.K),
             depth_known=far.is_measured,
             depth_sd_m=far.sd_m,
-            spin_sd_rad_s=motion.spin_sd / dt_s,
+            spin_sd_rad_s=motion.sd / dt_s,
             loom_sd_1_s=growth_sd / dt_s,
             box_px=(left, top, width / sx, height / sy),
             centre_px=to_original_px((float(point[0]), float(point[1])), now.scale),
@@ -303,8 +295,8 @@ def _motion_px(group: PixelGroup, motion: PatchMotion, shape: tuple[int, ...]) -
     slide = float(np.hypot(*motion.slide_px))
     if _is_cut(group, shape):
         return slide  # its growth is unknown
-    growth = _shrink_by_noise(motion.growth, motion.growth_sd)
-    spin = _shrink_by_noise(motion.spin_rad, motion.spin_sd)
+    growth = _shrink_by_noise(motion.growth, motion.sd)
+    spin = _shrink_by_noise(motion.spin_rad, motion.sd)
     return float(
         np.hypot(slide, 0.3 * np.sqrt(group.box[2] * group.box[3]) * np.hypot(growth, spin))
     )
@@ -322,18 +314,6 @@ def relative_rotation(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -
     now, before = np.asarray(R_world_now, float), np.asarray(R_world_before, float)
     out: Floats = now.T @ before
     return out
-
-
-def _centre_and_motion(
-    group: PixelGroup, frames: tuple[PyramidLevel, ...], room: BackgroundWarp
-) -> tuple[Floats, PatchMotion]:
-    """Return a patch's centre, and the motion there."""
-    places = np.column_stack((group.columns, group.rows)).astype(np.float64)
-    middle = places.mean(axis=0)
-    step = max(1, len(places) // _SAMPLE)
-    places, flow = places[::step], group.flow[::step]
-    start, rest = fit_affine_warp(places, flow, middle, float(len(group.columns)))
-    return middle, patch_motion(refine_warp(start, places, middle, frames, room), rest)
 
 
 def _shrink_by_noise(value: float, sd: float) -> float:
