@@ -53,8 +53,6 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
     },
     DETECTOR: {
         "auto": "gazerig.drivers.vision.face.detector:AUTO",
-        "mtcnn": "gazerig.drivers.vision.face.detector:MTCNN",
-        "yunet": "gazerig.drivers.vision.face.detector:YUNET",
     },
     ATTENTION: {"attention": "gazerig.gaze.attention.attention:Attention"},
     TRACKS: {"gazerig": "gazerig.config.load:TRACKS_FOLDER"},

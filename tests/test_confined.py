@@ -83,7 +83,7 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
         {"do": "save", "path": str(tmp_path / "made.yaml")},
         {"do": "save", "path": "~/made.yaml"},
         {"do": "set", "changes": {"gaze.scanpath.transition_matrix": "/etc/shadow"}},
-        {"do": "set", "changes": {"detector.model_file": "/etc/shadow"}},
+        {"do": "set", "changes": {"sound.folders": ["/etc"]}},
     ):
         words = hear(asked)
         assert words is not None and words.startswith("refused") and "root:" not in words

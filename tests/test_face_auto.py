@@ -91,23 +91,6 @@ def test_same_frames_same_numbers() -> None:
         assert [f.landmarks_px.tobytes() for f in one] == [f.landmarks_px.tobytes() for f in other]
 
 
-@pytest.mark.parametrize(
-    ("content", "kind"), [(b"PK\x03\x04..", "a zip archive"), (b"some text", "no ONNX file")]
-)
-def test_a_model_file_of_another_kind_is_told_once_and_mtcnn_searches(
-    tmp_path, content: bytes, kind: str
-) -> None:
-    file = tmp_path / "model.onnx"
-    file.write_bytes(content)
-    detector = auto(model_file=str(file))
-    frame, _ = room(("astronaut", 1.2, 300.0, 180.0))
-    assert len(detector.find(frame)) == 1
-    (line,) = detector.events()
-    assert f"{file} is not a YuNet network but {kind}" in line
-    detector.find(frame)
-    assert detector.events() == ()
-
-
 def test_a_man_who_talks_in_a_shaking_car_is_found_in_every_frame_of_the_film() -> None:
     film = cv2.VideoCapture(str(carphone()))
     detector, found = auto(), []

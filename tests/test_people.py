@@ -15,16 +15,18 @@ from test_perception import seen as percept_at
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import DetectedPerson, ImageArray, MovingBlob
+from gazerig.drivers.types import DetectedFace, DetectedPerson, ImageArray, MovingBlob
 from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection
 from gazerig.drivers.vision.face.auto import AutoDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.litert import anchors
 from gazerig.drivers.vision.model_files import (
     FOLDER_VARIABLE,
     PEOPLE,
 )
-from gazerig.drivers.vision.people import PeopleDetector, anchors
+from gazerig.drivers.vision.palms import PalmDetector
+from gazerig.drivers.vision.people import PeopleDetector
 from gazerig.gaze.angles import norm
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.dashboard.feed.camera_overlay import draw_detections
@@ -116,15 +118,17 @@ def test_two_people_are_two_and_one_who_is_unsure_or_upside_down_is_none() -> No
 def test_a_square_is_looked_at_in_each_frame_until_the_search_is_done() -> None:
     network = Seen((), 432.0)
     network.left_of = [0.0]
-    detector = PeopleDetector(FaceDetectorParams(people_hz=2.0), network)
+    people = PeopleDetector(FaceDetectorParams(people_hz=2.0), network)
+    detector = BodyDetector(Faceless(), people)
     frame = np.zeros((432, 768, 3), np.uint8)
     runs = []
     for i in range(33):
         before = network.runs
-        assert detector.find(frame, 10.0 + i / 30.0) == ()
+        detector.find(frame)
+        assert detector.people(frame, 10.0 + i / 30.0) == ()
         runs.append(network.runs - before)
     assert runs == [*[1] * 3, *[0] * 12, *[1] * 3, *[0] * 12, *[1] * 3]
-    assert detector.find(np.zeros((0, 0, 3), np.uint8), 99.0) == ()
+    assert people.find(np.zeros((0, 0, 3), np.uint8), 99.0) == ()
 
 
 class Faceless:
@@ -165,12 +169,42 @@ def test_a_damaged_file_is_told_once_and_faces_are_found(folder: Path) -> None:
     assert isinstance(off, AutoDetector) and off.events() == ()
 
 
+class Searching:
+    """A face detector that searches the whole of every fourth picture."""
+
+    count, searched = 0, False
+
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        self.searched, self.count = self.count % 4 == 0, self.count + 1
+        return (DetectedFace((300.0, 60.0, 40.0, 65.2), np.zeros((5, 2)), 0.9),)
+
+
+@pytest.mark.parametrize("rate_hz", [8.0, 30.0])
+def test_a_picture_gets_one_of_the_three_searches_and_each_has_its_turn(rate_hz: float) -> None:
+    network, runs = Seen((), 480.0), [0]
+    network.left_of = [0.0]
+
+    def palms(_: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        runs[0] += 1
+        return np.zeros((2016, 18), np.float32), np.full(2016, -9.0, np.float32)
+
+    params, faces = FaceDetectorParams(), Searching()
+    detector = BodyDetector(faces, PeopleDetector(params, network), PalmDetector(params, palms))
+    frame = np.zeros((480, 640, 3), np.uint8)
+    for i in range(round(4.0 * rate_hz)):
+        before = network.runs + runs[0]
+        found = detector.find(frame)
+        people = detector.people(frame, i / rate_hz)
+        detector.palms(frame, i / rate_hz, found, people)
+        assert network.runs + runs[0] - before + faces.searched <= 1
+    assert network.runs >= 8 and runs[0] >= (12 if rate_hz > 20.0 else 8)
+
+
 def test_the_doctor_names_what_is_missing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     examine_detector = pytest.importorskip("gazerig.features.bringup.cli.doctor").examine_detector
     monkeypatch.setenv("XDG_DATA_HOME", str(folder))
     found = examine_detector(FaceDetectorParams())
     assert found.level == "note" and found.remedy.startswith("gazerig models fetch")
-    assert examine_detector(FaceDetectorParams("mtcnn", people_hz=0.0, hands_hz=0.0)).level == "ok"
 
 
 # ---- where they are, and who ---------------------------------------------------------------

@@ -112,13 +112,13 @@ def test_a_name_nobody_brings_is_refused_with_those_there_are(folder):
 
 
 def test_a_name_that_is_taken_is_named_with_both_packages(folder):
-    install(folder, "one", {DETECTOR: {"eyes": "m:x", "mtcnn": "m:x"}}, {"m": "x = 1"})
+    install(folder, "one", {DETECTOR: {"eyes": "m:x", "auto": "m:x"}}, {"m": "x = 1"})
     install(folder, "two", {DETECTOR: {"eyes": "m:x"}}, {}, "3.0")
     with pytest.raises(
         PluginError, match="^detector 'eyes' comes with one 1.2 and two 3.0: uninstall one of them$"
     ):
         plugins.find(DETECTOR, "eyes")
-    assert plugins.find(DETECTOR, "mtcnn").is_ours
+    assert plugins.find(DETECTOR, "auto").is_ours
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
-"""Detection of faces, people without a visible face, and palms, depending on the model files."""
+"""All detectors of a picture: faces with meshes, people without a visible face, and palms."""
 
-import numpy as np
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
 
-from gazerig.drivers.camera.quiet_opencv import quiet_stderr
-from gazerig.drivers.errors import ModelFileError, extra_hint
+from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.types import (
     DetectedFace,
@@ -13,33 +14,54 @@ from gazerig.drivers.types import (
     ImageArray,
 )
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.model_files import PALMS, PEOPLE, ModelFile
-from gazerig.drivers.vision.palms import PalmDetector
-from gazerig.drivers.vision.people import Floats, Network, PeopleDetector
+
+if TYPE_CHECKING:
+    from gazerig.drivers.vision.face.mesh import MeshNetworks
+    from gazerig.drivers.vision.palms import PalmDetector
+    from gazerig.drivers.vision.people import PeopleDetector
+
+_Part = TypeVar("_Part")
 
 
 class BodyDetector:
-    """A face detector that also finds people whose face is not visible, and palms."""
+    """A face detector that also finds meshes, people whose face is not visible, and palms.
+
+    Of a search of the whole picture for faces, one for people and one for palms, each picture gets
+    at most one, the one that is due first; the others wait for the next picture.
+    """
 
     def __init__(
         self,
-        detector: FaceDetector,
-        people: PeopleDetector | None,
-        palms: PalmDetector | None = None,
+        faces: FaceDetector,
+        people: "PeopleDetector | None" = None,
+        palms: "PalmDetector | None" = None,
+        meshes: "MeshNetworks | None" = None,
         faults: tuple[str, ...] = (),
     ) -> None:
-        self._detector, self._people, self._palms = detector, people, palms
+        self._faces, self._people, self._palms, self._meshes = faces, people, palms, meshes
+        self._is_searched = False
         self._log = EventLog()
         for fault in faults:
             self._log.add(fault)
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Return faces, the largest first, in pixels of the image."""
-        return self._detector.find(image)
+        """Return faces, the largest first and with a mesh, in pixels of the image."""
+        faces = self._faces.find(image)
+        self._is_searched = getattr(self._faces, "searched", False)
+        if self._meshes is None or not faces:
+            return faces
+        first, *others = faces
+        return replace(first, mesh=self._meshes.mesh(image, first.landmarks_px)), *others
 
     def people(self, image: ImageArray, captured_s: float) -> tuple[DetectedPerson, ...]:
-        """Find people; see ``PeopleDetector.find``."""
-        return () if self._people is None else self._people.find(image, captured_s)
+        """Return the people in the next part of a picture; none while no search is due."""
+        people, palms = self._people, self._palms
+        if people is None or self._is_searched or not people.is_due(captured_s):
+            return ()
+        if palms is not None and palms.is_due(captured_s) and palms.due_s < people.due_s:
+            return ()
+        self._is_searched = True
+        return people.find(image, captured_s)
 
     def palms(
         self,
@@ -48,62 +70,57 @@ class BodyDetector:
         faces: tuple[DetectedFace, ...],
         people: tuple[DetectedPerson, ...],
     ) -> tuple[DetectedPalm, ...] | None:
-        """Find palms; see ``PalmDetector.find``."""
-        return None if self._palms is None else self._palms.find(image, captured_s, faces, people)
+        """Return the palms of the nearest person, None while no search is due."""
+        if self._palms is None:
+            return None
+        self._palms.watch(captured_s, faces, people)
+        if self._is_searched or not self._palms.is_due(captured_s):
+            return None
+        return self._palms.find(image, captured_s)
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
-        events = getattr(self._detector, "events", None)
+        events = getattr(self._faces, "events", None)
         return (*self._log.drain(), *(events() if events is not None else ()))
 
 
-def add_body_detection(detector: FaceDetector, params: FaceDetectorParams) -> FaceDetector:
-    """Return a detector that also finds people and palms, or the given one without their files.
+def add_body_detection(faces: FaceDetector, params: FaceDetectorParams) -> FaceDetector:
+    """Return a detector that also finds meshes, people and palms, as far as their files are there.
 
     A file that cannot be used is reported as an event.
     """
-    networks: list[Network | None] = []
     faults: list[str] = []
-    for file, rate_hz, without in (
-        (PEOPLE, params.people_hz, "people without a visible face"),
-        (PALMS, params.hands_hz, "hands that are held still"),
-    ):
+
+    def loaded(make: Callable[[], _Part], without: str) -> _Part | None:
         try:
-            networks.append(_load(file) if rate_hz > 0.0 else None)
-        except ModelFileError as error:
-            networks.append(None)
+            return make()
+        except FileNotFoundError:
+            return None
+        except (ImportError, ModelFileError) as error:
             faults.append(f"{error}; until then {without} are not found")
-    people, palms = networks
-    if people is palms is None and not faults:
-        return detector
-    return BodyDetector(
-        detector,
-        None if people is None else PeopleDetector(params, people),
-        None if palms is None else PalmDetector(params, palms),
-        tuple(faults),
-    )
+            return None
 
+    def mesh_networks() -> "MeshNetworks":
+        from gazerig.drivers.vision.face.mesh import MeshNetworks
 
-def _load(file: ModelFile) -> Network | None:
-    """Return a network, None if the user has no file for it."""
-    try:
-        content = file.read()
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except OSError as error:
-        raise ModelFileError(f"cannot read {file.path} ({error.strerror})") from error
-    try:
-        from ai_edge_litert.interpreter import Interpreter
-    except ImportError as error:
-        raise ModelFileError(extra_hint("ai-edge-litert", "people", error)) from error
-    with quiet_stderr():  # LiteRT prints a banner
-        net = Interpreter(model_content=content, num_threads=1)
-        net.allocate_tensors()
-    (given,), (boxes, scores) = net.get_input_details(), net.get_output_details()
+        return MeshNetworks()
 
-    def run(square: Floats) -> tuple[Floats, Floats]:
-        net.set_tensor(given["index"], square[np.newaxis])
-        net.invoke()
-        return net.get_tensor(boxes["index"])[0], net.get_tensor(scores["index"])[0, :, 0]
+    def people_detector() -> "PeopleDetector":
+        from gazerig.drivers.vision.people import people_detector
 
-    return run
+        return people_detector(params)
+
+    def palm_detector() -> "PalmDetector":
+        from gazerig.drivers.vision.palms import palm_detector
+
+        return palm_detector(params)
+
+    meshes = loaded(mesh_networks, "face meshes")
+    people = palms = None
+    if params.people_hz > 0.0:
+        people = loaded(people_detector, "people without a visible face")
+    if params.hands_hz > 0.0:
+        palms = loaded(palm_detector, "hands that are held still")
+    if not (meshes or people or palms or faults):
+        return faces
+    return BodyDetector(faces, people, palms, meshes, tuple(faults))

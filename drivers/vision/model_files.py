@@ -53,9 +53,9 @@ class ModelFile(NamedTuple):
         """Return whether it exists and is the known file."""
         try:
             self.read()
-        except (FileNotFoundError, NotADirectoryError):
+        except FileNotFoundError:
             return "missing"
-        except (OSError, ModelFileError):
+        except ModelFileError:
             return "damaged"
         return "there"
 
@@ -66,11 +66,16 @@ class ModelFile(NamedTuple):
             path: Its path; None: in the folder of models.
 
         Raises:
-            OSError: it cannot be read.
-            ModelFileError: it is damaged, or another version.
+            FileNotFoundError: there is none.
+            ModelFileError: it cannot be read, is damaged, or another version.
         """
         path = path or self.path
-        content = path.read_bytes()
+        try:
+            content = path.read_bytes()
+        except NotADirectoryError as error:
+            raise FileNotFoundError(path) from error
+        except PermissionError as error:
+            raise ModelFileError(f"cannot read {path} ({error.strerror})") from error
         if not self.is_content(content):
             raise ModelFileError(f"{path} is damaged or another version: {self.cure}")
         return content
@@ -146,27 +151,10 @@ IRIS_LANDMARK = ModelFile(
 MODEL_FILES = (YUNET, PEOPLE, PALMS, FACE_LANDMARK, IRIS_LANDMARK)
 
 
-def data_folder() -> Path:
-    """Return the folder of this program in the user's data folder."""
-    home = os.environ.get("XDG_DATA_HOME") or "~/.local/share"
-    return Path(home).expanduser() / "gazerig"
-
-
 def models_folder() -> Path:
     """Return the folder of models."""
-    named = os.environ.get(FOLDER_VARIABLE)
-    return Path(named).expanduser() if named else data_folder() / "models"
-
-
-def yunet_file() -> str:
-    """Return the newest YuNet file of the user, "" if there is none.
-
-    It is in the folder of models, or in the parent folder if it was copied by hand.
-    """
-    for folder in (models_folder(), data_folder()):
-        if found := max(map(str, folder.glob("face_detection_yunet_*.onnx")), default=""):
-            return found
-    return ""
+    home = os.environ.get("XDG_DATA_HOME") or "~/.local/share"
+    return Path(os.environ.get(FOLDER_VARIABLE) or f"{home}/gazerig/models").expanduser()
 
 
 class DetectorStatus(NamedTuple):
@@ -186,32 +174,20 @@ class DetectorStatus(NamedTuple):
 
 def detector_status(params: FaceDetectorParams) -> DetectorStatus:
     """Return the detectors that run with these parameters, and which are missing."""
-    lacks: list[str] = []
-    kind = params.kind
-    if kind == "auto":
-        file = params.model_file or yunet_file()
-        has_yunet = Path(file).expanduser().is_file() if file else False
-        if Path(file).name == YUNET.file and Path(file).parent == YUNET.path.parent:
-            has_yunet = YUNET.state() == "there"
-        kind = "auto (YuNet and MTCNN)" if has_yunet else "auto (MTCNN alone)"
-        lacks += [] if has_yunet else [YUNET.cure]
-    runs, litert = [], [] if find_spec("ai_edge_litert") else [install_command("people")]
-    for network, rate_hz, also in (
-        (PEOPLE, params.people_hz, "people also turned away"),
-        (PALMS, params.hands_hz, "palms"),
-    ):
-        if rate_hz > 0.0:
-            missing = _fetch_commands(network) + litert
-            lacks += [cure for cure in missing if cure not in lacks]
-            runs += [] if missing else [also]
-    cures = [cure for cure in lacks if cure.startswith("gazerig ")]
-    others = [cure for cure in lacks if cure not in cures]
-    fetch = cures[:1] if len(cures) == 1 else ["gazerig models fetch"] * bool(cures)
-    if "people also turned away" not in runs:
-        runs.insert(0, "people by their faces alone")
-    return DetectorStatus(f"faces by {kind}, {', '.join(runs)}", "; ".join([*fetch, *others]))
-
-
-def _fetch_commands(file: ModelFile) -> list[str]:
-    """Return the command that fetches a file, or an empty list if it exists."""
-    return [] if file.state() == "there" else [file.cure]
+    wanted = [
+        (YUNET, params.kind == "auto", "faces also from the side"),
+        (PEOPLE, params.people_hz > 0.0, "people also turned away"),
+        (PALMS, params.hands_hz > 0.0, "palms"),
+    ]
+    litert = find_spec("ai_edge_litert") is not None
+    runs, lacks = [], []
+    for file, is_wanted, finds in wanted:
+        if is_wanted and file.state() == "there" and (file is YUNET or litert):
+            runs.append(finds)
+        elif is_wanted and file.state() != "there":
+            lacks.append(file.cure)
+    cures = [lacks[0] if len(lacks) == 1 else "gazerig models fetch"] if lacks else []
+    if not litert and (params.people_hz > 0.0 or params.hands_hz > 0.0):
+        cures.append(install_command("people"))
+    text = f"faces by {params.kind}"
+    return DetectorStatus(", ".join([text, *runs]), "; ".join(cures))

@@ -15,7 +15,8 @@ import numpy as np
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import as_bgr, crop_square
-from gazerig.drivers.vision.people import Network, anchors, confidences
+from gazerig.drivers.vision.litert import Network, anchors, confidences, load_network
+from gazerig.drivers.vision.model_files import PALMS
 
 _SIDE_PX = 192
 # Cells of the anchors: size in pixels, and anchors per cell.
@@ -40,24 +41,16 @@ class PalmDetector:
     def __init__(self, params: FaceDetectorParams, network: Network) -> None:
         self._params, self._network = params, network
         self._anchors = anchors(_SIDE_PX, _CELLS)
-        self._due_s = self._seen_s = -np.inf
+        self.due_s = self._seen_s = -np.inf
         self._x = self._y = self._px_per_m = 0.0
 
-    def find(
+    def watch(
         self,
-        image: ImageArray,
         captured_s: float,
         faces: tuple[DetectedFace, ...],
         people: tuple[DetectedPerson, ...],
-    ) -> tuple[DetectedPalm, ...] | None:
-        """Return the palms within the nearest person's reach, None while no search is due.
-
-        Args:
-            image: The frame.
-            captured_s: Time of its capture, seconds, which schedules searches.
-            faces: Faces found in it.
-            people: People found in it.
-        """
+    ) -> None:
+        """Note where the nearest person is; ``captured_s`` schedules searches."""
         seen = [(person.trunk_px / _TRUNK_M, *person.head_px) for person in people]
         for face in faces:
             x, y, width, height = face.box_px
@@ -65,9 +58,16 @@ class PalmDetector:
         if seen:
             self._px_per_m, self._x, self._y = max(seen)
             self._seen_s = captured_s
-        if captured_s < self._due_s or captured_s - self._seen_s > _THERE_S or image.size == 0:
-            return None
-        self._due_s = captured_s + 1.0 / self._params.hands_hz
+
+    def is_due(self, captured_s: float) -> bool:
+        """Return whether a person is there and the next frame is to be searched."""
+        return captured_s >= self.due_s and captured_s - self._seen_s <= _THERE_S
+
+    def find(self, image: ImageArray, captured_s: float) -> tuple[DetectedPalm, ...]:
+        """Return the palms within the nearest person's reach."""
+        self.due_s = captured_s + 1.0 / self._params.hands_hz
+        if image.size == 0:
+            return ()
         half = _REACH_M * self._px_per_m / 2.0
         y = self._y + _BELOW_M * self._px_per_m
         box = np.array([self._x - half, y - half, self._x + half, y + half])
@@ -94,3 +94,8 @@ class PalmDetector:
             ):
                 found.append(DetectedPalm((x, y), size, float(sure[row])))
         return tuple(found)
+
+
+def palm_detector(params: FaceDetectorParams) -> PalmDetector:
+    """Return the detector with its network; it raises as ``load_network`` does."""
+    return PalmDetector(params, load_network(PALMS))

@@ -9,20 +9,17 @@ output: opencv_zoo, models/person_detection_mediapipe.
 """
 
 from math import ceil, hypot
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.types import (
-    DetectedPerson,
-    ImageArray,
-)
+from gazerig.drivers.types import DetectedPerson, ImageArray
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import as_bgr, crop_square
-
-Floats = NDArray[np.float32]
+from gazerig.drivers.vision.litert import Network, anchors, confidences, load_network
+from gazerig.drivers.vision.model_files import PEOPLE
 
 _SIDE_PX = 224
 # Cells of the anchors: size in pixels, and anchors per cell.
@@ -38,17 +35,6 @@ _SAME = 0.35
 _CONFIDENCE = 0.6
 # Half the width of a body as a share of the trunk, from head to hips.
 _HALF_WIDTH = 0.35
-
-
-class Network(Protocol):
-    """A network that can be run."""
-
-    def __call__(self, square: Floats) -> tuple[Floats, Floats]:
-        """Return boxes with points and scores of an RGB square, one row per anchor.
-
-        Shapes are (2254, 12) and (2254,) for people, from values of -1..1, and (2016, 18) and
-        (2016,) for palms, from values of 0..1.
-        """
 
 
 class _Square(NamedTuple):
@@ -67,16 +53,20 @@ class PeopleDetector:
         self._params, self._network = params, network
         self._anchors = anchors(_SIDE_PX, _CELLS)
         self._next = 0
-        self._due_s = self._started_s = -np.inf
+        self.due_s = self._started_s = -np.inf
+
+    def is_due(self, captured_s: float) -> bool:
+        """Return whether a part of the next frame is to be searched."""
+        return captured_s >= self.due_s
 
     def find(self, image: ImageArray, captured_s: float) -> tuple[DetectedPerson, ...]:
-        """Return the people in the next part of a frame; none while no search is due.
+        """Return the people in the next part of a frame.
 
         Args:
             image: The frame.
             captured_s: Time of its capture, seconds, which schedules searches.
         """
-        if captured_s < self._due_s or image.size == 0:
+        if image.size == 0:
             return ()
         frame = as_bgr(image)
         # Overlapping squares as high as the frame cover it.
@@ -99,7 +89,7 @@ class PeopleDetector:
         square = squares[self._next]
         self._next = (self._next + 1) % len(squares)
         if self._next == 0:
-            self._due_s = self._started_s + 1.0 / self._params.people_hz
+            self.due_s = self._started_s + 1.0 / self._params.people_hz
         box = np.array([square.left, 0.0, square.left + square.side, square.side])
         part, where = crop_square(frame, box, _SIDE_PX)
         rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
@@ -119,25 +109,9 @@ class PeopleDetector:
         return tuple(found)
 
 
-def confidences(scores: Floats) -> NDArray[np.float64]:
-    """Return scores of a network as confidences, 0..1."""
-    sure: NDArray[np.float64] = 1.0 / (
-        1.0 + np.exp(-np.clip(scores, -50.0, 50.0).astype(np.float64))
-    )
-    return sure
-
-
-def anchors(side_px: int, cells: tuple[tuple[int, int], ...]) -> NDArray[np.float64]:
-    """Return the anchors (n, 2) of boxes and points, as shares of the square's side.
-
-    cells: size of a cell in pixels, and anchors per cell
-    """
-    levels = []
-    for cell, count in cells:
-        across = (np.arange(side_px // cell) + 0.5) * cell / side_px
-        y, x = np.meshgrid(across, across, indexing="ij")
-        levels.append(np.column_stack([x.ravel(), y.ravel()]).repeat(count, axis=0))
-    return np.concatenate(levels)
+def people_detector(params: FaceDetectorParams) -> PeopleDetector:
+    """Return the detector with its network; it raises as ``load_network`` does."""
+    return PeopleDetector(params, load_network(PEOPLE))
 
 
 def _person(points: NDArray[np.float64], confidence: float) -> DetectedPerson | None:

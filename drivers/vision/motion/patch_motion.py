@@ -126,9 +126,10 @@ def patch_motion(
 
 def _fit_to_flow(arms: Floats, flow: Floats, size: float, area_px2: float) -> _Affine:
     """Fit a map to the flow of points around the centre."""
-    M, _ = cv2.estimateAffine2D(arms, arms - flow, method=cv2.LMEDS)
-    if M is None:
+    fitted, _ = cv2.estimateAffine2D(arms, arms - flow, method=cv2.LMEDS)
+    if fitted is None:
         return _Affine(np.eye(2), -np.median(flow, axis=0), np.inf)
+    M = np.asarray(fitted, np.float64)
     errors = np.hypot(*(arms @ M[:, :2].T + M[:, 2] - arms + flow).T)
     noise_px = max(_LEAST_FLOW_NOISE_PX, upper_median(errors) / 1.177)
     # Half of the squares of the arms is along each axis.
