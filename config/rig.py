@@ -11,8 +11,8 @@ from typing import Annotated, Any
 from gazerig.drivers.bus.servo_models import BUS_KINDS, BusKind
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.params import WebcamParams
-from gazerig.drivers.dynamixel.params import DynamixelParams
-from gazerig.drivers.feetech.params import FeetechParams
+from gazerig.drivers.dynamixel.control_table import DynamixelParams
+from gazerig.drivers.feetech.memory_table import FeetechParams
 from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Params
 from gazerig.drivers.sound.params import SoundParams

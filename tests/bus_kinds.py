@@ -77,7 +77,7 @@ def _pulses_on(bench: BusBench) -> None:
     bus.close()
 
 
-def _line(name: str, starts: Mapping[int, float]) -> Emulated:
+def _line(name: str, starts: Mapping[int, float], odd: Mapping[int, int] | None = None) -> Emulated:
     if name == "pca9685":
         return Pca9685Line(servos=tuple(HobbySpec(c, x) for c, x in starts.items()))
     if name == "maestro":
@@ -86,7 +86,8 @@ def _line(name: str, starts: Mapping[int, float]) -> Emulated:
         return MaestroLine(12, servos=tuple(hobby))
     firmware = OLD_FIRMWARE if name == "old dynamixel" else ServoSpec(1, "").firmware
     model = _SMART[name][0]
-    specs = tuple(ServoSpec(i, model, round(x), firmware) for i, x in starts.items())
+    versions = {**dict.fromkeys(starts, firmware), **(odd or {})}
+    specs = tuple(ServoSpec(i, model, round(x), versions[i]) for i, x in starts.items())
     return FeetechLine(specs) if name in FEETECH else DynamixelLine(specs)
 
 
@@ -187,14 +188,19 @@ class Bench(BusBench):
         raise AssertionError(f"not in 3 s: {feedback}, {bus.faults()}, {bus.events()}")
 
 
-def in_process(name: str, wire_time: bool = False) -> Bench:
-    """Make a kind's bench in this process; ``wire_time``: bytes take their time at 1 Mbit/s."""
+def in_process(
+    name: str, wire_time: bool = False, firmware: Mapping[int, int] | None = None
+) -> Bench:
+    """Make a kind's bench in this process.
+
+    wire_time: bytes take their time at 1 Mbit/s; firmware: that of single smart servos, by id
+    """
     kind, now = _kind(name), [50.0]
 
     def sleep_until(t_s: float) -> None:
         now[0] = max(now[0], t_s)
 
-    device = kind.device(kind.starts_steps, lambda: now[0])
+    device = build(_line(name, kind.starts_steps, firmware), lambda: now[0])
 
     def note(data: bytes) -> None:
         bench.seen.append(bench.places())

@@ -1,5 +1,6 @@
 """Patience and journal: the driver's small parts."""
 
+from dataclasses import replace
 from math import inf
 
 import pytest
@@ -39,7 +40,8 @@ class Line:
 @given(st.lists(st.floats(0.0, 0.1), max_size=300), st.floats(0.0, 0.0198))
 def test_patience_is_twice_the_worst_delay_within_its_bounds(delays, late_s):
     port = Line()
-    line = Transactions(port, DYNAMIXEL, 0.001, 0.02, 1_000_000)  # type: ignore[arg-type]
+    family = replace(DYNAMIXEL, prompt_timeout_s=0.001)
+    line = Transactions(port, family, 1_000_000)  # type: ignore[arg-type]
     assert line.timeout_s == 0.02
     for port.late_s in delays:
         line.exchange(b"ask", 6)

@@ -5,12 +5,13 @@ import struct
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.protocol import (
-    GoalPositionWrite,
     instruction,
     parse_statuses,
     sync_read,
 )
+from gazerig.drivers.servo_bus.family import GoalWrite
 from gazerig.sim_mock.dynamixel.packets import status
 
 
@@ -35,7 +36,7 @@ def test_instructions_are_the_protocols():
     assert sync_read((3, 7, 4), 132, 4, fast=True) == vector(
         "FF FF FD 00 FE 0A 00 8A 84 00 04 00 03 07 04 20 F2"
     )
-    assert GoalPositionWrite((1, 2)).packet((150, 170)) == vector(
+    assert GoalWrite(DYNAMIXEL, (1, 2)).packet((150, 170), (0, 0)) == vector(
         "FF FF FD 00 FE 11 00 83 74 00 04 00 01 96 00 00 00 02 AA 00 00 00 82 87"
     )
 
@@ -44,7 +45,7 @@ def test_what_looks_like_a_header_is_stuffed():
     assert instruction(1, 3, b"\x68\x00\xff\xff\xfd\x00") == vector(
         "FF FF FD 00 01 0A 00 03 68 00 FF FF FD FD 00 E2 7A"
     )
-    packet = GoalPositionWrite((1, 2)).packet((-1, 0x00FDFFFF))
+    packet = GoalWrite(DYNAMIXEL, (1, 2)).packet((-1, 0x00FDFFFF), (0, 0))
     assert b"\xff\xff\xfd\xfd" in packet
     assert int.from_bytes(packet[5:7], "little") == len(packet) - 7
 

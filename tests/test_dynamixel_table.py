@@ -11,9 +11,9 @@ from gazerig.drivers.dynamixel.control_table import (
     MODELS,
     STEPS_PER_TURN,
     VELOCITY_UNIT_STEPS_S,
-    name_errors,
     registers_of,
 )
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 
 RENAMED = {"secondary_shadow_id": "secondary_id", "present_load": "present_current"}
 
@@ -70,6 +70,6 @@ def test_units_and_turns_are_the_vendors(model):
 
 
 def test_error_bits_are_named_even_where_unknown():
-    assert name_errors(0x21) == ("input voltage", "overload")
-    assert name_errors(0x02) == ("error bit 1",)
-    assert name_errors(0) == ()
+    assert DYNAMIXEL.name_errors(0x21) == ("input voltage", "overload")
+    assert DYNAMIXEL.name_errors(0x02) == ("error bit 0x02",)
+    assert DYNAMIXEL.name_errors(0) == ()

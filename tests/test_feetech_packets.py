@@ -4,15 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.memory_table import (
     REGISTERS,
     acceleration_units,
-    name_errors,
-    speed_units,
 )
 from gazerig.drivers.feetech.protocol import (
     PING,
-    GoalWrite,
     answer_frame,
     checksum,
     instruction,
@@ -22,7 +20,7 @@ from gazerig.drivers.feetech.protocol import (
     sync_write,
     write,
 )
-from gazerig.drivers.servo_bus.family import Status
+from gazerig.drivers.servo_bus.family import GoalWrite, Status
 
 VECTORS = [
     (instruction(1, PING), "FF FF 01 02 01 FB"),
@@ -31,7 +29,7 @@ VECTORS = [
      "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5"),
     (sync_read((1, 2, 3), 56, 15), "FF FF FE 07 82 38 0F 01 02 03 2B"),
     (sync_write((1, 2), 40, 1, (b"\x01", b"\x01")), "FF FF FE 08 83 28 01 01 01 02 01 48"),
-    (GoalWrite((1, 2)).packet((2048, 1000), (3000, 500)),
+    (GoalWrite(FEETECH, (1, 2)).packet((2048, 1000), (3000, 500)),
      "FF FF FE 12 83 2A 06 01 00 08 00 00 B8 0B 02 E8 03 00 00 F4 01 8E"),
 ]  # fmt: skip
 
@@ -130,8 +128,8 @@ def test_values_of_registers_by_hand():
 
 
 def test_names_of_errors_and_limits_that_are_never_none():
-    assert name_errors(0x21) == ("input voltage", "overload")
-    assert name_errors(0x40) == ("error bit 0x40",)
-    assert [speed_units(v) for v in (0.0, 0.4, 3000.9, 1e9)] == [1, 1, 3000, 32767]
+    assert FEETECH.name_errors(0x21) == ("input voltage", "overload")
+    assert FEETECH.name_errors(0x40) == ("error bit 0x40",)
+    assert [FEETECH.speed_units(v) for v in (0.0, 0.4, 3000.9, 1e9)] == [1, 1, 3000, 32767]
     accelerations = (None, 0.0, 250.0, 25_400.0, 25_401.0)
     assert [acceleration_units(a) for a in accelerations] == [0, 1, 2, 254, 0]

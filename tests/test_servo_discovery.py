@@ -1,14 +1,12 @@
-"""Servos on the bus: every baud rate, pieces, shared ids, echoes; making a place the middle."""
+"""Servos on the bus: every baud rate, pieces, shared ids, echoes."""
 
 import pytest
 from sts_rig import Rig
 
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.errors import ServoFault, ServoMissing
-from gazerig.drivers.feetech.family import FEETECH, set_middle
+from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.servo_bus.discovery import FoundServo, count_corrupt, scan_ids
-from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -71,20 +69,3 @@ def test_two_servos_with_one_id_are_seen(family):
     bench.chain.faults.command("collide 1")
     # Their identities are equal and look healthy.
     assert bench.corrupt(1) >= 2 and bench.corrupt(2) == 0
-
-
-def test_the_present_place_becomes_the_middle_for_good():
-    bench = Bench(FEETECH, 1_000_000, 7)
-    bench.chain[7].write(42, (1949).to_bytes(2, "little"))
-    bench.chain[7].write(40, b"\x01")
-    with pytest.raises(ServoFault, match="servo 7 has its torque on: switch it off before"):
-        set_middle(bench.port, FEETECH, 7)
-    with pytest.raises(ServoMissing, match="servo 8 does not answer"):
-        set_middle(bench.port, FEETECH, 8)
-    bench.chain[7].write(40, b"\x00")
-    assert abs(set_middle(bench.port, FEETECH, 7)) == 2048 - 1949
-    bench.chain[7].restart()
-    bench.rig.now_s += 1.0
-    place = Registers(bench.port, FEETECH).read(7, "present_position")
-    assert place == pytest.approx(2048, abs=1)
-    assert (bench.rig.get(7, 40), bench.rig.get(7, 55)) == (0, 1)

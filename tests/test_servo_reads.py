@@ -43,7 +43,7 @@ class Kind:
         """Return the positions in an answer that is taken servo by servo."""
         group = self.group
         good, _ = sort_answers(group.parse(raw), IDS, group.length, self.family.codec.REFUSAL)
-        return {i: group.reply(answer, 1.0).position for i, answer in good.items()}
+        return {i: group.reply(answer, 1.0).values["position"] for i, answer in good.items()}
 
 
 @pytest.fixture(params=["dynamixel", "dynamixel fast", "feetech"])
@@ -87,10 +87,10 @@ def test_stuffed_answers_and_refusals_are_understood():
     assert everyday[:3] + b"\xfd" in raw and group.parse_whole(raw) is None
     good, _ = sort_answers(group.parse(raw), IDS, 10, 0x7F)
     reply = group.reply(good[1], 1.0)
-    assert (reply.effort, reply.velocity, reply.position) == (-1, -3, 2000)
+    assert reply.values == {"effort": -1, "velocity": -3, "position": 2000}
     good, _ = sort_answers(group.parse(status(1, 0x87, b"")), IDS, 10, 0x7F)
     reply = group.reply(good[1], 1.0)
-    assert (reply.error, reply.is_refused) == (0x87, True)
+    assert (reply.error, reply.values) == (0x87, {})
     assert not sort_answers(group.parse(status(1, 0x80, b"")), IDS, 10, 0x7F)[0]
 
 
@@ -129,8 +129,7 @@ def both_ways(raw, count=2):
     for servo_id, answer in sort_answers(group.parse(raw), ids, group.length, 0)[0].items():
         for columns in (single, whole):
             assert columns.apply_reply(servo_id - 1, group.reply(answer, 1.01))
-    values = group.parse_whole(raw)
-    taken = values is not None and whole.apply_whole(group, values, 1.01)
+    taken = whole.apply_whole(group, raw, 1.01)
     return (whole.now if taken else None), single.now
 
 

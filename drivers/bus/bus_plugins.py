@@ -5,8 +5,8 @@ from typing import Any
 
 from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.servo_models import SERVOS
-from gazerig.drivers.dynamixel.params import DynamixelParams
-from gazerig.drivers.feetech.params import FeetechParams
+from gazerig.drivers.dynamixel.control_table import DynamixelParams
+from gazerig.drivers.feetech.memory_table import FeetechParams
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params

@@ -8,12 +8,23 @@ Source: ROBOTIS e-Manual, X series.
 
 from dataclasses import dataclass
 from math import ceil
-from typing import Literal
+from typing import Annotated, Literal
 
 from gazerig.drivers.servo_bus.family import Register as Register
 from gazerig.drivers.servo_bus.family import ServoModel
 
 Series = Literal["x330", "x430"]
+
+
+@dataclass(frozen=True, slots=True)
+class DynamixelParams:
+    """Communication parameters of the servos, set in a rig file."""
+
+    # fmt: off
+    baud: Annotated[Literal[57600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000],
+        "Speed of the bus; the servos must be set to the same speed."] = 1_000_000
+    # fmt: on
+
 
 STEPS_PER_TURN = 4096
 VELOCITY_UNIT_STEPS_S = 0.229 / 60.0 * STEPS_PER_TURN
@@ -126,7 +137,7 @@ _BASE = (
     Register("model_number",            0, 2),
     Register("firmware_version",        6, 1),
     Register("id",                      7, 1, "rw", 1, 0, 252),
-    Register("baud_rate",               8, 1, "rw", 1, 0, 6),
+    Register("baud_rate",               8, 1, "rw", 1, 0, 7),
     Register("return_delay_time",       9, 1, "rw", 250, 0, 254),
     Register("drive_mode",             10, 1, "rw", 0, 0, 13),
     Register("operating_mode",         11, 1, "rw", 3, 0, 16),
@@ -139,7 +150,7 @@ _BASE = (
     Register("min_voltage_limit",      34, 2, "rw"),
     Register("pwm_limit",              36, 2, "rw", 885, 0, 885),
     Register("current_limit",          38, 2, "rw"),
-    Register("velocity_limit",         44, 4, "rw"),
+    Register("velocity_limit",         44, 4, "rw", None, 0, 2047),
     Register("max_position_limit",     48, 4, "rw", 4095, 0, 4095),
     Register("min_position_limit",     52, 4, "rw", 0, 0, 4095),
     Register("startup_configuration",  60, 1, "rw", 0, 0, 3),
@@ -183,7 +194,7 @@ REGISTERS: dict[str, Register] = {
 
 
 def registers_of(model: DynamixelModel) -> tuple[Register, ...]:
-    """Return a model's registers with its initial values and ranges."""
+    """Return a model's registers with its initial values."""
     absent = {"pwm_slope"} if model.series == "x430" else set[str]()
     if model.current_limit is None:
         absent |= {"current_limit", "goal_current"}
@@ -198,38 +209,11 @@ def registers_of(model: DynamixelModel) -> tuple[Register, ...]:
         "shutdown": model.shutdown,
         **dict(zip(GAINS, model.gains, strict=True)),
     }
-    small = model.series == "x330"
-    ranges = {
-        "baud_rate": (0, 6 if small else 7),
-        "protocol_type": (2, 22) if small else (1, 2),
-        "max_voltage_limit": (_lowest_voltage(model), model.max_voltage),
-        "min_voltage_limit": (_lowest_voltage(model), model.max_voltage),
-        "current_limit": (0, model.current_limit or 0),
-        "velocity_limit": (0, 2047 if small else 1023),
-    }
-    fitted = []
-    for one in REGISTERS.values():
-        if one.name not in absent:
-            low, high = ranges.get(one.name, (one.low, one.high))
-            first = initial.get(one.name, one.initial)
-            fitted.append(one._replace(initial=first, low=low, high=high))
-    return tuple(fitted)
-
-
-def _lowest_voltage(model: DynamixelModel) -> int:
-    """Return the lower bound of both voltage limits, 0.1 V; below the initial one on 5 V models."""
-    return 31 if model.rated_v == 5.0 else model.min_voltage
-
-
-def name_errors(status: int) -> tuple[str, ...]:
-    """Return the names of the set bits of Hardware Error Status."""
-    bits = [bit for bit in range(8) if status >> bit & 1]
-    return tuple(HARDWARE_ERRORS.get(bit, f"error bit {bit}") for bit in bits)
-
-
-def speed_units(speed_steps_s: float) -> int:
-    """Return a speed in units of Profile Velocity, at least 1, as 0 means no limit."""
-    return max(1, int(speed_steps_s / VELOCITY_UNIT_STEPS_S))
+    return tuple(
+        one._replace(initial=initial.get(one.name, one.initial))
+        for one in REGISTERS.values()
+        if one.name not in absent
+    )
 
 
 def acceleration_units(accel_steps_s2: float | None) -> int:

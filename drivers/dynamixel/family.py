@@ -6,6 +6,7 @@ from gazerig.drivers.dynamixel import protocol
 from gazerig.drivers.dynamixel.control_table import (
     BAUD_RATES,
     FAST_READ_SINCE,
+    HARDWARE_ERRORS,
     MODELS,
     PWM_FULL,
     REGISTERS,
@@ -13,8 +14,6 @@ from gazerig.drivers.dynamixel.control_table import (
     VELOCITY_UNIT_STEPS_S,
     WATCHDOG_UNIT_S,
     acceleration_units,
-    name_errors,
-    speed_units,
 )
 from gazerig.drivers.servo_bus.family import Family, Window
 
@@ -37,7 +36,7 @@ _SENSED = ("effort", "velocity", "position")
 def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
     """Return the required register values by name, in register units."""
     model = MODELS[setup.model]
-    speed = speed_units(setup.max_speed_steps_s)
+    speed = DYNAMIXEL.speed_units(setup.max_speed_steps_s)
     wanted = {"return_delay_time": 0, "drive_mode": 0, "operating_mode": POSITION_MODE}
     if setup.strength is not None:
         wanted["pwm_limit"] = round(setup.strength * PWM_FULL)
@@ -60,28 +59,31 @@ DYNAMIXEL = Family(
     registers=REGISTERS,
     models=MODELS,
     steps_per_turn=STEPS_PER_TURN,
-    name_errors=name_errors,
+    errors={1 << bit: text for bit, text in HARDWARE_ERRORS.items()},
+    error_register="hardware_error_status",
+    effort_register="present_current",
     velocity_unit_steps_s=VELOCITY_UNIT_STEPS_S,
-    speed_units=speed_units,
     acceleration_units=acceleration_units,
-    create_goal_packets=protocol.GoalPositionWrite,
+    goal_layout="<Bi",
+    goal_speed=False,
+    arming_register="profile_velocity",
+    most_goals=253,
     sync_read=True,
+    fast_read_since={name: FAST_READ_SINCE[model.series] for name, model in MODELS.items()},
     baud_rates=BAUD_RATES,
     scan_rates=USUAL_RATES,
     factory_baud=57_600,
     highest_id=252,
     format_firmware=str,
+    updater="Dynamixel Wizard 2.0",
     # Present Current, Velocity and Position (126..135).
     window=Window(126, "<hii", _SENSED),
     polled=(
         # Between them are addresses without a register, whose reads are refused.
-        ("torque_enable", "torque_enable"),
-        ("hardware_error_status", "hardware_error_status"),
-        ("present_input_voltage", "present_temperature"),
+        Window(64, "<B", ("torque_enable",)),
+        Window(70, "<B", ("hardware_error_status",)),
+        Window(144, "<HB", ("present_input_voltage", "present_temperature")),
     ),
-    has_fast_read=lambda model, firmware: firmware >= FAST_READ_SINCE[MODELS[model].series],
-    prompt_timeout_s=0.002,
-    effort_register="present_current",
     # In this order, as a new operating mode resets gains and profile.
     read_spans=(
         ("return_delay_time", "operating_mode"),
@@ -98,14 +100,8 @@ DYNAMIXEL = Family(
     ),
     answer_level=2,
     lock_register=None,
-    error_register="hardware_error_status",
     faults_latch=True,
     watchdog_unit_s=WATCHDOG_UNIT_S,
-    goal_speed=False,
     single_turn=False,
     duplicate_id_registers=("realtime_tick", "present_position"),
-    arming_register="profile_velocity",
-    most_goals=253,
-    fault_cure="then restart the servo power",
-    jump_cure="set its Homing Offset to 0",
 )

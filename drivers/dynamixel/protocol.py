@@ -37,7 +37,6 @@ _IDENTITY = struct.Struct("<HB")
 IDENTITY_LENGTH = _IDENTITY.size
 
 _HEAD = struct.Struct("<4sBHB")
-_SPAN = struct.Struct("<HH")
 _CRC = struct.Struct("<H")
 
 
@@ -47,6 +46,10 @@ def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
         params = params.replace(RAW, STUFFED)
     packet = _HEAD.pack(HEADER, servo_id, len(params) + 3, code) + params
     return packet + _CRC.pack(umts(packet))
+
+
+span = struct.Struct("<HH").pack
+"""Returns the bytes for an address and a number of bytes."""
 
 
 def ping(servo_id: int) -> bytes:
@@ -66,7 +69,7 @@ def parse_identity(status: Status) -> Identity | None:
 
 def read(servo_id: int, address: int, length: int) -> bytes:
     """Build a request for registers of one servo."""
-    return instruction(servo_id, READ, _SPAN.pack(address, length))
+    return instruction(servo_id, READ, span(address, length))
 
 
 def write(servo_id: int, address: int, data: bytes) -> bytes:
@@ -77,34 +80,13 @@ def write(servo_id: int, address: int, data: bytes) -> bytes:
 def sync_read(ids: Sequence[int], address: int, length: int, fast: bool = False) -> bytes:
     """Build a request for the same registers of several servos."""
     code = FAST_SYNC_READ if fast else SYNC_READ
-    return instruction(BROADCAST, code, _SPAN.pack(address, length) + bytes(ids))
+    return instruction(BROADCAST, code, span(address, length) + bytes(ids))
 
 
 def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes]) -> bytes:
     """Build a write to the same registers of several servos, ``size`` bytes each."""
     body = b"".join(bytes((i,)) + row for i, row in zip(ids, rows, strict=True))
-    return instruction(BROADCAST, SYNC_WRITE, _SPAN.pack(address, size) + body)
-
-
-class GoalPositionWrite:
-    """Builder of packets that write the goals (116..119) of a fixed set of servos."""
-
-    def __init__(self, ids: Sequence[int]) -> None:
-        self._params = _SPAN.pack(116, 4)
-        self._rows = struct.Struct("<" + "Bi" * len(ids))
-        length = 3 + _SPAN.size + self._rows.size
-        self._head = _HEAD.pack(HEADER, BROADCAST, length, SYNC_WRITE) + self._params
-        self._row = [number for servo_id in ids for number in (servo_id, 0)]
-
-    def packet(self, goals: Sequence[int], speeds: Sequence[int] = ()) -> bytes:
-        """Build the packet with one goal per servo; speeds are in the servos' own profiles."""
-        row = self._row
-        row[1::2] = goals
-        body = self._rows.pack(*row)
-        if RAW in body:
-            return instruction(BROADCAST, SYNC_WRITE, self._params + body)
-        packet = self._head + body
-        return packet + _CRC.pack(umts(packet))
+    return instruction(BROADCAST, SYNC_WRITE, span(address, size) + body)
 
 
 def parse_statuses(raw: bytes) -> list[Status]:
@@ -128,11 +110,13 @@ def answer_frame(ids: Sequence[int], length: int, fast: bool) -> AnswerFrame:
     count = len(ids)
     if not fast:
         heads = [_HEAD.pack(HEADER, i, length + 4, STATUS) + b"\x00" for i in ids]
-        return AnswerFrame(b"", heads, "H", f"{length + 9}s2x" * count, _are_intact)
+        return AnswerFrame(heads, "H", f"{length + 9}s2x" * count, _are_intact)
     front = _HEAD.pack(HEADER, BROADCAST, (length + 4) * count + 1, STATUS)
     # Each part reaches from the previous CRC, or the begin, up to a servo's CRC.
     parts = f"{len(front) + length + 2}s" + f"{length + 4}s" * (count - 1) + "2x"
-    return AnswerFrame(front, [bytes((0, i)) for i in ids], "H", parts, _are_chained)
+    heads = [bytes((0, i)) for i in ids]
+    heads[0] = front + heads[0]
+    return AnswerFrame(heads, "H", parts, _are_chained)
 
 
 def _are_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:

@@ -8,8 +8,12 @@ comes first.
 Sources: Feetech memory table STS3215, and for missing entries the tables of public clients.
 """
 
+from dataclasses import dataclass
+from typing import Annotated
+
 from gazerig.drivers.servo_bus.family import Register as Register
 from gazerig.drivers.servo_bus.family import ServoModel
+from gazerig.params import Choices
 
 STEPS_PER_TURN = 4096
 ACCELERATION_UNIT_STEPS_S2 = 100.0
@@ -27,6 +31,16 @@ FASTEST, HARDEST = 32767, 254
 
 BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)
 """Bit/s by the value of Baud Rate (6)."""
+
+
+@dataclass(frozen=True, slots=True)
+class FeetechParams:
+    """Communication parameters of the servos, set in a rig file."""
+
+    # fmt: off
+    baud: Annotated[int, Choices(*BAUD_RATES[::-1]), "Speed of the bus; the servos must be set to the same speed."] = 1_000_000
+    # fmt: on
+
 
 HIGHEST_ID = 253
 
@@ -154,17 +168,6 @@ def registers_of(model: ServoModel) -> tuple[Register, ...]:
         register._replace(initial=own[name]) if name in own else register
         for name, register in REGISTERS.items()
     )
-
-
-def name_errors(status: int) -> tuple[str, ...]:
-    """Return the names of the set bits of an error byte."""
-    bits = [1 << bit for bit in range(8) if status >> bit & 1]
-    return tuple(STATUS_ERRORS.get(bit, f"error bit {bit:#04x}") for bit in bits)
-
-
-def speed_units(speed_steps_s: float) -> int:
-    """Return a speed in units of Goal Speed, at least 1, as 0 means no limit."""
-    return max(1, min(FASTEST, int(speed_steps_s)))
 
 
 def acceleration_units(accel_steps_s2: float | None) -> int:

@@ -8,7 +8,6 @@ an answer.
 Source: Feetech, communication protocol of the SCS and STS series.
 """
 
-import struct
 from collections.abc import Iterable, Sequence
 from typing import Literal
 from zlib import adler32
@@ -58,6 +57,11 @@ def checksum(body: bytes) -> int:
     return ~sum(body) & 0xFF
 
 
+def span(address: int, length: int) -> bytes:
+    """Return the bytes for an address and a number of bytes."""
+    return bytes((address, length))
+
+
 def ping(servo_id: int) -> bytes:
     """Build a ping."""
     return instruction(servo_id, PING)
@@ -83,7 +87,7 @@ def parse_identity(status: Status) -> Identity | None:
 
 def read(servo_id: int, address: int, length: int) -> bytes:
     """Build a request for registers of one servo."""
-    return instruction(servo_id, READ, bytes((address, length)))
+    return instruction(servo_id, READ, span(address, length))
 
 
 def write(servo_id: int, address: int, data: bytes) -> bytes:
@@ -93,34 +97,13 @@ def write(servo_id: int, address: int, data: bytes) -> bytes:
 
 def sync_read(ids: Sequence[int], address: int, length: int) -> bytes:
     """Build a request for the same registers of several servos."""
-    return instruction(BROADCAST, SYNC_READ, bytes((address, length, *ids)))
+    return instruction(BROADCAST, SYNC_READ, span(address, length) + bytes(ids))
 
 
 def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes]) -> bytes:
     """Build a write to the same registers of several servos, ``size`` bytes each."""
     body = b"".join(bytes((i,)) + row for i, row in zip(ids, rows, strict=True))
-    return instruction(BROADCAST, SYNC_WRITE, bytes((address, size)) + body)
-
-
-MOST_GOALS = 35
-"""Largest number of goals in one packet, 7 bytes each."""
-
-
-class GoalWrite:
-    """Builder of packets that write goal, time and speed (42..47) of several servos."""
-
-    def __init__(self, ids: Sequence[int], order: str = "<") -> None:
-        self._head = bytes((BROADCAST, 4 + 7 * len(ids), SYNC_WRITE, 42, 6))
-        self._rows = struct.Struct(order + "BHHH" * len(ids))
-        self._row = [number for servo_id in ids for number in (servo_id, 0, 0, 0)]
-
-    def packet(self, goals: Sequence[int], speeds: Sequence[int]) -> bytes:
-        """Build the packet with one goal, 0 or above, and one speed per servo."""
-        row = self._row
-        row[1::4] = goals
-        row[3::4] = speeds
-        body = self._head + self._rows.pack(*row)
-        return b"%b%b%c" % (HEADER, body, ~sum(body) & 0xFF)
+    return instruction(BROADCAST, SYNC_WRITE, span(address, size) + body)
 
 
 def parse_statuses(raw: bytes) -> list[Status]:
@@ -150,7 +133,7 @@ def parse_statuses(raw: bytes) -> list[Status]:
 def answer_frame(ids: Sequence[int], length: int, fast: bool) -> AnswerFrame:
     """Return the frame of the answer to a sync read of ``length`` bytes; ``fast``: not known."""
     heads = [HEADER + bytes((servo_id, length + 2, 0)) for servo_id in ids]
-    return AnswerFrame(b"", heads, "B", f"2x{length + 4}s" * len(ids), _are_intact)
+    return AnswerFrame(heads, "B", f"2x{length + 4}s" * len(ids), _are_intact)
 
 
 def _are_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:

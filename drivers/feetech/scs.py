@@ -8,7 +8,6 @@ marked [A] are assumptions, as they are not documented. Sources: Feetech, SCSCL 
 """
 
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from gazerig.drivers.feetech.family import FEETECH, SENSED, SIGNS, wanted_settings
@@ -19,7 +18,6 @@ from gazerig.drivers.feetech.memory_table import (
     SCS_STEPS,
     TORQUE_FULL,
 )
-from gazerig.drivers.feetech.protocol import GoalWrite
 from gazerig.drivers.servo_bus.family import Register, Window
 
 if TYPE_CHECKING:  # the guardian starts without numpy
@@ -63,12 +61,12 @@ FEETECH_SCS = replace(
     models=SCS_MODELS,
     steps_per_turn=SCS_MODELS["scs0009"].steps_per_turn,
     acceleration_units=lambda accel_steps_s2: 0,  # [A]: 41 is not documented
-    create_goal_packets=partial(GoalWrite, order=">"),
+    goal_layout=">BHHH",
     sync_read=False,
     baud_rates=SCS_BAUD_RATES,
     scan_rates=SCS_BAUD_RATES,
     window=Window(56, ">HHHBBxB", SENSED, SIGNS),
-    polled=(("torque_enable", "torque_enable"),),
+    polled=(Window(40, ">B", ("torque_enable",)),),
     read_spans=(("return_delay_time", "position_i_gain"), ("lock", "lock")),
     wanted_settings=scs_settings,
     single_turn=False,

@@ -1,7 +1,7 @@
 """Smart servos of one family on one serial bus: one read and one write per tick."""
 
 from collections.abc import Collection, Mapping, Sequence
-from math import ceil, inf
+from math import inf
 
 from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.port_bus import PortBus
@@ -10,19 +10,16 @@ from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort, open_port
-from gazerig.drivers.servo_bus.discovery import find
-from gazerig.drivers.servo_bus.family import Family
+from gazerig.drivers.servo_bus.discovery import find, name_firmware
+from gazerig.drivers.servo_bus.family import Family, GoalWrite
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import CHECK_SUPPLY, PollList
-from gazerig.drivers.servo_bus.provisioning import Provisioning, read_registers
+from gazerig.drivers.servo_bus.settings import apply_settings
 from gazerig.drivers.servo_bus.supervisor import Supervisor
-from gazerig.drivers.servo_bus.sync_read import ServoReply, SyncReader
+from gazerig.drivers.servo_bus.sync_read import GroupRead, ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import raise_missing, switch_off
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import Feedback, ServoConfig
-
-_WATCHDOG_S = 0.2
-"""Silence after which servos with a watchdog stop by themselves."""
 
 RESTART_S = 0.1
 """Silence after which a servo may have restarted: it gets no goals until it is set up."""
@@ -63,8 +60,6 @@ class SmartServoBus(PortBus):
                 f"{len(setups)} servos are too many for one bus: {family.most_goals} at most"
             )
         self._family = family
-        unit_s = family.watchdog_unit_s
-        self._watchdog = ceil(_WATCHDOG_S / unit_s) if unit_s else 0
         self._check_setups(setups)
         self._port = port
         self._setups = self._target_setups = tuple(setups)
@@ -72,12 +67,11 @@ class SmartServoBus(PortBus):
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._by_id: dict[int, ServoConfig] = {}
-        self._goals = family.create_goal_packets(self._ids)
+        self._goals = GoalWrite(family, self._ids)
         self._nothing = Feedback.create_missing(len(self._ids))
         self._labels = {setup.id: setup.label() for setup in setups}
         self._log = EventLog()
-        prompt_s, most_s = family.prompt_timeout_s, timing.reply_timeout_s
-        self._line = Transactions(port, family, prompt_s, most_s, baud, self._labels)
+        self._line = Transactions(port, family, baud, timing.reply_timeout_s, self._labels)
         self._poll_at_s, self._turn = -inf, 0
         self._corrupt, self._is_troubled = 0, False
         self._assemble({})
@@ -88,15 +82,18 @@ class SmartServoBus(PortBus):
         self._apply_target()
         self._is_down = self._release_due = False
         self._poll_list = PollList(self._labels, log, line.lateness)
-        self._provisioning = Provisioning(line, self._by_id, log)
         self._feedback = FeedbackColumns(family, self._setups)
+        since = family.fast_read_since
         is_fast = bool(firmware) and all(
-            family.has_fast_read(setup.model, firmware[setup.id]) for setup in self._setups
+            firmware[setup.id] >= since.get(setup.model, inf) for setup in self._setups
         )
         self._reader = SyncReader(line, self._poll_list, is_fast)
-        self._supervisor = Supervisor(
-            line, self._by_id, self._provisioning, self._feedback, log, self._watchdog
-        )
+        self._polls = [
+            (slot, GroupRead(family, (servo_id,), window))
+            for window in family.polled
+            for slot, servo_id in enumerate(self._ids)
+        ]
+        self._supervisor = Supervisor(line, self._by_id, self._feedback, log)
 
     # --- one reading
 
@@ -108,7 +105,7 @@ class SmartServoBus(PortBus):
             self._corrupt = line.errors["corrupt"]
             feedback.places.record_damaged(now_s)
         for servo_id, reply in replies.items():
-            if reply.is_refused:
+            if not reply.values:
                 line.errors["refused"] += 1
             elif not feedback.apply_reply(self._slot[servo_id], reply):
                 line.errors["implausible"] += 1
@@ -122,16 +119,23 @@ class SmartServoBus(PortBus):
 
     def _poll(self, now_s: float) -> None:
         """Read what a group read does not cover of one servo; servos and spans take turns."""
-        family, count = self._family, len(self._ids)
-        self._poll_at_s = now_s + POLL_S
-        self._turn = (self._turn + 1) % (count * len(family.polled))
-        span, slot = divmod(self._turn, count)
-        servo_id = self._ids[slot]
+        line, self._poll_at_s = self._line, now_s + POLL_S
+        self._turn = (self._turn + 1) % len(self._polls)
+        slot, group = self._polls[self._turn]
+        (servo_id,) = group.ids
         if servo_id not in self._poll_list.group:
             return
-        values = read_registers(self._line, (servo_id,), *family.polled[span]).get(servo_id)
-        if values is None:
-            return
+        raw, at_s = line.exchange(group.request, group.reply_length)
+        whole = group.parse_whole(raw)
+        if whole is not None:
+            values: Mapping[str, int] = dict(zip(group.window.fields, whole, strict=False))
+        else:
+            good, damaged = line.collect(group.request, raw, group.ids, group.length, group.parse)
+            line.errors["corrupt"] += len(damaged)
+            if servo_id not in good:
+                line.drain()
+                return
+            values = group.reply(good[servo_id], at_s).values
         torque, volts = values.get("torque_enable"), values.get("present_input_voltage")
         if torque is not None:
             self._feedback.set(slot, torque=torque == 1)
@@ -151,7 +155,10 @@ class SmartServoBus(PortBus):
         where = self._port.port_name
         open_port(self._port, self._baud)
         try:
-            self._assemble(find(self._line, self._setups))
+            firmware = find(self._line, self._setups)
+            self._assemble(firmware)
+            for text in name_firmware(self._line, self._setups, firmware):
+                self._log.add(text)
             # A servo may be set to answer only reads; this write needs no answer.
             level = [self._family.answer_level] * len(self._ids)
             self._line.write_all(self._ids, "status_return_level", level)
@@ -160,7 +167,7 @@ class SmartServoBus(PortBus):
             for servo_id in released.holding_ids:
                 fault = f"{where}: {self._line.label(servo_id)} keeps its torque"
                 raise ServoMissing(f"{fault}: restart its power")
-            self._provisioning.apply(self._ids)
+            apply_settings(self._line, self._by_id, self._ids, self._log)
             self._line.starved = False
         except (ServoMissing, BusLost):
             self._port.closePort()
@@ -190,18 +197,14 @@ class SmartServoBus(PortBus):
                 self._apply_one_by_one(reader.read_each(now_s), now_s)
             else:
                 raw, at_s = line.exchange(group.request, group.reply_length)
-                values = group.parse_whole(raw)
-                if (
-                    values is None
-                    or self._is_troubled
-                    or at_s < feedback.places.disturbed_until_s
-                    or not feedback.apply_whole(group, values, at_s)
-                ):
+                if self._is_troubled or not feedback.apply_whole(group, raw, at_s):
                     self._apply_one_by_one(reader.sort_out(group, raw, at_s, now_s), now_s)
             if len(feedback.now.missing) == out:
                 # All servos that were read have answered: there is time for other exchanges.
-                if out:
-                    reader.read_silent(now_s)
+                due = self._poll_list.next_due(now_s) if out else None
+                if due is not None:
+                    # Its values are not used: after a long silence an answer may be an old one.
+                    reader.read_again((due,), now_s)
                 if now_s >= self._poll_at_s:
                     self._poll(now_s)
                 if now_s >= supervisor.due_s:
@@ -269,20 +272,24 @@ class SmartServoBus(PortBus):
         supervisor, line = self._supervisor, self._line
         if not supervisor.engaged or self._is_down or line.starved:
             return
-        speeds, withheld = supervisor.speeds, supervisor.limp.union(supervisor.held)
-        for servo_id, since_s in self._poll_list.silent_since_s.items():
-            if self._now_s - since_s >= RESTART_S:
-                withheld |= {servo_id}
+        builder, speeds = self._goals, supervisor.speeds
+        if supervisor.limp or supervisor.held or self._poll_list.silent_since_s:
+            kept = [k for k, servo_id in enumerate(self._ids) if not self._is_withheld(servo_id)]
+            if not kept:
+                return
+            builder = GoalWrite(self._family, [self._ids[k] for k in kept])
+            goals, speeds = [goals[k] for k in kept], [speeds[k] for k in kept]
         try:
-            if withheld:
-                kept = [k for k, servo_id in enumerate(self._ids) if servo_id not in withheld]
-                if kept:
-                    some = self._family.create_goal_packets([self._ids[k] for k in kept])
-                    line.send(some.packet([goals[k] for k in kept], [speeds[k] for k in kept]))
-            else:
-                line.send(self._goals.packet(goals, speeds))
+            line.send(builder.packet(goals, speeds))
         except BusLost as lost:
             self._record_loss(lost)
+
+    def _is_withheld(self, servo_id: int) -> bool:
+        """Return whether a servo gets no goals: it is limp or held, or may have restarted."""
+        supervisor = self._supervisor
+        if servo_id in supervisor.limp or servo_id in supervisor.held:
+            return True
+        return self._now_s - self._poll_list.silent_since_s.get(servo_id, inf) >= RESTART_S
 
     def _apply_target(self) -> None:
         """Apply the setups stored since torque was last on."""

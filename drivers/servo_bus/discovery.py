@@ -4,7 +4,7 @@ The identity of every id is read, as servos of some families answer a broadcast 
 An answer contains its id, so an answer that an adapter delivers late is still counted.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoMissing
@@ -89,19 +89,16 @@ def count_corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANS
     Two servos with one id answer at the same time and corrupt bytes that differ. Their answers to
     pings are often equal, their positions hardly ever.
     """
-    first, last = (family.registers[name] for name in family.duplicate_id_registers)
-    length = last.address + last.size - first.address
-    position = family.registers["present_position"]
-    at = position.address - first.address
+    address, length = family.span(*family.duplicate_id_registers)
     bad, places = 0, list[int]()
     for _ in range(tries):
         port.drain()
-        request = family.codec.read(servo_id, first.address, length)
+        request = family.codec.read(servo_id, address, length)
         raw, status = transact(port, family, request, length, REPLY_S, servo_id)
         if status is None:
             bad += bool(without_echo(raw, request))
         elif len(status.params) == length:
-            places.append(position.decode(status.params[at : at + position.size]))
+            places.append(family.decode(address, status.params)["present_position"])
     # A checksum of one byte over two mixed answers may match by chance, but not the position.
     wide = bool(places) and max(places) - min(places) > family.steps_per_turn // 8
     return max(bad, SHARED if wide else 0)
@@ -140,3 +137,29 @@ def _problem(family: Family, setup: ServoConfig, found: Identity | None) -> str:
     if found.model_number != family.models[setup.model].number:
         return f"{setup.label()} is {family.model_name(found.model_number)}, not {setup.model}"
     return ""
+
+
+def name_firmware(
+    line: Transactions, setups: Sequence[ServoConfig], firmware: Mapping[int, int]
+) -> list[str]:
+    """Return a line for servos with an old firmware, or an older one than their like."""
+    family, texts = line.family, []
+    for model in dict.fromkeys(one.model for one in setups):
+        own = {one.id: firmware[one.id] for one in setups if one.model == model}
+        needed, newest = family.fast_read_since.get(model, 0), max(own.values())
+        for version in sorted(set(own.values())):
+            if version < needed:
+                wanted = (
+                    f"not {family.format_firmware(needed)} or later: without fast sync reads all "
+                    "servos of this bus are read by plain ones, which are slower"
+                )
+            elif version < newest:
+                wanted = f"but others of this model have {family.format_firmware(newest)}"
+            else:
+                continue
+            named = ", ".join(
+                line.label(i) for i, own_version in own.items() if own_version == version
+            )
+            text = f"{named}: {model} with firmware {family.format_firmware(version)}"
+            texts.append(f"{text}, {wanted}: update it with {family.updater}")
+    return texts

@@ -7,14 +7,18 @@ explains how to add one.
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from types import ModuleType
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
 
 
 Area = Literal["eeprom", "ram"]
+
+FASTEST = 32767
+"""Largest value of a speed limit."""
 
 
 class Register(NamedTuple):
@@ -135,111 +139,84 @@ class Window(NamedTuple):
 class AnswerFrame(NamedTuple):
     """The bytes around the registers in an answer of several servos without errors.
 
-    front: bytes before those of the first servo
     heads: bytes before each servo's registers, its error byte included
     check: struct code of the checksum after each servo's registers
     parts: struct codes of the parts that the checksums cover
     is_intact: returns whether the checksums match, from the covered parts and the checksums
     """
 
-    front: bytes
     heads: Sequence[bytes]
     check: str
     parts: str
     is_intact: Callable[[tuple[bytes, ...], tuple[int, ...]], bool]
 
 
-class GoalPackets(Protocol):
-    """Builder of goal packets for a fixed set of servos."""
-
-    def packet(self, goals: Sequence[int], speeds: Sequence[int]) -> bytes:
-        """Build the packet with one goal and one speed per servo."""
-
-
 @dataclass(frozen=True)
 class Family:
-    """A family of smart servos.
+    """A family of smart servos; docs/servo-families.md compares those that exist.
 
-    Packets and table:
-        codec: module of packets, with the functions of gazerig.drivers.dynamixel.protocol
-        registers, models: registers and models by name
-        steps_per_turn: steps per turn of the shaft
-        name_errors: texts for the bits of ``error_register``
-        velocity_unit_steps_s: unit of the present velocity
-        speed_units: converts steps/s to the unit of speed limits; at least 1
-        acceleration_units: converts steps/s^2 to the unit of acceleration limits; None for no limit
-        create_goal_packets: builds goal packets for some servos
-        sync_read: whether one request reads several servos; otherwise each is read alone
-        baud_rates: bit/s, indexed by the value of the servo's register
-        scan_rates: all baud rates, the usual ones first
-        factory_baud: baud rate of a new servo
-        highest_id: highest id of a servo
-        format_firmware: formats a firmware number as the manufacturer does
-
-    Reading:
-        window: registers read from all servos in every cycle; up to 7 bytes before them can be read
-        polled: first and last register of spans that are read from one servo after the other
-        has_fast_read: returns whether a model with a firmware has a fast sync read
-        prompt_timeout_s: shortest time-out of an answer in addition to its bytes on the wire
-        effort_register: register of load or current
-
-    Settings:
-        read_spans: first and last register of ranges that are read together
-        wanted_settings: required register values; written in this order within a span
-        corrected_value: value to write to a register, given the found and the wanted value
-        answer_level: Status Return Level at which every instruction is answered
-        lock_register: register that must be 0 while EEPROM is written, None if torque is the lock
-
-    Traits:
-        error_register: register of a servo's faults
-        faults_latch: whether a fault stays until the servo is restarted; otherwise its bit comes
-            and goes
-        watchdog_unit_s: unit of Bus Watchdog; None without a watchdog
-        goal_speed: whether a goal includes its speed; otherwise ``arming_register`` limits it
-        single_turn: whether a servo measures its position within one turn when it starts
-        duplicate_id_registers: first and last of the registers in which two servos with the same id
-            differ
-        arming_register: limit of speed or acceleration that is written before torque is switched on
-        most_goals: largest number of goals in one packet
-        fault_cure, jump_cure: remedies if torque is refused, or a position jumps
+    A span is the first and the last of registers that are read together.
     """
 
     name: str
     codec: ModuleType
+    """Module of its packets, with the functions of gazerig.drivers.dynamixel.protocol."""
     registers: Mapping[str, Register]
     models: Mapping[str, ServoModel]
     steps_per_turn: int
-    name_errors: Callable[[int], tuple[str, ...]]
+    errors: Mapping[int, str]
+    """Texts for the bits of ``error_register``."""
+    error_register: str
+    effort_register: str
+    """Register of load or current."""
     velocity_unit_steps_s: float
-    speed_units: Callable[[float], int]
     acceleration_units: Callable[[float | None], int]
-    create_goal_packets: Callable[[Sequence[int]], GoalPackets]
+    """Converts steps/s^2 to the unit of acceleration limits; None for no limit."""
+    goal_layout: str
+    """Struct codes of a servo's id, goal and further numbers in a packet of goals."""
+    goal_speed: bool
+    """Whether the last of them is a speed; otherwise ``arming_register`` limits it."""
+    arming_register: str
+    """Limit of speed or acceleration that is written before torque is switched on."""
+    most_goals: int
+    """Largest number of goals in one packet."""
     sync_read: bool
+    """Whether one request reads several servos; otherwise each is read alone."""
+    fast_read_since: Mapping[str, int]
+    """First firmware of a model that answers a sync read in one packet."""
     baud_rates: tuple[int, ...]
+    """Bit/s, indexed by the value of the servo's register."""
     scan_rates: tuple[int, ...]
+    """The same, the usual ones first."""
     factory_baud: int
     highest_id: int
     format_firmware: Callable[[int], str]
+    """Formats a firmware number as the manufacturer does."""
+    updater: str
+    """The manufacturer's program that updates the firmware."""
     window: Window
-    polled: tuple[tuple[str, str], ...]
-    has_fast_read: Callable[[str, int], bool]
-    prompt_timeout_s: float
-    effort_register: str
+    """Registers read from all servos in every cycle; up to 7 bytes before them can be read."""
+    polled: tuple[Window, ...]
+    """Registers that are read from one servo after the other; fields are their names."""
     read_spans: tuple[tuple[str, str], ...]
+    """Spans of settings."""
     wanted_settings: Callable[["ServoConfig"], Mapping[str, int]]
+    """Required register values; written in this order within a span."""
     corrected_value: Callable[[str, int, int], int]
+    """Value to write to a register, given the found and the wanted value."""
     answer_level: int
+    """Status Return Level at which every instruction is answered."""
     lock_register: str | None
-    error_register: str
+    """Register that must be 0 while EEPROM is written, None if torque is the lock."""
     faults_latch: bool
+    """Whether a fault stays until the servo is restarted; otherwise its bit comes and goes."""
     watchdog_unit_s: float | None
-    goal_speed: bool
     single_turn: bool
+    """Whether a servo measures its position within one turn when it starts."""
     duplicate_id_registers: tuple[str, str]
-    arming_register: str
-    most_goals: int
-    fault_cure: str
-    jump_cure: str
+    """Span in which two servos with the same id differ."""
+    prompt_timeout_s: float = 0.002
+    """Shortest time-out of an answer in addition to its bytes on the wire."""
 
     def request(self, ids: Sequence[int], address: int, length: int) -> bytes:
         """Return a request for the same registers of some servos; of one if each is read alone."""
@@ -247,7 +224,51 @@ class Family:
         packet: bytes = ask(asked, address, length)
         return packet
 
+    def span(self, first: str, last: str) -> tuple[int, int]:
+        """Return the address and the number of bytes of a span."""
+        begin, end = self.registers[first], self.registers[last]
+        return begin.address, end.address + end.size - begin.address
+
+    def decode(self, address: int, data: bytes) -> dict[str, int]:
+        """Return the values by name of the registers in bytes that begin at an address."""
+        return {
+            one.name: one.decode(data[one.address - address :][: one.size])
+            for one in self.registers.values()
+            if address <= one.address and one.address + one.size <= address + len(data)
+        }
+
+    def speed_units(self, speed_steps_s: float) -> int:
+        """Return a speed in the unit of speed limits, at least 1, as 0 means no limit."""
+        return max(1, min(FASTEST, int(speed_steps_s / self.velocity_unit_steps_s)))
+
+    def name_errors(self, status: int) -> tuple[str, ...]:
+        """Return the names of the set bits of ``error_register``."""
+        bits = [1 << bit for bit in range(8) if status >> bit & 1]
+        return tuple(self.errors.get(bit, f"error bit {bit:#04x}") for bit in bits)
+
     def model_name(self, number: int) -> str:
         """Return the name of a model, "model number 350" if it is unknown."""
         names = (model.name for model in self.models.values() if model.number == number)
         return next(names, f"model number {number}")
+
+
+class GoalWrite:
+    """Builder of packets that write the goals of a fixed set of servos."""
+
+    def __init__(self, family: Family, ids: Sequence[int]) -> None:
+        order, codes = family.goal_layout[0], family.goal_layout[1:]
+        self._rows = struct.Struct(order + codes * len(ids))
+        self._count, self._has_speed = len(codes), family.goal_speed
+        self._row = [n for servo_id in ids for n in (servo_id, *[0] * (self._count - 1))]
+        codec, address = family.codec, family.registers["goal_position"].address
+        self._span = codec.span(address, struct.calcsize(order + codes) - 1)
+        self._instruction = partial(codec.instruction, codec.BROADCAST, codec.SYNC_WRITE)
+
+    def packet(self, goals: Sequence[int], speeds: Sequence[int]) -> bytes:
+        """Build the packet with one goal per servo, and one speed if the family sends it."""
+        row = self._row
+        row[1 :: self._count] = goals
+        if self._has_speed:
+            row[self._count - 1 :: self._count] = speeds
+        packet: bytes = self._instruction(self._span + self._rows.pack(*row))
+        return packet

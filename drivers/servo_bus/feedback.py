@@ -44,17 +44,20 @@ class FeedbackColumns:
             fault=now.fault,
         )
 
-    def apply_whole(self, group: GroupRead, values: tuple[Any, ...], at_s: float) -> bool:
+    def apply_whole(self, group: GroupRead, raw: bytes, at_s: float) -> bool:
         """Apply an answer of all servos that contains only measurements and no errors.
 
         Args:
             group: Read that it answers.
-            values: Values of the answer.
-            at_s: Time of its arrival, seconds.
+            raw: The received bytes.
+            at_s: Time of their arrival, seconds.
 
         Returns:
-            Whether it was applied; if not, some position is not plausible.
+            Whether it was applied; if not, it must be taken servo by servo.
         """
+        values = group.parse_whole(raw)
+        if values is None or at_s < self.places.disturbed_until_s:
+            return False
         now = self.now
         at_position, at_velocity, at_effort, at_voltage, at_temperature = group.columns
         position, velocity, effort = values[at_position], values[at_velocity], values[at_effort]
@@ -91,49 +94,60 @@ class FeedbackColumns:
 
     def apply_reply(self, slot: int, reply: ServoReply) -> bool:
         """Apply one servo's answer; return False if its position is not plausible."""
-        if not self.places.is_plausible(slot, reply.position, reply.at_s):
+        values = reply.values
+        if not self.places.is_plausible(slot, values["position"], reply.at_s):
             return False
-        self._set_motion(slot, reply)
-        if reply.voltage is not None and reply.temperature is not None:
-            self.set_climate(slot, reply.voltage, reply.temperature)
+        self._set_motion(slot, reply.at_s, **values)
         return True
 
-    def _set_motion(self, slot: int, reply: ServoReply) -> None:
+    def _set_motion(
+        self,
+        slot: int,
+        at_s: float,
+        position: int,
+        velocity: int = 0,
+        effort: int = 0,
+        **climate: int,
+    ) -> None:
         missing = tuple([other for other in self.now.missing if other != slot])
         self.now = self.now._replace(missing=missing)
         self.set(
             slot,
-            position_steps=reply.position,
-            velocity_steps_s=reply.velocity * self._velocity_unit,
-            load=max(-1.0, min(1.0, reply.effort * self._load_units[slot])),
-            at_s=reply.at_s,
+            position_steps=position,
+            velocity_steps_s=velocity * self._velocity_unit,
+            load=max(-1.0, min(1.0, effort * self._load_units[slot])),
+            at_s=at_s,
         )
+        if climate:
+            self.set_climate(slot, **climate)
 
     def set(self, slot: int, **values: Any) -> None:
         """Set a servo's values by column."""
         columns = {
             name: _replace_value(getattr(self.now, name), slot, value)
             for name, value in values.items()
+            if getattr(self.now, name)[slot] != value
         }
-        self.now = self.now._replace(**columns)
+        if columns:
+            self.now = self.now._replace(**columns)
 
     def expect_torque(self, on: bool, limp: Collection[int] = ()) -> None:
         """Record that torque has been switched for all servos but the limp ones."""
         torque = tuple([on and slot not in limp for slot in range(len(self.now.torque))])
         self.now = self.now._replace(torque=torque)
 
-    def set_climate(self, slot: int, tenth_volts: int, temperature_c: int) -> None:
-        """Record a servo's voltage and temperature."""
+    def set_climate(self, slot: int, voltage: int, temperature: int) -> None:
+        """Record a servo's voltage, in 0.1 V, and temperature."""
         self._tenth_volts = ()
-        self.set(slot, voltage_v=0.1 * tenth_volts)
-        if temperature_c <= MOST_CELSIUS:
-            self.set(slot, temperature_c=temperature_c)
+        self.set(slot, voltage_v=0.1 * voltage)
+        if temperature <= MOST_CELSIUS:
+            self.set(slot, temperature_c=temperature)
 
     def hold(self, slot: int, position: int, at_s: float, torque: bool) -> None:
         """Set the position of a servo that was just set up and does not move."""
         self.set(slot, torque=torque)
         self.places.record(slot, position, at_s)
-        self._set_motion(slot, ServoReply(at_s, 0, position))
+        self._set_motion(slot, at_s, position)
 
 
 def _replace_value(column: tuple[Any, ...], slot: int, value: Any) -> tuple[Any, ...]:

@@ -115,18 +115,15 @@ class PollList:
         return silences_s
 
     def _report_all(self, answered: bool, now_s: float) -> None:
-        """Report that no servo answers, and the end of such a silence."""
-        silent_s = self.all_silent_s(now_s)
-        if not answered:
-            self._all_since_s = min(self._all_since_s, now_s)
-            if silent_s >= BLAME_S and not self._all_reported:
-                self._all_reported = True
-                self._blame("no servo answers", CHECK_SUPPLY, now_s, self._all_since_s)
-        elif self._all_since_s < inf:
-            if silent_s >= SILENCE_S:
-                fault = f"no servo answered for {silent_s:.1f} s"
-                self._blame(fault, CHECK_SUPPLY, now_s, self._all_since_s)
-            self._all_since_s, self._all_until_s, self._all_reported = inf, now_s, False
+        """Report that no servo answers."""
+        if answered:
+            if self._all_since_s < inf:
+                self._all_since_s, self._all_until_s, self._all_reported = inf, now_s, False
+            return
+        self._all_since_s = min(self._all_since_s, now_s)
+        if self.all_silent_s(now_s) >= BLAME_S and not self._all_reported:
+            self._all_reported = True
+            self._blame("no servo answers", CHECK_SUPPLY, now_s, self._all_since_s)
 
     def _blame(self, fault: str, remedy: str, now_s: float, since_s: float = inf) -> None:
         self._log.add(self._lateness.blame(fault, remedy, now_s, since_s))

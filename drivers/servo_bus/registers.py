@@ -61,16 +61,12 @@ class Registers:
         left = sorted((self._family.registers[name] for name in values), key=lambda r: r.address)
         while left:
             start = end = left[0].address
-            span = []
             while left and left[0].address == end:
-                span.append(left.pop(0))
-                end += span[-1].size
+                end += left.pop(0).size
             request = self._family.codec.read(servo_id, start, end - start)
             status = self._exchange(servo_id, request, end - start)
             if status is not None:
-                for one in span:
-                    at = one.address - start
-                    values[one.name] = one.decode(status.params[at : at + one.size])
+                values |= self._family.decode(start, status.params)
             elif not self.refusal:
                 break
         return values

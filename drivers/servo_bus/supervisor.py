@@ -16,9 +16,9 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.process.host_lateness import LATE_COMPUTER
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import BAD_LINE
-from gazerig.drivers.servo_bus.provisioning import Provisioning
+from gazerig.drivers.servo_bus.settings import apply_settings
 from gazerig.drivers.servo_bus.torque import (
-    crosses_zero,
+    WATCHDOG_S,
     enable,
     goal_speeds,
     read_positions,
@@ -44,24 +44,18 @@ MOST_RESTARTS, WITHIN_S = 3, 10.0
 ENTRY_S = 0.3
 """Time beyond that of its way after which a servo has moved into its limits, or never will."""
 
-SELDOM_S = 10.0
-"""Shortest time between two reports of tripped watchdogs."""
-
 AGAIN_AND_AGAIN = "restarts again and again: supply too weak"
-FAR_SIDE = "is beyond its encoder's zero: turn it into its range by hand, then restart its power"
 NOT_SET_UP = "cannot be set up again"
 
 
 class Supervisor:
-    """Supervisor of the servos of one bus.
+    """Supervisor of the servos of one bus; whatever uses the line raises BusLost if it is lost.
 
     Args:
         line: Exchanges on the bus.
-        setups: The servos by id.
-        provisioning: Their settings.
+        setups: The servos by id, with the present setups.
         feedback: Their feedback.
         log: Records events.
-        watchdog: Armed value of Bus Watchdog, in its units; 0 for none.
 
     engaged: whether torque is on
     limp: servos whose torque is off on purpose
@@ -76,25 +70,20 @@ class Supervisor:
         self,
         line: Transactions,
         setups: Mapping[int, ServoConfig],
-        provisioning: Provisioning,
         feedback: FeedbackColumns,
         log: EventLog,
-        watchdog: int = 0,
     ) -> None:
         self._line, self._family = line, line.family
-        self._setups = setups
+        self._setups, self._feedback, self._log = setups, feedback, log
         self._ids = tuple(setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
-        self._provisioning = provisioning
-        self._feedback = feedback
-        self._log = log
-        self._watchdog = watchdog
         self.engaged = False
         self.limp: frozenset[int] = frozenset()
         self.held: set[int] = set()
         self.faults: dict[int, str] = {}
-        self.due_s = self._pause_until_s = self._reported_s = -inf
+        self.due_s = self._pause_until_s = -inf
         self._restarts_s = {i: deque[float](maxlen=MOST_RESTARTS) for i in self._ids}
+        self._expected: dict[int, dict[str, int]] = {}  # registers under torque
         self._marked: dict[int, float] = {}  # time of the next attempt to set it up
         self._problems: dict[int, str] = {}  # result of the last attempt
         self._rearmed: dict[int, float] = {}  # end of its slow way, -inf if it has none
@@ -114,16 +103,22 @@ class Supervisor:
             ServoFault: a servo refuses its torque, or would move in the wrong direction.
         """
         # A servo may have restarted since it was prepared.
-        self._provisioning.apply(self._ids)
-        goals, outside = enable(self._line, self._setups, self._ids, self._watchdog)
+        apply_settings(self._line, self._setups, self._ids, self._log)
+        goals, outside = enable(self._line, self._setups, self._ids)
         self.stop_supervision()
         self._marked.clear()
         self._problems.clear()
         for servo_id in [*self.faults]:
             self._set_fault(servo_id, "")
+        for servo_id, setup in self._setups.items():
+            expected = {**self._family.wanted_settings(setup), "torque_enable": 1}
+            if self._family.goal_speed:
+                acceleration = self._family.acceleration_units(setup.max_accel_steps_s2)
+                expected[self._family.arming_register] = acceleration
+            self._expected[servo_id] = expected
         self.engaged = True
-        unit_s = self._family.watchdog_unit_s or 0.0
-        self._line.starving_s, self._line.tries = self._watchdog * unit_s or inf, 1
+        self._line.starving_s = WATCHDOG_S if self._family.watchdog_unit_s else inf
+        self._line.tries = 1
         self._feedback.expect_torque(True)
         self._feedback.places.forget()
         self._record_rearmed(outside)
@@ -142,9 +137,6 @@ class Supervisor:
 
         A servo that does not confirm keeps its torque. One that refuses it is set up by later
         reads.
-
-        Raises:
-            BusLost: the port is lost.
         """
         off, on = tuple(set(wanted) - self.limp), tuple(self.limp.difference(wanted))
         if not off and not on:
@@ -160,7 +152,7 @@ class Supervisor:
     def _enable_again(self, ids: tuple[int, ...]) -> bool:
         """Give some servos torque again at their present positions; return whether they have it."""
         try:
-            _, outside = enable(self._line, self._setups, ids, self._watchdog)
+            _, outside = enable(self._line, self._setups, ids)
         except (ServoMissing, ServoFault):
             for servo_id in ids:
                 self.mark(servo_id)
@@ -196,11 +188,8 @@ class Supervisor:
             self.mark(servo_id, is_held=False)
         if not self.engaged or servo_id in self.limp:
             return
-        wanted = {**self._provisioning.wanted(servo_id), "torque_enable": 1}
-        if self._family.goal_speed:
-            accel = self._setups[servo_id].max_accel_steps_s2
-            wanted[self._family.arming_register] = self._family.acceleration_units(accel)
-        if any(values.get(name, value) != value for name, value in wanted.items()):
+        expected = self._expected[servo_id]
+        if any(expected.get(name, value) != value for name, value in values.items()):
             self.mark(servo_id)
 
     # --- after every read
@@ -211,9 +200,6 @@ class Supervisor:
         Args:
             group: Servos that answer.
             now_s: Present time.
-
-        Raises:
-            BusLost: the port is lost.
         """
         due = [i for i, at_s in self._marked.items() if at_s <= now_s and i in group]
         if due and now_s >= self._pause_until_s:
@@ -244,27 +230,18 @@ class Supervisor:
         self._set_speeds()
 
     def recover_tripped(self, group: Collection[int]) -> None:
-        """Rearm servos that were stopped by their own watchdog; they refuse goals until then.
-
-        Raises:
-            BusLost: the port is lost.
-        """
+        """Rearm servos that were stopped by their own watchdog; they refuse goals until then."""
         self._line.starved = False
         values = self._line.ask(tuple(group), "bus_watchdog") if group else {}
         tripped = tuple(servo_id for servo_id, value in values.items() if value == TRIPPED)
         if not tripped or not self._enable_again(tripped):
             return
         self._rearmed = {**dict.fromkeys(tripped, -inf), **self._rearmed}
-        now_s = self._line.port.now_s()
-        late = self._line.lateness.cause(now_s)
+        late = self._line.lateness.cause(self._line.port.now_s())
         self._line.errors[LATE_COMPUTER if late else "watchdog"] += len(tripped)
-        if now_s - self._reported_s >= SELDOM_S:
-            self._reported_s = now_s
-            cause = late or "packets get lost (check cable and plugs)"
-            self._log.add(
-                f"{cause}, so the watchdog of {len(tripped)} servos stopped them; they continue "
-                "from their position"
-            )
+        cause = late or "packets get lost (check cable and plugs)"
+        stopped = f"so the watchdog of {len(tripped)} servos stopped them"
+        self._log.add(f"{cause}, {stopped}; they continue from their position")
 
     # --- one marked servo
 
@@ -326,18 +303,16 @@ class Supervisor:
             return " and ".join(family.name_errors(found[family.error_register]))
         position = read_positions(line, ids)[servo_id]
         misplaced = far_outside_steps(setup, position)
-        if crosses_zero(family, setup, position):
-            misplaced = FAR_SIDE
         if arms and misplaced:
             switch_off(line, ids)
             return misplaced
-        self._provisioning.apply(ids)
+        apply_settings(line, self._setups, ids, self._log)
         if arms:
             restarts_s = self._restarts_s[servo_id]
             often = len(restarts_s) == MOST_RESTARTS and now_s - restarts_s[0] < WITHIN_S
             if has_restarted and often:
                 return AGAIN_AND_AGAIN
-            (position,), outside = enable(line, self._setups, ids, self._watchdog)
+            (position,), outside = enable(line, self._setups, ids)
             if outside:
                 position = read_positions(line, ids)[servo_id]
             self._record_rearmed({servo_id: -inf, **outside})

@@ -7,6 +7,7 @@ positions are read again before and afterwards.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from math import ceil
 from typing import TYPE_CHECKING
 
 from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
@@ -14,7 +15,7 @@ from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.event_log import register_label
 from gazerig.drivers.serial.port import BusPort, open_port
-from gazerig.drivers.servo_bus.family import Family
+from gazerig.drivers.servo_bus.family import Family, GoalWrite
 from gazerig.drivers.servo_bus.transaction import Transactions
 
 if TYPE_CHECKING:  # the guardian starts without numpy
@@ -25,15 +26,25 @@ TRIES = 3
 JUMP_TURN = 0.25
 """Share of a turn that no hand moves a joint while torque is switched on: it has wrapped."""
 
+FAR_SIDE = (
+    "beyond its encoder's zero, and would move into its range in the wrong direction: turn it into "
+    "that range by hand, then restart its power"
+)
+
 STILL_STEPS = 16
 """Distance that a joint without torque, held by a hand, may move between two reads."""
 
-LEAST_S, MOST_S = 0.005, 0.02
-"""Time-outs of an answer beyond its time on the wire, when torque is released on a raw port."""
+WATCHDOG_S = 0.2
+"""Silence after which servos with a watchdog stop by themselves."""
+
+
+def watchdog_units(family: Family) -> int:
+    """Return the armed value of Bus Watchdog, 0 for a family without one."""
+    return ceil(WATCHDOG_S / family.watchdog_unit_s) if family.watchdog_unit_s else 0
 
 
 def enable(
-    line: Transactions, setups: Mapping[int, "ServoConfig"], ids: Sequence[int], watchdog: int
+    line: Transactions, setups: Mapping[int, "ServoConfig"], ids: Sequence[int]
 ) -> tuple[tuple[int, ...], dict[int, float]]:
     """Set goals to the present positions, clipped to the limits, then switch torque on.
 
@@ -43,7 +54,6 @@ def enable(
         line: Exchanges on the bus.
         setups: All servos by id.
         ids: Servos that get torque.
-        watchdog: Value of Bus Watchdog, in its units; 0 for none.
 
     Returns:
         The goals in steps, and by id the times that servos outside need, seconds.
@@ -52,46 +62,31 @@ def enable(
         ServoMissing: a servo does not answer or rejects its goal.
         ServoFault: a servo refuses its torque, or would move in the wrong direction.
     """
-    family = line.family
+    family, watchdog = line.family, watchdog_units(line.family)
     if not ids:
         return (), {}
-    if family.watchdog_unit_s is not None:
+    if watchdog:
         write_verified(line, "bus_watchdog", dict.fromkeys(ids, 0))
     present = read_positions(line, ids)
     goals, outside = dict[int, int](), dict[int, float]()
     for servo_id, steps in present.items():
-        setup = setups[servo_id]
-        low, high = setup.min_steps, setup.max_steps
-        if crosses_zero(family, setup, steps):
-            raise ServoFault(
-                f"{line.label(servo_id)} is at {steps}, beyond its encoder's zero, and would move "
-                f"into {low}..{high} in the wrong direction: turn it into that range by hand, then "
-                "restart its power"
-            )
-        goals[servo_id] = min(max(steps, low), high)
-        if not low <= steps <= high:
-            away = abs(goals[servo_id] - steps)
-            outside[servo_id] = away / entry_speed_steps_s(setup, family.steps_per_turn)
+        setup, turn = setups[servo_id], family.steps_per_turn
+        goals[servo_id] = min(max(steps, setup.min_steps), setup.max_steps)
+        away = abs(goals[servo_id] - steps)
+        # The servo itself would not take a shorter way across its encoder's zero.
+        if family.single_turn and 2 * away > turn - (setup.max_steps - setup.min_steps):
+            raise ServoFault(f"{line.label(servo_id)} is {FAR_SIDE}")
+        if away:
+            outside[servo_id] = away / entry_speed_steps_s(setup, turn)
     own = [setups[servo_id] for servo_id in ids]
     speeds = goal_speeds(family, own, outside)
     accelerations = [family.acceleration_units(setup.max_accel_steps_s2) for setup in own]
     armed = accelerations if family.goal_speed else speeds
     write_verified(line, family.arming_register, dict(zip(ids, armed, strict=True)))
     _switch_on(line, present, goals, dict(zip(ids, speeds, strict=True)))
-    if family.watchdog_unit_s is not None:
+    if watchdog:
         write_verified(line, "bus_watchdog", dict.fromkeys(ids, watchdog))
     return tuple(goals.values()), outside
-
-
-def crosses_zero(family: Family, setup: "ServoConfig", steps: int) -> bool:
-    """Return whether a servo's nearest way into its limits leads across its encoder's zero.
-
-    The servo itself would move in the other direction.
-    """
-    if not family.single_turn:
-        return False
-    away = max(setup.min_steps - steps, steps - setup.max_steps)
-    return away > family.steps_per_turn - (setup.max_steps - setup.min_steps) - away
 
 
 def goal_speeds(
@@ -171,7 +166,7 @@ def _switch_on(
     family, ids = line.family, tuple(goals)
 
     def send(left: Sequence[int]) -> None:
-        builder = family.create_goal_packets(left)
+        builder = GoalWrite(family, left)
         line.send(builder.packet([goals[i] for i in left], [speeds[i] for i in left]))
 
     write_verified(line, "goal_position", goals, send, present if family.goal_speed else None)
@@ -191,12 +186,13 @@ def _switch_on(
         )
         if not named:
             raise
-        raise ServoFault(f"{named}: let it cool, free it, {family.fault_cure}") from None
+        remedy = "let it cool, free it, check its supply, then restart its power"
+        raise ServoFault(f"{named}: {remedy}") from None
     for servo_id, now in read_positions(line, ids).items():
         if abs(now - before[servo_id]) > JUMP_TURN * family.steps_per_turn:
             raise ServoFault(
                 f"{line.label(servo_id)}: position jumped from {before[servo_id]} to {now} when "
-                f"torque was switched on: {family.jump_cure}"
+                f"torque was switched on: set its Homing Offset to 0 and restart its power"
             )
     if family.goal_speed:
         write_verified(line, "goal_position", goals, send)
@@ -206,7 +202,7 @@ def switch_off(line: Transactions, ids: Sequence[int]) -> ReleaseResult:
     """Switch the watchdog, then torque off, and verify that torque is off."""
     left = tuple(ids)
     found: dict[int, int] = {}
-    watchdog = () if line.family.watchdog_unit_s is None else ("bus_watchdog",)
+    watchdog = ("bus_watchdog",) if line.family.watchdog_unit_s else ()
     for _ in range(TRIES):
         # Twice, as no servo confirms a group write, and this one matters most.
         for name in (*watchdog, "torque_enable", "torque_enable"):
@@ -233,7 +229,7 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
         BusLost: the port is lost.
     """
     open_port(port, baud)
-    released = switch_off(Transactions(port, family, LEAST_S, MOST_S, baud), ids)
+    released = switch_off(Transactions(port, family, baud), ids)
     return (*released.holding_ids, *released.unconfirmed_ids)
 
 

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import inf
 
+from gazerig.drivers.bus.timing import TIMING
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 from gazerig.drivers.servo_bus.family import Family, Status
@@ -61,35 +62,35 @@ class Transactions:
     Args:
         port: Its port.
         family: Family of the servos.
-        least_s: Shortest time-out of an answer in addition to its bytes on the wire, seconds.
-        most_s: Longest one; the first one, and always used outside the loop.
         baud: Bit/s.
+        most_s: Longest time-out of an answer in addition to its bytes on the wire, seconds; the
+            first one, and always used outside the loop.
         names: Labels of the servos for messages.
 
+    timeout_s: present time-out of an answer in addition to its bytes on the wire
     tx_bytes, rx_bytes: counts since creation
     errors: counts by kind
     tries: number of attempts to read a servo outside the cyclic exchange; 1 in the loop
     starving_s: silence after which a servo's own watchdog trips; inf if none is armed
     starved: whether such a silence has happened
     lateness: delays of this computer: its own silences, answers after their time-outs
-    deadline_s: end of the last exchange's time-out
+    deadline_s: end of the last time-out
     """
 
     def __init__(
         self,
         port: BusPort,
         family: Family,
-        least_s: float,
-        most_s: float,
         baud: int,
+        most_s: float = TIMING.reply_timeout_s,
         names: Mapping[int, str] | None = None,
     ) -> None:
         self.port, self.family = port, family
         self._names = names or {}
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
-        self._least_s, self.most_s = min(least_s, most_s), most_s
-        self._worst_s = most_s / FACTOR
+        self._least_s, self.most_s = min(family.prompt_timeout_s, most_s), most_s
+        self.timeout_s = most_s
         self.tries = TRIES
         self.starving_s = inf
         self.starved = self._is_owed = False
@@ -101,36 +102,25 @@ class Transactions:
         """Return a servo's label for messages."""
         return self._names.get(servo_id, f"servo {servo_id}")
 
-    @property
-    def timeout_s(self) -> float:
-        """Return the present time-out of an answer in addition to its bytes on the wire."""
-        timeout_s = FACTOR * self._worst_s
-        if timeout_s < self._least_s:
-            return self._least_s
-        return timeout_s if timeout_s < self.most_s else self.most_s
-
     def send(self, packet: bytes) -> None:
         """Send a packet."""
-        self._record_sent(len(packet))
-        self.port.write(packet)
-
-    def _record_sent(self, count: int) -> float:
-        """Record bytes that are sent now; return the time at which they have left."""
         now_s = self.port.now_s()
         if now_s - self._sent_s >= self.starving_s:  # the servos' watchdogs have tripped
             self.starved = True
             self.lateness.record_own_silence(now_s - self._sent_s, now_s)
         self._sent_s = now_s
+        count = len(packet)
         self.tx_bytes += count
         # Bytes leave after those still in the output buffer, at the speed of the bus.
         free_s = self._free_s if self._free_s > now_s else now_s
-        self._free_s = free_s = free_s + count * self._byte_s
-        return free_s
+        self._free_s = free_s + count * self._byte_s
+        self.port.write(packet)
 
     def exchange(self, request: bytes, length: int) -> tuple[bytes, float]:
         """Send a request and wait for ``length`` bytes.
 
-        The wait ends with the time-out, which is added to the time of the bytes on the wire.
+        The wait ends with the time-out, which is added to the time of the bytes on the wire. It is
+        lengthened at once if needed, and shortened slowly.
 
         Returns:
             The received bytes, and the time of their arrival, seconds.
@@ -138,18 +128,22 @@ class Transactions:
         port = self.port
         if self._is_owed:
             self._count_late(port.read_until(ROOM, port.now_s()))
-        whole_s = self._record_sent(len(request)) + length * self._byte_s
+        self.send(request)
+        whole_s = self._free_s + length * self._byte_s
         self.deadline_s = deadline_s = whole_s + self.timeout_s
-        port.write(request)
         raw = port.read_until(length, deadline_s)
         at_s = port.now_s()
         self.rx_bytes += len(raw)
         self._is_owed = len(raw) < length
         if self._is_owed:
             self.lateness.record_wait(deadline_s, at_s)
-        else:
-            late_s, worst_s = at_s - whole_s, DECAY * self._worst_s
-            self._worst_s = late_s if late_s > worst_s else worst_s
+            return raw, at_s
+        wanted_s, timeout_s = FACTOR * (at_s - whole_s), DECAY * self.timeout_s
+        if wanted_s > timeout_s:
+            timeout_s = wanted_s
+        if timeout_s < self._least_s:
+            timeout_s = self._least_s
+        self.timeout_s = timeout_s if timeout_s < self.most_s else self.most_s
         return raw, at_s
 
     def collect(
@@ -158,25 +152,18 @@ class Transactions:
         raw: bytes,
         ids: Collection[int],
         length: int,
-        deadline_s: float,
         parse: Callable[[bytes], list[Status]],
     ) -> tuple[dict[int, Status], set[int]]:
         """Return the answers in received bytes, after waiting for those that have not arrived.
 
-        Args:
-            request: Packet that was sent; some adapters return it before the answers.
-            raw: Bytes received so far.
-            ids: Servos that must answer.
-            length: Number of params of their answers.
-            deadline_s: End of the wait.
-            parse: Returns the answers in bytes.
+        Some adapters return the request before the answers.
         """
         while True:
             statuses = parse(raw.replace(request, b"", 1))
             good, damaged = sort_answers(statuses, ids, length, self.family.codec.REFUSAL)
             if len(good) + len(damaged) >= len(ids):
                 return good, damaged
-            more = read_some(self.port, deadline_s)
+            more = read_some(self.port, self.deadline_s)
             if not more:
                 return good, damaged
             self.rx_bytes += len(more)
@@ -199,7 +186,7 @@ class Transactions:
         self.rx_bytes += len(raw)
         if any(status.intact for status in self.family.codec.parse_statuses(raw)):
             self.lateness.record_late_answer(self.port.now_s())
-            self._worst_s = self.timeout_s
+            self.timeout_s = min(self.most_s, FACTOR * self.timeout_s)
 
     def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos.
@@ -224,9 +211,13 @@ class Transactions:
 
     def ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
         """Read one register of several servos; return the values of good answers by id."""
-        register = self.family.registers[name]
-        found = self.ask_bytes(ids, register.address, register.size)
-        return {servo_id: register.decode(data) for servo_id, data in found.items()}
+        return {i: values[name] for i, values in self.ask_span(ids, name, name).items()}
+
+    def ask_span(self, ids: Sequence[int], first: str, last: str) -> dict[int, dict[str, int]]:
+        """Read a range of registers of several servos; return their values by id and name."""
+        address, length = self.family.span(first, last)
+        found = self.ask_bytes(ids, address, length)
+        return {servo_id: self.family.decode(address, data) for servo_id, data in found.items()}
 
     def write_all(self, ids: Sequence[int], name: str, values: Iterable[int]) -> None:
         """Write one register of several servos; no servo confirms it."""
@@ -237,20 +228,21 @@ class Transactions:
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos once; return those of good answers."""
         found: dict[int, bytes] = {}
+        parse, overhead = self.family.codec.parse_statuses, self.family.codec.STATUS_OVERHEAD
         # In the loop other servos wait, and the delay of answers has been measured.
         timeout_s = self.most_s if self.tries > 1 else min(self.most_s, HURRIED * self.timeout_s)
         for asked in [tuple(ids)] if self.family.sync_read else [(one,) for one in ids]:
             request = self.family.request(asked, address, length)
             self.port.drain(0.0)
             self.send(request)
-            answer_bytes = len(asked) * (length + self.family.codec.STATUS_OVERHEAD)
-            deadline_s = self._free_s + answer_bytes * self._byte_s + timeout_s
-            good, damaged = self.collect(
-                request, b"", asked, length, deadline_s, self.family.codec.parse_statuses
-            )
+            count = len(asked) * (length + overhead)
+            self.deadline_s = self._free_s + count * self._byte_s + timeout_s
+            raw = self.port.read_until(count, self.deadline_s)
+            self.rx_bytes += len(raw)
+            good, damaged = self.collect(request, raw, asked, length, parse)
             self.errors["corrupt"] += len(damaged)
             if len(good) < len(asked):
-                self.lateness.record_wait(deadline_s, self.port.now_s())
+                self.lateness.record_wait(self.deadline_s, self.port.now_s())
                 self.drain()
             found |= {i: one.params for i, one in good.items() if len(one.params) == length}
         return found

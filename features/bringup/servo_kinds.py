@@ -12,9 +12,7 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.feetech import memory_table as feetech
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
-from gazerig.drivers.feetech.family import set_middle
 from gazerig.drivers.feetech.scs import FEETECH_SCS
-from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family
 
 Tell = Callable[[str], None]
@@ -60,7 +58,8 @@ class ServoKind(NamedTuple):
     no_reply: checks if no servo answers
     notes: notes about all servos of the kind
     calibration: None if this program does not move a single servo of the kind
-    set_middle: sets the present position as the middle, None if the kind does not support it
+    set_middle: value of Torque Enable that makes the present position the middle, None if the kind
+        does not support it
     """
 
     name: BusKind
@@ -69,7 +68,7 @@ class ServoKind(NamedTuple):
     no_reply: str
     notes: tuple[str, ...]
     calibration: CalibrationRegisters | None
-    set_middle: Callable[[BusPort, Family, int], int] | None = None
+    set_middle: int | None = None
 
 
 GENTLE_ACCELERATION = 10
@@ -92,7 +91,7 @@ def _gentle_feetech(
     return {
         "torque_limit": max(1, round(feetech.TORQUE_FULL * strength)),
         "goal_time": 0,
-        "goal_speed": feetech.speed_units(speed_steps_s),
+        "goal_speed": FEETECH_FAMILY.speed_units(speed_steps_s),
         "acceleration": GENTLE_ACCELERATION,
     }
 
@@ -139,7 +138,7 @@ FEETECH = ServoKind(
             current * feetech.CURRENT_UNIT_MA / 1000.0 / feetech.MODELS[model].stall_current_a
         ),
     ),
-    set_middle=set_middle,
+    set_middle=feetech.SET_MIDDLE,
 )
 
 SCS = FEETECH._replace(

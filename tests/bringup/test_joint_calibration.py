@@ -229,7 +229,12 @@ def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> Non
     bench.script = [600, -1200, 600]
     with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* --set-middle"):
         calibrate_by_hand(bench.joint, bench, 2.0)
-    bench.joint.set_middle()
+    offset = bench.joint.set_middle()
+    bench.command("brown-out {id}")
+    bench.clock.sleep_until(bench.clock.now_s() + 1.0)
+    assert [bench.get(name) for name in ("position_offset", "lock", "torque_enable")] == [
+        offset, 1, 0,
+    ]  # fmt: skip
     bench.script = [600, -1200, 600]
     found = calibrate_by_hand(bench.joint, bench, 2.0)
     assert found.zero_step == pytest.approx(2048, abs=4) and found.max_deg > 45.0

@@ -341,6 +341,23 @@ def test_a_wrong_model_is_named_at_open(name):
     assert label(bench, 2) in text and bench.kind.model in text and other in text
 
 
+@every_kind(*BOARDS, why="a board's servos have no firmware")
+def test_a_firmware_that_is_old_or_unlike_its_neighbours_is_named_at_open(name):
+    plain = in_process(name).bus()
+    plain.open()
+    old = name == "old dynamixel"
+    assert len([line for line in plain.events() if "firmware" in line]) == old
+    bench = in_process(name, firmware={1: 44})
+    bus = bench.bus()
+    bus.open()
+    lines = [line for line in bus.events() if "firmware" in line]
+    found, right = ("3.44", "others of this model have 3.53") if name in FEETECH else ("44", "46")
+    assert has_line(lines, label(bench, 1), f"firmware {found}, ", right, "update it with")
+    assert len(lines) == 1 + old and label(bench, 0) not in lines[0]
+    bus.enable_torque()
+    bench.go(bus, [0.5] * 4)
+
+
 @pytest.mark.parametrize("low", [True, False])
 @every_kind(*BOARDS, why="a board does not measure its supply")
 def test_a_wrong_voltage_is_named_before_anything_moves(name, low):

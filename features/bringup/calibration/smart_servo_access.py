@@ -30,6 +30,9 @@ WATCHDOG_S = 0.3
 LIMITS = ("min_position_limit", "max_position_limit")
 
 
+NEAR_STEPS = 8
+"""Motion of the joint caused by a hand's tremor while its middle is set."""
+
 PERIOD_S = 0.02
 """A search reads 50 times a second if the line is fast enough."""
 
@@ -144,8 +147,13 @@ class SmartServoAccess:
     def set_middle(self) -> int:
         """Set the servo's present position as its middle, 2048; return the new offset.
 
+        The servo computes the offset itself on request and keeps it in its EEPROM. Earlier
+        calibrations in steps are invalid afterwards. Source: Feetech memory table STS3215,
+        register 40.
+
         Raises:
             SetupError: this kind does not support it.
+            ServoFault: the servo rejects it.
         """
         if self._kind.set_middle is None:
             raise SetupError(
@@ -153,7 +161,17 @@ class SmartServoAccess:
                 "some firmware loses its Homing Offset; take the horn off and turn the shaft"
             )
         self._torque_off()
-        return self._kind.set_middle(self._port, self._kind.family, self._id)
+        self._put("lock", 0)
+        self._registers.write(self._id, "torque_enable", self._kind.set_middle)
+        self._torque_off()  # some firmware leaves it on
+        self._put("lock", 1)
+        place = self._value("present_position")
+        if abs(place - self._family.steps_per_turn // 2) > NEAR_STEPS:
+            raise ServoFault(
+                f"{self.who} does not accept its present position as its middle (it reads {place}): "
+                "switch its power off and on and try again"
+            )
+        return self._value(self._driving.offset)
 
     def disable_torque(self) -> None:
         """Switch the torque off and verify it; then the guardian has nothing to watch.
