@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from gazerig.drivers.types import Clothing, Located
 from gazerig.gaze.types import FIRST_THING, body_name
 from gazerig.robot.model.tracker_params import TrackerParams
-from gazerig.robot.perception.perception import covariances
+from gazerig.robot.perception.perception import covariance
 from gazerig.robot.perception.track import BodyTrack
 from gazerig.robot.perception.tracker import Tracker
 
@@ -173,7 +173,7 @@ def test_a_sudden_step_is_followed_at_once_and_standing_stays_smooth() -> None:
 
 def cov_of(track: BodyTrack) -> np.ndarray:
     f = track.filter
-    return covariances([f])[0]
+    return np.array(covariance(f))
 
 
 def test_the_covariance_tells_how_far_off_the_track_is() -> None:

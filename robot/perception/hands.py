@@ -94,10 +94,10 @@ _DEEP_M = 0.5
 # Speed across the view relative to a person below which a patch moves along: at least this, or this
 # fraction of the person's.
 _ALONG_WITH_M_S, _ALONG_WITH_SHARE = 0.3, 0.5
+# Tolerance of the depth of a part of the head, in addition to two standard deviations.
+_MARGIN_M = 0.05
 OwnParts = Callable[[Mat3, Vec3], Sequence[Capsule]]
 """Returns the parts of the head in the world for a pose."""
-
-_MARGIN_M = 0.05
 
 
 @dataclass(slots=True)

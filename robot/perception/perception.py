@@ -5,7 +5,7 @@ its present pose. Motion of a person's own body is separated from that of other 
 (hand_ownership). A tracker assigns identities and velocities.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import cos, hypot, radians, sqrt
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
 from gazerig.gaze.angles import add, dot, rotate, rotate_back, scale, sub
-from gazerig.gaze.types import PARTS, Bodies, Face, Floats, Mat3, Percept, Vec3
+from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
@@ -234,17 +234,23 @@ def _bodies(tracks: tuple[BodyTrack, ...]) -> Bodies:
         np.array([one.v_m_s for one in filters]),
         np.array([scale(track.filter.view, track.detection.spin_rad_s) for track in tracks]),
         np.array([one.radius_m for one in found]),
-        covariances(filters),
+        np.array([covariance(one) for one in filters]),
     )
 
 
-def covariances(filters: Sequence[TrackFilter]) -> Floats:
-    """Return the covariances of position and velocity in the world, (n, 6, 6)."""
-    numbers = np.array([(*one.view, *one.across, *one.along) for one in filters])
-    views, blocks = numbers[:, :3], [[0, 1], [1, 2]]
-    across, along = numbers[:, 3:6][:, blocks], numbers[:, 6:][:, blocks]
-    # Across the view a variance is the same in all directions.
-    lines = views[:, :, np.newaxis] * views[:, np.newaxis]
-    out: Floats = np.einsum("nij,xy->nixjy", across, np.eye(3))
-    out += np.einsum("nij,nxy->nixjy", along - across, lines)
-    return out.reshape(-1, 6, 6)
+def covariance(known: TrackFilter) -> list[list[float]]:
+    """Return the covariance of position and velocity in the world, (6, 6).
+
+    Across the view a variance is the same in all directions.
+    """
+    view, across, along = known.view, known.across, known.along
+    more = sub(along, across)
+    return [
+        [
+            (across[i + j] if x == y else 0.0) + more[i + j] * view[x] * view[y]
+            for j in (0, 1)
+            for y in (0, 1, 2)
+        ]
+        for i in (0, 1)
+        for x in (0, 1, 2)
+    ]
