@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.detector import MotionDetector, relative_rotation
-from gazerig.drivers.vision.motion.image import scale_down
+from gazerig.drivers.vision.motion.flow import scale_down
 from gazerig.drivers.vision.motion.params import MotionParams
 
 DT_S = 1 / 30
@@ -100,7 +100,7 @@ def test_pictures_too_small_or_narrow_are_silent(shape: tuple[int, int]) -> None
     detector = MotionDetector(MotionParams())
     for k in range(3):
         assert look(detector, np.full(shape, 9 * k, dtype=np.uint8), k * DT_S) == ()
-    assert detector.report.no_result_reason == "frame too small"
+    assert detector.no_result_reason == "frame too small"
 
 
 @pytest.mark.parametrize("level", [0, 255])
@@ -125,7 +125,7 @@ def test_times_that_do_not_follow_are_not_compared(times: tuple[float, float]) -
     look(detector, scene(0), times[0])
     assert detector.before_s == times[0]
     assert look(detector, scene(1), times[1]) == ()
-    assert detector.report.no_result_reason == "no frame shortly before"
+    assert detector.no_result_reason == "no frame shortly before"
 
 
 def test_what_is_no_picture_is_refused_in_words() -> None:

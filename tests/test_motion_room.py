@@ -87,7 +87,7 @@ def watch(
                 depth(rotation(seen_from), (WALL, *boards), t_s, rng) if depth_known else None,
             )
         )
-        silent.append(detector.report.no_result_reason)
+        silent.append(detector.no_result_reason)
     return found, silent
 
 

@@ -10,8 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.image import Floats, Grey
-from gazerig.drivers.vision.motion.optical_flow import Flow, Mask
+from gazerig.drivers.vision.motion.flow import Floats, Flow, Grey, Mask
 from gazerig.drivers.vision.motion.segmentation import MotionMask
 
 Indices = NDArray[np.intp]

@@ -1,11 +1,14 @@
 """Detection of moving things between two images, independent of the camera's own motion.
 
 The newer image is compared with the older one, which is turned as the joints measured. If most of
-the room keeps its position, flow is computed only where the images differ (optical_flow); otherwise
-everywhere, and the camera's own motion is estimated from it (ego_motion). Other motion
-(segmentation) is clustered to patches (clustering). Their slide, growth and spin (affine,
-lucas_kanade) give position and velocity (backprojection), and persistent ids (tracking). No clock
-is used: times come with images.
+the room keeps its position, flow is computed only where the images differ; otherwise everywhere,
+and the camera's own motion is estimated from it (ego_motion). Other motion (segmentation) is
+clustered to patches (clustering). Their slide, growth and spin (patch_motion) give position and
+velocity, and persistent ids (tracking). No clock is used: times come with images.
+
+Camera frame: optical, x right, y down, z forward. With p = z (x', y', 1), where x' and y' are the
+pixel divided by the focal length, the velocity is z (dx'/dt, dy'/dt, 0) + (dz/dt) (x', y', 1). A
+thing that grows by a share per second approaches by that share: dz/dt = -loom z.
 
 While the camera turns fast, and if the camera's motion cannot be separated from that of things,
 nothing is reported, like human vision during a saccade.
@@ -13,18 +16,12 @@ nothing is reported, like human vision during a saccade.
 
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
-from gazerig.drivers.vision.motion.backprojection import (
-    back_project,
-    distance,
-    radius_m,
-    shrink_depth,
-    velocity,
-)
 from gazerig.drivers.vision.motion.clustering import (
     PixelGroup,
     cluster_motion,
@@ -38,22 +35,20 @@ from gazerig.drivers.vision.motion.ego_motion import (
     predicted_ego_motion,
     turn_rad,
 )
-from gazerig.drivers.vision.motion.gloves import GloveDetector, exclude_gloves
-from gazerig.drivers.vision.motion.image import (
+from gazerig.drivers.vision.motion.flow import (
     Floats,
-    Plane,
-    SmallImage,
-    scale_down,
-    to_original_px,
-)
-from gazerig.drivers.vision.motion.optical_flow import (
     FlowSearch,
     ImagePair,
+    Plane,
+    SmallImage,
     align_images,
     changed_windows,
     is_searchable,
+    scale_down,
+    to_original_px,
     turn_homography,
 )
+from gazerig.drivers.vision.motion.gloves import GloveDetector, exclude_gloves
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.patch_motion import PatchMotion, blur_images, patch_motion
 from gazerig.drivers.vision.motion.segmentation import (
@@ -83,23 +78,68 @@ _EDGE_SHARE = 0.06
 _CUT_PX = 1
 
 
-class MotionReport(NamedTuple):
-    """Result for one image, for the page and the summary.
+Vec3 = tuple[float, float, float]
 
-    blobs: moving things
-    no_result_reason: reason why nothing could be detected, "" for none
-    turn_deg_s: the camera's own turn rate, as measured in the image
-    background_share: share of the image's texture with common motion
-    noise_px, threshold_px: flow noise of the still room, and the smallest detectable motion, in
-        pixels of the small image
-    """
+ASSUMED_M, _ASSUMED_SPREAD = 2.0, 0.5
+"""Distance assumed for things without a measured depth; its standard deviation as a share of it."""
+# A depth image has holes and, at edges, the background; a tenth of a thing must have depth.
+_LEAST_SHARE, _LEAST_PIXELS = 0.1, 5
+_LEAST_SD_M = 0.005
+# Median absolute deviation to standard deviation.
+_MAD = 1.4826
 
-    blobs: tuple[MovingBlob, ...] = ()
-    no_result_reason: str = ""
-    turn_deg_s: float = 0.0
-    background_share: float = 0.0
-    noise_px: float = 0.0
-    threshold_px: float = 0.0
+
+class Distance(NamedTuple):
+    """Distance of a thing along the optical axis, its standard deviation, and whether measured."""
+
+    z_m: float
+    sd_m: float
+    is_measured: bool
+
+
+def shrink_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane | None:
+    """Resize a depth image to the small image's size; invalid distances become NaN."""
+    if depth_m is None or depth_m.ndim != 2 or depth_m.size == 0:
+        return None
+    depth = np.asarray(depth_m, dtype=np.float32)
+    if depth.shape != shape:  # nearest neighbour, as the mean of two surfaces is on neither
+        size = shape[1], shape[0]
+        depth = np.asarray(cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST), np.float32)
+    out: Plane = np.where(np.isfinite(depth) & (depth > 0.0), depth, np.float32(np.nan))
+    return out
+
+
+def distance(group: PixelGroup, depth: Plane | None) -> Distance:
+    """Return a thing's distance from the depth image, or the assumed one."""
+    if depth is not None:
+        values = depth[group.rows, group.columns]
+        values = values[np.isfinite(values)]
+        if len(values) >= max(_LEAST_PIXELS, _LEAST_SHARE * len(group.columns)):
+            z = float(np.median(values))
+            spread = _MAD * float(np.median(np.abs(values - z)))
+            return Distance(z, max(_LEAST_SD_M, spread), True)
+    return Distance(ASSUMED_M, ASSUMED_M * _ASSUMED_SPREAD, False)
+
+
+def back_project(point_px: Floats, z_m: float, K: Floats) -> Vec3:
+    """Return the point at depth ``z_m`` of a pixel."""
+    x, y = ((point_px - K[:2, 2]) / K[[0, 1], [0, 1]]).tolist()
+    return z_m * x, z_m * y, z_m
+
+
+def velocity(p_m: Vec3, flow_px_s: tuple[float, float], loom_1_s: float, K: Floats) -> Vec3:
+    """Return the velocity of a thing at ``p_m`` from the motion and growth of its image."""
+    x, y, z = p_m
+    return (
+        z * flow_px_s[0] / float(K[0, 0]) - loom_1_s * x,
+        z * flow_px_s[1] / float(K[1, 1]) - loom_1_s * y,
+        -loom_1_s * z,
+    )
+
+
+def radius_m(area_px: float, z_m: float, K: Floats) -> float:
+    """Return the radius of a disc with this area in the image."""
+    return z_m * float(np.sqrt(area_px / (np.pi * K[0, 0] * K[1, 1])))
 
 
 class MotionDetector:
@@ -112,7 +152,7 @@ class MotionDetector:
         self._gloves = GloveDetector()
         self._before: SmallImage | None = None
         self._moved_s = -np.inf  # time of the last camera motion known only from the image
-        self.report = MotionReport()
+        self.no_result_reason = ""
 
     @property
     def before_s(self) -> float | None:
@@ -141,13 +181,11 @@ class MotionDetector:
         """
         now = scale_down(image, self._params.work_px, lens, captured_s)
         before, self._before = self._before, now
-        self.report = self._compare_images(now, before, R_now_before, depth_m)
+        blobs, self.no_result_reason = self._compare_images(now, before, R_now_before, depth_m)
         if self._params.gloves:
             gloves = self._gloves.find(image, captured_s, lens, self._params.work_px)
-            self.report = self.report._replace(
-                blobs=(*gloves, *exclude_gloves(self.report.blobs, gloves))
-            )
-        return self.report.blobs
+            blobs = (*gloves, *exclude_gloves(blobs, gloves))
+        return blobs
 
     def forget(self) -> None:
         """Discard the last image: the next one is the first of another scene."""
@@ -161,23 +199,23 @@ class MotionDetector:
         before: SmallImage | None,
         R_now_before: Floats | None,
         depth_m: NDArray[Any] | None,
-    ) -> MotionReport:
-        """Compare two images; return the motion, or the reason why they cannot be compared."""
+    ) -> tuple[tuple[MovingBlob, ...], str]:
+        """Compare two images; return what moves, and the reason why they cannot be compared."""
         if not is_searchable(now.grey):
-            return MotionReport(no_result_reason="frame too small")
+            return (), "frame too small"
         if before is None or before.grey.shape != now.grey.shape:
             self._tracks.forget()
-            return MotionReport(no_result_reason="first frame")
+            return (), "first frame"
         dt_s = now.captured_s - before.captured_s
         if not 0.0 < dt_s <= _LONGEST_GAP_S:
-            return MotionReport(no_result_reason="no frame shortly before")
+            return (), "no frame shortly before"
         depth = shrink_depth(depth_m, now.grey.shape)
         pair, ego, still = self._measure_flow(now, before, R_now_before)
         turn = float(np.degrees(turn_rad(ego, now.grey, now.K))) / dt_s
         why = self._separation_fault(pair, ego, turn)
         if why:
             self._tracks.predict(ego.total, now.captured_s, dt_s)
-            return MotionReport((), why, turn, ego.background_share, ego.noise_px)
+            return (), why
         shrink = now.fine_grey.shape[0] // now.grey.shape[0]
         things = segment_motion(pair, ego, shrink, R_now_before is None, still)
         groups = cluster_motion(things, shrink)
@@ -202,9 +240,7 @@ class MotionDetector:
             for (group, _, motion), follow in zip(moving, follows, strict=True)
             if self._tracks.is_confirmed(follow)
         )
-        return MotionReport(
-            blobs, "", turn, ego.background_share, ego.noise_px, things.threshold_px
-        )
+        return blobs, ""
 
     def _measure_flow(
         self, now: SmallImage, before: SmallImage, R_now_before: Floats | None

@@ -17,12 +17,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.image import Floats, Grey, remove_illumination, upper_median
-from gazerig.drivers.vision.motion.optical_flow import (
+from gazerig.drivers.vision.motion.flow import (
+    Floats,
+    Grey,
     ImagePair,
     Mask,
     corners,
     gradients,
+    remove_illumination,
+    upper_median,
     warp_points,
 )
 
@@ -107,7 +110,6 @@ class EgoMotion(NamedTuple):
     noise_px: deviation of their flow from it, standard deviation along one axis
     shift_px: median motion of the image by the camera's motion
     unforeseen_px: the same motion if only the image shows it, otherwise 0
-    is_fitted: whether the image had enough texture for a fit
     """
 
     B: Floats
@@ -116,7 +118,6 @@ class EgoMotion(NamedTuple):
     noise_px: float
     shift_px: float
     unforeseen_px: float
-    is_fitted: bool
 
 
 def estimate_ego_motion(
@@ -136,7 +137,7 @@ def estimate_ego_motion(
     x, y = x.ravel(), y.ravel()
     good = (strength[y, x] > _LEAST_CORNER) & pair.valid_mask[y, x]
     points = np.column_stack((x[good], y[good])).astype(np.float64)
-    B, share, noise, fitted, free = np.eye(3), 1.0, _LEAST_NOISE_PX, False, False
+    B, share, noise, free = np.eye(3), 1.0, _LEAST_NOISE_PX, False
     if len(points) >= _LEAST_POINTS:
         at = points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)
         there = points + pair.flow[at]
@@ -145,12 +146,12 @@ def estimate_ego_motion(
         found = _fit_room(points, there, K, pair, reach, need)
         if found is not None:
             B, share, noise, free = found
-            share, fitted = (share if noise <= _MOST_NOISE_PX else 0.0), True
+            share = share if noise <= _MOST_NOISE_PX else 0.0
     back = _inverse(pair.H) @ B
     way = _median_shift(back, points) if len(points) else 0.0
     unforeseen = _median_shift(B, points) if free else 0.0
     total = _inverse(back)
-    return EgoMotion(B, total / total[2, 2], share, noise, way, unforeseen, fitted)
+    return EgoMotion(B, total / total[2, 2], share, noise, way, unforeseen)
 
 
 def predicted_ego_motion(pair: ImagePair, changed: Mask) -> EgoMotion | None:
@@ -176,9 +177,7 @@ def predicted_ego_motion(pair: ImagePair, changed: Mask) -> EgoMotion | None:
     if np.hypot(*slid[:2]) > _REST_PX:
         return None
     way = _median_shift(_inverse(pair.H), corners(pair.now.shape))
-    return EgoMotion(
-        np.eye(3), pair.H / pair.H[2, 2], float(share), _LEAST_NOISE_PX, way, 0.0, True
-    )
+    return EgoMotion(np.eye(3), pair.H / pair.H[2, 2], float(share), _LEAST_NOISE_PX, way, 0.0)
 
 
 def _fit_room(

@@ -14,8 +14,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, upper_median
-from gazerig.drivers.vision.motion.optical_flow import ImagePair, warp_points
+from gazerig.drivers.vision.motion.flow import (
+    Floats,
+    Grey,
+    ImagePair,
+    Plane,
+    upper_median,
+    warp_points,
+)
 
 # Most points for a fit, and least for the refinement.
 _SAMPLE, _LEAST_POINTS = 400, 24

@@ -12,8 +12,16 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.vision.motion.ego_motion import EgoMotion
-from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, remove_illumination
-from gazerig.drivers.vision.motion.optical_flow import Flow, ImagePair, Mask, gradients
+from gazerig.drivers.vision.motion.flow import (
+    Floats,
+    Flow,
+    Grey,
+    ImagePair,
+    Mask,
+    Plane,
+    gradients,
+    remove_illumination,
+)
 
 LEAST_FLOW_PX = 0.25
 """Smallest displacement that counts as motion, in pixels of the scaled-down image."""

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gazerig.drivers.vision.motion.image import Floats
-from gazerig.drivers.vision.motion.optical_flow import warp_points
+from gazerig.drivers.vision.motion.flow import Floats, warp_points
 
 # Largest distance from the expected position, in sizes (root of box width times height).
 _GATE_SIZES = 0.75
