@@ -1,8 +1,8 @@
 """All detectors of a picture: faces with meshes, people without a visible face, and palms."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.event_log import EventLog
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from gazerig.drivers.vision.face.mesh import MeshNetworks
     from gazerig.drivers.vision.palms import PalmDetector
     from gazerig.drivers.vision.people import PeopleDetector
-
-_Part = TypeVar("_Part")
 
 
 class BodyDetector:
@@ -91,36 +89,21 @@ def add_body_detection(faces: FaceDetector, params: FaceDetectorParams) -> FaceD
     """
     faults: list[str] = []
 
-    def loaded(make: Callable[[], _Part], without: str) -> _Part | None:
+    def loaded(module: str, name: str, without: str, *given: object) -> Any:
         try:
-            return make()
+            return getattr(import_module(f"gazerig.drivers.vision.{module}"), name)(*given)
         except FileNotFoundError:
             return None
         except (ImportError, ModelFileError) as error:
             faults.append(f"{error}; until then {without} are not found")
             return None
 
-    def mesh_networks() -> "MeshNetworks":
-        from gazerig.drivers.vision.face.mesh import MeshNetworks
-
-        return MeshNetworks()
-
-    def people_detector() -> "PeopleDetector":
-        from gazerig.drivers.vision.people import people_detector
-
-        return people_detector(params)
-
-    def palm_detector() -> "PalmDetector":
-        from gazerig.drivers.vision.palms import palm_detector
-
-        return palm_detector(params)
-
-    meshes = loaded(mesh_networks, "face meshes")
+    meshes = loaded("face.mesh", "MeshNetworks", "face meshes")
     people = palms = None
     if params.people_hz > 0.0:
-        people = loaded(people_detector, "people without a visible face")
+        people = loaded("people", "people_detector", "people without a visible face", params)
     if params.hands_hz > 0.0:
-        palms = loaded(palm_detector, "hands that are held still")
+        palms = loaded("palms", "palm_detector", "hands that are held still", params)
     if not (meshes or people or palms or faults):
         return faces
     return BodyDetector(faces, people, palms, meshes, tuple(faults))

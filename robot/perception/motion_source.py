@@ -26,17 +26,18 @@ class MotionSource:
         field_rad: float,
         turns: PoseBuffer | None,
     ) -> None:
-        # Imported here, with OpenCV, because the control loop's process does not detect motion
-        # itself.
-        from gazerig.drivers.vision.motion.detector import MotionDetector
+        self._lens, self._field_rad, self._turns = lens, field_rad, turns
+        self._detector = None
+        if params.enabled:
+            # Imported here, with OpenCV, because the control loop's process does not detect motion
+            # itself.
+            from gazerig.drivers.vision.motion.detector import MotionDetector
 
-        self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
-        self._turns = turns
-        self._detector = MotionDetector(params)
+            self._detector = MotionDetector(params)
 
     def __call__(self, shot: Shot) -> tuple[MovingBlob, ...]:
         """Find motion since the previous frame; return nothing while it is not enabled."""
-        if not self._enabled:
+        if self._detector is None:
             return ()
         height, width = shot.image.shape[:2]
         lens = intrinsics_of_lens(self._lens, self._field_rad, width, height, shot.lens)

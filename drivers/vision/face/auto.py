@@ -90,8 +90,6 @@ _SEARCH_EVERY, _SEARCH_SOON = 4, 2
 _MTCNN_EVERY = 4
 # A far face needs a higher confidence than a near one, as a few pixels can resemble a face.
 _FAR_CONFIDENCE = 0.9
-# Mean change in grey levels above which a frame is another shot; rows and columns sampled.
-_CUT_GREY, _SAMPLES = 30.0, 24
 
 
 class AutoDetector:
@@ -127,7 +125,6 @@ class AutoDetector:
             self._log.add(fault)
         self._known: list[FoundFace] = []
         self._size: tuple[int, ...] = ()
-        self._samples = np.zeros(0)
         self._since_search, self._searches, self._next_tile = 0, 0, 0
         self.searched = False
 
@@ -144,7 +141,7 @@ class AutoDetector:
         near = min(1.0, self._params.work_width_px / width) * _LEAST_PX / MIN_FACE_PX
         tiles = far_tiles(width, height, near)
         known = self._track_faces(frame)
-        soon = len(known) < len(self._known) or self._is_cut(frame)
+        soon = len(known) < len(self._known)
         self._since_search += 1
         every = _SEARCH_SOON if soon or not known else _SEARCH_EVERY
         self.searched = first or self._since_search >= every
@@ -167,14 +164,6 @@ class AutoDetector:
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
         return self._log.drain()
-
-    def _is_cut(self, frame: ImageArray) -> bool:
-        """Return whether a frame shows another shot than the previous one."""
-        height, width = frame.shape[:2]
-        rows, columns = max(1, height // _SAMPLES), max(1, width // _SAMPLES)
-        samples = frame[::rows, ::columns, 1].astype(np.float64)
-        before, self._samples = self._samples, samples
-        return before.shape == samples.shape and float(np.abs(samples - before).mean()) > _CUT_GREY
 
     def _track_faces(self, frame: ImageArray) -> list[FoundFace]:
         """Return the known faces that are still present, placed in this frame."""

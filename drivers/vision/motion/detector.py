@@ -48,7 +48,6 @@ from gazerig.drivers.vision.motion.flow import (
     to_original_px,
     turn_homography,
 )
-from gazerig.drivers.vision.motion.gloves import GloveDetector, exclude_gloves
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.patch_motion import PatchMotion, blur_images, patch_motion
 from gazerig.drivers.vision.motion.segmentation import (
@@ -149,7 +148,11 @@ class MotionDetector:
         self._params = params
         self._search = FlowSearch()
         self._tracks = MotionTracks()
-        self._gloves = GloveDetector()
+        self._gloves = None
+        if params.gloves:
+            from gazerig.drivers.vision.motion.gloves import GloveDetector
+
+            self._gloves = GloveDetector()
         self._before: SmallImage | None = None
         self._moved_s = -np.inf  # time of the last camera motion known only from the image
         self.no_result_reason = ""
@@ -182,16 +185,16 @@ class MotionDetector:
         now = scale_down(image, self._params.work_px, lens, captured_s)
         before, self._before = self._before, now
         blobs, self.no_result_reason = self._compare_images(now, before, R_now_before, depth_m)
-        if self._params.gloves:
-            gloves = self._gloves.find(image, captured_s, lens, self._params.work_px)
-            blobs = (*gloves, *exclude_gloves(blobs, gloves))
+        if self._gloves is not None:
+            blobs = self._gloves.add_gloves(blobs, image, captured_s, lens, self._params.work_px)
         return blobs
 
     def forget(self) -> None:
         """Discard the last image: the next one is the first of another scene."""
         self._before, self._moved_s = None, -np.inf
         self._tracks.forget()
-        self._gloves.forget()
+        if self._gloves is not None:
+            self._gloves.forget()
 
     def _compare_images(
         self,

@@ -86,6 +86,18 @@ class GloveDetector:
         self._known: list[_Glove] = []
         self._next_id = getattr(self, "_next_id", _FIRST_ID)
 
+    def add_gloves(
+        self,
+        blobs: tuple[MovingBlob, ...],
+        bgr: ImageArray,
+        captured_s: float,
+        lens: Intrinsics,
+        work_px: int,
+    ) -> tuple[MovingBlob, ...]:
+        """Return the gloves, as ``find`` does, and the other moving things."""
+        gloves = self.find(bgr, captured_s, lens, work_px)
+        return (*gloves, *exclude_gloves(blobs, gloves))
+
     def find(
         self, bgr: ImageArray, captured_s: float, lens: Intrinsics, work_px: int
     ) -> tuple[MovingBlob, ...]:
