@@ -184,7 +184,7 @@ def test_a_picture_gets_one_of_the_three_searches_and_each_has_its_turn(rate_hz:
     network, runs = Seen((), 480.0), [0]
     network.left_of = [0.0]
 
-    def palms(_: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def palms(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         runs[0] += 1
         return np.zeros((2016, 18), np.float32), np.full(2016, -9.0, np.float32)
 

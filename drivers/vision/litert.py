@@ -2,11 +2,14 @@
 
 from typing import Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.quiet_opencv import quiet_stderr
 from gazerig.drivers.errors import ModelFileError, extra_hint
+from gazerig.drivers.types import ImageArray
+from gazerig.drivers.vision.face.preprocess import as_bgr, crop_square
 from gazerig.drivers.vision.model_files import ModelFile
 
 Floats = NDArray[np.float32]
@@ -48,12 +51,53 @@ def load_network(file: ModelFile) -> Network:
     return run
 
 
-def confidences(scores: Floats) -> NDArray[np.float64]:
-    """Return scores of a network as confidences, 0..1."""
-    sure: NDArray[np.float64] = 1.0 / (
-        1.0 + np.exp(-np.clip(scores, -50.0, 50.0).astype(np.float64))
-    )
-    return sure
+class PointSearch:
+    """Search of a square of an image for things with points.
+
+    Args:
+        network: The network.
+        side_px: Side of the square that it expects.
+        cells: Cells of its anchors: size in pixels, and anchors per cell.
+        grey_levels: Grey levels per unit of its input.
+        black: Its input for black.
+    """
+
+    def __init__(
+        self,
+        network: Network,
+        side_px: int,
+        cells: tuple[tuple[int, int], ...],
+        grey_levels: float,
+        black: float,
+    ) -> None:
+        self._network, self._side_px = network, side_px
+        self._anchors = anchors(side_px, cells)
+        self._grey_levels, self._black = np.float32(grey_levels), np.float32(black)
+
+    def search(
+        self, image: ImageArray, box: NDArray[np.float64], least: float
+    ) -> tuple[NDArray[np.float64], list[float]]:
+        """Return what has at least this confidence, the most certain first.
+
+        Args:
+            image: The frame.
+            box: The square (left, top, right, bottom), pixel edges.
+            least: Smallest confidence.
+
+        Returns:
+            Points (n, points, 2) in pixels of the frame, of which the first is the centre of the
+            thing's box; and confidences.
+        """
+        part, where = crop_square(as_bgr(image), box, self._side_px)
+        rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
+        boxes, scores = self._network(rgb / self._grey_levels + self._black)
+        sure = 1.0 / (1.0 + np.exp(-np.clip(scores, -50.0, 50.0).astype(np.float64)))
+        rows = np.argsort(-sure, kind="stable")[: int((sure >= least).sum())]
+        # The third and fourth number are the size of the box.
+        points = np.delete(boxes[rows], (2, 3), axis=1)
+        points = points.reshape(len(rows), boxes.shape[1] // 2 - 1, 2) / self._side_px
+        points = (points + self._anchors[rows][:, None]) * (where[2] - where[0]) + where[:2] - 0.5
+        return points, sure[rows].tolist()
 
 
 def anchors(side_px: int, cells: tuple[tuple[int, int], ...]) -> NDArray[np.float64]:

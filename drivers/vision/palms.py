@@ -9,13 +9,11 @@ opencv_zoo, models/palm_detection_mediapipe.
 
 from math import hypot
 
-import cv2
 import numpy as np
 
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.preprocess import as_bgr, crop_square
-from gazerig.drivers.vision.litert import Network, anchors, confidences, load_network
+from gazerig.drivers.vision.litert import Network, PointSearch, load_network
 from gazerig.drivers.vision.model_files import PALMS
 
 _SIDE_PX = 192
@@ -39,8 +37,8 @@ class PalmDetector:
     """Detector of palms of the nearest person."""
 
     def __init__(self, params: FaceDetectorParams, network: Network) -> None:
-        self._params, self._network = params, network
-        self._anchors = anchors(_SIDE_PX, _CELLS)
+        self._params = params
+        self._search = PointSearch(network, _SIDE_PX, _CELLS, 255.0, 0.0)
         self.due_s = self._seen_s = -np.inf
         self._x = self._y = self._px_per_m = 0.0
 
@@ -71,15 +69,10 @@ class PalmDetector:
         half = _REACH_M * self._px_per_m / 2.0
         y = self._y + _BELOW_M * self._px_per_m
         box = np.array([self._x - half, y - half, self._x + half, y + half])
-        part, where = crop_square(as_bgr(image), box, _SIDE_PX)
-        rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
-        boxes, scores = self._network(rgb / np.float32(255.0))
-        sure = confidences(scores)
         found: list[DetectedPalm] = []
-        for row in np.argsort(-sure, kind="stable")[: int((sure >= _CONFIDENCE).sum())]:
-            # Wrist, and roots of index, middle and little finger, from the anchor.
-            points = boxes[row][4:].reshape(7, 2)[[0, 1, 2, 4]] / _SIDE_PX + self._anchors[row]
-            points = points * (where[2] - where[0]) + where[:2] - 0.5
+        for places, sure in zip(*self._search.search(image, box, _CONFIDENCE), strict=True):
+            # Wrist, and roots of index, middle and little finger.
+            points = places[[1, 2, 3, 5]]
             wrist, index, middle, little = points
             size = max(
                 float(np.linalg.norm(middle - wrist)),
@@ -92,7 +85,7 @@ class PalmDetector:
                 hypot(x - one.centre_px[0], y - one.centre_px[1]) < _SAME * max(size, one.size_px)
                 for one in found
             ):
-                found.append(DetectedPalm((x, y), size, float(sure[row])))
+                found.append(DetectedPalm((x, y), size, sure))
         return tuple(found)
 
 

@@ -11,14 +11,12 @@ output: opencv_zoo, models/person_detection_mediapipe.
 from math import ceil, hypot
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.types import DetectedPerson, ImageArray
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.preprocess import as_bgr, crop_square
-from gazerig.drivers.vision.litert import Network, anchors, confidences, load_network
+from gazerig.drivers.vision.litert import Network, PointSearch, load_network
 from gazerig.drivers.vision.model_files import PEOPLE
 
 _SIDE_PX = 224
@@ -50,8 +48,8 @@ class PeopleDetector:
     """Detector of people, which searches a part of each frame."""
 
     def __init__(self, params: FaceDetectorParams, network: Network) -> None:
-        self._params, self._network = params, network
-        self._anchors = anchors(_SIDE_PX, _CELLS)
+        self._params = params
+        self._search = PointSearch(network, _SIDE_PX, _CELLS, 127.5, -1.0)
         self._next = 0
         self.due_s = self._started_s = -np.inf
 
@@ -68,9 +66,8 @@ class PeopleDetector:
         """
         if image.size == 0:
             return ()
-        frame = as_bgr(image)
         # Overlapping squares as high as the frame cover it.
-        height, width = frame.shape[:2]
+        height, width = image.shape[:2]
         count = max(1, ceil((width - height) / (_STEP * height)) + 1)
         if count == 1:
             side = float(max(width, height))
@@ -91,17 +88,10 @@ class PeopleDetector:
         if self._next == 0:
             self.due_s = self._started_s + 1.0 / self._params.people_hz
         box = np.array([square.left, 0.0, square.left + square.side, square.side])
-        part, where = crop_square(frame, box, _SIDE_PX)
-        rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
-        boxes, scores = self._network(rgb / np.float32(127.5) - np.float32(1.0))
-        sure = confidences(scores)
-        rows = np.flatnonzero(sure >= _CONFIDENCE)
-        # Face centre, hips and the top of the body's circle, from the anchor.
-        points = boxes[rows][:, (0, 1, 4, 5, 6, 7)].reshape(-1, 3, 2) / _SIDE_PX
-        points = (points + self._anchors[rows][:, None]) * (where[2] - where[0]) + where[:2] - 0.5
         found: list[DetectedPerson] = []
-        for row in np.argsort(-sure[rows], kind="stable"):
-            person = _person(points[row], float(sure[rows[row]]))
+        for points, sure in zip(*self._search.search(image, box, _CONFIDENCE), strict=True):
+            # Face centre, hips and the top of the body's circle.
+            person = _person(points[:3], sure)
             if person is None or not square.least_x <= person.head_px[0] < square.most_x:
                 continue
             if not any(_is_same(person, other) for other in found):
