@@ -42,7 +42,7 @@ from gazerig.drivers.vision.motion.flow import (
     Plane,
     SmallImage,
     align_images,
-    changed_windows,
+    changed_window,
     is_searchable,
     scale_down,
     to_original_px,
@@ -259,7 +259,7 @@ class MotionDetector:
             still = image_difference(pair)
             ego = predicted_ego_motion(pair, still.changed_mask)
             if ego is not None:
-                return self._search.search(pair, changed_windows(still.changed_mask)), ego, still
+                return self._search.search(pair, changed_window(still.changed_mask)), ego, still
         pair = self._search.search(pair)
         ego = estimate_ego_motion(pair, now.K, R_now_before is not None, moved_before)
         if ego.unforeseen_px > 0.0:

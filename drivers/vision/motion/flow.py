@@ -114,8 +114,8 @@ Flow = NDArray[np.float32]
 # Below 8 px at the finest level of its pyramid, a quarter of the image, DIS reads outside its
 # memory; its count of levels depends on the version of OpenCV.
 _LARGEST_ASPECT = 4.0
-# Margin around changes in which flow is computed, and share of the image above which all of it is.
-_AROUND_PX, _MOST_SHARE = 8, 0.7
+# Margin around changes in which flow is computed.
+_AROUND_PX = 8
 _STILL_PX = 0.02
 """Largest motion of the corners that does not count as a turn."""
 
@@ -133,7 +133,7 @@ class ImagePair(NamedTuple):
     flow: a point at x in ``now`` is at x + flow in ``before``
     H: (3, 3) pixels of the older image to those of ``before``
     fine_images: the same two images before they were scaled for the search
-    windows: parts in which flow was computed; elsewhere it is 0
+    window: part in which flow was computed; elsewhere it is 0
     """
 
     now: Grey
@@ -142,7 +142,7 @@ class ImagePair(NamedTuple):
     flow: Flow
     H: Floats
     fine_images: tuple[Grey, Grey]
-    windows: tuple[Window, ...] = ()
+    window: Window = (slice(0, 0), slice(0, 0))
 
     def crop(self, window: Window) -> "ImagePair":
         """Return a part of both images with its flow."""
@@ -162,24 +162,22 @@ class FlowSearch:
         self._dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
         self._dis.setFinestScale(0)
 
-    def search(self, pair: ImagePair, windows: tuple[Window, ...] | None = None) -> ImagePair:
-        """Compute the flow in parts of the images; None: everywhere."""
-        if windows is None:
-            windows = ((slice(0, pair.now.shape[0]), slice(0, pair.now.shape[1])),)
-        flow: Flow = np.zeros((*pair.now.shape, 2), dtype=np.float32)
-        known = pair.valid_mask.copy()
-        for window in windows:
-            now, before = (np.ascontiguousarray(grey[window]) for grey in (pair.now, pair.before))
-            found: Flow = np.zeros((*now.shape, 2), dtype=np.float32)  # initial guess, then result
+    def search(self, pair: ImagePair, window: Window | None = None) -> ImagePair:
+        """Compute the flow in a part of the images; None: everywhere."""
+        if window is None:
+            window = slice(0, pair.now.shape[0]), slice(0, pair.now.shape[1])
+        now, before = (np.ascontiguousarray(grey[window]) for grey in (pair.now, pair.before))
+        found: Flow = np.zeros((*now.shape, 2), dtype=np.float32)  # initial guess, then result
+        if found.size:
             self._dis.calc(now, before, found)
-            flow[window] = found
-            # Flow that ends outside the other image is unknown.
-            part = flow[window]
-            height, width = part.shape[:2]
-            at_x = part[..., 0] + np.arange(width, dtype=np.float32)
-            at_y = part[..., 1] + np.arange(height, dtype=np.float32)[:, None]
-            known[window] &= (at_x >= 0) & (at_x <= width - 1) & (at_y >= 0) & (at_y <= height - 1)
-        return pair._replace(flow=flow, valid_mask=known, windows=windows)
+        flow: Flow = np.zeros((*pair.now.shape, 2), dtype=np.float32)
+        flow[window] = found
+        # Flow that ends outside the other image is unknown.
+        known, (height, width) = pair.valid_mask.copy(), now.shape
+        at_x = found[..., 0] + np.arange(width, dtype=np.float32)
+        at_y = found[..., 1] + np.arange(height, dtype=np.float32)[:, None]
+        known[window] &= (at_x >= 0) & (at_x <= width - 1) & (at_y >= 0) & (at_y <= height - 1)
+        return pair._replace(flow=flow, valid_mask=known, window=window)
 
 
 def align_images(now: SmallImage, before: SmallImage, H: Floats) -> ImagePair:
@@ -194,8 +192,8 @@ def align_images(now: SmallImage, before: SmallImage, H: Floats) -> ImagePair:
     return ImagePair(now.grey, grey, known, flow, H, (now.fine_grey, fine))
 
 
-def changed_windows(changed: Mask) -> tuple[Window, ...] | None:
-    """Return the parts of an image that changed, None for all of it.
+def changed_window(changed: Mask) -> Window:
+    """Return the part of an image that changed.
 
     Args:
         changed: Mask (h, w).
@@ -204,22 +202,21 @@ def changed_windows(changed: Mask) -> tuple[Window, ...] | None:
     cells = cv2.resize(
         changed.astype(np.uint8), None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA
     )
-    reach = 2 * (_AROUND_PX // 4) + 1
-    near = cv2.dilate(cells, np.ones((reach, reach), np.uint8))
-    count, _, stats, _ = cv2.connectedComponentsWithStats(near)
-    out, area = [], 0
-    for x, y, w, h, _ in stats[1:].tolist():
-        columns, rows = _widen(4 * x, 4 * w, width), _widen(4 * y, 4 * h, height)
-        out.append((rows, columns))
-        area += (rows.stop - rows.start) * (columns.stop - columns.start)
-    return tuple(out) if area < _MOST_SHARE * changed.size else None
+    x, y, w, h = cv2.boundingRect(cells)
+    if not w:
+        return slice(0, 0), slice(0, 0)
+    more = 2 * _AROUND_PX
+    return (
+        _widen(4 * y - _AROUND_PX, 4 * h + more, height),
+        _widen(4 * x - _AROUND_PX, 4 * w + more, width),
+    )
 
 
 def _widen(start: int, length: int, most: int) -> slice:
     """Return a range of an image, at least as long as the flow search needs."""
-    more = max(0, LEAST_SIDE_PX - length)
-    start = max(0, min(start - more // 2, most - length - more))
-    return slice(start, min(most, start + length + more))
+    length = min(most, max(length, LEAST_SIDE_PX))
+    start = max(0, min(start, most - length))
+    return slice(start, start + length)
 
 
 def is_searchable(grey: Grey) -> bool:

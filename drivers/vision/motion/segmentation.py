@@ -120,32 +120,32 @@ def segment_motion(
     change = np.zeros(shape, np.float32)
     flow = np.zeros((*shape, 2), np.float32)
     things = MotionMask(flow, np.zeros(shape, np.bool_), threshold, change)
-    for window in pair.windows:
-        part = pair.crop(window)
-        corner = np.array((window[1].start, window[0].start), np.float32)
-        at = None if there is None else there[window] - corner
-        rest = -part.flow if at is None else at - _add_flow(part.flow, 1.0)
-        moves = rest
-        if by_image and ego.shift_px > _STANDS_PX:
-            moves = rest - _parallax_part(rest, ego, _PARALLAX_SHARE)
-        mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold
-        mask &= part.valid_mask
-        squares = still.mean_squares[window]
-        mask &= squares > _NOISE_RATIO * still.noise
-        if mask.any():
-            mask &= _cross_edge_mask(part.now, moves, threshold)
-            # The flow must explain a pixel, and the camera's motion must not. Background that a
-            # thing has uncovered changed too, and any flow explains plain background. But its flow
-            # begins at unchanged pixels, the flow of a thing at pixels that it has left.
-            moving = _mean_squares(part.now, part.before, _add_flow(part.flow, 1.0))
-            left = cv2.remap(
-                squares, _add_flow(rest, -1.0), _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE
-            )
-            mask &= left > _NOISE_RATIO * still.noise
-            mask &= moving < _LEFT_SHARE * (squares - still.noise) + still.noise
-        things.flow[window], things.mask[window] = rest, mask
-        if mask.any():
-            change[window] = _object_change(part, at)
+    window = pair.window
+    part = pair.crop(window)
+    if part.now.size == 0:
+        return things
+    corner = np.array((window[1].start, window[0].start), np.float32)
+    at = None if there is None else there[window] - corner
+    rest = -part.flow if at is None else at - _add_flow(part.flow, 1.0)
+    moves = rest
+    if by_image and ego.shift_px > _STANDS_PX:
+        moves = rest - _parallax_part(rest, ego, _PARALLAX_SHARE)
+    mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold
+    mask &= part.valid_mask
+    squares = still.mean_squares[window]
+    mask &= squares > _NOISE_RATIO * still.noise
+    if mask.any():
+        mask &= _cross_edge_mask(part.now, moves, threshold)
+        # The flow must explain a pixel, and the camera's motion must not. Background that a
+        # thing has uncovered changed too, and any flow explains plain background. But its flow
+        # begins at unchanged pixels, the flow of a thing at pixels that it has left.
+        moving = _mean_squares(part.now, part.before, _add_flow(part.flow, 1.0))
+        left = cv2.remap(squares, _add_flow(rest, -1.0), _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
+        mask &= left > _NOISE_RATIO * still.noise
+        mask &= moving < _LEFT_SHARE * (squares - still.noise) + still.noise
+    things.flow[window], things.mask[window] = rest, mask
+    if mask.any():
+        change[window] = _object_change(part, at)
     return things
 
 
