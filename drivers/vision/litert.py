@@ -94,8 +94,8 @@ class PointSearch:
         sure = 1.0 / (1.0 + np.exp(-np.clip(scores, -50.0, 50.0).astype(np.float64)))
         rows = np.argsort(-sure, kind="stable")[: int((sure >= least).sum())]
         # The third and fourth number are the size of the box.
-        pairs = np.delete(boxes[rows], (2, 3), axis=1)
-        pairs = pairs.reshape(len(rows), boxes.shape[1] // 2 - 1, 2) / self._side_px
+        numbers = np.delete(boxes[rows], (2, 3), axis=1)
+        pairs = numbers.reshape(len(rows), boxes.shape[1] // 2 - 1, 2) / self._side_px
         points = (pairs + self._anchors[rows][:, None]) * (where[2] - where[0]) + where[:2] - 0.5
         return points, sure[rows].tolist()
 
