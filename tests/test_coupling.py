@@ -21,7 +21,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.coupled_servos import CoupledServos
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.coupling import CouplingParams
-from gazerig.robot.model.mass_params import LinkMassParams, MassParams
+from gazerig.robot.model.mass_params import HeadMassParams, MassParams
 
 PITCH, ROLL = 35.0, 25.0
 COUPLING = CouplingParams("neck_pitch", "neck_roll", 1.5, 1.2)
@@ -29,7 +29,7 @@ COUPLING = CouplingParams("neck_pitch", "neck_roll", 1.5, 1.2)
 
 def rig_with(coupling: CouplingParams) -> Rig:
     # With a balanced head goals have no part that makes up for its weight.
-    balanced = MassParams(head=LinkMassParams(com_mm=(0.0, 0.0, 0.0)))
+    balanced = MassParams(head=HeadMassParams(com_mm=(0.0, 0.0, 0.0)))
     return replace(load_rig("desk"), couplings={"neck": coupling}, mass=balanced)
 
 

@@ -18,12 +18,11 @@ from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.description.build import joint_torques_nm
 from gazerig.robot.description.files import description_files
 from gazerig.robot.description.links import Description, Inertia
-from gazerig.robot.description.mass import join_inertias
+from gazerig.robot.description.mass import carried_links, join_inertias
 from gazerig.robot.description.mjcf import Mjcf, mjcf
 from gazerig.robot.description.urdf import Urdf, urdf
-from gazerig.robot.description.weights import carried_links
 from gazerig.robot.model.coupling import CouplingParams
-from gazerig.robot.model.mass_params import LinkMassParams, MassParams
+from gazerig.robot.model.mass_params import HeadMassParams, MassParams
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +40,7 @@ def test_all_files_are_read_by_others(written: Path) -> None:
     import yourdfpy
 
     model = mujoco.MjModel.from_xml_path(str(written / "scene.xml"))
-    assert model.njnt == 11 and model.nu == 27
+    assert model.njnt == 11 and model.nu == 9
     robot = yourdfpy.URDF.load(str(written / "expressive.urdf"), load_collision_meshes=True)
     assert robot.validate() and robot.errors == []
     looks = [visual.name for link in _links("expressive") for visual in link.visuals]
@@ -50,7 +49,7 @@ def test_all_files_are_read_by_others(written: Path) -> None:
     assert {again.body(i).name for i in range(again.nbody)} >= {"base_link", "head", "jaw_link"}
     scene = trimesh.load_scene(written / "expressive.glb")
     assert {link.name for link in _links("expressive")} <= set(scene.graph.nodes)
-    assert sum(path.stat().st_size for path in written.rglob("*") if path.is_file()) < 7e6
+    assert sum(path.stat().st_size for path in written.rglob("*") if path.is_file()) < 13e6
 
 
 def _links(rig: str) -> tuple[Any, ...]:
@@ -124,10 +123,6 @@ def _in_mujoco(description: Description, angles: Mapping[str, float]) -> Poses:
     return _mujoco_poses(mjcf(description, looks=False), description, angles)
 
 
-def _in_mujoco_awake(description: Description, angles: Mapping[str, float]) -> Poses:
-    return _mujoco_poses(mjcf(description, looks=False, awake=True), description, angles)
-
-
 def _mujoco_poses(
     text: Mjcf | Urdf, description: Description, angles: Mapping[str, float]
 ) -> Poses:
@@ -163,7 +158,7 @@ def _in_yourdfpy(description: Description, angles: Mapping[str, float]) -> Poses
     return {name: (matrix[:3, :3], matrix[:3, 3]) for name, matrix in found.items()}
 
 
-READERS = (_own, _in_mujoco, _in_mujoco_awake, _in_mujoco_from_urdf, _in_yourdfpy)
+READERS = (_own, _in_mujoco, _in_mujoco_from_urdf, _in_yourdfpy)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -189,7 +184,7 @@ def test_the_whole_model_is_compiled_with_looks(name: str) -> None:
     assert model.nu == len(shipped(name).joints)
     for joint in description.joints:
         low, high = model.joint(joint.name).range
-        limit = shipped(name).joints[joint.follows.joint if joint.follows else joint.name].limit()
+        limit = shipped(name).joints[joint.follows or joint.name].limit()
         assert (low, high) == pytest.approx((limit.low_rad, limit.high_rad), abs=1e-12)
     assert model.ncam == 1
     looks = [visual.name for link in description.links for visual in link.visuals]
@@ -223,7 +218,7 @@ def test_a_head_weighs_what_its_shapes_give() -> None:
 
 def test_a_head_weighs_what_its_file_says() -> None:
     desk = shipped("desk")
-    given = LinkMassParams(0.9, (40.0, 2.0, 30.0))
+    given = HeadMassParams(0.9, (40.0, 2.0, 30.0))
     whole = whole_head(replace(desk, mass=MassParams(head=given)))
     assert whole.mass_kg == pytest.approx(0.9)
     assert np.allclose(whole.com_m, (0.040, 0.002, 0.030), atol=1e-9)

@@ -7,7 +7,7 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.run_bus import emulated_lines
-from gazerig.robot.model.mass_params import LinkMassParams, MassParams
+from gazerig.robot.model.mass_params import HeadMassParams, MassParams
 from gazerig.sim_mock.devices import (
     FeetechLine,
     build,
@@ -16,7 +16,7 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
 def test_the_servos_of_a_rig_can_be_sent():
-    heavy = MassParams(head=LinkMassParams(mass_kg=0.9))
+    heavy = MassParams(head=HeadMassParams(mass_kg=0.9))
     (line,) = emulated_lines(replace(load_rig("desk"), mass=heavy)).values()
     assert pickle.loads(pickle.dumps(line)) == line
 

@@ -3,7 +3,7 @@
 import io
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -16,10 +16,9 @@ from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.dashboard.view.glb import EYE, painted_glb
 from gazerig.robot.dashboard.view.head_view import head_dimensions
 from gazerig.robot.dashboard.view.viewpoints import FACE, View, named_view
-from gazerig.robot.description import head_mesh
-from gazerig.robot.description.head_shape import measures_of
-from gazerig.robot.description.mesh import Painted, merge_meshes
-from gazerig.robot.description.person_shape import hand, head, torso
+from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh, stored_shape
+from gazerig.robot.description.parts import measures_of
+from gazerig.robot.description.people import head, part_of, torso
 from gazerig.robot.model.types import JointState, Snapshot
 
 RIGS = sorted(path.stem for path in shipped_path("rigs", "desk").parent.glob("*.yaml"))
@@ -62,8 +61,7 @@ def drawn(seen: View, points_m: Floats, aspect: float) -> Floats:
 @cache
 def skin_and_cap() -> Floats:
     """Return all points of the head, in distances between the eyes."""
-    parts = (head_mesh.skin().head.mesh, head_mesh.cap().mesh)
-    return np.concatenate([part.vertices for part in parts])
+    return merge_meshes([stored_shape("skin"), stored_shape("cap")]).mesh.vertices
 
 
 @pytest.mark.parametrize("name", RIGS)
@@ -92,16 +90,12 @@ def test_measures_follow_the_rig() -> None:
 
 
 WHOLE: dict[str, Callable[[], Painted]] = {
-    "cap": head_mesh.cap,
-    "brow": head_mesh.brow,
-    "eye": head_mesh.eye,
-    "ear": head_mesh.ear,
-    "neck": head_mesh.neck,
-    "bust": head_mesh.bust,
-    "skin": lambda: merge_meshes([head_mesh.skin().head, head_mesh.skin().jaw]),
-    "person": lambda: head(0, 0.8),
+    **{name: partial(stored_shape, name) for name in ("cap", "brow", "eye", "ear", "neck", "bust")},
+    "skin": lambda: merge_meshes([stored_shape("skin"), stored_shape("jaw")]),
+    "other brow": lambda: move_mesh(stored_shape("brow"), scale=(1.0, -1.0, 1.0)),
+    "person": lambda: head(0),
     "chest": lambda: torso(0, 0.34),
-    "hand": lambda: hand(0),
+    "hand": lambda: part_of(0, "hand"),
 }
 
 
@@ -115,7 +109,7 @@ def test_faces_are_turned_outwards_for_their_backs_are_not_drawn(part: str) -> N
 def test_another_reader_finds_the_mesh_in_the_file() -> None:
     import trimesh
 
-    mesh, colours, normals = head_mesh.eye()
+    mesh, colours, normals = stored_shape("eye")
     data = painted_glb(Painted(mesh, colours, normals), EYE._replace(is_lit=False))
     scene = trimesh.load_scene(io.BytesIO(data), "glb")
     (found,) = scene.geometry.values()

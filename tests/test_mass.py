@@ -20,9 +20,9 @@ from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.app.rig_weight import rest_park_deg, weight_findings
 from gazerig.robot.control.body import Body
 from gazerig.robot.description.mjcf import mjcf
-from gazerig.robot.model.mass_params import CounterweightParams, LinkMassParams, MassParams
+from gazerig.robot.model.mass_params import CounterweightParams, HeadMassParams, MassParams
 
-REAL = MassParams(head=LinkMassParams(com_mm=(40.0, 0.0, 30.0)))
+REAL = MassParams(head=HeadMassParams(com_mm=(40.0, 0.0, 30.0)))
 """A realistic skull and jaw."""
 
 
@@ -41,7 +41,7 @@ def mujoco_loads_nm(rig: Rig, angles: Mapping[str, float]) -> dict[str, float]:
     mujoco.mj_forward(model, data)
     found = dict.fromkeys(rig.joints, 0.0)
     for joint in description.joints:
-        name = joint.follows.joint if joint.follows else joint.name
+        name = joint.follows or joint.name
         at = model.joint(joint.name).dofadr[0]
         found[name] += data.qfrc_passive[at] - data.qfrc_bias[at]
     return found
@@ -81,10 +81,7 @@ def test_a_head_rests_where_its_weight_has_no_lever_or_on_its_stop() -> None:
         ("head: {mass_kg: -1}", "mass.head.mass_kg", "to 50 kg"),
         ("head: {mass_kg: 0.02}", "mass.head.mass_kg", "weigh 0.029"),
         ("head: {com_mm: [200, 0, 30]}", "mass.head.com_mm", "outside the head"),
-        ("links: {lefteye: {mass_kg: 1}}", "mass.links.lefteye", "did you mean left_eye"),
-        ("links: {head: {mass_kg: 1}}", "mass.links.head", "under mass.head"),
-        ("counterweights: {a: {mass_kg: 1, position_mm: [0, 0, 0], link: x}}",
-         "mass.counterweights.a.link", "no link of that name"),
+        ("links: {left_eye: {mass_kg: 1}}", "mass.links", "mass.head"),
     ],
 )  # fmt: skip
 def test_impossible_masses_are_refused(lines: str, key: str, rule: str, tmp_path: Path) -> None:
@@ -164,7 +161,7 @@ def test_what_a_neck_holds_is_reported_with_its_heat() -> None:
     pitch, _, parked = weight_findings(heavy("desk"))
     assert "level with 25% of its stall torque (0.46 A)" in pitch.what and pitch.level == "note"
     assert parked.what == "parked at -12 deg it sinks to -35 deg when torque is switched off"
-    twice = MassParams(head=LinkMassParams(1.2, (40.0, 0.0, 30.0)))
+    twice = MassParams(head=HeadMassParams(1.2, (40.0, 0.0, 30.0)))
     strong = next(iter(weight_findings(heavy("desk", twice))))
     assert strong.level == "warn" and "counterweights" in strong.cure
     assert "63% of its stall" in strong.what and "90 degC" in strong.what

@@ -53,12 +53,12 @@ def test_an_stl_in_millimetres_is_shown_where_the_file_says(tmp_path: Path) -> N
     )
     description = description_of(load_rig(str(path)))
     (look,) = description.link("head").visuals
-    points = look.painted.mesh.vertices @ np.array(look.R).T + look.p_m
+    points = look.painted().mesh.vertices @ np.array(look.R).T + look.p_m
     assert np.allclose(points.min(axis=0), (-0.06, -0.01, -0.02))
     assert np.allclose(points.max(axis=0), (-0.02, 0.01, 0.04))
     # Faces of a box stay flat.
-    assert look.painted.normals is not None
-    assert np.allclose(np.abs(look.painted.normals).max(axis=1), 1.0, atol=1e-6)
+    normals = look.painted().normals
+    assert normals is not None and np.allclose(np.abs(normals).max(axis=1), 1.0, atol=1e-6)
     text = mjcf(description)
     model = mujoco.MjSpec.from_string(text.xml, assets=text.assets).compile()
     assert "head_own" in {model.geom(i).name for i in range(model.ngeom)}
@@ -77,10 +77,10 @@ def test_a_gltf_file_stands_upright(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("mesh", "key", "words"),
     [
-        ("head: {file: none.stl}", "meshes.head.file", "No such file"),
+        ("head: {file: none.stl}", "meshes.head.file", "no such file"),
         ("head: {file: torn.glb}", "meshes.head.file", "torn.glb"),
         ("head: {file: box.step}", "meshes.head.file", "export it as one of these"),
-        ("haed: {file: box.stl}", "meshes.haed", "did you mean head?"),
+        ("haed: {file: box.stl}", "meshes.haed", "did you mean"),
     ],
 )
 def test_a_bad_mesh_is_told_with_line_and_cure(

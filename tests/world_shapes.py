@@ -5,11 +5,12 @@ from math import sin
 
 import numpy as np
 
+from gazerig.features.world.body_shape import grid
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.mesh import Mesh, Painted, grid, paint
-from gazerig.robot.description.person_shape import head, torso
+from gazerig.robot.dashboard.feed.world_shapes import WorldPart
+from gazerig.robot.description.mesh import Mesh, Painted, paint
+from gazerig.robot.description.people import head, torso
 from gazerig.robot.description.texture import add_texture
-from gazerig.robot.description.world_shapes import WorldPart
 from gazerig.robot.model.frames import Quaternion
 
 LEAVES_S = 60.0
@@ -39,9 +40,9 @@ class SmallWorld:
         stool = paint(_plane((-0.3, -0.4, -0.09), (0.0, 0.8, 0.0), (0.6, 0.0, 0.0)), (90, 60, 40))
         return [
             WorldPart("floor", floor),
-            WorldPart("stool", stool._replace(normals=None)),
+            WorldPart("stool", stool),
             WorldPart("wall", add_texture(wall)),
-            WorldPart("ann/head", head(0, 0.8), "skin", moves=True),
+            WorldPart("ann/head", head(0), "skin", moves=True),
             WorldPart("ann/chest", torso(0, 0.34), "cloth", moves=True),
         ]
 

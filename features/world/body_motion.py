@@ -31,7 +31,7 @@ from gazerig.features.world.time_profiles import (
 )
 from gazerig.features.world.timeline import HEAD_M, floor_m
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.person_shape import EYE_FACE_M, MOUTH_FACE_M
+from gazerig.robot.description.people import EYE_FACE_M, MOUTH_FACE_M
 from gazerig.sim_mock.scenes.script import HEAD, SceneScript
 from gazerig.sim_mock.scenes.timeline import TimedAct
 

@@ -15,24 +15,34 @@ from gazerig.robot.description.mesh import (
     Colour,
     Mesh,
     Painted,
-    grid,
     merge_meshes,
-    mirror_mesh,
-    mix,
+    move_mesh,
     paint,
-    smooth_step,
-    spot_weight,
+    stored_shape,
 )
-from gazerig.robot.description.person_shape import PersonLook, open_right_hand
-from gazerig.robot.description.solid import Solid, capsule, ellipsoid, union
+from gazerig.robot.description.people import SHIRTS, part_of
 
 _AROUND = 18
-_GLOVE: Colour = (206, 30, 38)
+_TROUSERS: Colour = (52, 60, 82)
+_SHOES: Colour = (58, 50, 46)
 _HAND_SCALE = 0.104
 _WRIST = 0.74
+_SHOE_M = 0.262
+"""Length of the foot in the stored shoe."""
 
 Row = tuple[float, float, float, float]
 """Height of a section, forward position of its centre, half its depth, half its width."""
+
+
+def grid(points: Floats, *, closed: bool) -> Mesh:
+    """Return the surface through points (rows, columns, 3); ``closed`` joins a row's ends."""
+    rows, columns = points.shape[:2]
+    row, column = np.mgrid[0 : rows - 1, 0 : columns if closed else columns - 1]
+    right = (column + 1) % columns
+    a, b = row * columns + column, row * columns + right
+    c, d = (row + 1) * columns + right, (row + 1) * columns + column
+    triangles = np.stack((a, b, c, a, c, d), axis=-1)
+    return Mesh(points.reshape(-1, 3), triangles.reshape(-1, 3).astype(np.uint32))
 
 
 def loft_surface(rows: Sequence[Row], around: int = _AROUND) -> Mesh:
@@ -64,10 +74,20 @@ def _limb(
     return loft_surface([(z, 0.0, r, r) for z, r in (*low, *middle, *top[::-1])], 12)
 
 
-def body_segments(body: Measures, look: PersonLook, gloves: bool) -> Mapping[str, Painted]:
-    """Return the painted segments of a body, without those of the head."""
+def body_segments(body: Measures, look: int, number: int, gloves: bool) -> Mapping[str, Painted]:
+    """Return the painted segments of a body, without those of the head.
+
+    Args:
+        body: its dimensions.
+        look: its look, which determines the skin.
+        number: number of the person, which determines the shirt.
+        gloves: whether it wears boxing gloves.
+    """
     k = body.stature_m / ADULT_M
-    sleeve = look.skin if look.short_sleeves or gloves else look.shirt
+    hand, shirt = part_of(look, "hand"), SHIRTS[number % len(SHIRTS)]
+    r, g, b = hand.colours[0].tolist()
+    skin = round(r), round(g), round(b)
+    sleeve = skin if gloves else shirt
     upper = _limb(
         ((0.03, 0.046), (0.2, 0.049), (0.45, 0.045), (0.75, 0.041), (1.0, 0.040)),
         k,
@@ -79,18 +99,21 @@ def body_segments(body: Measures, look: PersonLook, gloves: bool) -> Mapping[str
     shank = _limb(((0.0, 0.058), (0.3, 0.060), (0.7, 0.048), (1.0, 0.044)), k, body.shank_m)
     pelvis = loft_surface([(z * k, x * k, a * k, b * k) for z, x, a, b in _PELVIS])
     found = {
-        "pelvis": paint(pelvis, look.trousers),
-        "torso": _shirt(look, k),
-        "neck": paint(_neck(body.neck_m, k), _mix_colours(look.skin, (120, 60, 44), 0.18)),
+        "pelvis": paint(pelvis, _TROUSERS),
+        "torso": _shirt(shirt, k),
+        "neck": paint(_neck(body.neck_m, k), _mix_colours(skin, (120, 60, 44), 0.18)),
     }
-    right = boxing_glove(k) if gloves else _hand(look, k)
+    right = move_mesh(stored_shape("glove"), scale=k) if gloves else _hand(hand, k)
+    shoe = move_mesh(stored_shape("shoe"), scale=body.foot_m / _SHOE_M)
     for side in ("left", "right"):
-        found[f"{side}_upper_arm"] = paint(upper, look.shirt)
+        found[f"{side}_upper_arm"] = paint(upper, shirt)
         found[f"{side}_forearm"] = paint(fore, sleeve)
-        found[f"{side}_hand"] = right if side == "right" else mirror_mesh(right)
-        found[f"{side}_thigh"] = paint(thigh, look.trousers)
-        found[f"{side}_shank"] = paint(shank, look.trousers)
-        found[f"{side}_foot"] = paint(_shoe(body), look.shoes)
+        found[f"{side}_hand"] = (
+            right if side == "right" else move_mesh(right, scale=(1.0, -1.0, 1.0))
+        )
+        found[f"{side}_thigh"] = paint(thigh, _TROUSERS)
+        found[f"{side}_shank"] = paint(shank, _TROUSERS)
+        found[f"{side}_foot"] = paint(shoe.mesh, _SHOES)
     return found
 
 
@@ -123,7 +146,7 @@ _LEANS_M, _LEAN = 0.27, 0.52
 the body lower in front than behind."""
 
 
-def _shirt(look: PersonLook, k: float) -> Painted:
+def _shirt(colour: Colour, k: float) -> Painted:
     from scipy.interpolate import PchipInterpolator  # imports SciPy only to build a mesh
 
     at = np.linspace(0.0, len(_TORSO) - 1.0, 3 * (len(_TORSO) - 1) + 1)
@@ -134,11 +157,11 @@ def _shirt(look: PersonLook, k: float) -> Painted:
     top = _TORSO[-1][0]
     share = np.clip((height - _LEANS_M) / (top - _LEANS_M), 0.0, 1.0)
     points[:, 2] -= _LEAN * share * share * (points[:, 0] + 0.015)
-    shirt = paint(Mesh(points * k, mesh.faces), look.shirt)
-    pale = _mix_colours(look.shirt, (255, 255, 255), 0.40)
-    dark = _mix_colours(look.shirt, (20, 20, 30), 0.35)
-    colours = mix(shirt.colours, pale, smooth_step(height - 0.3845, 0.002))
-    return shirt._replace(colours=mix(colours, dark, 0.5 * smooth_step(-height - 0.108, 0.004)))
+    shirt = paint(Mesh(points * k, mesh.faces), colour)
+    pale = _mix_colours(colour, (255, 255, 255), 0.40)
+    dark = _mix_colours(colour, (20, 20, 30), 0.35)
+    colours = mix(shirt.colours, pale, _smooth_step(height - 0.3845, 0.002))
+    return shirt._replace(colours=mix(colours, dark, 0.5 * _smooth_step(-height - 0.108, 0.004)))
 
 
 def _neck(neck_m: float, k: float) -> Mesh:
@@ -149,65 +172,29 @@ def _neck(neck_m: float, k: float) -> Mesh:
     return loft_surface([(z, x, r * k, 1.04 * r * k) for z, x, r in rows], 18)
 
 
-def _hand(look: PersonLook, k: float) -> Painted:
+def _hand(hand: Painted, k: float) -> Painted:
     """Return a right hand: hanging, its fingers down."""
-    mesh, colours, normals = open_right_hand(look, 22)
+    mesh, colours, normals = hand
     size, turn = _HAND_SCALE * k, np.array((1.0, -1.0, -1.0))
     # Fingers end bluntly, not in the point of an ellipsoid.
     u = np.clip((mesh.vertices[:, 2] - 0.45) / 0.55, 0.0, 0.99)
     blunt = np.minimum((1.0 - u**4) ** 0.25 / np.sqrt(1.0 - u**2), 1.9)[:, None]
     round_off = mesh.vertices * np.hstack([blunt, blunt, np.ones_like(blunt)])
     points = (round_off + (0.0, 0.0, _WRIST)) * size * turn
-    assert normals is not None
     return Painted(Mesh(points, mesh.faces), colours, normals * turn)
 
 
-def _shoe(body: Measures) -> Mesh:
-    k = body.foot_m / 0.262
-    low = -body.ankle_m / k
-
-    def field(points: Floats) -> Floats:
-        sole = capsule((-0.035, 0.0, low + 0.036), (0.125, 0.0, low + 0.030), 0.040, 0.042)(points)
-        toe = ellipsoid((0.135, 0.0, low + 0.028), (0.065, 0.046, 0.030))(points)
-        leg = capsule((-0.012, 0.0, low + 0.05), (0.0, 0.0, 0.012), 0.042, 0.040)(points)
-        solid = union(union(sole, toe, 0.03), leg, 0.04)
-        return np.asarray(np.maximum(solid, low + 0.002 - points[:, 2]))
-
-    found = Solid(field, (0.03, 0.0, low + 0.03), 0.30).all_round(11, 16)
-    return grid(found.points * k, closed=True)
-
-
-def boxing_glove(k: float = 1.0) -> Painted:
-    """Return a right boxing glove over a fist, with a white cuff and a patch that shows spin."""
-
-    def field(points: Floats) -> Floats:
-        fist = ellipsoid((0.0, 0.0, -0.090), (0.066, 0.074, 0.086))(points)
-        thumb = capsule((0.030, -0.055, -0.055), (0.046, -0.050, -0.105), 0.028, 0.026)(points)
-        cuff = capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.050), 0.048, 0.050)(points)
-        return union(union(fist, thumb, 0.02), cuff, 0.03)
-
-    found = Solid(field, (0.0, 0.0, -0.06), 0.26).all_round(26, 26)
-    points = found.points.reshape(-1, 3)
-    colours = np.broadcast_to(np.array(_GLOVE, float), points.shape)
-    colours = mix(colours, (240, 238, 232), smooth_step(points[:, 2] - 0.005, 0.006))
-    colours = mix(
-        colours,
-        (242, 240, 234),
-        smooth_step(spot_weight(points, (-0.066, 0.0, -0.10), 0.05) - 0.62, 0.1),
-    )
-    colours = mix(colours, (120, 14, 20), smooth_step(points[:, 0] - 0.05, 0.01))
-    return Painted(
-        Mesh(found.points.reshape(-1, 3) * k, grid(found.points, closed=True).faces),
-        colours,
-        found.normals.reshape(-1, 3),
-    )
+def _smooth_step(value: Floats, width: float) -> Floats:
+    """Return 0 below and 1 above zero, with a smooth transition."""
+    share = np.clip(0.5 + value / (2.0 * width), 0.0, 1.0)
+    return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
 def cup_shape() -> Painted:
     """Return a mug, relative to the middle of its height, z up."""
     rows = [(-0.048, 0.0, 0.030, 0.030), (0.048, 0.0, 0.040, 0.040)]
     mug = paint(loft_surface(rows, 24), (236, 232, 222))
-    stripe = smooth_step(0.014 - np.abs(mug.mesh.vertices[:, 2] + 0.048), 0.004)
+    stripe = _smooth_step(0.014 - np.abs(mug.mesh.vertices[:, 2] + 0.048), 0.004)
     turn = np.linspace(-0.5 * pi, 0.5 * pi, 8)
     handle = np.stack([0.038 + 0.026 * np.cos(turn), 0 * turn, 0.028 * np.sin(turn)], axis=1)
     ring = [(0.006 * cos(w), 0.006 * sin(w)) for w in np.linspace(0, 2 * pi, 8, endpoint=False)]
@@ -221,10 +208,16 @@ def ball_shape() -> Painted:
     angles = [radians(d) for d in range(-90, 91, 12)]
     mesh = loft_surface([(0.06 * sin(a), 0.0, 0.06 * cos(a), 0.06 * cos(a)) for a in angles], 24)
     plain = paint(mesh, (220, 150, 40))
-    stripe = smooth_step(np.sin(5.0 * np.arctan2(mesh.vertices[:, 1], mesh.vertices[:, 0])), 0.3)
+    stripe = _smooth_step(np.sin(5.0 * np.arctan2(mesh.vertices[:, 1], mesh.vertices[:, 0])), 0.3)
     return plain._replace(colours=mix(plain.colours, (60, 90, 170), stripe))
 
 
 def _mix_colours(colour: Colour, other: Colour, share: float) -> Colour:
     r, g, b = (round(a + share * (o - a)) for a, o in zip(colour, other, strict=True))
     return r, g, b
+
+
+def mix(colours: Floats, colour: Colour, share: Floats) -> Floats:
+    """Blend colours (..., 3) towards one colour by fractions (...), clipped to 0..1."""
+    part = np.clip(share, 0.0, 1.0)[..., None]
+    return np.asarray(colours * (1.0 - part) + np.array(colour, float) * part)

@@ -8,12 +8,11 @@ import numpy as np
 from gazerig.features.world.body_shape import ball_shape, body_segments, cup_shape
 from gazerig.features.world.figure import SEGMENTS, Figures
 from gazerig.features.world.measures import Measures
-from gazerig.gaze.types import Vec3
-from gazerig.robot.description.mesh import Painted, move_mesh
-from gazerig.robot.description.person_shape import WORLD_LOOKS, head_segments
+from gazerig.gaze.angles import scale
+from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh
+from gazerig.robot.description.people import part_of
 from gazerig.robot.description.texture import add_texture
 
-FINENESS = 0.45
 SOLID_GROUP = 3
 """Group of the collision shapes, which pictures do not show."""
 _SPECULAR, _SHININESS = 0.12, 0.2
@@ -33,22 +32,19 @@ def add_people(spec: Any, figures: Figures) -> None:
             _add_solid(body, segment, figures.measures[owner], gloves[owner])
 
 
-def figure_shapes(figures: Figures, fineness: float = FINENESS) -> dict[str, Painted]:
+def figure_shapes(figures: Figures) -> dict[str, Painted]:
     """Return the shape of every segment and thing in its own frame, in the order of the names."""
     found: dict[str, Painted] = {}
-    for name, person in figures.script.people.items():
-        look, body = WORLD_LOOKS[person.look], figures.measures[name]
-        head = head_segments(look, fineness)
-        nose = tuple(-one for one in body.skull_m)
-        here: Vec3 = (0.0, 0.0, 0.0)
+    for number, (name, person) in enumerate(figures.script.people.items()):
+        body = figures.measures[name]
         k = body.head_scale
-        parts = {
-            "head": move_mesh(head.head, (nose[0], nose[1], nose[2]), k),
-            "lips": move_mesh(head.lips, here, k),
-            **{f"{side}_eye": move_mesh(head.eye, here, k) for side in ("left", "right")},
-            **{f"{side}_lid": move_mesh(head.lid, here, k) for side in ("left", "right")},
-        }
-        parts |= body_segments(body, look, person.gloves)
+        head = merge_meshes([part_of(person.look, part) for part in ("head", "face", "mouth")])
+        parts = {"head": move_mesh(head, scale(body.skull_m, -1.0), k)}
+        for part in ("lips", "eye", "lid"):
+            shape = move_mesh(part_of(person.look, part), scale=k)
+            names = (part,) if part == "lips" else (f"left_{part}", f"right_{part}")
+            parts |= dict.fromkeys(names, shape)
+        parts |= body_segments(body, person.look, number, person.gloves)
         found |= {f"{name}/{segment}": parts[segment] for segment in SEGMENTS}
     for name, thing in figures.script.things.items():
         found[f"thing/{name}"] = cup_shape() if thing.kind == "cup" else ball_shape()

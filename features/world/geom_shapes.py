@@ -1,23 +1,23 @@
 """The geoms of a compiled MuJoCo model as coloured meshes in their initial poses."""
 
 from collections.abc import Callable, Collection, Iterator
-from math import cos, pi, sin
+from math import cos, radians, sin
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.features.world.body_shape import loft_surface
 from gazerig.gaze.types import Floats
+from gazerig.robot.dashboard.feed.world_shapes import WorldPart
 from gazerig.robot.description.mesh import (
     Mesh,
     Painted,
-    ellipsoid,
-    lathe,
     smooth_normals,
+    stored_shape,
 )
 from gazerig.robot.description.texture import TexturedMesh
-from gazerig.robot.description.world_shapes import WorldPart
 
 _SHOWN_GROUPS = 3
 """Groups of geoms below this are shown, as in MuJoCo's own viewer."""
@@ -171,24 +171,26 @@ def _plane(model: Any, geom: int) -> _Surface:
 
 def _cylinder(model: Any, geom: int) -> _Surface:
     radius, half = model.geom_size[geom][:2].tolist()
-    edge = [(0.0, -half), (radius, -half)]
     # Repeated rows make sharp edges.
-    profile = [*edge, (radius, -half), (radius, half), (radius, half), (0.0, half)]
-    return _smooth(model, geom, lathe(profile, _ROUND))
+    rows = [(z, 0.0, radius, radius) for z in (-half, -half, half, half)]
+    return _smooth(model, geom, loft_surface(rows, _ROUND))
 
 
 def _capsule(model: Any, geom: int) -> _Surface:
     radius, half = model.geom_size[geom][:2].tolist()
-    turn = [0.5 * pi * k / 6 for k in range(7)]
-    below = [(radius * sin(a), -half - radius * cos(a)) for a in turn]
-    above = [(radius * cos(a), half + radius * sin(a)) for a in turn]
-    return _smooth(model, geom, lathe(below + above, _ROUND // 2))
+    rows = []
+    for end, angles in ((-half, range(-90, 1, 15)), (half, range(0, 91, 15))):
+        for a in map(radians, angles):
+            rows.append((end + radius * sin(a), 0.0, radius * cos(a), radius * cos(a)))
+    return _smooth(model, geom, loft_surface(rows, _ROUND // 2))
 
 
 def _ball(model: Any, geom: int) -> _Surface:
-    x, y, z = model.geom_size[geom].tolist()
-    round_one = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE
-    return _smooth(model, geom, ellipsoid((x, x, x) if round_one else (x, y, z)))
+    half = model.geom_size[geom]
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE:
+        half = half[:1]
+    ball = stored_shape("ball").mesh
+    return _smooth(model, geom, Mesh(ball.vertices * half, ball.faces))
 
 
 def _mesh(model: Any, geom: int) -> _Surface:

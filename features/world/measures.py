@@ -2,7 +2,7 @@
 
 Lengths are those of Drillis & Contini (1966), Body segment parameters, fig. 1 (heights of the
 joints and breadths as fractions of the stature), as reprinted by Winter, Biomechanics and motor
-control of human movement, fig. 4.1. The head is that of gazerig.robot.description.person_shape,
+control of human movement, fig. 4.1. The head is that of gazerig.robot.description.people,
 with the eye distance of Mitake et al., table 1; a child's is a little smaller.
 """
 

@@ -9,13 +9,10 @@ from typing import NamedTuple
 from gazerig.features.world.opponent_motion import Opponent
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.world_shapes import WorldPart
+from gazerig.robot.dashboard.feed.world_shapes import WorldPart
 from gazerig.robot.model.frames import Quaternion
 
 _SKIN = ("head", "neck", "lips", "left_hand", "right_hand", "left_lid", "right_lid")
-
-_FINENESS = 0.6
-"""People on the page are farther away than those before the rig's camera."""
 
 
 class SpecShapes(NamedTuple):
@@ -35,7 +32,7 @@ class SpecShapes(NamedTuple):
         from gazerig.features.world.geom_shapes import fixed_parts
 
         figures = self.spec.figures
-        moving = {} if figures is None else figure_shapes(figures, _FINENESS)
+        moving = {} if figures is None else figure_shapes(figures)
         return (
             *fixed_parts(model.mj, moving, self.rig_joints),
             *(

@@ -4,12 +4,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from gazerig.config.rig import Rig
+from gazerig.config.schema import unknown_text
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.rig_limits import lid_ends
 from gazerig.robot.control.sag import SagCompensation
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import Description
-from gazerig.robot.description.own_meshes import MeshUnusable, OwnMesh, read_mesh, unknown_links
+from gazerig.robot.description.own_meshes import own_visual
 from gazerig.robot.description.statics import NECK_JOINTS, Statics, moving_bodies
 from gazerig.robot.model.types import order_joints
 
@@ -19,12 +20,12 @@ def description_of(rig: Rig, *, looks: bool = True) -> Description:
 
     Args:
         rig: the rig.
-        looks: Whether to include visible shapes; without them the same mechanism is built faster.
+        looks: Whether to read the meshes of its own.
 
     Raises:
         SetupError: one of its meshes cannot be used.
     """
-    return describe(shape_of(rig if looks else replace(rig, meshes={})), looks=looks)
+    return describe(shape_of(rig if looks else replace(rig, meshes={})))
 
 
 def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
@@ -57,7 +58,7 @@ def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
     lost = {key.split(".")[1] for key in faults}
     return shape._replace(
         meshes=tuple(
-            OwnMesh(name, params, read_mesh(params))
+            (name, own_visual(name, params))
             for name, params in rig.meshes.items()
             if name not in lost
         )
@@ -87,13 +88,13 @@ def mesh_faults(rig: Rig) -> Iterable[tuple[str, str]]:
     """Find meshes of a rig that cannot be shown: their key in its file, and the fault."""
     if not rig.meshes:
         return
-    made = describe(shape_of(replace(rig, meshes={})), looks=False)
-    unknown = unknown_links(made, rig.meshes)
+    made = describe(shape_of(replace(rig, meshes={})))
+    links = [link.name for link in made.links]
     for name, params in rig.meshes.items():
-        if name in unknown:
-            yield f"meshes.{name}", unknown[name]
+        if name not in links:
+            yield f"meshes.{name}", unknown_text("link", name, links)
             continue
         try:
-            read_mesh(params)
-        except MeshUnusable as error:
+            own_visual(name, params)
+        except SetupError as error:
             yield f"meshes.{name}.file", str(error)

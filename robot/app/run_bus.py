@@ -5,7 +5,7 @@ The emulated servos are mounted in the rig's joints as its YAML defines.
 
 import hashlib
 from collections.abc import Callable, Mapping
-from math import pi, radians
+from math import radians
 from typing import NamedTuple
 
 from gazerig.config.rig import BusConfig, Rig
@@ -22,9 +22,9 @@ from gazerig.robot.app.bus_wiring import (
     rig_bus,
     servo_configs,
 )
+from gazerig.robot.app.joint_weights import Weight, joint_weights
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of
-from gazerig.robot.description.statics import Weight, joint_weights
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling import pair_setups
 from gazerig.robot.model.frames import CameraMount, PoseHistory
@@ -101,7 +101,7 @@ def _emulated_servo(rig: Rig, name: str, weight: Weight) -> ServoSpec:
     """Return the smart servo of one joint with this weight on it; coupled servos carry none."""
     joint = rig.joints[name]
     start, (low, high) = _start_step(rig, name), _mechanical_stops(rig, name)
-    turns = joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
+    turns = joint.shaft_turns()
     is_coupled = any(name in pair.joints for pair in rig.couplings.values())
     physics = Physics(
         load_kg_m2=weight.inertia_kg_m2 / turns**2,

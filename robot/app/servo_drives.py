@@ -6,7 +6,7 @@ linkage that is not linear counts with its mean ratio within 10 deg of joint ang
 """
 
 from collections.abc import Mapping, Sequence
-from math import log, pi, radians
+from math import pi, radians
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.dynamixel.control_table import GAINS, PWM_FULL, DynamixelModel
@@ -30,7 +30,6 @@ from gazerig.sim_mock.smart_servo.physics import (
     Physics,
     mechanics_of,
 )
-from gazerig.sim_mock.smart_servo.shaft import SMOOTHING
 
 
 def servo_drives(rig: Rig) -> dict[str, ServoDrive]:
@@ -96,13 +95,11 @@ def _shaft_drive(motor: Motor, physics: Physics, loop: Loop) -> ServoDrive:
     return ServoDrive(
         armature_kg_m2=physics.rotor_s * stall_nm / top_rad_s,
         friction_nm=physics.coulomb_share * stall_nm,
-        damping_nm_s=physics.viscous_share * stall_nm / top_rad_s,
+        damping_nm_s=stall_nm
+        * (physics.viscous_share / top_rad_s + built.rate * STEPS_PER_RAD * MS_S),
         kp_nm_rad=stall_nm * loop.p * STEPS_PER_RAD,
         kv_nm_s=stall_nm * loop.d * STEPS_PER_RAD * MS_S,
         force_nm=stall_nm * loop.u_max,
-        back_emf_nm_s=stall_nm * built.rate * STEPS_PER_RAD * MS_S,
-        smoothing_s=-MS_S / log(1.0 - SMOOTHING),
-        slew_nm_s=stall_nm * loop.slew / MS_S,
     )
 
 
@@ -119,9 +116,6 @@ def _at_joint(shafts: Mapping[str, ServoDrive], turns: Sequence[tuple[str, float
                 one.kp_nm_rad * square,
                 one.kv_nm_s * square,
                 one.force_nm * abs(turn),
-                one.back_emf_nm_s * square,
-                one.smoothing_s / len(turns),
-                one.slew_nm_s * abs(turn),
             )
         )
     return ServoDrive(*map(sum, zip(*parts, strict=True)))

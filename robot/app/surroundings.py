@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gazerig.robot.app.options import RunOptions
     from gazerig.robot.app.program_parts import ProgramParts
     from gazerig.robot.app.run_bus import CameraPoses, RunBus
-    from gazerig.robot.description.world_shapes import WorldShapes
+    from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
     from gazerig.robot.model.clock import Clock
     from gazerig.robot.model.frames import CameraParams
     from gazerig.sim_mock.scenes.scene import Scene

@@ -7,28 +7,40 @@ with their signs (robot/model/kinematics.py).
 """
 
 from collections.abc import Iterator, Mapping
-from itertools import combinations, product
-from math import copysign, pi, radians
+from math import radians
 from typing import NamedTuple
 
-from gazerig.gaze.angles import rotation
+import numpy as np
+
+from gazerig.gaze.angles import add, rotation, scale, sub
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description import mass, parts
-from gazerig.robot.description.head_shape import HeadMeasures
+from gazerig.robot.description import mass
 from gazerig.robot.description.links import (
-    CameraFrame,
+    CAMERA,
+    OPTICAL_FRAME,
+    ORIGIN,
+    CameraView,
     Description,
+    Ellipsoid,
+    Inertia,
     Link,
-    LinkageFollower,
     LinkJoint,
+    Visual,
 )
-from gazerig.robot.description.own_meshes import OwnMesh, with_own_meshes
-from gazerig.robot.description.weights import (
-    HEAD,
-    carried_links,
-    head_inertia,
-    mass_faults,
-    weighed,
+from gazerig.robot.description.parts import (
+    CHIN,
+    FACE_PARTS,
+    FLOOR_M,
+    LOWER_REST,
+    SIDES,
+    UPPER_REST,
+    HeadMeasures,
+    ear_look,
+    face_look,
+    hinge,
+    lid_look,
+    meeting_rad,
+    tube,
 )
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import OPTICAL, CameraParams
@@ -48,10 +60,7 @@ def joint_torques_nm(
     own = {}
     for name, joint in joints.items():
         shaft_nm = joint.model_facts.stall_torque_nm * (joint.torque_limit or 1.0)
-        # At the position with the highest ratio of servo to joint rotation.
-        own[name] = shaft_nm * (
-            joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
-        )
+        own[name] = shaft_nm * joint.shaft_turns()
     found = dict(own)
     for pair in couplings.values():
         if joints.keys() >= {*pair.joints}:
@@ -61,13 +70,19 @@ def joint_torques_nm(
     return found
 
 
-BASE = "base_link"
-CAMERA, OPTICAL_FRAME = "camera_link", "camera_optical_frame"
-SIDES = ("left", "right")
+BASE, HEAD = "base_link", mass.HEAD
 
-UP: Vec3 = (0.0, -1.0, 0.0)
-_AXES: dict[str, Vec3] = {"yaw": (0.0, 0.0, 1.0), "pitch": UP, "roll": (1.0, 0.0, 0.0)}
-_AXES |= {"pan": _AXES["yaw"], "tilt": UP}
+_AXES: dict[str, Vec3] = {
+    "yaw": (0.0, 0.0, 1.0), "pan": (0.0, 0.0, 1.0), "pitch": (0.0, -1.0, 0.0),
+    "tilt": (0.0, -1.0, 0.0), "roll": (1.0, 0.0, 0.0),
+}  # fmt: skip
+_EYE: Vec3 = (0.0, 0.5, 0.0)
+_THROAT: Vec3 = (-0.72, 0.0, -0.90)
+"""Upper end of a neck without joints, in distances between the eyes."""
+_BUST, _BELOW_CHIN = 1.45, 0.25
+"""Width of the shoulders, and their distance from the chin, in distances between the eyes."""
+_LEAST_M = 0.01
+"""Smallest height of the shoulders."""
 
 
 class RigShape(NamedTuple):
@@ -75,7 +90,7 @@ class RigShape(NamedTuple):
 
     lids: angles of the lid joints shut and open
     image_px: width and height of the camera's frames
-    meshes: meshes supplied by the user
+    meshes: names of links, and the user's own looks of them
     """
 
     name: str
@@ -86,25 +101,23 @@ class RigShape(NamedTuple):
     camera: CameraParams
     mass: MassParams = MassParams()
     image_px: tuple[int, int] = (640, 480)
-    meshes: tuple[OwnMesh, ...] = ()
+    meshes: tuple[tuple[str, Visual], ...] = ()
 
 
-def describe(rig: RigShape, *, looks: bool = True) -> Description:
-    """Return the description of a rig.
-
-    Args:
-        rig: the rig.
-        looks: include visual shapes; without them, the same mechanism is built much faster.
-    """
-    if not looks:
-        return _Builder(rig, looks=False).description().without_looks()
-    return with_own_meshes(_Builder(rig, looks=True).description(), rig.meshes)
+def describe(rig: RigShape) -> Description:
+    """Return the description of a rig; the user's own looks do not change masses and collisions."""
+    built, own = _Builder(rig).description(), dict(rig.meshes)
+    links = (
+        link._replace(visuals=(own[link.name],)) if link.name in own else link
+        for link in built.links
+    )
+    return built._replace(links=tuple(links))
 
 
 def rig_mass_faults(rig: RigShape) -> Iterator[tuple[str, str]]:
     """Find masses that are impossible for such a head: key in the rig's file, and the fault."""
-    built = describe(rig._replace(mass=MassParams()), looks=False)
-    yield from mass_faults(rig.mass, _measures(rig.geometry), built)
+    plain = describe(rig._replace(mass=MassParams()))
+    yield from mass.mass_faults(rig.mass, _measures(rig.geometry), plain)
 
 
 def _measures(geometry: GeometryParams) -> HeadMeasures:
@@ -113,8 +126,8 @@ def _measures(geometry: GeometryParams) -> HeadMeasures:
 
 
 class _Builder:
-    def __init__(self, rig: RigShape, *, looks: bool) -> None:
-        self._rig, self._looks = rig, looks
+    def __init__(self, rig: RigShape) -> None:
+        self._rig = rig
         self._torques = joint_torques_nm(rig.joints, rig.couplings)
         geometry = rig.geometry
         self._eyes_m: Vec3 = (geometry.eyes_ahead_mm / 1e3, 0.0, geometry.eyes_above_mm / 1e3)
@@ -123,7 +136,7 @@ class _Builder:
 
     def description(self) -> Description:
         rig = self._rig
-        neck = self._add_neck()
+        neck, place = self._add_neck()
         first = len(self._links)
         for side in SIDES:
             self._add_eye(side)
@@ -132,143 +145,146 @@ class _Builder:
                 self._add_lid(name)
         for name in further_joints(rig.joints):
             if name not in LOWER_NECK:
-                place, axis = parts.facial_joint_axis(name, self._measures)
-                joint = self._joint(name, axis)
-                self._links.append(
-                    parts.facial_part(link_name(name), HEAD, place, joint, self._measures)
-                )
-        self._links = [weighed(link, rig.mass) for link in self._links]
-        self._links.insert(first, self._build_head(neck, self._links[first:]))
+                self._add_face_part(name)
+        self._links.insert(first, self._head(neck, place, self._links[first:]))
         camera = rig.camera
-        x, y, z = camera.position_mm
         angles = radians(camera.yaw_deg), radians(camera.pitch_deg), radians(camera.roll_deg)
-        holder = HEAD if camera.mount == "head" else BASE
-        self._links.append(
-            parts.camera(CAMERA, holder, (x / 1e3, y / 1e3, z / 1e3), rotation(angles))
+        housing = Link(
+            CAMERA,
+            HEAD if camera.mount == "head" else BASE,
+            scale(camera.position_mm, 1e-3),
+            rotation(angles),
+            visuals=(Visual(CAMERA, "camera"),),
         )
-        self._links.append(Link(OPTICAL_FRAME, CAMERA, R=OPTICAL))
+        self._links += [housing, Link(OPTICAL_FRAME, CAMERA, R=OPTICAL)]
         field = radians(camera.horizontal_field_deg)
-        frame = CameraFrame(CAMERA, OPTICAL_FRAME, field, *rig.image_px)
-        # The links of the neck overlap each other, the shoulders and the head.
-        necks = [link.name for link in self._links[1:first]]
-        inside = [HEAD, *(link.name for link in self._links if link.parent == HEAD)]
-        touching = [*combinations((BASE, *necks), 2), *product(necks, inside)]
-        if not necks:
-            touching += product((BASE,), inside)
-        return Description(rig.name, tuple(self._links), frame, tuple(touching))
+        return Description(rig.name, tuple(self._links), CameraView(field, *rig.image_px))
 
-    def _joint(
-        self, name: str, axis: Vec3, of: str = "", follows: LinkageFollower | None = None
-    ) -> LinkJoint:
-        own = self._rig.joints[of or name]
-        limit = own.limit()
+    def _joint(self, name: str, axis: Vec3, follows: str = "") -> LinkJoint:
+        limit = self._rig.joints[follows or name].limit()
+        most_nm = self._torques[follows or name]
         return LinkJoint(
-            name,
-            axis,
-            limit.low_rad,
-            limit.high_rad,
-            limit.speed_rad_s,
-            self._torques[of or name],
-            follows,
+            name, axis, limit.low_rad, limit.high_rad, limit.speed_rad_s, most_nm, follows
         )
 
-    def _add_neck(self) -> str:
-        """Add base and neck; return the link that carries the head."""
+    def _add_neck(self) -> tuple[str, Vec3]:
+        """Add base and neck; return the link that carries the head, and the head's place in it."""
         geometry, joints = self._rig.geometry, self._rig.joints
         pivot = geometry.pitch_axis_height_mm / 1e3
         lower = geometry.lower_pitch_axis_height_mm / 1e3
         chain = [(name, lower) for name in LOWER_NECK if name in joints]
         chain += [(name, pivot) for name in NECK if name in joints]
-        head_m = (self._eyes_m[0], 0.0, pivot + self._eyes_m[2])
-        first = chain[0][1] if chain else pivot
-        # A column about a yaw axis turns with that axis; other columns do not move.
-        turns = bool(chain) and chain[0][0].endswith("yaw")
-        self._links.append(
-            parts.base(BASE, self._measures, head_m, 0.0 if turns else first, bool(chain))
-        )
-        below = first - parts.shoulders_m(self._measures, head_m) if turns else 0.0
+        head_m = add((0.0, 0.0, pivot), self._eyes_m)
+        self._add_base(head_m, chain[0][1] if chain else None)
         parent, at = BASE, 0.0
         heights = [height for _, height in chain[1:]] + [pivot]
         for (name, height), following in zip(chain, heights, strict=False):
+            link, length = link_name(name), following - height
+            looks = (tube(link, self._measures, length, ORIGIN),) if length >= 1e-3 else ()
             joint = self._joint(name, _AXES[name.rpartition("_")[2]])
             place = (0.0, 0.0, height - at)
-            above = following - height
             self._links.append(
-                parts.neck(link_name(name), parent, place, joint, self._measures, below, above)
+                Link(link, parent, place, joint=joint, inertia=mass.servo(), visuals=looks)
             )
-            parent, at, below = link_name(name), height, 0.0
-        self._pivot_m: Vec3 = (0.0, 0.0, pivot - at)
-        return parent
+            parent, at = link, height
+        return parent, add((0.0, 0.0, pivot - at), self._eyes_m)
 
-    def _build_head(self, neck: str, carried: list[Link]) -> Link:
-        """Return the head without the links that it carries."""
-        x, y, z = self._pivot_m
-        ahead, _, above = self._eyes_m
-        still = [
-            (side, self._lid_meeting_rad(side))
-            for side in SIDES
-            if f"{side}_upper_lid" in self._rig.lids and f"{side}_lower_lid" not in self._rig.lids
-        ]
-        return parts.head(
-            HEAD,
-            neck,
-            (x + ahead, y, z + above),
-            self._measures,
-            head_inertia(self._rig.mass, self._measures, carried_links(carried)),
-            further_joints(self._rig.joints),
-            still,
-            self._looks,
+    def _add_base(self, head_m: Vec3, axis_m: float | None) -> None:
+        """Add the fixed parts: shoulders, and a neck up to the first axis.
+
+        Args:
+            head_m: the point between the eyes with all joints at 0.
+            axis_m: height of the first axis; None: the neck has no joints.
+        """
+        unit = self._measures.interocular_m
+        # At the neck base or a little below the chin.
+        top = min(0.0, head_m[2] + (CHIN - _BELOW_CHIN) * unit)
+        tall = max(_LEAST_M, top - FLOOR_M)
+        x, y, end = add(head_m, self._measures.scaled(_THROAT))
+        if axis_m is not None:
+            x, y, end = 0.0, 0.0, axis_m
+        bust = _BUST * unit
+        looks = [Visual("bust", "bust", "cloth", (x, y, top), scale=(bust, bust, tall))]
+        if end > top + 1e-3:
+            looks.append(tube("column", self._measures, end - top, (x, y, top)))
+        body = Ellipsoid((x, y, top - 0.5 * tall), (1.2 * unit, 2.3 * unit, 0.5 * tall))
+        # It does not move.
+        inertia = Inertia(1.5, (x, y, top - 0.6 * tall), np.diag((0.010, 0.006, 0.012)))
+        self._links.append(
+            Link(BASE, None, inertia=inertia, visuals=tuple(looks), collisions=(body,))
         )
 
+    def _head(self, neck: str, p_m: Vec3, carried: list[Link]) -> Link:
+        """Return the head without the links that it carries."""
+        measures, joints, lids = self._measures, self._rig.joints, self._rig.lids
+        unit = measures.interocular_m
+        looks = [Visual("skin", "skin", "skin", scale=unit), Visual("cap", "cap", scale=unit)]
+        if "jaw" in joints:
+            looks.append(Visual("mouth", "mouth", "dark", scale=unit))
+        looks += [face_look(part, measures) for part in FACE_PARTS if part not in joints]
+        looks += [ear_look(side, measures) for side in SIDES]
+        for side in SIDES:
+            if f"{side}_upper_lid" in lids and f"{side}_lower_lid" not in lids:
+                still = lid_look(f"{side}_still_lid", measures, False, self._lid_meeting_rad(side))
+                looks.append(still._replace(p_m=measures.scaled(_EYE, side)))
+        inertia = mass.head_inertia(self._rig.mass, measures, mass.carried_links(carried))
+        bodies = measures.bodies()
+        return Link(HEAD, neck, p_m, inertia=inertia, visuals=tuple(looks), collisions=bodies)
+
     def _add_eye(self, side: str) -> None:
-        joints = self._rig.joints
-        parent, place = HEAD, parts.eye_m(side, self._measures.interocular_m)
+        """Add an eyeball with iris and pupil, whose gaze is along its x axis, and its gimbal."""
+        joints, radius = self._rig.joints, self._measures.eye_radius_m
+        parent, place = HEAD, self._measures.scaled(_EYE, side)
         for turn in ("pan", "tilt"):
             own, both = f"{side}_eye_{turn}", f"eyes_{turn}"
-            if own in joints:
-                joint = self._joint(own, _AXES[turn])
-            elif both not in joints:
+            if own not in joints and both not in joints:
                 continue
-            elif any(link.joint and link.joint.name == both for link in self._links):
-                name = f"{side}_eyes_{turn}"
-                while name in joints:
-                    name += "_"
-                joint = self._joint(name, _AXES[turn], both, LinkageFollower(both))
-            else:
-                joint = self._joint(both, _AXES[turn])
+            name, follows = own if own in joints else both, ""
+            if any(link.joint and link.joint.name == name for link in self._links):
+                name, follows = f"{side}_eyes_{turn}", both
+            joint = self._joint(name, _AXES[turn], follows)
             name = link_name(joint.name)
-            ring = mass.gimbal(self._measures.eye_radius_m)
-            self._links.append(Link(name, parent, place, joint=joint, inertia=ring))
-            parent, place = name, (0.0, 0.0, 0.0)
-        self._links.append(parts.eye(f"{side}_eye", parent, place, self._measures))
+            self._links.append(
+                Link(name, parent, place, joint=joint, inertia=mass.shell("gimbal", radius))
+            )
+            parent, place = name, ORIGIN
+        name = f"{side}_eye"
+        look = Visual(name, "eye", "eye", scale=radius)
+        self._links.append(Link(name, parent, place, inertia=mass.shell_of(look), visuals=(look,)))
 
     def _add_lid(self, name: str) -> None:
         """Add a lid whose edge meets the other lid's at the rig's shut angle."""
         side, which, _ = name.split("_")
         shut, wide = self._rig.lids[name]
-        opens = 1.0 if wide > shut else -1.0
-        up = opens if which == "upper" else -opens
-        meet = self._lid_meeting_rad(side)
+        upper = which == "upper"
+        up = 1.0 if upper == (wide > shut) else -1.0
+        rest = UPPER_REST if upper else LOWER_REST
+        joint = self._joint(name, (0.0, -up, 0.0))._replace(awake_rad=shut + rest * (wide - shut))
         # Elevation of the edge above the eye's equator with the joint at 0.
-        edge = meet - up * shut
-        opened = parts.awake_opening_rad(which == "upper", meet, abs(wide - shut))
-        awake = shut + copysign(opened, wide - shut)
-        joint = self._joint(name, (0.0, -up, 0.0))._replace(awake_rad=awake)
-        place = parts.eye_m(side, self._measures.interocular_m)
-        self._links.append(
-            parts.lid(link_name(name), HEAD, place, joint, self._measures, which == "upper", edge)
-        )
+        edge = self._lid_meeting_rad(side) - up * shut
+        look = lid_look(link_name(name), self._measures, upper, edge)
+        self._add_shell(joint, self._measures.scaled(_EYE, side), look)
+
+    def _add_face_part(self, name: str) -> None:
+        place, axis = hinge(name, self._measures)
+        joint = self._joint(name, axis)
+        if name in FACE_PARTS:
+            look = face_look(name, self._measures)
+            self._add_shell(joint, place, look._replace(p_m=sub(look.p_m, place)))
+        else:
+            inertia = mass.servo(0.3)
+            self._links.append(Link(link_name(name), HEAD, place, joint=joint, inertia=inertia))
+
+    def _add_shell(self, joint: LinkJoint, p_m: Vec3, look: Visual) -> None:
+        """Add a thin part of the head that a joint moves."""
+        inertia = mass.shell_of(look)
+        name = link_name(joint.name)
+        self._links.append(Link(name, HEAD, p_m, joint=joint, inertia=inertia, visuals=(look,)))
 
     def _lid_meeting_rad(self, side: str) -> float:
         """Return the elevation at which the lids of an eye meet."""
-        spans = [
-            abs(wide - shut)
-            for shut, wide in (
-                self._rig.lids.get(f"{side}_{which}_lid", (0.0, 0.0))
-                for which in ("upper", "lower")
-            )
-        ]
-        return parts.meeting_rad(spans[0], spans[1])
+        ends = (self._rig.lids.get(f"{side}_{one}_lid", (0.0, 0.0)) for one in ("upper", "lower"))
+        return meeting_rad(*(abs(wide - shut) for shut, wide in ends))
 
 
 def link_name(joint: str) -> str:

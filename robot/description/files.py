@@ -52,7 +52,7 @@ def description_files(
     named = description._replace(name=name)
     found: dict[str, bytes] = {}
     if "mjcf" in formats:
-        text, assets = mjcf(named, folder=MESHES, awake=True)
+        text, assets = mjcf(named, folder=MESHES)
         found[f"{name}.xml"] = text.encode()
         found["scene.xml" if name != "scene" else "scene_.xml"] = _SCENE.format(
             name=name, floor=FLOOR_M

@@ -4,60 +4,46 @@ A joint is a separate node between a link and its parent. Its rotation by the jo
 the axis in its extras moves its children. y is up, as glTF requires, below a root that turns z up.
 """
 
-from math import atan, tan
 from typing import Any
 
 import numpy as np
 import trimesh
 from PIL import Image
 from trimesh.exchange.gltf import export_glb
-from trimesh.transformations import quaternion_from_matrix
 from trimesh.visual.material import PBRMaterial
 
 from gazerig.gaze.angles import compose, turn_about
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.description.links import (
-    IDENTITY,
-    ORIGIN,
-    Description,
-    Finish,
-    Visual,
-)
+from gazerig.robot.description.links import IDENTITY, ORIGIN, ROUGHNESS, Description, Visual
 from gazerig.robot.description.texture import add_texture
+from gazerig.robot.model.frames import quaternion
 
-_ROUGHNESS: dict[Finish, float] = {
-    "skin": 0.7, "plastic": 0.45, "cloth": 0.95, "eye": 0.12, "dark": 1.0,
-}  # fmt: skip
 _Y_UP: Mat3 = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
 _ROOT = "world"
-_VERTICES, _FACES = 34962, 34963
-"""Use of a part of glTF's buffer."""
 
 
 def gltf(description: Description) -> bytes:
     """Return a description as a binary glTF file, with its lids open and all other joints at 0."""
     scene: Any = trimesh.Scene(base_frame=_ROOT)
     names = {_ROOT, *(link.name for link in description.links)}
-    names |= {f"{look.name}_mesh" for link in description.links for look in link.visuals}
     joints: dict[str, dict[str, Any]] = {}
-    poses: dict[str, dict[str, list[float]]] = {}
     for link in description.links:
         parent = link.parent or _ROOT
         R, p = (link.R, link.p_m) if link.parent else (_Y_UP, ORIGIN)
         if link.joint is not None:
             node = link.joint.name  # may have the name of a link
-            while node in names or node in joints:
+            while node in names:
                 node += "_"
             R = compose(R, turn_about(link.joint.axis, link.joint.awake_rad))
             scene.graph.update(frame_from=parent, frame_to=node, matrix=_matrix(R, p))
-            w, x, y, z = quaternion_from_matrix(_matrix(R, p)).tolist()  # type: ignore[no-untyped-call]
-            poses[node] = {"rotation": [x, y, z, w], "translation": list(p)}
-            joints[node] = {
+            w, x, y, z = quaternion(R)
+            extras = {
                 "joint": link.joint.name,
                 "axis": list(link.joint.axis),
                 "low_rad": link.joint.low_rad,
                 "high_rad": link.joint.high_rad,
             }
+            joints[node] = {"extras": extras, "rotation": [x, y, z, w], "translation": list(p)}
             parent, R, p = node, IDENTITY, ORIGIN
         scene.graph.update(frame_from=parent, frame_to=link.name, matrix=_matrix(R, p))
         for visual in link.visuals:
@@ -72,26 +58,9 @@ def gltf(description: Description) -> bytes:
     def complete(tree: dict[str, Any]) -> None:
         for node in tree["nodes"]:
             if node["name"] in joints:
-                node["extras"] = joints[node["name"]]
                 # Only a node without a matrix can be animated (glTF 2.0, 3.5.3).
                 node.pop("matrix", None)
-                node.update(poses[node["name"]])
-        # A camera of glTF looks along -z with y up; the optical frame looks along z with y down.
-        camera = description.camera
-        share = camera.width_px / camera.height_px
-        field_y = 2.0 * atan(tan(0.5 * camera.horizontal_field_rad) / share)
-        perspective = {"aspectRatio": share, "yfov": field_y, "znear": 0.01}
-        tree["cameras"] = [{"name": "camera", "type": "perspective", "perspective": perspective}]
-        view = {"name": "camera_view", "camera": 0, "rotation": [1.0, 0.0, 0.0, 0.0]}
-        tree["nodes"].append(view)
-        (optical,) = (node for node in tree["nodes"] if node["name"] == camera.optical)
-        optical.setdefault("children", []).append(len(tree["nodes"]) - 1)
-        # Mark the parts of the buffer as vertices or faces, which trimesh does not do.
-        views, accessors = tree["bufferViews"], tree["accessors"]
-        for primitive in (one for mesh in tree["meshes"] for one in mesh["primitives"]):
-            for accessor in primitive["attributes"].values():
-                views[accessors[accessor]["bufferView"]]["target"] = _VERTICES
-            views[accessors[primitive["indices"]]["bufferView"]]["target"] = _FACES
+                node.update(joints[node["name"]])
 
     exported: Any = export_glb(  # type: ignore[no-untyped-call]
         scene, include_normals=True, tree_postprocessor=complete
@@ -100,12 +69,12 @@ def gltf(description: Description) -> bytes:
 
 
 def _mesh(visual: Visual) -> Any:
-    mesh = add_texture(visual.painted)
+    mesh = add_texture(visual.painted())
     material = PBRMaterial(  # type: ignore[no-untyped-call]
         name=visual.name,
         baseColorTexture=Image.fromarray(mesh.image),
         metallicFactor=0.0,
-        roughnessFactor=_ROUGHNESS[visual.finish],
+        roughnessFactor=ROUGHNESS[visual.finish],
     )
     # trimesh counts v from below.
     uv = mesh.uv * (1.0, -1.0) + (0.0, 1.0)

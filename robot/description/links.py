@@ -6,12 +6,12 @@ are parallel to it while every joint is at 0.
 """
 
 from collections.abc import Mapping, Sequence
-from math import inf
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from gazerig.gaze.angles import add, compose, rotate, turn_about
-from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.description.mesh import Painted
+from gazerig.gaze.types import Floats, Mat3, Vec3
+from gazerig.robot.description.mesh import Painted, move_mesh, stored_shape
 
 IDENTITY: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ORIGIN: Vec3 = (0.0, 0.0, 0.0)
@@ -20,8 +20,10 @@ Pose = tuple[Mat3, Vec3]
 """R_parent_child and p_parent_child_m."""
 Finish = Literal["skin", "plastic", "cloth", "eye", "dark"]
 """Material of a surface; each viewer approximates it."""
-Layer = Literal["body", "lid"]
-ShapeKind = Literal["sphere", "ellipsoid", "capsule", "box"]
+ROUGHNESS: Mapping[Finish, float] = {
+    "skin": 0.7, "plastic": 0.45, "cloth": 0.95, "eye": 0.12, "dark": 1.0,
+}  # fmt: skip
+"""Of glTF: 0 is a mirror."""
 
 
 class Inertia(NamedTuple):
@@ -29,52 +31,52 @@ class Inertia(NamedTuple):
 
     mass_kg: float
     com_m: Vec3
-    tensor_kg_m2: Mat3
+    tensor_kg_m2: Floats
 
 
-class CollisionShape(NamedTuple):
-    """A simple body that represents a link in collisions.
+class Ellipsoid(NamedTuple):
+    """A simple body that represents a link in collisions: its centre and half axes."""
 
-    half_m: half axes of an ellipsoid or a box; radius of a sphere first; a capsule's radius and
-        half the length of its line, along its z axis
-    layer: lids collide only with lids, bodies with everything else
-    """
-
-    kind: ShapeKind
+    p_m: Vec3
     half_m: Vec3
-    p_m: Vec3 = ORIGIN
-    R: Mat3 = IDENTITY
-    layer: Layer = "body"
+
+
+@dataclass(frozen=True, eq=False)
+class OwnMesh:
+    """The user's own mesh, in metres."""
+
+    painted: Painted
 
 
 class Visual(NamedTuple):
-    """Painted mesh of a link; the name is unique in the description."""
+    """Visible shape of a link; the name is unique in the description.
+
+    shape: name of a stored shape, or the user's own mesh
+    scale: factor of its size, or one for each axis; a negative one mirrors it
+    """
 
     name: str
-    painted: Painted
+    shape: str | OwnMesh
     finish: Finish = "plastic"
     p_m: Vec3 = ORIGIN
     R: Mat3 = IDENTITY
+    scale: float | Vec3 = 1.0
 
-
-class LinkageFollower(NamedTuple):
-    """Joint that a linkage moves with another joint: its angle is ``ratio`` times the other's."""
-
-    joint: str
-    ratio: float = 1.0
+    def painted(self) -> Painted:
+        """Return its mesh, in metres."""
+        if isinstance(self.shape, OwnMesh):
+            return self.shape.painted
+        return move_mesh(stored_shape(self.shape), scale=self.scale)
 
 
 class ServoDrive(NamedTuple):
     """Servo as it acts at its joint, all values per rad of the joint.
 
     armature_kg_m2: inertia of its rotor at the output of the gear
-    friction_nm, damping_nm_s: dry and viscous friction of motor and gear
+    friction_nm: dry friction of motor and gear
+    damping_nm_s: viscous friction, and the loss of torque due to the motor's induced voltage
     kp_nm_rad, kv_nm_s: gains of its controller on the errors of position and speed
     force_nm: largest torque of its controller, at standstill
-    back_emf_nm_s: loss of torque due to the motor's induced voltage, per rad/s; none while it is
-        switched off
-    smoothing_s: time constant with which its controller adopts the speed of a goal
-    slew_nm_s: largest change of its controller's torque per second; inf: not limited
     """
 
     armature_kg_m2: float
@@ -83,15 +85,13 @@ class ServoDrive(NamedTuple):
     kp_nm_rad: float
     kv_nm_s: float
     force_nm: float
-    back_emf_nm_s: float
-    smoothing_s: float
-    slew_nm_s: float = inf
 
 
 class LinkJoint(NamedTuple):
     """The hinge between a link and its parent.
 
     name: name in the rig, or a separate one if it follows another joint
+    follows: joint of the rig that a linkage turns together with it, "" for none
     axis: unit vector in the link's frame; positive angles turn about it by the right-hand rule
     max_torque_nm: largest torque of the servo at the joint
     awake_rad: its angle while the head is awake and looks straight ahead
@@ -104,7 +104,7 @@ class LinkJoint(NamedTuple):
     high_rad: float
     max_speed_rad_s: float
     max_torque_nm: float
-    follows: LinkageFollower | None = None
+    follows: str = ""
     awake_rad: float = 0.0
     drive: ServoDrive | None = None
 
@@ -119,32 +119,27 @@ class Link(NamedTuple):
     joint: LinkJoint | None = None
     inertia: Inertia | None = None
     visuals: tuple[Visual, ...] = ()
-    collisions: tuple[CollisionShape, ...] = ()
+    collisions: tuple[Ellipsoid, ...] = ()
 
 
-class CameraFrame(NamedTuple):
-    """Camera: its links and its field of view.
+CAMERA, OPTICAL_FRAME = "camera_link", "camera_optical_frame"
+"""Links of the camera: x forward, y left, z up; x right, y down, z forward (as in ROS)."""
 
-    link: x forward, y left, z up; optical: x right, y down, z forward (as in ROS)
-    """
 
-    link: str
-    optical: str
+class CameraView(NamedTuple):
+    """Field of view of the camera, and the size of its frames."""
+
     horizontal_field_rad: float
     width_px: int
     height_px: int
 
 
 class Description(NamedTuple):
-    """A rig as a tree of links, parents first.
-
-    may_touch: pairs of links whose shapes overlap by construction
-    """
+    """A rig as a tree of links, parents first."""
 
     name: str
     links: tuple[Link, ...]
-    camera: CameraFrame
-    may_touch: tuple[tuple[str, str], ...] = ()
+    camera: CameraView
 
     @property
     def joints(self) -> tuple[LinkJoint, ...]:
@@ -152,27 +147,17 @@ class Description(NamedTuple):
         return tuple(link.joint for link in self.links if link.joint is not None)
 
     def link(self, name: str) -> Link:
-        """Return a link by its name.
-
-        Raises:
-            KeyError: no link has that name.
-        """
-        for link in self.links:
-            if link.name == name:
-                return link
-        raise KeyError(name)
-
-    def without_looks(self) -> "Description":
-        """Return the same mechanism without visual shapes."""
-        return self._replace(links=tuple(link._replace(visuals=()) for link in self.links))
+        """Return a link by its name."""
+        return next(link for link in self.links if link.name == name)
 
     def with_drives(self, drives: Mapping[str, ServoDrive]) -> "Description":
         """Return the description with the servos at its joints, by the joints' names."""
-        links = []
-        for link in self.links:
-            if link.joint is not None and link.joint.name in drives:
-                link = link._replace(joint=link.joint._replace(drive=drives[link.joint.name]))
-            links.append(link)
+        links = (
+            link._replace(joint=link.joint._replace(drive=drives.get(link.joint.name)))
+            if link.joint is not None
+            else link
+            for link in self.links
+        )
         return self._replace(links=tuple(links))
 
     def angles(self, names: Sequence[str], position_rad: Sequence[float]) -> dict[str, float]:
@@ -183,13 +168,7 @@ class Description(NamedTuple):
             position_rad: their angles; the other joints are at 0.
         """
         known = dict(zip(names, position_rad, strict=True))
-        found = {}
-        for joint in self.joints:
-            if joint.follows is None:
-                found[joint.name] = known.get(joint.name, 0.0)
-            else:
-                found[joint.name] = joint.follows.ratio * known.get(joint.follows.joint, 0.0)
-        return found
+        return {joint.name: known.get(joint.follows or joint.name, 0.0) for joint in self.joints}
 
     def poses(self, angles_rad: Mapping[str, float]) -> dict[str, Pose]:
         """Return R_world_link and p_world_link_m of every link.

@@ -3,84 +3,160 @@
 Lengths in metres, tensors about the centre of mass.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from math import dist
 
 import numpy as np
 
-from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.description.links import Inertia
+from gazerig.gaze.angles import add, scale, sub
+from gazerig.gaze.types import Floats, Vec3
+from gazerig.robot.description.links import ORIGIN, Description, Inertia, Link, Visual
+from gazerig.robot.description.parts import MIDDLE, HeadMeasures
 from gazerig.robot.model.mass_params import MassParams
 
-_PRINTED_KG_M3 = 1050.0
-"""Density of printed PLA or PETG with the usual fraction of air."""
-SHELL_M, _GLOBE_M, _LID_M = 1.6e-3, 1.6e-3, 1.2e-3
-"""Thickness of the skull's shell, of an eyeball and of a lid."""
 HEAD_KG, _REFERENCE_M = 0.6, 0.0619
 """Mass of a whole head (skull, servos, eyes, lids) with this distance between the eyes."""
 SERVO_KG = 0.023
 """Servo of the size of an XC330 or of models smaller than the STS3215."""
 _SERVO_HALF_M: Vec3 = (0.010, 0.013, 0.017)
 
+HEAD = "head"
+_FARTHEST = 2.0
+"""Largest distance of a centre of mass from the head's middle, in distances between the eyes."""
 _CONTENT_HALF: Vec3 = (1.5, 1.1, 0.6)
 """Half axes of a head's contents (servos, frame, counterweight), in distances between the eyes."""
-_SKULL = (47.15, (-0.831, 0.0, 0.110), ((65.81, 0.0, 8.78), (0.0, 72.79, 0.0), (8.78, 0.0, 54.48)))
-"""Mass, centre and tensor of a head's shell of that thickness, scaled to eyes 1 m apart."""
+# fmt: off
+_SHELLS: dict[str, tuple[float, ...]] = {
+    "skull": (47.15, -0.831, 0.0, 0.110, 65.81, 72.79, 54.48, 0.0, 8.78, 0.0),
+    "upper_lid": (
+        5.597414718302458, 0.3395310289236136, -1.6854745020226395e-06, 0.52706062858029,
+        2.4644923121741233, 1.4415620606338968, 2.8167452316134662,
+        6.1912980975475235e-06, 0.3838717928321496, 6.822040067578836e-06,
+    ),
+    "lower_lid": (
+        5.535733644653229, 0.335675177788879, 3.237347479623953e-07, -0.5329468791568047,
+        2.416523280923074, 1.4108556037100175, 2.7728786820774114,
+        -9.284339860683027e-07, -0.37247313412177463, 1.4134006783231593e-05,
+    ),
+    "jaw": (
+        3.2096232274322554, -0.02946125197536431, -4.8187510442486433e-05, -1.3573469669493914,
+        0.3780980113446686, 0.2876907857700745, 0.36723922569244616,
+        -9.794030661389545e-05, -0.06584911743707507, -0.00011073203571927051,
+    ),
+    "brow": (
+        0.2728615986476984, 0.13652300741508008, 0.4882072755658346, 0.6417407973683329,
+        0.009507683226817895, 0.0013691344540548954, 0.01007395756492994,
+        0.0028471382651842994, -7.182368496499894e-05, 0.0002976965711361344,
+    ),
+    "eye": (
+        21.11150263212341, 0.0, 0.0, 0.0, 14.074335088082274, 14.074335088082274, 14.074335088082274,
+        0.0, 0.0, 0.0,
+    ),
+    "gimbal": (
+        3.1667253948185117, 0.0, 0.0, 0.0, 1.5833626974092558, 1.5833626974092558,
+        3.1667253948185117, 0.0, 0.0, 0.0,
+    ),
+}
+# fmt: on
+"""Thin shells of printed PLA or PETG with the usual fraction of air (1050 kg/m3), scaled to eyes
+1 m apart; lids, eyes and the rings that carry eyes (15 % of their mass) to a radius of 1 m. Mass,
+centre, and xx, yy, zz, xy, xz, yz of the tensor. Skull and eyes are 1.6 mm thick, lids 1.2, others
+2."""
 
 
-def head_mass_kg(params: MassParams, interocular_m: float) -> float:
-    """Return the mass of the whole head: from the rig's file, or from its shapes.
+def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[Inertia]) -> Inertia:
+    """Return the inertia of the head without the links that it carries, in the head's frame.
 
-    Its shell grows with its surface, its mechanism does not.
+    Args:
+        params: mass parameters of the rig; the mass of its head includes all carried links.
+        measures: dimensions of the head.
+        carried: eyes, lids and all other carried links, in the head's frame.
     """
-    if params.head.mass_kg is not None:
-        return params.head.mass_kg
-    share = interocular_m / _REFERENCE_M
-    return HEAD_KG * (0.5 + 0.5 * share * share)
+    rest, unit = join_inertias(carried), measures.interocular_m
+    whole = params.head.mass_kg
+    if whole is None:
+        # The shell grows with its surface, the mechanism does not.
+        made = HEAD_KG * (0.5 + 0.5 * (unit / _REFERENCE_M) ** 2)
+        whole = max(made, 2.0 * rest.mass_kg)
+    kg, com = whole - rest.mass_kg, None
+    if params.head.com_mm is not None:
+        com = _from_pivot(params.head.com_mm, measures)
+        com = add(com, scale(sub(com, rest.com_m), rest.mass_kg / kg))
+    own = filled(shell("skull", unit), kg, unit, measures.scaled(MIDDLE), com)
+    weights = [
+        Inertia(one.mass_kg, _from_pivot(one.position_mm, measures), np.zeros((3, 3)))
+        for one in params.counterweights.values()
+    ]
+    return join_inertias((own, *weights)) if weights else own
+
+
+def mass_faults(
+    params: MassParams, measures: HeadMeasures, built: Description
+) -> Iterator[tuple[str, str]]:
+    """Find masses that are impossible for such a head: key in its file, and the fault.
+
+    Args:
+        params: mass parameters of the rig.
+        measures: dimensions of the head.
+        built: description of the same rig with the masses of its shapes.
+    """
+    wanted, names = params.head, [link.name for link in built.links]
+    rest_kg = sum(one.mass_kg for one in carried_links(built.links[names.index(HEAD) + 1 :]))
+    if wanted.mass_kg is not None and wanted.mass_kg <= 1.01 * rest_kg:
+        yield (
+            "mass.head.mass_kg",
+            f"the head weighs {wanted.mass_kg:g} kg with all it carries, and eyes, lids and other "
+            f"parts of it weigh {rest_kg:.3g} kg already",
+        )
+    elif wanted.com_mm is not None:
+        away = dist(_from_pivot(wanted.com_mm, measures), measures.scaled(MIDDLE))
+        if away > _FARTHEST * measures.interocular_m:
+            yield (
+                "mass.head.com_mm",
+                "this centre of mass is outside the head: give it ahead, left and above of the "
+                "neck's pitch axis, in mm",
+            )
+
+
+def carried_links(links: Iterable[Link]) -> list[Inertia]:
+    """Return the inertias of links that the head carries, in its frame, all joints at 0."""
+    at: dict[str, Vec3] = {HEAD: ORIGIN}
+    found = []
+    for link in links:
+        p = at[link.name] = add(at.get(link.parent or "", ORIGIN), link.p_m)
+        if link.inertia is not None:
+            found.append(link.inertia._replace(com_m=add(p, link.inertia.com_m)))
+    return found
+
+
+def _from_pivot(position_mm: Vec3, measures: HeadMeasures) -> Vec3:
+    return add(scale(position_mm, 1e-3), measures.pivot_m)
 
 
 def servo(times: float = 1.0) -> Inertia:
     """Return a servo with its bracket, as a box at the centre of its link."""
     mass = times * (SERVO_KG + 0.012)
     x, y, z = (half * half / 3.0 for half in _SERVO_HALF_M)
-    return Inertia(mass, (0.0, 0.0, 0.0), diagonal(mass * (y + z), mass * (x + z), mass * (x + y)))
+    return Inertia(mass, (0.0, 0.0, 0.0), np.diag((mass * (y + z), mass * (x + z), mass * (x + y))))
 
 
-def skull(interocular_m: float) -> Inertia:
-    """Return the shell of a head, of constant thickness, about the midpoint between the eyes."""
-    mass, com, tensor = _SKULL
-    unit = interocular_m
-    return Inertia(
-        mass * unit**2, _vector(np.array(com) * unit), matrix(np.array(tensor) * unit**4)
-    )
+def shell(name: str, unit_m: float) -> Inertia:
+    """Return a thin shell of constant thickness in the frame of its shape.
+
+    Args:
+        name: name of the shell.
+        unit_m: the distance between the eyes, or the radius of a lid or an ear.
+    """
+    mass, x, y, z, xx, yy, zz, xy, xz, yz = _SHELLS[name]
+    tensor = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))) * unit_m**4
+    return Inertia(mass * unit_m**2, scale((x, y, z), unit_m), tensor)
 
 
-def globe(radius_m: float) -> Inertia:
-    """Return a hollow eyeball about its centre."""
-    mass = 4.0 * np.pi * radius_m**2 * _GLOBE_M * _PRINTED_KG_M3
-    about = 2.0 / 3.0 * mass * radius_m**2
-    return Inertia(mass, (0.0, 0.0, 0.0), diagonal(about, about, about))
-
-
-def gimbal(radius_m: float) -> Inertia:
-    """Return the ring of wire and plastic that carries an eye, about its centre."""
-    mass = 0.15 * globe(radius_m).mass_kg
-    about = mass * radius_m**2
-    return Inertia(mass, (0.0, 0.0, 0.0), diagonal(0.5 * about, 0.5 * about, about))
-
-
-def sheet(vertices: Floats, faces: np.ndarray, thickness_m: float = _LID_M) -> Inertia:
-    """Return a thin plastic sheet, such as a lid or a skull's shell, by its triangles."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    masses = areas * thickness_m * _PRINTED_KG_M3
-    # Three points at the midpoints of its edges have the moments of a triangle.
-    points = np.concatenate(((a + b) / 2, (b + c) / 2, (c + a) / 2))
-    masses = np.tile(masses / 3.0, 3)
-    mass = float(masses.sum())
-    com = masses @ points / mass
-    off = points - com
-    second = (off * masses[:, None]).T @ off
-    return Inertia(mass, _vector(com), matrix(np.trace(second) * np.eye(3) - second))
+def shell_of(look: Visual) -> Inertia:
+    """Return the mass of a thin part in the frame of its link."""
+    factors = np.broadcast_to(look.scale, 3)
+    R = np.array(look.R) * np.sign(factors)
+    return in_parent_frame(shell(str(look.shape), abs(float(factors[0]))), R, look.p_m)
 
 
 def filled(
@@ -97,21 +173,15 @@ def filled(
     """
     rest = mass_kg - shell.mass_kg
     if rest <= 0.05 * mass_kg:  # a very large head has a thinner shell
-        thinner = scale_mass(shell, mass_kg)
-        return thinner if com_m is None else thinner._replace(com_m=com_m)
+        tensor = shell.tensor_kg_m2 * (mass_kg / shell.mass_kg)
+        return Inertia(mass_kg, shell.com_m if com_m is None else com_m, tensor)
     middle = middle_m
     if com_m is not None:
         moment = mass_kg * np.array(com_m) - shell.mass_kg * np.array(shell.com_m)
         middle = _vector(moment / rest)
     x, y, z = ((half * unit_m) ** 2 / 5.0 for half in _CONTENT_HALF)
-    tensor = diagonal(rest * (y + z), rest * (x + z), rest * (x + y))
+    tensor = np.diag((rest * (y + z), rest * (x + z), rest * (x + y)))
     return join_inertias((shell, Inertia(rest, middle, tensor)))
-
-
-def scale_mass(one: Inertia, mass_kg: float) -> Inertia:
-    """Return the same shape with another mass."""
-    share = mass_kg / one.mass_kg
-    return Inertia(mass_kg, one.com_m, matrix(np.array(one.tensor_kg_m2) * share))
 
 
 def join_inertias(parts: Iterable[Inertia]) -> Inertia:
@@ -121,34 +191,17 @@ def join_inertias(parts: Iterable[Inertia]) -> Inertia:
     com = sum((body.mass_kg * np.array(body.com_m) for body in bodies), np.zeros(3)) / mass
     tensor = np.zeros((3, 3))
     for body in bodies:
-        tensor += np.array(body.tensor_kg_m2) + _parallel_axis_tensor(
-            np.array(body.com_m) - com, body.mass_kg
-        )
-    return Inertia(mass, _vector(com), matrix(tensor))
+        off = np.array(body.com_m) - com  # the parallel-axis theorem
+        tensor += body.tensor_kg_m2 + body.mass_kg * ((off @ off) * np.eye(3) - np.outer(off, off))
+    return Inertia(mass, _vector(com), tensor)
 
 
-def in_parent_frame(one: Inertia, R: Mat3, p_m: Vec3) -> Inertia:
+def in_parent_frame(one: Inertia, R: Floats, p_m: Vec3) -> Inertia:
     """Return the inertia of a body in a parent frame, in which the body's frame has this pose."""
-    turn = np.array(R)
-    com = turn @ np.array(one.com_m) + p_m
-    return Inertia(one.mass_kg, _vector(com), matrix(turn @ np.array(one.tensor_kg_m2) @ turn.T))
-
-
-def diagonal(x: float, y: float, z: float) -> Mat3:
-    """Return a diagonal tensor with these moments."""
-    return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
-
-
-def _parallel_axis_tensor(off: Floats, mass_kg: float) -> Floats:
-    return np.asarray(mass_kg * ((off @ off) * np.eye(3) - np.outer(off, off)))
+    com = R @ one.com_m + p_m
+    return Inertia(one.mass_kg, _vector(com), R @ one.tensor_kg_m2 @ R.T)
 
 
 def _vector(values: Floats) -> Vec3:
     x, y, z = np.asarray(values, float).tolist()
     return x, y, z
-
-
-def matrix(values: Floats) -> Mat3:
-    """Return a NumPy matrix as rows."""
-    a, b, c = np.asarray(values, float)
-    return _vector(a), _vector(b), _vector(c)

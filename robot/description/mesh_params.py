@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from gazerig.params import Bounds
+from gazerig.robot.model.mass_params import PositionMm
 
-_Millimetres = Annotated[float, Bounds(-2000, 2000)]
 _Degrees = Annotated[float, Bounds(-180, 180)]
 
 
@@ -16,7 +16,7 @@ class MeshParams:
     # fmt: off
     file: Annotated[str, "path of an STL, OBJ, PLY, OFF, GLB or glTF file, relative to this file"]
     metres_per_unit: Annotated[float, Bounds(1e-6, 1000), "length of one unit of the file; 0.001: it is in millimetres"] = 0.001
-    position_mm: Annotated[tuple[_Millimetres, _Millimetres, _Millimetres],
+    position_mm: Annotated[PositionMm,
         "where the file's origin is in the link: ahead, left and above"] = (0.0, 0.0, 0.0)
     rotation_deg: Annotated[tuple[_Degrees, _Degrees, _Degrees],
         "how the file is turned in the link: to the left, up, right side down"] = (0.0, 0.0, 0.0)

@@ -1,21 +1,19 @@
 """A description as URDF, which ROS, Foxglove and most simulators read: text and its meshes. Pure.
 
-URDF has no ellipsoids and capsules. An ellipsoid is a scaled sphere of radius 1, a capsule a
-cylinder with a sphere at each end. Meshes are in the same folder with relative paths, so no package
-is needed.
+URDF has no ellipsoids: they are scaled meshes of a ball. Meshes are in the same folder with
+relative paths, so no package is needed.
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
+from math import atan2, cos, hypot, sin
 from typing import NamedTuple
 
-from gazerig.gaze.angles import add, rotate
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.description.links import IDENTITY, ORIGIN, CollisionShape, Description, Link
-from gazerig.robot.description.mesh import ellipsoid
-from gazerig.robot.description.mesh_files import mesh_files, numbers, plain_obj, roll_pitch_yaw
+from gazerig.robot.description.links import Description, Link, Visual
+from gazerig.robot.description.mesh_files import element, mesh_files
 
-_BALL = "ball_of_radius_1.obj"
+_BALL = Visual("ball_of_radius_1", "ball")
 
 
 class Urdf(NamedTuple):
@@ -35,36 +33,30 @@ def urdf(description: Description, folder: str = "meshes", *, looks: bool = True
     """
     root = ET.Element("robot", name=description.name)
     # For MuJoCo, which otherwise drops visual shapes and looks for meshes in the text's folder.
-    extension = ET.SubElement(root, "mujoco")
-    ET.SubElement(
-        extension, "compiler", meshdir=folder, discardvisual="false", fusestatic="false",
-        strippath="true",
+    element(
+        element(root, "mujoco"), "compiler", meshdir=folder, discardvisual="false",
+        fusestatic="false", strippath="true",
     )  # fmt: skip
     assets: dict[str, bytes] = {}
-    for link in description.links if looks else description.without_looks().links:
-        element = ET.SubElement(root, "link", name=link.name)
+    for link in description.links:
+        body = element(root, "link", name=link.name)
         if link.inertia is not None:
-            inertial = ET.SubElement(element, "inertial")
-            _place(inertial, link.inertia.com_m, IDENTITY)
-            ET.SubElement(inertial, "mass", value=numbers((link.inertia.mass_kg,)))
+            inertial = element(body, "inertial")
+            element(inertial, "origin", xyz=link.inertia.com_m)
+            element(inertial, "mass", value=link.inertia.mass_kg)
             (xx, xy, xz), (_, yy, yz), (_, _, zz) = link.inertia.tensor_kg_m2
-            moments = {"ixx": xx, "ixy": xy, "ixz": xz, "iyy": yy, "iyz": yz, "izz": zz}
-            ET.SubElement(inertial, "inertia", {key: numbers((m,)) for key, m in moments.items()})
-        for visual in link.visuals:
-            part = ET.SubElement(element, "visual", name=visual.name)
+            element(inertial, "inertia", ixx=xx, ixy=xy, ixz=xz, iyy=yy, iyz=yz, izz=zz)
+        for visual in link.visuals if looks else ():
+            part = element(body, "visual", name=visual.name)
             _place(part, visual.p_m, visual.R)
-            geometry = ET.SubElement(part, "geometry")
-            ET.SubElement(geometry, "mesh", filename=f"{folder}/{visual.name}.obj")
-            assets |= mesh_files(visual.name, visual.painted)
+            element(element(part, "geometry"), "mesh", filename=f"{folder}/{visual.name}.obj")
+            assets |= mesh_files(visual)
         for shape in link.collisions:
-            for kind, sizes, p_m in _pieces(shape):
-                part = ET.SubElement(element, "collision")
-                _place(part, p_m, shape.R)
-                geometry = ET.SubElement(part, "geometry")
-                if kind == "mesh":
-                    sizes["filename"] = f"{folder}/{_BALL}"
-                    assets[_BALL] = plain_obj("ball", ellipsoid((1.0, 1.0, 1.0), rings=11))
-                ET.SubElement(geometry, kind, sizes)
+            part = element(body, "collision")
+            element(part, "origin", xyz=shape.p_m)
+            ball = f"{folder}/{_BALL.name}.obj"
+            element(element(part, "geometry"), "mesh", filename=ball, scale=shape.half_m)
+            assets |= mesh_files(_BALL)
         if link.parent is not None:
             _add_joint(root, link, link.parent, {joint.name for joint in description.joints})
     ET.indent(root)
@@ -72,25 +64,13 @@ def urdf(description: Description, folder: str = "meshes", *, looks: bool = True
     return Urdf(f'<?xml version="1.0"?>\n{text}\n', assets)
 
 
-def _place(element: ET.Element, p_m: Vec3, R: Mat3) -> None:
-    if p_m != ORIGIN or R != IDENTITY:
-        ET.SubElement(element, "origin", xyz=numbers(p_m), rpy=numbers(roll_pitch_yaw(R)))
-
-
-def _pieces(shape: CollisionShape) -> Iterator[tuple[str, dict[str, str], Vec3]]:
-    """Yield the elements of URDF that form a shape: name, sizes and position."""
-    a, b, _ = shape.half_m
-    if shape.kind == "box":
-        yield "box", {"size": numbers(2.0 * half for half in shape.half_m)}, shape.p_m
-    elif shape.kind == "sphere":
-        yield "sphere", {"radius": numbers((a,))}, shape.p_m
-    elif shape.kind == "ellipsoid":
-        yield "mesh", {"scale": numbers(shape.half_m)}, shape.p_m
-    else:
-        yield "cylinder", {"radius": numbers((a,)), "length": numbers((2.0 * b,))}, shape.p_m
-        for end in (-b, b):
-            place = add(shape.p_m, rotate(shape.R, (0.0, 0.0, end)))
-            yield "sphere", {"radius": numbers((a,))}, place
+def _place(parent: ET.Element, p_m: Vec3, R: Mat3) -> None:
+    """Add a pose; its angles turn about fixed x, y and z axes, in this order."""
+    (a, b, c), (d, e, f), (g, _, _) = R
+    yaw, pitch = atan2(d, a), atan2(-g, hypot(a, d))
+    # From the rotation without yaw, so that it is also valid if pitch is a right angle.
+    s, k = sin(yaw), cos(yaw)
+    element(parent, "origin", xyz=p_m, rpy=(atan2(s * c - k * f, k * e - s * b), pitch, yaw))
 
 
 def _add_joint(root: ET.Element, link: Link, parent: str, taken: Collection[str]) -> None:
@@ -98,21 +78,19 @@ def _add_joint(root: ET.Element, link: Link, parent: str, taken: Collection[str]
     name, kind = (f"{link.name}_fixed", "fixed") if joint is None else (joint.name, "revolute")
     while joint is None and name in taken:
         name += "_"
-    element = ET.SubElement(root, "joint", name=name, type=kind)
-    ET.SubElement(element, "parent", link=parent)
-    ET.SubElement(element, "child", link=link.name)
-    _place(element, link.p_m, link.R)
-    if joint is not None:
-        ET.SubElement(element, "axis", xyz=numbers(joint.axis))
-        ET.SubElement(
-            element, "limit", lower=numbers((joint.low_rad,)), upper=numbers((joint.high_rad,)),
-            effort=numbers((joint.max_torque_nm,)), velocity=numbers((joint.max_speed_rad_s,)),
-        )  # fmt: skip
-        if joint.drive is not None:
-            ET.SubElement(
-                element, "dynamics", damping=numbers((joint.drive.damping_nm_s,)),
-                friction=numbers((joint.drive.friction_nm,)),
-            )  # fmt: skip
-        if joint.follows is not None:
-            leader, ratio = joint.follows
-            ET.SubElement(element, "mimic", joint=leader, multiplier=numbers((ratio,)), offset="0")
+    hinge = element(root, "joint", name=name, type=kind)
+    element(hinge, "parent", link=parent)
+    element(hinge, "child", link=link.name)
+    _place(hinge, link.p_m, link.R)
+    if joint is None:
+        return
+    element(hinge, "axis", xyz=joint.axis)
+    element(
+        hinge, "limit", lower=joint.low_rad, upper=joint.high_rad,
+        effort=joint.max_torque_nm, velocity=joint.max_speed_rad_s,
+    )  # fmt: skip
+    if joint.drive is not None:
+        drive = joint.drive
+        element(hinge, "dynamics", damping=drive.damping_nm_s, friction=drive.friction_nm)
+    if joint.follows:
+        element(hinge, "mimic", joint=joint.follows, multiplier="1", offset="0")

@@ -238,6 +238,10 @@ class JointParams:
         """Return the servo position at 0 deg, in the unit of its model."""
         return self.zero_step if self.zero_step is not None else self.model_facts.middle
 
+    def shaft_turns(self) -> float:
+        """Return the highest number of shaft turns per turn of the joint."""
+        return self.make_linkage().steepest * 2.0 * pi / self.model_facts.steps_per_turn
+
     def make_linkage(self) -> Linkage:
         """Build the linkage between servo and joint.
 

@@ -22,14 +22,13 @@ ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 class MovingBody(NamedTuple):
     """Links that move together, in the frame of the joint that turns them.
 
-    joint, ratio, axis: the rig's joint, rotation per rotation of that joint, and axis
+    joint, axis: the joint, and its axis
     parent: number of the body that carries it; the first one has no parent
     R_parent, p_parent_m: pose in the parent with the joint at 0
     mass_kg, moment_kg_m: mass, and mass times its centre
     """
 
     joint: str
-    ratio: float
     axis: Vec3
     parent: int
     R_parent: Mat3
@@ -41,7 +40,7 @@ class MovingBody(NamedTuple):
 def weight_nm(bodies: Sequence[MovingBody], angles_rad: Mapping[str, float]) -> dict[str, float]:
     """Return the torque of the weight at each joint of some bodies; omitted joints are at 0."""
     turns = [
-        compose(one.R_parent, turn_about(one.axis, one.ratio * angles_rad.get(one.joint, 0.0)))
+        compose(one.R_parent, turn_about(one.axis, angles_rad.get(one.joint, 0.0)))
         for one in bodies
     ]
     masses = [one.mass_kg for one in bodies]
@@ -57,5 +56,5 @@ def weight_nm(bodies: Sequence[MovingBody], angles_rad: Mapping[str, float]) -> 
         a, b, c = rotate_back(turn, up[one.parent])
         up.append((a, b, c))
         torque = dot(one.axis, (y * c - z * b, z * a - x * c, x * b - y * a))
-        found[one.joint] = found.get(one.joint, 0.0) - one.ratio * GRAVITY_M_S2 * torque
+        found[one.joint] = found.get(one.joint, 0.0) - GRAVITY_M_S2 * torque
     return found

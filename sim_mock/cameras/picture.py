@@ -17,17 +17,14 @@ from numpy.typing import NDArray
 from gazerig.drivers.types import ImageArray
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.mesh import Painted, cap, lathe, paint
-from gazerig.robot.description.person_shape import LOOKS, head_parts, open_right_hand, torso
+from gazerig.robot.description.mesh import Painted, paint, stored_shape
+from gazerig.robot.description.people import SHIRTS, features, part_of, torso
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 _NEAREST_M = 0.06
 """Nothing nearer is drawn."""
-_FINE, _COARSE, _NEAR_M = 0.4, 0.28, 0.9
-"""Fineness of the heads of people who are near and far, and the distance between these."""
-_HAND_ROWS, _CHEST_M, _HAND_M = 26, 0.75, 0.1
-_SLEEVE_M, _WRIST_M = 0.052, 0.028
+_CHEST_M, _HAND_M = 0.75, 0.1
 _SHOULDER_M = np.array((0.10, 0.19, -0.17))
 """Shoulder from the tip of the nose: backwards, to the side, and up."""
 _SPINE_M, _DARKER = -0.117, 0.85
@@ -97,7 +94,7 @@ def _person(person: ScenePerson, number: int, eye_m: Floats) -> list[_Solid]:
     R_head = np.array(rotation((*person.face_yaw_pitch_rad, 0.0)))
     to_eye = eye_m - place
     away_m = float(np.linalg.norm(to_eye))
-    solid, features = _head(number, _FINE if away_m < _NEAR_M else _COARSE)
+    solid, features = _head(number)
     # The chest is drawn before the head in any case: the neck is in its collar.
     chest = _Solid(_chest(number), _R_towards(to_eye), place, away_m + 0.01)
     found = [chest, _Solid(solid, R_head, place, away_m)]
@@ -107,22 +104,21 @@ def _person(person: ScenePerson, number: int, eye_m: Floats) -> list[_Solid]:
 
 
 @lru_cache(maxsize=8)
-def _head(number: int, fineness: float) -> tuple[_Shape, _Shape]:
+def _head(number: int) -> tuple[_Shape, _Shape]:
     """Return skin and hair, and the features of the face on them."""
-    solid, features = head_parts(number, fineness)
-    return _flat(solid), _flat(features)
+    return _flat(part_of(number, "head")), _flat(features(number))
 
 
 @lru_cache(maxsize=8)
 def _chest(number: int) -> _Shape:
     """Return a chest in a checked shirt."""
-    return _pattern(torso(number, _CHEST_M, 28), _SPINE_M, 7.0, 9.0)
+    return _pattern(torso(number, _CHEST_M), _SPINE_M, 7.0, 9.0)
 
 
 @lru_cache(maxsize=8)
 def _palm(number: int) -> _Shape:
     """Return an open hand of radius 1."""
-    return _pattern(open_right_hand(LOOKS[number % len(LOOKS)], _HAND_ROWS), 0.0, 5.0, 7.0)
+    return _pattern(part_of(number, "hand"), 0.0, 5.0, 7.0)
 
 
 def _pattern(plain: Painted, axis_x_m: float, around: float, along: float) -> _Shape:
@@ -139,7 +135,6 @@ def _pattern(plain: Painted, axis_x_m: float, around: float, along: float) -> _S
 def _flat(painted: Painted) -> _Shape:
     """Return a painted mesh with one normal and colour for each two triangles of its grids."""
     vertices, triangles = painted.mesh
-    assert painted.normals is not None
     first, second = triangles[::2], triangles[1::2]
     # A mirrored mesh has the corners of each triangle in the opposite order.
     last = np.where(second[:, 2] == first[:, 2], second[:, 0], second[:, 2])
@@ -183,7 +178,7 @@ def _R_towards(way: Floats) -> Floats:
 @lru_cache(maxsize=1)
 def _ball() -> _Shape:
     """Return a ball of radius 1 in six coloured sectors about x, so that its turns are visible."""
-    ball = paint(cap(1.0, pi, 9, 24), (96, 150, 200))
+    ball = paint(stored_shape("ball").mesh, (96, 150, 200))
     _, y, z = ball.mesh.vertices.T
     ball.colours[np.sin(3.0 * np.arctan2(z, y)) > 0.0] = (238, 206, 120)
     return _flat(ball)
@@ -192,10 +187,7 @@ def _ball() -> _Shape:
 @lru_cache(maxsize=8)
 def _sleeve(number: int) -> _Shape:
     """Return an arm of length 1 along z; the radius is in metres."""
-    share = np.linspace(0.0, 1.0, 17)
-    tube = zip(_SLEEVE_M + share * (_WRIST_M - _SLEEVE_M), share, strict=True)
-    profile = [(0.0, -0.05), (0.7 * _SLEEVE_M, -0.03), *tube]
-    limb = paint(lathe(profile, around=16), LOOKS[number % len(LOOKS)].shirt)
+    limb = paint(stored_shape("sleeve").mesh, SHIRTS[number % len(SHIRTS)])
     return _pattern(limb, 0.0, 4.0, 9.0 * pi)
 
 

@@ -110,7 +110,7 @@ class PersonScript:
 
     # fmt: off
     start: Annotated[str, "the place where the round begins and ends; on a seat the person sits"]
-    look: Annotated[int, Bounds(0, 7), "choice of face, hair and clothes"] = 0
+    look: Annotated[int, Bounds(0, 1), "face and hair: 0 short, 1 long"] = 0
     stature_m: Annotated[float, Bounds(0.9, 2.1), "height of the standing person"] = 1.72
     gloves: Annotated[bool, "whether the person wears boxing gloves"] = False
     looks_at: Annotated[str, "gaze target before the first look_at: a person, a place or head"] = HEAD

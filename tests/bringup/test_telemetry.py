@@ -30,7 +30,7 @@ from gazerig.features.bringup.telemetry import (
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.track_file import TOLERANCE_DEG, track_text, write_track
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.mass_params import LinkMassParams, MassParams
+from gazerig.robot.model.mass_params import HeadMassParams, MassParams
 from gazerig.robot.model.track_fit import track_motions
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -183,7 +183,7 @@ class HandBench:
 
     def __init__(self, rig: Rig) -> None:
         # Its head is balanced, so that the limp neck stays where the hand has turned it.
-        balanced = MassParams(head=LinkMassParams(com_mm=(0.0, 0.0, 0.0)))
+        balanced = MassParams(head=HeadMassParams(com_mm=(0.0, 0.0, 0.0)))
         self.rig = EmulatedRig(replace(rig, mass=balanced))
         self.port = self.rig.ports[""]
         self.port.setBaudRate(rig.bus.section.baud)

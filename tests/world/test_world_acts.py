@@ -38,7 +38,7 @@ ARM_ACTS = ("wave", "point", "reach", "push", "punch", "feint")
 
 @cache
 def figures(acts: tuple[Act, ...], start: str = "behind", *, cup: bool = False) -> Figures:
-    people = {"anna": PersonScript(start, acts=acts), "ben": PersonScript("chair_left", look=4)}
+    people = {"anna": PersonScript(start, acts=acts), "ben": PersonScript("chair_left", look=1)}
     things = {"cup": ThingScript("anna")} if cup else {}
     return Figures(SceneScript(people, round_s=ROUND_S, things=things), 2)
 

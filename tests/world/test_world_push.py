@@ -1,6 +1,5 @@
 """A pushed head yields within its torque limits and returns; registers show it."""
 
-from math import degrees, radians
 from pathlib import Path
 
 import pytest
@@ -54,22 +53,6 @@ def test_servos_yield_within_their_torque_limits() -> None:
     bench.pass_ms(280)
     assert abs(bench.world.joints_rad()["neck_roll"]) > 0.3
     assert 0.8 < abs(roll.shaft.effort) <= 1.01
-
-
-def test_upper_and_lower_lids_hold_each_other_off() -> None:
-    """Both are sent beyond where they meet: they touch, strain and stay apart."""
-    bench = WorldBench("maker")
-    wanted = {"left_upper_lid": -24.0, "left_lower_lid": -12.0}
-    for name, angle in wanted.items():
-        joint = bench.rig.joints[name]
-        bench.devices[""].channels[joint.id].set_target(round(joint.steps(radians(angle))))
-    bench.pass_ms(500)
-    for name, angle in wanted.items():
-        assert degrees(bench.world.joints_rad()[name]) > angle + 2.0
-        assert bench.servos[name].is_resting
-    assert (
-        sum(degrees(bench.world.joints_rad()[name]) for name in wanted) > -29.5
-    )  # they meet at -28
 
 
 # --- as a command

@@ -16,9 +16,9 @@ from gazerig.features.world.room import HOME
 from gazerig.features.world.run.run_world import rig_in_world, world_scene
 from gazerig.features.world.shapes import SpecShapes, shapes_of
 from gazerig.features.world.world_spec import WorldSpec
+from gazerig.robot.dashboard.feed.world_shapes import WorldPart
 from gazerig.robot.description.mesh import Painted
 from gazerig.robot.description.texture import TexturedMesh
-from gazerig.robot.description.world_shapes import WorldPart
 
 pytestmark = pytest.mark.usefixtures("mujoco")
 WORLDS = sorted(

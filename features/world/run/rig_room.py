@@ -26,7 +26,7 @@ from gazerig.robot.app.run_bus import (
     ideal_run_bus,
     in_process_run_bus,
 )
-from gazerig.robot.description.world_shapes import WorldShapes
+from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraParams
 from gazerig.sim_mock.pty.client import PtyBuses

@@ -32,9 +32,9 @@ from gazerig.robot.dashboard.feed.page_process import (
     VALUES,
 )
 from gazerig.robot.dashboard.feed.snapshot import RunState, ShownRig, SnapshotBuilder
+from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
 from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES
 from gazerig.robot.description.build import RigShape
-from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.model.scene_view import PinholeView, SceneView

@@ -5,6 +5,7 @@ graphics card does not have to light every pixel of every frame.
 """
 
 import json
+import struct
 from math import pi
 from typing import Any, Final, NamedTuple
 
@@ -14,14 +15,11 @@ import viser
 from PIL import Image
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.description.glb_file import join_glb
 from gazerig.robot.description.mesh import (
     Colour,
     Mesh,
     Painted,
-    lathe,
-    smooth_normals,
-    uniform_colours,
+    stored_shape,
 )
 from gazerig.robot.description.texture import TexturedMesh
 
@@ -124,7 +122,7 @@ def painted_glb(painted: Painted, finish: Finish, pose: Floats | None = None) ->
     rgba[:, :3] = _to_linear(rgba[:, :3])
     gain = 1.0
     by_browser = finish.roughness < 1.0
-    if finish.is_lit and not by_browser and normals is not None:
+    if finish.is_lit and not by_browser:
         rgba[:, :3] = shade_colours(
             rgba[:, :3], normals if pose is None else normals @ pose.T, finish
         )
@@ -141,11 +139,8 @@ def painted_glb(painted: Painted, finish: Finish, pose: Floats | None = None) ->
     }
     if colours.shape[1] == 4:
         material["alphaMode"] = "BLEND"
-    if not by_browser:
-        normals = None
-    elif normals is None:
-        normals = smooth_normals(mesh)
-    return glb_file(mesh, np.rint(255.0 * rgba).astype(np.uint8), normals, material)
+    bytes_rgba = np.rint(255.0 * rgba).astype(np.uint8)
+    return glb_file(mesh, bytes_rgba, normals if by_browser else None, material)
 
 
 def shade_colours(colours: Floats, normals: Floats, finish: Finish) -> Floats:
@@ -226,18 +221,19 @@ def glb_file(
     }
     if used := sorted(material["extensions"]):
         tree["extensionsUsed"] = used
-    return join_glb(json.dumps(tree, separators=(",", ":")).encode(), data)
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    body = struct.pack("<I4s", len(text), b"JSON") + text
+    body += struct.pack("<I4s", len(data), b"BIN\0") + data
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
-def glow_disc(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
+def glow_disc(inner: tuple[int, int, int, int]) -> Painted:
     """Return a flat disc of radius 1, facing up, that fades out from its centre."""
-    radius = np.linspace(1.0, 0.0, rings)
-    mesh = lathe([(r, 0.0) for r in radius.tolist()])
-    alpha = np.repeat(
-        (0.5 + 0.5 * np.cos(pi * radius)) ** 1.3 * inner[3], len(mesh.vertices) // rings
-    )
-    colours = np.column_stack((uniform_colours(mesh, inner[:3]), alpha))
-    return Painted(mesh, colours, np.tile((0.0, 0.0, 1.0), (len(mesh.vertices), 1)))
+    disc = stored_shape("disc")
+    radius = np.hypot(*disc.mesh.vertices[:, :2].T)
+    alpha = (0.5 + 0.5 * np.cos(pi * radius)) ** 1.3 * inner[3]
+    return disc._replace(colours=np.column_stack((np.tile(inner[:3], (len(alpha), 1)), alpha)))
 
 
 def add_lights(scene: viser.SceneApi) -> None:

@@ -21,11 +21,16 @@ from gazerig.robot.dashboard.view.glb import (
 )
 from gazerig.robot.dashboard.view.scene_node import set_pose
 from gazerig.robot.description import links
-from gazerig.robot.description.build import SIDES, RigShape, describe
-from gazerig.robot.description.head_shape import HeadMeasures, measures_of
-from gazerig.robot.description.links import Description, Link
+from gazerig.robot.description.build import RigShape, describe
+from gazerig.robot.description.links import CAMERA, Description
 from gazerig.robot.description.mesh import Colour
-from gazerig.robot.description.parts import FLOOR_M, meeting_rad
+from gazerig.robot.description.parts import (
+    FLOOR_M,
+    SIDES,
+    HeadMeasures,
+    measures_of,
+    meeting_rad,
+)
 from gazerig.robot.model.frames import CameraParams, quaternion
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, GeometryParams
@@ -92,7 +97,7 @@ class HeadView:
         self._seen: tuple[tuple[str, ...], HeadMeasures] | None = None
         self._description: Description | None = None
         self._root = scene.add_frame("/rig", show_axes=False)
-        self._shade = self._add("/shade", painted_glb(glow_disc((20, 24, 34, 140), 10), FLAT))
+        self._shade = self._add("/shade", painted_glb(glow_disc((20, 24, 34, 140)), FLAT))
         self._sights: list[viser.LineSegmentsHandle] = []
         self._colour = _SIGHT["fixate"]
         self.lid_edges = LidEdges({}, {})
@@ -127,7 +132,7 @@ class HeadView:
             if link.joint is not None:
                 R = compose(link.R, turn_about(link.joint.axis, angles[link.joint.name]))
                 set_pose(self.links[link.name].frame, link.p_m, quaternion(R))
-        for look in self.links[description.camera.link].looks:
+        for look in self.links[CAMERA].looks:
             look.visible = camera
         self._shade.visible = not self.on_table
         colour = _SIGHT.get(snapshot.phase, _SIGHT["fixate"])
@@ -179,7 +184,7 @@ class HeadView:
         for link in description.links:
             node = self.links[link.name]
             set_pose(node.frame, link.p_m, quaternion(link.R))
-            if before is not None and _look_alike(before.link(link.name), link):
+            if before is not None and before.link(link.name).visuals == link.visuals:
                 continue
             while node.looks:
                 node.looks.pop().remove()
@@ -188,7 +193,7 @@ class HeadView:
                 moved = link.joint.name if link.joint is not None else ""
                 if look.name.endswith("still_lid") or "lower_lid" in moved:
                     R_lit = _LIT_LOWER_LID
-                data = painted_glb(look.painted, _FINISHES[look.finish], np.array(R_lit))
+                data = painted_glb(look.painted(), _FINISHES[look.finish], np.array(R_lit))
                 handle = self._add(f"{paths[link.name]}/look_{look.name}", data)
                 handle.position, handle.wxyz = look.p_m, quaternion(look.R)
                 node.looks.append(handle)
@@ -197,16 +202,6 @@ class HeadView:
         if base.visuals:
             x, y, _ = base.visuals[0].p_m
             set_pose(self._shade, (x, y, FLOOR_M + 0.001))
-
-
-def _look_alike(one: Link, other: Link) -> bool:
-    """Return whether two links look alike in their own frames."""
-    return len(one.visuals) == len(other.visuals) and all(
-        a._replace(painted=b.painted) == b
-        and np.array_equal(a.painted.mesh.vertices, b.painted.mesh.vertices)
-        and np.array_equal(a.painted.colours, b.painted.colours)
-        for a, b in zip(one.visuals, other.visuals, strict=True)
-    )
 
 
 def lid_angles(

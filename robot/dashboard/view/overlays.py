@@ -12,9 +12,8 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.feed.live_feed import OverlayChoices
 from gazerig.robot.dashboard.view.head_view import LidEdges
 from gazerig.robot.dashboard.view.scene_node import pitch_up, rotation_to, set_pose
-from gazerig.robot.description.build import SIDES
-from gazerig.robot.description.head_shape import EYE_RADIUS, measures_of, surface
-from gazerig.robot.description.mesh import Colour, Mesh, grid, lid, ring
+from gazerig.robot.description.mesh import Colour, Mesh, stored_shape
+from gazerig.robot.description.parts import EYE_RADIUS, SIDES, measures_of
 from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.types import CommandedPose, Snapshot
 
@@ -121,8 +120,6 @@ def field_edge(*, left: bool) -> Floats:
 
 _GHOST: Colour = (70, 110, 255)
 _SIGHT = 5.6  # length of its lines of sight, in distances between the eyes
-# In distances between the eyes: the ghost's skin is outside the rig's; otherwise both would flicker
-_SWELL = 0.04
 _IRIS_RAD = radians(29.0)
 _APART = radians(1.5)  # of the head's axes: less would only tint the rig's own shell
 
@@ -142,9 +139,7 @@ class CommandedPoseView:
         # Elements with a size, and their distance ahead in their frame, in eye distances.
         self._sized: list[tuple[viser.MeshHandle | viser.LineSegmentsHandle, float]] = []
         self._frame = scene.add_frame("/ghost", show_axes=False, visible=False)
-        points, normals = (array[::3, ::3] for array in surface())
-        shell = grid(points + _SWELL * normals, closed=True)
-        self._shell = self._add("/ghost/shell", shell, 0.2)
+        self._shell = self._add("/ghost/shell", stored_shape("shell").mesh, 0.2)
         self._eyes = [self._add_eye(side) for side in SIDES]
         self._joints: tuple[str, ...] = ()
         self._unit = 0.0
@@ -166,9 +161,10 @@ class CommandedPoseView:
         """Add a ring for the iris with a line of sight, and the edges of the lids."""
         name = f"/ghost/eye_{side}"
         ball = self._scene.add_frame(name, show_axes=False)
-        iris = ring(1.12 * EYE_RADIUS * float(np.sin(_IRIS_RAD)), 0.012)
+        iris, faces = stored_shape("ring").mesh
+        iris = iris * (1.12 * EYE_RADIUS * float(np.sin(_IRIS_RAD)))
         ahead = 1.12 * EYE_RADIUS * float(np.cos(_IRIS_RAD))
-        self._add(f"{name}/iris", iris, 0.8, ahead)
+        self._add(f"{name}/iris", Mesh(iris, faces), 0.8, ahead)
         line = np.array((((EYE_RADIUS, 0.0, 0.0), (_SIGHT, 0.0, 0.0)),))
         sight = self._scene.add_line_segments(
             f"{name}/sight", line, _GHOST, thickness=1.0, thickness_units="screen"
@@ -178,9 +174,8 @@ class CommandedPoseView:
             self._scene.add_frame(f"/ghost/{name}_{side}", show_axes=False)
             for name in ("lid", "lower_lid")
         )
-        for frame, sweep_deg in ((upper, 14.0), (lower, -9.0)):
-            edge = lid(1.14 * EYE_RADIUS, radians(sweep_deg))
-            self._add(f"{frame.name}/edge", edge, 0.45)
+        for frame, which in ((upper, "upper"), (lower, "lower")):
+            self._add(f"{frame.name}/edge", stored_shape(f"{which}_lid_edge").mesh, 0.45)
         return _CommandedEye(side, ball, upper, lower)
 
     def show(self, snapshot: Snapshot | None, edges: LidEdges) -> None:

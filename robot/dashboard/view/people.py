@@ -8,9 +8,9 @@ import viser
 from gazerig.gaze.types import PARTS, Face, Floats, Vec3
 from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glow_disc, painted_glb
 from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose, set_rotation
-from gazerig.robot.description.mesh import Colour, Mesh, cap, ring
+from gazerig.robot.description.mesh import Colour, stored_shape
 from gazerig.robot.description.parts import FLOOR_M
-from gazerig.robot.description.person_shape import LOOKS, hand, head, torso
+from gazerig.robot.description.people import SHIRTS, head, part_of, torso
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.types import SeenBody, Snapshot
@@ -24,16 +24,15 @@ _FOUND: Colour = (40, 120, 255)
 """Colour of marks of detected faces and bodies on people of a simulated world."""
 _OUTLINE_M, _OUTLINE_MIDDLE_M = 0.115, np.array((-0.02, 0.0, 0.01))
 """Radius and centre of the line around a face, from the nose, m."""
-_FINENESS = 0.8
 _CHEST_M = 0.34
-_LABEL_ABOVE_M, _BEHIND_M = 0.155, 0.11
+_LABEL_ABOVE_M, _BEHIND_M, _HALO_M = 0.155, 0.11, 0.019
 _LEFT_EYE, _RIGHT_EYE, _NOSE = (PARTS.index(part) for part in ("LE", "RE", "N"))
 
 
-@lru_cache(maxsize=len(LOOKS))
-def _person_glb(look: int) -> tuple[bytes, bytes]:
+@lru_cache(maxsize=len(SHIRTS))
+def _person_glb(number: int) -> tuple[bytes, bytes]:
     """Return the head and chest of a person as files for browsers."""
-    return painted_glb(head(look, _FINENESS), SKIN), painted_glb(torso(look, _CHEST_M), CLOTH)
+    return painted_glb(head(number), SKIN), painted_glb(torso(number, _CHEST_M), CLOTH)
 
 
 class _Shadow:
@@ -42,7 +41,7 @@ class _Shadow:
     def __init__(self, scene: viser.SceneApi, name: str, radius_m: float) -> None:
         self._spot = scene.add_glb(
             name,
-            painted_glb(glow_disc((20, 24, 34, 96), 8), FLAT),
+            painted_glb(glow_disc((20, 24, 34, 96)), FLAT),
             scale=radius_m,
             cast_shadow=False,
             receive_shadow=False,
@@ -60,7 +59,7 @@ class _Person:
 
     def __init__(self, scene: viser.SceneApi, frame: str, face: Face) -> None:
         self._shade = _Shadow(scene, f"/shades/{face.id}", 0.3)
-        shown, chest = _person_glb((face.id - 1) % len(LOOKS))
+        shown, chest = _person_glb((face.id - 1) % len(SHIRTS))
         self._head = scene.add_glb(f"{frame}/head", shown, cast_shadow=False, receive_shadow=False)
         self._chest = scene.add_glb(
             f"/chests/{face.id}", chest, cast_shadow=False, receive_shadow=False
@@ -88,9 +87,9 @@ class _Outline:
     """Line around a detected face, used if the world draws the person."""
 
     def __init__(self, scene: viser.SceneApi, frame: str) -> None:
-        line = ring(_OUTLINE_M, 0.0025)
+        line, faces = stored_shape("thin_ring").mesh
         self._line = scene.add_mesh_simple(
-            f"{frame}/outline", line.vertices, line.faces, color=_FOUND, side="double"
+            f"{frame}/outline", _OUTLINE_M * line, faces, color=_FOUND, side="double"
         )
 
     def show(self, face: Face, nose_m: Floats) -> None:
@@ -118,14 +117,12 @@ class _FaceView:
         self._shape = _Outline(scene, self._name) if marks else _Person(scene, self._name, face)
         self._size = 0.0
         self._parts: list[viser.FrameHandle] = []
-        self._halo = self._add("halo", ring(0.019, 0.0022), _TARGET)
+        halo, faces = stored_shape("ring").mesh
+        self._halo = scene.add_mesh_simple(
+            f"{self._name}/halo", _HALO_M * halo, faces, color=_TARGET, side="double"
+        )
         self._label = scene.add_label(
             f"{self._name}/label", face_label(face), anchor="bottom-center"
-        )
-
-    def _add(self, name: str, mesh: Mesh, colour: Colour) -> viser.MeshHandle:
-        return self._scene.add_mesh_simple(
-            f"{self._name}/{name}", mesh.vertices, mesh.faces, color=colour, side="double"
         )
 
     def show(self, face: Face, p_world_target_m: Vec3, parts: bool) -> None:
@@ -146,7 +143,7 @@ class _FaceView:
             for part in PARTS:
                 path = f"{self._name}/{part}"
                 self._parts.append(self._scene.add_frame(path, show_axes=False))
-                self._add(f"{part}/mark", cap(0.0042, np.pi, 8), _TARGET)
+                self._scene.add_icosphere(f"{path}/mark", radius=0.0042, color=_TARGET)
         for handle, p_m in zip(self._parts, parts_m.tolist(), strict=False):
             handle.visible = parts
             set_pose(handle, p_m)
@@ -176,7 +173,7 @@ class _BodyView:
                 opacity=0.5, cast_shadow=False,
             )  # fmt: skip
         elif body.kind == "hand":
-            data = painted_glb(hand(0), SKIN)
+            data = painted_glb(part_of(0, "hand"), SKIN)
             self._shape = scene.add_glb(
                 f"{name}/hand", data, cast_shadow=False, receive_shadow=False
             )

@@ -9,7 +9,7 @@ import viser
 from gazerig.gaze.angles import add, sub
 from gazerig.gaze.types import Vec3
 from gazerig.robot.dashboard.view.head_view import head_dimensions
-from gazerig.robot.description.head_shape import CHIN, TOP, HeadMeasures
+from gazerig.robot.description.parts import CHIN, TOP, HeadMeasures
 from gazerig.robot.model.types import Snapshot
 
 _FOV_STEP_RAD = 0.01

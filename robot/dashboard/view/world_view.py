@@ -5,6 +5,7 @@ from typing import Final
 
 import viser
 
+from gazerig.robot.dashboard.feed.world_shapes import WorldFinish, WorldPart, WorldShapes
 from gazerig.robot.dashboard.view.glb import (
     CLOTH,
     FLAT,
@@ -15,8 +16,7 @@ from gazerig.robot.dashboard.view.glb import (
     textured_glb,
 )
 from gazerig.robot.dashboard.view.scene_node import set_pose
-from gazerig.robot.description.mesh import Painted, merge_meshes, smooth_normals
-from gazerig.robot.description.world_shapes import WorldFinish, WorldPart, WorldShapes
+from gazerig.robot.description.mesh import Painted, merge_meshes
 
 _FINISHES: Mapping[WorldFinish, Finish] = {
     "skin": SKIN,
@@ -80,8 +80,6 @@ def room_glbs(parts: Iterable[WorldPart]) -> list[bytes]:
             continue
         shape = part.shape
         if isinstance(shape, Painted):
-            if shape.normals is None:
-                shape = shape._replace(normals=smooth_normals(shape.mesh))
             plain.setdefault(part.finish, []).append(shape)
         else:
             files.append(part_glb(part))
