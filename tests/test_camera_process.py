@@ -12,6 +12,7 @@ from fakes.films import write_film
 from fakes.waiting import wait_for
 from present import present
 
+from gazerig.drivers.camera.film import Film
 from gazerig.drivers.camera.params import RECOVERY, CameraRecovery
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
@@ -24,7 +25,6 @@ from gazerig.drivers.camera.process import (
 from gazerig.drivers.camera.recorder import RecordingWriter
 from gazerig.drivers.camera.shared_frames import SharedDetections, SlotReader, SlotWriter
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Detections
@@ -84,8 +84,8 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
 
 
 def test_source_that_cannot_be_opened_says_so_at_once(tmp_path):
-    camera = process(partial(VideoFile, tmp_path / "nope.avi"))
-    with pytest.raises(CameraError, match=r"no film or image at .*nope\.avi"):
+    camera = process(partial(Film, tmp_path / "nope.avi"))
+    with pytest.raises(CameraError, match=r"no readable film or image at .*nope\.avi"):
         camera.open()
     camera.close()
 
@@ -175,7 +175,7 @@ def test_silence_is_judged_by_what_is_usual():
 def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     path = write_film(tmp_path / "film.avi", 3)
     care = CameraRecovery(0.001, 0.005, give_up_s=0.1)
-    camera = process(partial(VideoFile, path), care)
+    camera = process(partial(Film, path), care)
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)
     path.unlink()  # it cannot be opened for its second showing
@@ -184,7 +184,7 @@ def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
         try:
             camera.latest(0.0)
         except CameraError as error:
-            return "no film or image at" in str(error)
+            return "no readable film or image at" in str(error)
         return False
 
     wait_for(gone)

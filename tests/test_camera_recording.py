@@ -15,11 +15,11 @@ from present import present
 
 from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera.camera_plugins import recorded
+from gazerig.drivers.camera.film import Film
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.camera.playback import CameraReplay, Recording
+from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.recorder import CameraRecorder, RecordingWriter
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.robot.app.options import RunOptions
 
@@ -61,14 +61,21 @@ def assert_same(found: Shot, wanted: Shot) -> None:
     assert found.lens == wanted.lens
 
 
+def frames_of(path: Path) -> list[Shot]:
+    """Return the frames of a recording with their times since the first."""
+    return [
+        frame.read()._replace(captured_s=frame.start_s) for frame in CameraReplay(path).play_once()
+    ]
+
+
 def test_pictures_depth_lens_and_times_come_out_exactly(file):
-    recording = Recording(file)
-    assert recording.note == ""
-    assert recording.times_s == pytest.approx([t - TIMES_S[0] for t in TIMES_S], abs=1e-9)
-    for k in range(len(TIMES_S)):
-        assert_same(recording.shot(k), shot(k))
-        assert not recording.shot(k).image.flags.writeable
-    recording.close()
+    found = frames_of(file)
+    assert [one.captured_s for one in found] == pytest.approx(
+        [t - TIMES_S[0] for t in TIMES_S], abs=1e-9
+    )
+    for k, one in enumerate(found):
+        assert_same(one, shot(k))
+        assert not one.image.flags.writeable
 
 
 def test_standard_tools_read_the_file(file):
@@ -86,8 +93,7 @@ def test_standard_tools_read_the_file(file):
 
 
 def test_what_the_camera_does_not_give_is_not_there(tmp_path):
-    recording = Recording(write(tmp_path / "plain.mcap", [shot(0, whole=False)]))
-    found = recording.shot(0)
+    (found,) = frames_of(write(tmp_path / "plain.mcap", [shot(0, whole=False)]))
     assert (found.depth_m, found.lens) == (None, None)
 
 
@@ -96,10 +102,10 @@ def test_a_frame_that_is_no_later_than_the_one_before_is_left_out(tmp_path):
     shots = [
         shot(k)._replace(captured_s=5000.0 + t) for k, t in enumerate((0.0, 0.2, 0.1, 0.2, 0.3))
     ]
-    recording = Recording(write(tmp_path / "back.mcap", shots))
-    assert recording.times_s == pytest.approx([0.0, 0.2, 0.3])
-    for index, k in enumerate((0, 1, 4)):
-        assert np.array_equal(recording.shot(index).image, shots[k].image)
+    found = frames_of(write(tmp_path / "back.mcap", shots))
+    assert [one.captured_s for one in found] == pytest.approx([0.0, 0.2, 0.3])
+    for one, k in zip(found, (0, 1, 4), strict=True):
+        assert np.array_equal(one.image, shots[k].image)
 
 
 def test_frames_are_put_on_the_disk_every_second(tmp_path, monkeypatch):
@@ -117,13 +123,13 @@ def test_frames_are_put_on_the_disk_every_second(tmp_path, monkeypatch):
 def test_cut_file_gives_its_whole_pictures(file, share):
     data = file.read_bytes()
     file.write_bytes(data[: int(len(data) * share)])
-    recording = Recording(file)
-    count = len(recording.times_s)
+    replay = CameraReplay(file)
+    count = len(list(replay.play_once()))
     assert count >= int(len(TIMES_S) * share) - 1
     if share < 0.95:
-        assert f"was not closed: its {count} complete frames" in recording.note
-    for k in range(count):
-        assert_same(recording.shot(k), shot(k))
+        assert replay.events() == ("seen.mcap was not closed: its complete frames are played",)
+    for k, one in enumerate(frames_of(file)):
+        assert_same(one, shot(k))
 
 
 def test_damage_inside_a_picture_is_named(file):
@@ -131,10 +137,10 @@ def test_damage_inside_a_picture_is_named(file):
     where = data.rindex(b'"data":"') + 40
     data[where : where + 400] = b"!" * 400
     file.write_bytes(bytes(data))
-    recording = Recording(file)
+    *_, before, last = CameraReplay(file).play_once()
     with pytest.raises(CameraError, match=r"frame 6 of .* is damaged .*copy the file again"):
-        recording.shot(5)
-    assert_same(recording.shot(4), shot(4))
+        last.read()
+    assert_same(before.read(), shot(4))
 
 
 @pytest.mark.parametrize(
@@ -142,7 +148,7 @@ def test_damage_inside_a_picture_is_named(file):
     [
         (lambda p: None, "no recording at"),
         (lambda p: p.write_text("hello world, this is text"), "is not a recording"),
-        (lambda p: write(p, []), "contains no frame"),
+        (lambda p: write(p, []), "contains no readable frame"),
     ],
 )
 def test_what_is_no_recording_is_named(tmp_path, make, words):
@@ -156,19 +162,14 @@ def test_replay_counts_on_and_repeats(file):
     replay = CameraReplay(file)
     replay.open()
     n = len(TIMES_S)
-    step = replay.length_s - (TIMES_S[-1] - TIMES_S[0])
-    assert step == pytest.approx(0.0334, abs=0.001)
-    for number in (1, 4, n, n + 1, 2 * n + 3):
-        found = replay.shot(number)
+    for number in range(1, 2 * n + 3):
+        found = replay.next_shot()
         assert found.number == number
         assert_same(found, shot((number - 1) % n))
         showing, index = divmod(number - 1, n)
-        due_s = showing * replay.length_s + TIMES_S[index] - TIMES_S[0]
+        due_s = showing * (TIMES_S[-1] - TIMES_S[0] + 0.0331) + TIMES_S[index] - TIMES_S[0]
         assert found.captured_s == pytest.approx(due_s, abs=1e-6)
     assert replay.events() == ()
-    replay.close()
-    with pytest.raises(CameraError, match="not open"):
-        replay.shot(1)
 
 
 class Source:
@@ -204,11 +205,9 @@ def test_recorder_hands_pictures_through_and_into_the_file(tmp_path):
     seen += [recorder.take(time.monotonic, GO_ON) for _ in range(2)]
     recorder.close()
     recorder.finish()
-    recording = Recording(tmp_path / "r.mcap")
-    assert recording.note == "" and len(recording.times_s) == recorder.written_frames == 6
-    for k, one in enumerate(seen):
+    for k, (one, found) in enumerate(zip(seen, frames_of(tmp_path / "r.mcap"), strict=True)):
         assert_same(present(one), shot(k))
-        assert_same(recording.shot(k), present(one))
+        assert_same(found, present(one))
     assert recorder.events() == ("something of the source",)
     assert (recorder.failure, recorder.dropped_frames) == ("", 0)
 
@@ -253,12 +252,12 @@ def test_a_run_records_the_frames_of_its_camera_and_never_over_a_file(tmp_path):
     film = write_film(tmp_path / "film.avi", rate_hz=50.0)
     out = tmp_path / "seen.mcap"
     for path in (out, tmp_path / "seen-2.mcap"):
-        source = recorded(partial(VideoFile, str(film)), out)
+        source = recorded(partial(Film, str(film)), out)
         assert isinstance(source, CameraRecorder)
         source.open()
         assert present(source.take(time.monotonic, threading.Event())).number == 1
         source.close()
         source.finish()
-        assert Recording(path).shot(0).image.shape == (48, 64, 3)
+        assert frames_of(path)[0].image.shape == (48, 64, 3)
     with pytest.raises(SetupError, match="--oak or --camera"):
         RunOptions(mock=True, record_camera=out).check_and_complete()

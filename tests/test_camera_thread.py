@@ -9,10 +9,10 @@ from fakes.films import write_film
 from fakes.waiting import wait_for
 from present import present
 
+from gazerig.drivers.camera.film import Film
 from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
-from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import DetectedFace
 
@@ -187,7 +187,7 @@ def test_slow_detector_skips_pictures_and_queues_none(tmp_path):
             return ()
 
     camera = CameraThread(
-        VideoFile(write_film(tmp_path / "film.avi", rate_hz=10.0)), Slow(), lambda: clock[0]
+        Film(write_film(tmp_path / "film.avi", rate_hz=10.0)), Slow(), lambda: clock[0]
     )
     camera.open()
     free.release()

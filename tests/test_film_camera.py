@@ -1,48 +1,31 @@
 """A film in simulated time shows each picture once, in order, after its delay."""
 
+from collections.abc import Iterator
+from functools import partial
+from itertools import count
+
 import numpy as np
 import pytest
 from present import present
 
+from gazerig.drivers.camera.file_player import FilePlayer, StoredFrame
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.recorder import RecordingWriter
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import DetectedFace, MovingBlob
 from gazerig.sim_mock.cameras.video import FilmCamera
 
 RATE_HZ = 25.0
 
 
-class Film:
-    """Pictures whose grey is their number, 25 a second; insists on being read forward."""
+class Film(FilePlayer):
+    """Pictures whose grey is their number, 25 a second."""
 
-    def __init__(self) -> None:
-        self.read: list[int] = []
-        self.is_open = False
-
-    def open(self) -> None:
-        self.read, self.is_open = [], True
-
-    def due_s(self, number: int) -> float:
-        return (number - 1) / RATE_HZ
-
-    def image(self, number: int):
-        if not self.is_open:
-            raise CameraError("the film is not open")
-        assert not self.read or number > self.read[-1]
-        self.read.append(number)
-        return np.full((128, 128, 3), number % 256, np.uint8)
-
-    def shot(self, number: int) -> Shot:
-        return Shot(self.due_s(number), number, self.image(number))
-
-    def events(self) -> tuple[str, ...]:
-        return ("the film is a fake",)
-
-    def close(self) -> None:
-        self.is_open = False
+    def play_once(self) -> Iterator[StoredFrame]:
+        for number in count(1):
+            image = np.full((128, 128, 3), number % 256, np.uint8)
+            yield StoredFrame((number - 1) / RATE_HZ, 1.0 / RATE_HZ, partial(Shot, 0.0, 0, image))
 
 
 class EveryThird:
@@ -60,7 +43,7 @@ class EveryThird:
 
 @pytest.fixture
 def film():
-    return Film()
+    return Film("film")
 
 
 @pytest.fixture
@@ -88,9 +71,8 @@ def test_picture_comes_through_after_the_delay(camera):
     assert int(second.image[0, 0, 0]) == 2
 
 
-def test_jump_looks_at_every_picture_in_order(camera, film):
+def test_jump_looks_at_every_picture_in_order(camera):
     assert camera.latest(1.07).number == 26
-    assert film.read == list(range(1, 27))
     assert (camera.frames, camera.frames_with_face) == (26, 8)
 
 

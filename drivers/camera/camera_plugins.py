@@ -76,9 +76,9 @@ def recorded(make: Callable[[], FrameSource], file: Path) -> FrameSource:
 
 def film(path: str) -> FrameSource:
     """Return a film or photo."""
-    from gazerig.drivers.camera.video_file import VideoFile
+    from gazerig.drivers.camera.film import Film
 
-    return VideoFile(path)
+    return Film(path)
 
 
 def oak(params: OakParams) -> FrameSource:

@@ -73,12 +73,13 @@ class Intrinsics:
 def intrinsics_of_view(view_rad: float, width_px: int, height_px: int) -> Intrinsics:
     """Return the intrinsics of square pixels with the optical axis at the centre of the frame.
 
-    view_rad: horizontal field of view, from edge to edge
+    view_rad: field of view along the longer side, from edge to edge: that of a camera on its side
+        is the same lens
 
     Raises:
         ValueError: the field of view is not between 0 and pi.
     """
     if not 0.0 < view_rad < pi:
         raise ValueError(f"a field of view must be between 0 and pi rad, not {view_rad}")
-    focal_px = 0.5 * width_px / tan(0.5 * view_rad)
+    focal_px = 0.5 * max(width_px, height_px) / tan(0.5 * view_rad)
     return Intrinsics(focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1))

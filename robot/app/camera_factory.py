@@ -51,8 +51,7 @@ from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from gazerig.drivers.camera.playback import CameraReplay
-    from gazerig.drivers.camera.video_file import VideoFile
+    from gazerig.drivers.camera.file_player import FilePlayer
 
 
 def camera_poses(
@@ -344,14 +343,14 @@ def _package_camera_params(rig: Rig, name: str) -> object:
         ) from error
 
 
-def _film_source(options: RunOptions) -> "VideoFile | CameraReplay":
+def _film_source(options: RunOptions) -> "FilePlayer":
     if options.replay is not None:
         from gazerig.drivers.camera.playback import CameraReplay
 
         return CameraReplay(options.replay)
-    from gazerig.drivers.camera.video_file import VideoFile
+    from gazerig.drivers.camera.film import Film
 
-    return VideoFile(str(options.video))
+    return Film(str(options.video))
 
 
 def _source_factory(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:

@@ -59,7 +59,7 @@ class CameraParams:
         "(mount base)"] = (20.0, 0.0, 45.0)
     yaw_deg: Annotated[float, Bounds(-180, 180), "rotation of the camera to the left"] = 0.0
     pitch_deg: Annotated[float, Bounds(-90, 90), "rotation of the camera upwards"] = 0.0
-    horizontal_field_deg: Annotated[float, Bounds(10, 150), "horizontal field of view of the lens"] = ASSUMED_FIELD_DEG
+    horizontal_field_deg: Annotated[float, Bounds(10, 150), "field of view along the longer side of the picture"] = ASSUMED_FIELD_DEG
     roll_deg: Annotated[float, Bounds(-180, 180), "rotation of the camera about its optical axis, right side down"] = 0.0
     rotation: Annotated[Literal[0, 90, 180, 270],
         "degrees clockwise by which the camera's frames are turned upright; all other values here refer to upright frames"] = 0

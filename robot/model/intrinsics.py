@@ -40,7 +40,7 @@ def intrinsics_of_lens(
 
     Args:
         lens: Measured lens.
-        view_rad: Horizontal field of view, from edge to edge.
+        view_rad: Field of view along the longer side, from edge to edge.
         width_px: Width of the images.
         height_px: Height of the images.
         own: Intrinsics reported by the camera, used if no measured lens fits.

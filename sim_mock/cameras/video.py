@@ -10,8 +10,7 @@ from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
 from gazerig.drivers.types import Detections, FaceDetector
 
 if TYPE_CHECKING:
-    from gazerig.drivers.camera.playback import CameraReplay
-    from gazerig.drivers.camera.video_file import VideoFile
+    from gazerig.drivers.camera.file_player import FilePlayer
 
 
 class FilmCamera:
@@ -21,7 +20,7 @@ class FilmCamera:
     equal those of any other run to the same time.
 
     Args:
-        video: the film, whose frames are due at film times, without end.
+        video: the film.
         detector: finds faces.
         delay_s: time from exposure to detections, at least 0.
         start_s: simulated time of the first exposure.
@@ -34,7 +33,7 @@ class FilmCamera:
 
     def __init__(
         self,
-        video: "VideoFile | CameraReplay",
+        video: "FilePlayer",
         detector: FaceDetector,
         delay_s: float,
         start_s: float = 0.0,
@@ -67,11 +66,9 @@ class FilmCamera:
         Raises:
             CameraError: the film cannot be read any more.
         """
-        while self._captured_s(self.frames + 1) + self._delay_s <= now_s:
-            number = self.frames + 1
-            shot = self._orientation.turn_shot(self._video.shot(number))
-            shot = shot._replace(captured_s=self._captured_s(number))
-            found = self._frames.analyze(shot)
+        while (captured_s := self._start_s + self._video.due_s) + self._delay_s <= now_s:
+            shot = self._orientation.turn_shot(self._video.next_shot())
+            found = self._frames.analyze(shot._replace(captured_s=captured_s))
             self.frames += 1
             self.frames_with_face += bool(found.faces)
             self._newest = found
@@ -84,7 +81,3 @@ class FilmCamera:
     def close(self) -> None:
         """Free the film; safe to call twice."""
         self._video.close()
-
-    def _captured_s(self, number: int) -> float:
-        """Return the simulated time of a frame's exposure."""
-        return self._start_s + self._video.due_s(number)

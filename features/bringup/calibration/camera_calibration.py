@@ -6,7 +6,7 @@ module adds the refusal of unsuitable views and results.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import atan2, degrees, inf
+from math import atan, degrees, inf
 from typing import Annotated, NamedTuple
 
 import cv2
@@ -73,11 +73,12 @@ class LensCalibration:
 
     @property
     def horizontal_field_deg(self) -> float:
-        """Return the field of view from edge to edge, at the height of the optical axis."""
-        edges = np.array([(-0.5, self.intrinsics.cy_px), (self.width_px - 0.5,) * 2])
-        edges[1, 1] = self.intrinsics.cy_px
-        (left, _, _), (right, _, _) = rays(edges, self.intrinsics).tolist()
-        return degrees(atan2(right, 1.0) - atan2(left, 1.0))
+        """Return the field of view along the longer side, through the optical axis."""
+        lens, longer = self.intrinsics, int(self.height_px > self.width_px)
+        edges = np.array([(lens.cx_px, lens.cy_px)] * 2)
+        edges[:, longer] = -0.5, max(self.width_px, self.height_px) - 0.5
+        first, last = rays(edges, lens)[:, longer].tolist()
+        return degrees(atan(last) - atan(first))
 
     def params(self) -> LensParams:
         """Return the lens in the format of the rig's file."""

@@ -282,7 +282,10 @@ def _find_lens(job: _Job, eye: _CameraView, what: CalibrationTarget) -> _KnownLe
 def _known_lens(job: _Job, lens: Intrinsics, image: ImageArray) -> _KnownLens:
     """Return the lens that an OAK camera gives with its frames, from its factory calibration."""
     height, width = image.shape[:2]
-    left, right = (lens.cx_px + 0.5) / lens.fx_px, (width - 0.5 - lens.cx_px) / lens.fx_px
+    longer, axis, focal = (
+        (width, lens.cx_px, lens.fx_px) if width >= height else (height, lens.cy_px, lens.fy_px)
+    )
+    left, right = (axis + 0.5) / focal, (longer - 0.5 - axis) / focal
     params = lens_params(lens, width, height)
     say(
         f"the camera's own lens: focal length {lens.fx_px:.1f}, {lens.fy_px:.1f} px, axis at "
