@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from gazerig.drivers.bus.servo_models import BUS_KINDS, BusKind
-from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.params import WebcamParams
+from gazerig.drivers.camera.params import OakParams, WebcamParams
 from gazerig.drivers.dynamixel.control_table import DynamixelParams
 from gazerig.drivers.feetech.memory_table import FeetechParams
 from gazerig.drivers.maestro.board import MaestroParams

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from gazerig.drivers.camera.oak.discovery import load_depthai
-from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import PipelineOutputs
 from gazerig.drivers.camera.oak.source import OakSource
+from gazerig.drivers.camera.params import OakParams
 
 
 def real():

@@ -40,13 +40,6 @@ def test_background_beside_the_thing_is_left_out():
     assert found.spread_m < 0.03
 
 
-def test_mask_says_which_pixels():
-    depth = scene()
-    mask = depth > 2.0
-    assert depth_at(depth, mask=mask).distance_m == pytest.approx(3.0, abs=0.005)
-    assert depth_at(depth, mask=np.zeros_like(mask)).distance_m is None
-
-
 @settings(max_examples=100, deadline=None)
 @given(
     arrays(

@@ -6,7 +6,7 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 
-from gazerig.drivers.camera.double_buffer import PoseBuffer
+from gazerig.drivers.camera.shared_slots import PoseBuffer
 
 
 def turn(deg: float) -> np.ndarray:

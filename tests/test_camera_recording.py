@@ -1,21 +1,18 @@
 """A camera's frames are the same after recording, whatever happens to the writer."""
 
 import json
-import os
 import threading
 import time
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from fakes.films import write_film
 from mcap.reader import make_reader
 from present import present
 
 from gazerig.drivers.camera import recording_format as fmt
-from gazerig.drivers.camera.camera_plugins import recorded
-from gazerig.drivers.camera.film import Film
+from gazerig.drivers.camera.capture_loop import CameraParts, CaptureLoop
+from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.recorder import CameraRecorder, RecordingWriter
@@ -41,8 +38,8 @@ def shot(k: int, whole: bool = True) -> Shot:
     return Shot(TIMES_S[k], k + 1, picture, depth, LENS)
 
 
-def write(path: Path, shots, **how) -> Path:
-    writer = RecordingWriter(path, {"source": "test"}, **how)
+def write(path: Path, shots) -> Path:
+    writer = RecordingWriter(path)
     for each in shots:
         writer.write(each)
     writer.close()
@@ -106,17 +103,6 @@ def test_a_frame_that_is_no_later_than_the_one_before_is_left_out(tmp_path):
     assert [one.captured_s for one in found] == pytest.approx([0.0, 0.2, 0.3])
     for one, k in zip(found, (0, 1, 4), strict=True):
         assert np.array_equal(one.image, shots[k].image)
-
-
-def test_frames_are_put_on_the_disk_every_second(tmp_path, monkeypatch):
-    written, synced = [0], list[int]()
-    monkeypatch.setattr(os, "fsync", lambda fd: synced.append(written[0]))
-    writer = RecordingWriter(tmp_path / "r.mcap", {})
-    for k in range(95):
-        written[0] = k + 1
-        writer.write(Shot(5000.0 + k / 30.0, k + 1, np.zeros((4, 4, 3), np.uint8)))
-    writer.close()
-    assert np.diff([0, *synced, 95]).max() <= 31
 
 
 @pytest.mark.parametrize("share", [0.999, 0.9, 0.5, 0.3])
@@ -194,28 +180,41 @@ class Source:
         self.is_open = False
 
 
-def test_recorder_hands_pictures_through_and_into_the_file(tmp_path):
-    source = Source()
-    recorder = CameraRecorder(source, tmp_path / "r.mcap", {"source": "test"})
-    recorder.open()
-    seen = [recorder.take(time.monotonic, GO_ON) for _ in range(4)]
-    # The camera is lost and comes back; the file goes on.
-    recorder.close()
-    recorder.open()
-    seen += [recorder.take(time.monotonic, GO_ON) for _ in range(2)]
-    recorder.close()
-    recorder.finish()
-    for k, (one, found) in enumerate(zip(seen, frames_of(tmp_path / "r.mcap"), strict=True)):
-        assert_same(present(one), shot(k))
-        assert_same(found, present(one))
-    assert recorder.events() == ("something of the source",)
-    assert (recorder.failure, recorder.dropped_frames) == ("", 0)
+class _Nobody:
+    def find(self, image):
+        return ()
+
+
+def looked(source: Source, path: Path, events: list[str] | None = None) -> CaptureLoop:
+    """Return an open loop that records the frames of a source."""
+    parts = CameraParts(lambda: source, _Nobody, record=path)
+    report = (events if events is not None else []).append
+    loop = CaptureLoop(parts, time.monotonic, CameraRecovery(give_up_s=0.0), report)
+    loop.open()
+    return loop
+
+
+def test_a_run_records_the_frames_of_its_camera_and_never_over_a_file(tmp_path):
+    events: list[str] = []
+    for path in (tmp_path / "r.mcap", tmp_path / "r-2.mcap"):
+        loop = looked(Source(), tmp_path / "r.mcap", events)
+        for _ in TIMES_S:
+            loop.next_detections(GO_ON)
+        with pytest.raises(CameraError, match="unplugged"):
+            loop.next_detections(GO_ON)
+        loop.close()
+        for k, found in enumerate(frames_of(path)):
+            assert_same(found, shot(k))
+        assert len(frames_of(path)) == len(TIMES_S)
+    assert set(events) == {"something of the source"}
+    with pytest.raises(SetupError, match="--oak or --camera"):
+        RunOptions(mock=True, record_camera=tmp_path / "x.mcap").check_and_complete()
 
 
 def test_recorder_that_cannot_write_its_file_frees_the_source(tmp_path):
     source = Source()
     with pytest.raises(CameraError, match="cannot write"):
-        CameraRecorder(source, tmp_path / "no" / "r.mcap").open()
+        looked(source, tmp_path / "no" / "r.mcap")
     assert not source.is_open
 
 
@@ -224,40 +223,27 @@ def test_full_disk_ends_the_recording_and_not_the_camera(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(RecordingWriter, "add", full)
-    recorder = CameraRecorder(Source(), tmp_path / "r.mcap")
-    recorder.open()
-    seen = [recorder.take(time.monotonic, GO_ON) for _ in range(6)]
+    recorder = CameraRecorder(tmp_path / "r.mcap")
+    for k in range(6):
+        recorder.add(shot(k))
     recorder.finish()
-    assert all(one is not None for one in seen)
-    assert "No space left on device" in recorder.failure
-    assert recorder.failure in recorder.events()
+    (line,) = recorder.events()
+    assert line.endswith("recording ended: No space left on device")
 
 
 def test_slow_disk_leaves_pictures_out_and_says_so(tmp_path, monkeypatch):
-    go = threading.Event()
-    monkeypatch.setattr(RecordingWriter, "add", lambda *given: go.wait(20.0))
-    source = Source()
-    source.left = [0] * 60
-    recorder = CameraRecorder(source, tmp_path / "r.mcap")
-    recorder.open()
+    go, written = threading.Event(), list[int]()
+
+    def slow(self, captured_s, number, messages) -> None:
+        go.wait(20.0)
+        written.append(number)
+
+    monkeypatch.setattr(RecordingWriter, "add", slow)
+    recorder = CameraRecorder(tmp_path / "r.mcap")
     for _ in range(60):
-        assert recorder.take(time.monotonic, GO_ON) is not None
+        recorder.add(shot(0))
     go.set()
     recorder.finish()
-    assert 25 <= recorder.dropped_frames <= 30
-    (reported,) = [line for line in recorder.events() if "is slower than the camera" in line]
-
-
-def test_a_run_records_the_frames_of_its_camera_and_never_over_a_file(tmp_path):
-    film = write_film(tmp_path / "film.avi", rate_hz=50.0)
-    out = tmp_path / "seen.mcap"
-    for path in (out, tmp_path / "seen-2.mcap"):
-        source = recorded(partial(Film, str(film)), out)
-        assert isinstance(source, CameraRecorder)
-        source.open()
-        assert present(source.take(time.monotonic, threading.Event())).number == 1
-        source.close()
-        source.finish()
-        assert frames_of(path)[0].image.shape == (48, 64, 3)
-    with pytest.raises(SetupError, match="--oak or --camera"):
-        RunOptions(mock=True, record_camera=out).check_and_complete()
+    assert len(written) == 30
+    (line,) = recorder.events()
+    assert "is slower than the camera" in line

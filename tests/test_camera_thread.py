@@ -9,6 +9,7 @@ from fakes.films import write_film
 from fakes.waiting import wait_for
 from present import present
 
+from gazerig.drivers.camera.capture_loop import CameraParts
 from gazerig.drivers.camera.film import Film
 from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.source import Shot
@@ -76,7 +77,7 @@ def source():
 
 @pytest.fixture
 def camera(source):
-    thread = CameraThread(source, EveryOther(), time.monotonic, AT_ONCE)
+    thread = CameraThread(CameraParts(lambda: source, EveryOther), time.monotonic, AT_ONCE)
     thread.open()
     yield thread
     thread.close()
@@ -120,7 +121,7 @@ def test_fault_of_the_detector_reaches_the_loop_in_one_line(source):
         def find(self, picture):
             raise RuntimeError("layer 3\nhas no weights")
 
-    thread = CameraThread(source, Broken(), time.monotonic)
+    thread = CameraThread(CameraParts(lambda: source, Broken), time.monotonic)
     thread.open()
     source.fed.release()
     wait_for(lambda: source.closed)
@@ -148,7 +149,7 @@ def test_waits_between_tries_double_up_to_the_longest(source):
     waits: list[float] = []
     care = CameraRecovery(0.1, 0.35, give_up_s=1.0)
     clock = [0.0]
-    camera = CameraThread(source, EveryOther(), lambda: clock[0], care)
+    camera = CameraThread(CameraParts(lambda: source, EveryOther), lambda: clock[0], care)
 
     class Stop(threading.Event):
         def wait(self, timeout=None) -> bool:
@@ -168,7 +169,7 @@ def test_waits_between_tries_double_up_to_the_longest(source):
 
 def test_close_does_not_wait_for_a_lost_camera(source):
     care = CameraRecovery(60.0, 60.0, give_up_s=86_400.0)
-    camera = CameraThread(source, EveryOther(), time.monotonic, care)
+    camera = CameraThread(CameraParts(lambda: source, EveryOther), time.monotonic, care)
     camera.open()
     lose(source)
     wait_for(lambda: source.closed)
@@ -187,7 +188,8 @@ def test_slow_detector_skips_pictures_and_queues_none(tmp_path):
             return ()
 
     camera = CameraThread(
-        Film(write_film(tmp_path / "film.avi", rate_hz=10.0)), Slow(), lambda: clock[0]
+        CameraParts(lambda: Film(write_film(tmp_path / "film.avi", rate_hz=10.0)), Slow),
+        lambda: clock[0],
     )
     camera.open()
     free.release()

@@ -6,11 +6,12 @@ from functools import partial
 import numpy as np
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.double_buffer import PoseSlot
+from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
-from gazerig.robot.app.drawn_camera import DrawnCamera, DrawnSource, scene_pixels
+from gazerig.robot.app.drawn_camera import DrawnSource, scene_pixels
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.model.frames import CameraMount
@@ -20,20 +21,20 @@ LEFT = ((0.8, -0.6, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, 1.0))
 
 
 def test_the_newest_pose_is_read_whole() -> None:
-    poses = PoseSlot()
+    poses = PoseBuffer()
     assert poses.newest() is None and poses.first_s == 0.0
     poses.record(2.0, LEVEL, (0.0, 0.0, 0.1))
     poses.record(2.5, LEFT, (0.1, 0.2, 0.3))
     assert poses.newest() == (2.5, LEFT, (0.1, 0.2, 0.3)) and poses.first_s == 2.0
 
 
-def source(scene: str, poses: PoseSlot) -> DrawnSource:
+def source(scene: str, poses: PoseBuffer) -> DrawnSource:
     mount = CameraMount(load_rig("desk").camera)
     make = partial(scene_pixels, load_scene(scene), mount, 69.0, np.random.default_rng(3))
     return DrawnSource(make, poses)
 
 
-def taken(frames: DrawnSource, poses: PoseSlot, t_s: float) -> Shot:
+def taken(frames: DrawnSource, poses: PoseBuffer, t_s: float) -> Shot:
     poses.record(t_s, LEVEL, (0.0, 0.0, 0.1))
     frames._due_s = 0.0
     shot = frames.take(lambda: t_s, threading.Event())
@@ -42,7 +43,7 @@ def taken(frames: DrawnSource, poses: PoseSlot, t_s: float) -> Shot:
 
 
 def test_frames_are_drawn_as_of_the_pose_that_was_told() -> None:
-    poses = PoseSlot()
+    poses = PoseBuffer()
     frames = source("face-to-face", poses)
     frames.open()
     first = taken(frames, poses, 100.0)
@@ -63,6 +64,6 @@ def test_only_a_drawn_scene_in_real_time_has_a_process() -> None:
     try:
         lent = made.robot.camera
         assert isinstance(lent, BorrowedCamera)
-        assert isinstance(lent.own, DrawnCamera)
+        assert isinstance(lent.own, CameraProcess)
     finally:
         made.close()

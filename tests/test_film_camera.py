@@ -77,7 +77,7 @@ def test_jump_looks_at_every_picture_in_order(camera):
 
 
 def test_recording_in_simulated_time_gives_depth_and_lens_and_what_moves(tmp_path):
-    writer = RecordingWriter(tmp_path / "r.mcap", {})
+    writer = RecordingWriter(tmp_path / "r.mcap")
     lens, blob = Intrinsics(20.0, 20.0, 8.0, 6.0), MovingBlob(1, "thing", (0.0, 0.0, 2.0), 0.1)
     for k in range(4):
         picture, depth = np.full((12, 16, 3), k, np.uint8), np.full((12, 16), 1.0 + k, np.float32)

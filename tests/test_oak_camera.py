@@ -16,12 +16,12 @@ from fakes.films import write_film
 from present import present
 
 from gazerig.drivers.camera.oak.discovery import load_depthai
-from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import (
     PipelineOutputs,
     device_nodes,
 )
 from gazerig.drivers.camera.oak.source import OakSource
+from gazerig.drivers.camera.params import OakParams
 from gazerig.drivers.errors import CameraError, install_command
 
 GO_ON = threading.Event()

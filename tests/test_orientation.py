@@ -1,24 +1,16 @@
 """A camera upside down, on its side, mirrored, of any and of changing size: the same directions."""
 
 import pickle
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from math import radians
 
 import numpy as np
 import pytest
-from fakes.cameras import QuietCamera
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.orientation import (
-    AS_DELIVERED,
-    FrameOrientation,
-    UprightSource,
-    upright,
-)
+from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, ImageArray
@@ -59,18 +51,6 @@ def test_pixels_depth_and_lens_go_where_the_image_goes(orientation: FrameOrienta
     assert rays(there, shot.lens) == pytest.approx(rays(pixels, LENS) @ axes(orientation).T)
 
 
-class Frames(QuietCamera):
-    """A source of given images."""
-
-    def __init__(self, images: Iterator[ImageArray]) -> None:
-        self._images, self._number = images, 0
-
-    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Return the next."""
-        self._number += 1
-        return Shot(0.1 * self._number, self._number, next(self._images))
-
-
 class Spot:
     """Finds a face whose nose is at the brightest pixel."""
 
@@ -107,18 +87,12 @@ def test_e100_a_person_is_at_one_place_however_the_camera_is_mounted_and_whateve
             image = np.rot90(image, orientation.rotation // 90)
             yield np.ascontiguousarray(image[:, ::-1] if orientation.mirrored else image)
 
-    source = UprightSource(Frames(images()), orientation)
-    analyzer = FrameAnalyzer(Spot(), None, FrameLocator(None, field_rad))
-    source.open()
-    for width, height in sizes:
-        shot = source.take(lambda: 0.0, threading.Event())
-        assert shot is not None and shot.image.shape == (height, width, 3)
-        found = analyzer.analyze(shot)
+    analyzer = FrameAnalyzer(Spot(), None, FrameLocator(None, field_rad), orientation)
+    for number, (image, (width, height)) in enumerate(zip(images(), sizes, strict=True), 1):
+        found = analyzer.analyze(Shot(0.1 * number, number, image))
         assert found.located is not None and (found.width_px, found.height_px) == (width, height)
         x, y, z = found.located.faces[0].p_m
         assert (x / z, y / z) == pytest.approx((0.2, -0.12), abs=4.0 / width)
-    source.close()
-    assert source.events() == ()
 
 
 def test_a_lens_of_another_shape_is_reported_once_and_the_gaze_goes_on() -> None:
@@ -143,6 +117,5 @@ def test_the_rig_says_how_frames_are_turned() -> None:
     assert frame_orientation(rig.camera) == AS_DELIVERED
     turned = frame_orientation(replace(rig.camera, rotation=180, mirrored=True))
     assert turned == FrameOrientation(180, True)
-    source = upright(partial(Frames, iter(())), turned)
-    assert isinstance(source(), UprightSource)
+    assert turned.turned_by(270) == FrameOrientation(90, True)
     assert pickle.loads(pickle.dumps(turned)) == turned  # it goes to the camera's process

@@ -163,7 +163,7 @@ def test_a_named_pipe_a_device_or_a_socket_is_refused_at_once(pipe: Path, force:
                 partial(refuse_existing, path, force=force),
                 partial(write_file, path, "x", force),
                 Recorder(path, info_for(), over=force).open,
-                partial(RecordingWriter, path, {}, over=force),
+                partial(RecordingWriter, path),
             ):
                 assert f"{path} is {what}: name a file" in refused(write)
 

@@ -2,7 +2,6 @@
 
 import os
 import threading
-from typing import Any
 
 import cv2
 import numpy as np
@@ -160,43 +159,6 @@ def test_latency_of_the_camera_is_taken_off(device):
     camera._open_capture = lambda name: Capture(stamp_ms=49_970.0)
     camera.open()
     assert present(camera.take(lambda: 50.0, GO_ON)).captured_s == pytest.approx(49.935)
-
-
-def run(device, stated_hz: float, gives_hz: float, away_s: float, count: int = 60) -> list[str]:
-    """Read frames of a camera that states one rate and delivers another."""
-    capture = Capture()
-    capture.stated_hz = stated_hz
-    camera = opened(device, capture)
-    reported: list[Any] = []
-    clock, picture = [100.0], [0]
-
-    def grab() -> bool:
-        # The next picture that is not over yet; missed ones are lost.
-        picture[0] = max(picture[0] + 1, int((clock[0] - 100.0) * gives_hz) + 1)
-        clock[0] = 100.0 + picture[0] / gives_hz
-        return True
-
-    capture.grab = grab  # type: ignore[method-assign]
-    for _ in range(count):
-        camera.take(lambda: clock[0], GO_ON)
-        reported += camera.events()
-        clock[0] += away_s
-    return reported
-
-
-def test_camera_that_lies_about_its_rate_is_noticed_once(device):
-    (reported,) = run(device, 30.0, 15.0, away_s=0.008)
-    assert "states 30 frames a second and delivers 15.0" in reported
-    assert str(device) in reported
-
-
-@pytest.mark.parametrize("gives_hz", [30.0, 27.0, 33.0])
-def test_honest_camera_is_left_alone(device, gives_hz):
-    assert run(device, 30.0, gives_hz, away_s=0.008) == []
-
-
-def test_slow_reader_is_no_fault_of_the_camera(device):
-    assert run(device, 30.0, 30.0, away_s=0.05) == []
 
 
 @pytest.mark.parametrize(

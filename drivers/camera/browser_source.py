@@ -6,8 +6,8 @@ from math import radians
 
 import numpy as np
 
-from gazerig.drivers.camera.double_buffer import JpegSlot
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
+from gazerig.drivers.camera.shared_slots import JpegSlot
 from gazerig.drivers.camera.source import Shot, to_bgr
 
 FIELD_DEG = 60.0

@@ -2,67 +2,22 @@
 
 import threading
 from collections.abc import Callable
-from math import degrees, isnan
+from contextlib import suppress
+from itertools import count
+from math import isnan
+from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING, NamedTuple
 
-from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG, CameraRecovery
+from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
+from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.source import FrameSource, Shot, to_bgr
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.plugins import describe_error, plugin_error
 from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, LocatedFrame, MovingBlob
 
-
-def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
-    """Return whether a face is outside the frame by its landmarks.
-
-    A network may guess points of a face cut by the edge; a face whose centre is outside is not in
-    view. If a face or a landmark is farther outside than the size of the face, the detector is
-    wrong, usually because its pixels belong to another frame size; that is reported.
-    """
-    points: list[tuple[float, float]] = face.landmarks_px.tolist()
-    if not points:
-        return False  # a face without points: its consumer reports that
-    x, y = sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
-    if isnan(x) or isnan(y):
-        return False  # not numbers: the consumer reports that too
-    outside = _distance_outside_px(x, y, width_px, height_px)
-    return outside > 0.0 or _is_misplaced(points, width_px, height_px)
-
-
-def _distance_outside_px(x: float, y: float, width_px: int, height_px: int) -> float:
-    """Return the distance of a point outside the frame; negative inside."""
-    return max(-0.5 - x, x - width_px + 0.5, -0.5 - y, y - height_px + 0.5)
-
-
-def _is_misplaced(points: list[tuple[float, float]], width_px: int, height_px: int) -> bool:
-    """Return whether a point is farther outside the frame than the size of the face."""
-    size = max((max(along) - min(along) for along in zip(*points, strict=True)), default=0.0)
-    return any(_distance_outside_px(x, y, width_px, height_px) > size for x, y in points)
-
-
-class OffFrameReport:
-    """One-time report that a detector returns faces outside the frame."""
-
-    def __init__(self) -> None:
-        self._reported = False
-
-    def report(
-        self, faces: tuple[DetectedFace, ...], width_px: int, height_px: int
-    ) -> tuple[str, ...]:
-        """Return the line about the faces of a frame, or an empty tuple."""
-        if self._reported:
-            return ()
-        for face in faces:
-            if _is_misplaced(face.landmarks_px.tolist(), width_px, height_px):
-                self._reported = True
-                x, y = face.landmarks_px.mean(axis=0).tolist()
-                return (
-                    f"a face with landmarks about ({x:.0f}, {y:.0f}), outside the frame of "
-                    f"{width_px} x {height_px}, is ignored, as are all such faces: a detector "
-                    "must return pixels of the frame that it was given",
-                )
-        return ()
-
+if TYPE_CHECKING:
+    from gazerig.drivers.camera.recorder import CameraRecorder
 
 Motion = Callable[[Shot], tuple[MovingBlob, ...]]
 """Finds motion from one frame to the next."""
@@ -72,6 +27,48 @@ one line why its calibration is not used for a frame, "" if it is used. Each lin
 """
 
 
+class CameraParts(NamedTuple):
+    """Parts of a camera, created where they are used; all must be picklable for a process.
+
+    source, detector: functions without arguments; motion: also a function without arguments, or
+        None
+    locate: locates detections in the camera's axes; None: their consumer does
+    orientation: turns frames upright
+    record: path of a new file for the frames as the source delivers them, None for none
+    """
+
+    source: Callable[[], FrameSource]
+    detector: Callable[[], FaceDetector]
+    motion: Callable[[], Motion | None] | None = None
+    locate: Locate | None = None
+    orientation: FrameOrientation = AS_DELIVERED
+    record: Path | None = None
+
+
+def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
+    """Return whether a face is outside the frame by its landmarks.
+
+    A network may guess points of a face cut by the edge; a face whose centre is outside is not in
+    view. If a face or a landmark is farther outside than the size of the face, the detector is
+    wrong, usually because its pixels belong to another frame size.
+    """
+    points: list[tuple[float, float]] = face.landmarks_px.tolist()
+    if not points:
+        return False  # a face without points: its consumer reports that
+    x, y = sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
+    if isnan(x) or isnan(y):
+        return False  # not numbers: the consumer reports that too
+    size = max(max(along) - min(along) for along in zip(*points, strict=True))
+    return _distance_outside_px(x, y, width_px, height_px) > 0.0 or any(
+        _distance_outside_px(x, y, width_px, height_px) > size for x, y in points
+    )
+
+
+def _distance_outside_px(x: float, y: float, width_px: int, height_px: int) -> float:
+    """Return the distance of a point outside the frame; negative inside."""
+    return max(-0.5 - x, x - width_px + 0.5, -0.5 - y, y - height_px + 0.5)
+
+
 class FrameAnalyzer:
     """Runner of the detectors.
 
@@ -79,8 +76,9 @@ class FrameAnalyzer:
         detector: Finds faces.
         motion: Finds motion; None for none.
         locate: Locates faces and things; None: their consumer does.
-        rotation_deg: Angle by which frames have been turned clockwise already.
-        has_unknown_lens: Whether the camera does not report its field of view.
+        orientation: Turns frames upright.
+        turns_film: Whether frames whose faces are turned are turned upright; otherwise that is
+            reported as a condition of the camera.
     """
 
     def __init__(
@@ -88,29 +86,33 @@ class FrameAnalyzer:
         detector: FaceDetector,
         motion: Motion | None = None,
         locate: Locate | None = None,
-        rotation_deg: int = 0,
-        has_unknown_lens: bool = False,
+        orientation: FrameOrientation = AS_DELIVERED,
+        turns_film: bool = False,
     ) -> None:
         self._detector, self._motion, self._locate = detector, motion, locate
+        self._orientation, self._turns_film = orientation, turns_film
+        self._turned_count = 0
         self._faults: dict[str, bool] = {}  # fault -> whether it has been reported
-        self._has_unknown_lens = has_unknown_lens
         # Imported here because the loop's process imports this module too, without OpenCV.
-        from gazerig.drivers.camera.health import CameraHealth
+        from gazerig.drivers.camera.health import CameraHealth, TurnedFaceSearch
         from gazerig.drivers.vision.clothing import ClothingReader
         from gazerig.drivers.vision.cut_detector import CutDetector
 
         self._cuts, self._clothing = CutDetector(), ClothingReader()
-        self._health = CameraHealth(rotation_deg)
-        self._off_frame = OffFrameReport()
+        self._health, self._turned = CameraHealth(orientation.rotation), TurnedFaceSearch()
 
     def analyze(self, shot: Shot) -> Detections:
-        """Find and locate faces, people, palms and motion."""
+        """Turn a frame upright, and find and locate faces, people, palms and motion in it."""
         began_s = perf_counter()
+        shot = self._orientation.turn_shot(shot)
         height, width = shot.image.shape[:2]
-        faces = self._detector.find(shot.image)
-        for line in self._off_frame.report(faces, width, height):
-            self._faults.setdefault(line, False)
-        faces = tuple([face for face in faces if not is_off_frame(face, width, height)])
+        faces = tuple(
+            [
+                face
+                for face in self._detector.find(shot.image)
+                if not is_off_frame(face, width, height)
+            ]
+        )
         faces_s = perf_counter()
         find_people = getattr(self._detector, "people", None)
         people = () if find_people is None else find_people(shot.image, shot.captured_s)
@@ -125,14 +127,8 @@ class FrameAnalyzer:
             "people and hands": bodies_s - faces_s,
             "motion": perf_counter() - bodies_s,
         }
-        field_rad = getattr(self._locate, "field_rad", None)
-        field_assumed = (
-            self._has_unknown_lens
-            and shot.lens is None
-            and getattr(self._locate, "lens", None) is None
-            and field_rad is not None
-            and abs(degrees(field_rad) - ASSUMED_FIELD_DEG) < 1e-6
-        )
+        scene = self._cuts.scene(shot.image) + self._turned_count
+        self._judge_turn(shot, faces)
         found = Detections(
             shot.captured_s,
             shot.number,
@@ -143,10 +139,10 @@ class FrameAnalyzer:
             shot.image,
             shot.depth_m,
             shot.lens,
-            scene=self._cuts.scene(shot.image),
+            scene=scene,
             people=people,
             palms=palms,
-            conditions=self._health.assess(shot, faces, spent_s, field_assumed),
+            conditions=self._health.assess(shot, spent_s),
         )
         if (fault := getattr(self._locate, "fault", None)) is not None and (line := fault(found)):
             self._faults.setdefault(line, False)
@@ -160,6 +156,19 @@ class FrameAnalyzer:
         told = events() if events is not None else ()
         return (*faults, *self._health.events(), *told)
 
+    def _judge_turn(self, shot: Shot, faces: tuple[DetectedFace, ...]) -> None:
+        """Report a camera whose faces are turned; turn the next frames of such a film."""
+        rotation = self._turned.find(shot.image, shot.captured_s, faces)
+        if rotation is None:
+            return
+        if not self._turns_film:
+            self._health.turned(rotation)
+        elif rotation:
+            self._orientation = self._orientation.turned_by(rotation)
+            self._turned_count += 1
+            line = f"the film is turned by {360 - rotation} deg, according to the faces: it is shown upright"
+            self._faults[line] = False
+
 
 LOST, BACK, CLOSING = "camera lost", "camera back", "closing the camera"
 """First words of events about the loss of a source, its reconnection, and an error at its end."""
@@ -172,47 +181,49 @@ class CaptureLoop:
     numbers continue to count meanwhile.
 
     Args:
-        source: Source of frames.
-        detector: Finds faces.
+        parts: Source and detectors.
         now_s: The host's monotonic clock, seconds.
         recovery: Times of reopening a lost source.
-        motion: Finds motion, None for none.
         report: Called with each event as one line, immediately.
-        locate: Locates detections in the camera's axes, None for none.
     """
 
     def __init__(
         self,
-        source: FrameSource,
-        detector: FaceDetector,
+        parts: CameraParts,
         now_s: Callable[[], float],
         recovery: CameraRecovery,
-        motion: Motion | None,
         report: Callable[[str], None],
-        locate: Locate | None = None,
     ) -> None:
-        self._source = source
+        self.source = parts.source()
         self._frames = FrameAnalyzer(
-            detector,
-            motion,
-            locate,
-            getattr(source, "rotation", 0),
-            getattr(source, "has_unknown_lens", False),
+            parts.detector(),
+            parts.motion() if parts.motion is not None else None,
+            parts.locate,
+            parts.orientation,
+            bool(getattr(self.source, "is_film", False)),
         )
-        self._now_s = now_s
-        self._recovery = recovery
+        self._now_s, self._recovery, self._report = now_s, recovery, report
+        self._record = parts.record
+        self._recorder: CameraRecorder | None = None
         self._counted = 0  # frames of the source before it was last reopened
         self._number = 0
-        self._report = report
 
     def open(self) -> None:
         """Open the source and begin at frame 1.
 
         Raises:
-            CameraError: the source cannot be opened.
+            CameraError: the source cannot be opened, or the recording cannot be created.
         """
-        self._source.open()
+        self.source.open()
         self._counted = self._number = 0
+        if self._record is not None:
+            from gazerig.drivers.camera.recorder import CameraRecorder
+
+            try:
+                self._recorder = CameraRecorder(unused_path(self._record))
+            except BaseException:
+                self.source.close()
+                raise
 
     def next_detections(self, stop: threading.Event) -> Detections | None:
         """Return the detections in the next frame, None if ``stop`` was set meanwhile.
@@ -223,22 +234,29 @@ class CaptureLoop:
         shot = self._take(stop)
         if shot is None:
             return None
+        if self._recorder is not None:
+            self._recorder.add(shot)
         self._number = self._counted + shot.number
         image = to_bgr(shot.image)
         if image is None:
             raise CameraError("the camera returned a frame that is not an image of 8 or 16 bits")
         found = self._frames.analyze(shot._replace(number=self._number, image=image))
-        for line in (*self._source.events(), *self._frames.events()):
+        recorder_events = self._recorder.events() if self._recorder is not None else ()
+        for line in (*self.source.events(), *recorder_events, *self._frames.events()):
             self._report(line)
         return found
 
     def close(self) -> None:
         """Free the source; safe to call twice. An error is reported: nothing can be done."""
         try:
-            self._source.close()
+            self.source.close()
         except Exception as error:
             named = plugin_error(error) or describe_error(error)
-            self._report(f"{CLOSING}: {named}")
+            with suppress(OSError):  # nobody listens any more
+                self._report(f"{CLOSING}: {named}")
+        if self._recorder is not None:
+            self._recorder.finish()
+            self._recorder = None
 
     def _take(self, stop: threading.Event) -> Shot | None:
         """Return the next frame, reopening a lost source; None if ``stop`` was set."""
@@ -247,15 +265,15 @@ class CaptureLoop:
         while True:
             try:
                 if lost_s is not None:
-                    self._source.open()
-                shot = self._source.take(self._now_s, stop)
+                    self.source.open()
+                shot = self.source.take(self._now_s, stop)
             except CameraError as error:
                 if lost_s is None:
                     self._counted = self._number
                     if self._recovery.give_up_s > 0.0:
                         self._report(f"{LOST} ({error}): trying it again")
                     lost_s = self._now_s()
-                self._source.close()
+                self.source.close()
                 if self._now_s() - lost_s >= self._recovery.give_up_s:
                     raise
                 if stop.wait(wait_s):
@@ -266,6 +284,12 @@ class CaptureLoop:
                 self._report(f"{BACK} after {self._now_s() - lost_s:.1f} s")
             # A source of another package may disregard ``stop``.
             return None if stop.is_set() else shot
+
+
+def unused_path(file: Path) -> Path:
+    """Return a path of which no file exists: after a restart of the camera FILE-2, and so on."""
+    paths = (file.with_stem(f"{file.stem}-{n}") if n > 1 else file for n in count(1))
+    return next(path for path in paths if not path.exists())
 
 
 def detection_error(failure: BaseException) -> CameraError:

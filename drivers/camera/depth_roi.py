@@ -33,35 +33,25 @@ _NOTHING = DepthReading(None, 0.0, 0.0)
 
 
 def depth_at(
-    depth_m: Depth,
-    box_px: tuple[float, float, float, float] | None = None,
-    mask: NDArray[np.bool_] | None = None,
-    shrink: float = 0.6,
+    depth_m: Depth, box_px: tuple[float, float, float, float], shrink: float = 0.6
 ) -> DepthReading:
-    """Return the distance of the object that a box or a mask of the frame covers.
+    """Return the distance of the object that a box of the frame covers.
 
     The nearest layer of sufficient size is the object; other layers are behind it.
 
     box_px: x, y, width, height; only its central share ``shrink`` is read, as its edges contain
-        background; mask: (height, width); if both are given, their intersection is read
+        background
     """
     depth = np.asarray(depth_m)
-    if depth.ndim != 2 or not depth.size or (mask is not None and mask.shape != depth.shape):
+    if depth.ndim != 2 or not np.isfinite(box_px).all():
         return _NOTHING
     height, width = depth.shape
-    top, bottom, left, right = 0, height, 0, width
-    if box_px is not None:
-        if not np.isfinite(box_px).all():
-            return _NOTHING
-        x, y, w, h = box_px
-        middle_x, middle_y = x + w / 2.0, y + h / 2.0
-        half_x, half_y = max(0.5, shrink * w / 2.0), max(0.5, shrink * h / 2.0)
-        top, bottom = np.clip([round(middle_y - half_y), round(middle_y + half_y)], 0, height)
-        left, right = np.clip([round(middle_x - half_x), round(middle_x + half_x)], 0, width)
-    seen = np.asarray(depth[top:bottom, left:right], dtype=np.float64)
-    if mask is not None:
-        seen = seen[mask[top:bottom, left:right]]
-    seen = seen.ravel()
+    x, y, w, h = box_px
+    middle_x, middle_y = x + w / 2.0, y + h / 2.0
+    half_x, half_y = max(0.5, shrink * w / 2.0), max(0.5, shrink * h / 2.0)
+    top, bottom = np.clip([round(middle_y - half_y), round(middle_y + half_y)], 0, height)
+    left, right = np.clip([round(middle_x - half_x), round(middle_x + half_x)], 0, width)
+    seen = np.asarray(depth[top:bottom, left:right], dtype=np.float64).ravel()
     if not seen.size:
         return _NOTHING
     step = -(-seen.size // _MOST_PIXELS)

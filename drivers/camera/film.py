@@ -24,6 +24,7 @@ _LEAST_COMPLETE = 0.95
 class Film(FilePlayer):
     """A film, or a still image that is shown ten times a second; PyAV and OpenCV read them."""
 
+    is_film = True
     _is_damaged = False
 
     def play_once(self) -> Iterator[StoredFrame]:

@@ -5,22 +5,21 @@ camera itself. So no other code depends on the mount of the camera. Turning take
 640 x 480 and .2 to .9 ms at 1920 x 1080.
 """
 
-import threading
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.camera.source import FrameSource, Shot
+from gazerig.drivers.camera.source import Shot
 
 Floats = NDArray[np.float64]
 Rotation = Literal[0, 90, 180, 270]
 """Degrees clockwise by which frames are turned."""
 
+ROTATIONS: tuple[Rotation, ...] = (0, 90, 180, 270)
+"""All rotations."""
 # Clockwise in the image (x right, y down), by quarter turns.
 _QUARTERS = {
     0: ((1, 0), (0, 1)),
@@ -46,6 +45,10 @@ class FrameOrientation:
     def is_plain(self) -> bool:
         """Return whether frames need no change."""
         return self.rotation == 0 and not self.mirrored
+
+    def turned_by(self, deg: Rotation) -> "FrameOrientation":
+        """Return the orientation that turns frames further, clockwise."""
+        return FrameOrientation(ROTATIONS[(self.rotation + deg) // 90 % 4], self.mirrored)
 
     def turn_shot(self, shot: Shot) -> Shot:
         """Return a frame turned upright, with its data."""
@@ -101,58 +104,3 @@ class FrameOrientation:
 
 AS_DELIVERED = FrameOrientation()
 """Orientation that leaves frames unchanged."""
-
-
-class UprightSource:
-    """A source whose frames are turned upright."""
-
-    def __init__(self, source: FrameSource, orientation: FrameOrientation) -> None:
-        self._source, self._orientation = source, orientation
-
-    @property
-    def rotation(self) -> Rotation:
-        """Return the angle by which frames are turned clockwise, degrees."""
-        return self._orientation.rotation
-
-    @property
-    def has_unknown_lens(self) -> bool:
-        """Return whether the camera does not report its field of view."""
-        return bool(getattr(self._source, "has_unknown_lens", False))
-
-    def open(self) -> None:
-        """Open the device or file.
-
-        Raises:
-            CameraError: it cannot be opened.
-        """
-        self._source.open()
-
-    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for the next frame; return None if ``stop`` was set meanwhile.
-
-        Raises:
-            CameraError: there will be no more frames.
-        """
-        shot = self._source.take(now_s, stop)
-        return None if shot is None else self._orientation.turn_shot(shot)
-
-    def events(self) -> tuple[str, ...]:
-        """Return the events since the last call, one line each."""
-        return self._source.events()
-
-    def close(self) -> None:
-        """Free the device or file; safe to call twice."""
-        self._source.close()
-
-
-def upright(
-    source: Callable[[], FrameSource], orientation: FrameOrientation
-) -> Callable[[], FrameSource]:
-    """Return a factory of a source with upright frames; picklable."""
-    return source if orientation.is_plain else partial(_create_upright_source, source, orientation)
-
-
-def _create_upright_source(
-    source: Callable[[], FrameSource], orientation: FrameOrientation
-) -> FrameSource:
-    return UprightSource(source(), orientation)

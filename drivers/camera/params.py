@@ -1,4 +1,4 @@
-"""Times of reopening a lost camera, and parameters of a webcam."""
+"""Times of reopening a lost camera, and parameters of a webcam and an OAK-D."""
 
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
@@ -22,8 +22,8 @@ class CameraRecovery(NamedTuple):
     retry_s: float = 0.25
     longest_retry_s: float = 2.0
     give_up_s: float = 60.0
-    silent_s: float = 1.0
-    restart_s: float = 3.0
+    silent_s: float = 2.0
+    restart_s: float = 10.0
 
 
 RECOVERY = CameraRecovery()
@@ -39,4 +39,14 @@ class WebcamParams:
     rate_hz: Annotated[float, Bounds(1, 1000), "frame rate requested from the camera"] = 30.0
     latency_ms: Annotated[float, Bounds(0, 1000),
         "delay from the middle of the exposure to the frame's time stamp; measure it by filming a running clock"] = 0.0
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class OakParams:
+    """The OAK-D to use, and its frame rate."""
+
+    # fmt: off
+    device: Annotated[str, "device id or IP address, if there are several cameras; empty: the first one found"] = ""
+    rate_hz: Annotated[float, Bounds(1, 120), "frame rate"] = 30.0
     # fmt: on

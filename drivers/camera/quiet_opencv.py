@@ -9,12 +9,7 @@ import cv2
 
 @contextmanager
 def quiet_opencv() -> Iterator[None]:
-    """Silence OpenCV's log for the duration of a with block, in all threads.
-
-    FFmpeg in OpenCV is silenced permanently when the first film is opened, as it reads its level
-    only once; a level set by the user in the environment stays.
-    """
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    """Silence OpenCV's log for the duration of a with block, in all threads."""
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         yield

@@ -1,18 +1,17 @@
-"""Detection in real time: a thread analyses frames and stores the newest result in one slot.
+"""Detection in a separate thread, so that the control loop never waits for a frame.
 
-No queue and no lock are needed: the slot contains one frozen value, and rebinding a Python name is
-atomic. Frames that arrive while the detector works are skipped.
+The newest detections are kept in one slot: they are an immutable value, and rebinding a Python name
+is atomic. Frames that arrive while the detector works are skipped.
 """
 
 import threading
 from collections import deque
 from collections.abc import Callable
 
-from gazerig.drivers.camera.capture_loop import CaptureLoop, Locate, Motion, detection_error
+from gazerig.drivers.camera.capture_loop import CameraParts, CaptureLoop, detection_error
 from gazerig.drivers.camera.params import RECOVERY, CameraRecovery
-from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import Detections, FaceDetector
+from gazerig.drivers.types import Detections
 
 # OpenCV stops waiting for a camera after 10 s; a film stops immediately.
 _LONGEST_WAIT_S = 12.0
@@ -20,46 +19,26 @@ _MOST_EVENTS = 100
 
 
 class CameraThread:
-    """A camera, or a film paced by the real clock, watched for faces and motion.
+    """A camera watched from a thread of this process, for the parts of a program.
 
-    While a lost source is reopened the last detections stay; their age shows the loss.
-
-    Args:
-        source: Source of frames.
-        detector: Finds faces.
-        now_s: The host's monotonic clock, seconds.
-        recovery: Times of reopening a lost source.
-        motion: Called in the camera's thread with every frame, None for none.
-        locate: Locates detections in the camera's axes, None for none.
-
-    frames, frames_with_face: counts of analysed frames since open
+    Its arguments and methods are those of ``CameraProcess``.
     """
 
     def __init__(
         self,
-        source: FrameSource,
-        detector: FaceDetector,
+        parts: CameraParts,
         now_s: Callable[[], float],
         recovery: CameraRecovery = RECOVERY,
-        motion: Motion | None = None,
-        locate: Locate | None = None,
+        tell: Callable[[float], None] | None = None,
     ) -> None:
         self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
-        self._camera = CaptureLoop(
-            source,
-            detector,
-            now_s,
-            recovery,
-            motion,
-            self._events.append,
-            locate,
-        )
+        self._camera = CaptureLoop(parts, now_s, recovery, self._events.append)
+        self._tell = tell
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._newest: Detections | None = None
         self._failure: BaseException | None = None
-        self.frames = 0
-        self.frames_with_face = 0
+        self.frames = self.frames_with_face = 0
 
     def open(self) -> None:
         """Open the source and start detection.
@@ -85,16 +64,15 @@ class CameraThread:
         Raises:
             CameraError: the source is lost permanently, or detection has failed.
         """
+        if self._tell is not None:
+            self._tell(now_s)
         if self._failure is not None:
             raise detection_error(self._failure) from self._failure
         return self._newest
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
-        messages = []
-        while self._events:
-            messages.append(self._events.popleft())
-        return tuple(messages)
+        return tuple([self._events.popleft() for _ in range(len(self._events))])
 
     def close(self) -> None:
         """Stop detection and free the source; safe to call twice."""

@@ -3,12 +3,11 @@
 import os
 import threading
 from collections.abc import Callable
-from math import isfinite
+from math import inf
 from pathlib import Path
 
 import cv2
 
-from gazerig.drivers.camera.clock_sync import FrameRateMonitor
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.camera.source import Shot, to_bgr
@@ -17,6 +16,9 @@ from gazerig.drivers.errors import CameraError
 # Consecutive failed frames after which the camera counts as lost; one fails at times with a long
 # cable.
 _MOST_FAILURES = 5
+# A reader that was away for a smaller part of a frame period has lost no frame, so that period
+# counts, with a share, as the camera's: many take longer in the dark.
+_PROMPT, _SHARE = 0.5, 0.2
 # The kernel's stamp is used if it is at most this old on the same clock.
 _OLDEST_STAMP_S = 1.0
 # Compressed, which USB 2 carries at full size and rate.
@@ -32,12 +34,7 @@ def open_v4l2(device: str) -> cv2.VideoCapture:
 
 
 class Webcam:
-    """A camera at /dev/video<N>, or at a device file such as /dev/v4l/by-id/...
-
-    has_unknown_lens: whether the camera does not report its field of view
-    """
-
-    has_unknown_lens = True
+    """A camera at /dev/video<N>, or at a device file such as /dev/v4l/by-id/..."""
 
     def __init__(
         self,
@@ -63,11 +60,9 @@ class Webcam:
         self._open_capture = capture
         self._capture: cv2.VideoCapture | None = None
         self._number = 0
-        self._rate = FrameRateMonitor("", 0.0)
-        self._rate_hz = 0.0
-        self._left_s: float | None = None
+        self._period_s, self._captured_s, self._left_s = 0.0, 0.0, 0.0
         self._events: list[str] = []
-        self._reported: set[str] = set()
+        self._reported = False
 
     def open(self) -> None:
         """Open the camera and fetch one frame as a check.
@@ -98,13 +93,14 @@ class Webcam:
                 "close that program or name another camera"
             )
         self._capture, self._number = capture, 0
-        self._rate_hz = capture.get(cv2.CAP_PROP_FPS)
-        self._rate = FrameRateMonitor(f"camera {self._file}", self._rate_hz)
-        self._left_s = None
+        stated_hz = capture.get(cv2.CAP_PROP_FPS)
+        self._period_s = 1.0 / (stated_hz if stated_hz > 0.0 else self._params.rate_hz)
+        self._captured_s = inf
         given = int(capture.get(cv2.CAP_PROP_FOURCC))
         name = "".join(chr(given >> 8 * k & 0xFF) for k in range(4)).strip("\0 ")
-        if name and name != _FOURCC:
-            self._report_once(
+        if name and name != _FOURCC and not self._reported:
+            self._reported = True
+            self._events.append(
                 f"camera {self._file} uses {name} instead of {_FOURCC}: large frames may arrive slowly"
             )
 
@@ -128,13 +124,8 @@ class Webcam:
             if pixels is not None:
                 stamp_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
                 captured_s = stamp_s if 0.0 <= arrived_s - stamp_s <= _OLDEST_STAMP_S else arrived_s
-                away_s = 0.0 if self._left_s is None else came_s - self._left_s
-                self._report(self._rate.update(captured_s, away_s))
+                self._count(captured_s, came_s - self._left_s)
                 self._left_s = now_s()
-                # Frames that arrived while the reader was busy count as skipped.
-                rate_hz = self._rate.measured_hz or self._rate_hz
-                missed = away_s * rate_hz if isfinite(rate_hz) else 0.0
-                self._number += 1 + max(0, int(missed) - 1)
                 latency_s = self._params.latency_ms / 1e3
                 return Shot(captured_s - latency_s, self._number, pixels)
         raise CameraError(
@@ -142,7 +133,7 @@ class Webcam:
         )
 
     def events(self) -> tuple[str, ...]:
-        """Return a line about another format, and one if the rate is not the stated one."""
+        """Return a line about another format, once."""
         messages, self._events = tuple(self._events), []
         return messages
 
@@ -152,12 +143,11 @@ class Webcam:
             self._capture.release()
         self._capture = None
 
-    def _report(self, line: str) -> None:
-        """Store a line for ``events``."""
-        if line and line not in self._reported:
-            self._events.append(line)
-
-    def _report_once(self, line: str) -> None:
-        """Store a line once, even if the camera is reopened."""
-        self._report(line)
-        self._reported.add(line)
+    def _count(self, captured_s: float, away_s: float) -> None:
+        """Count a frame, and those that arrived while the reader was busy for a time."""
+        step_s, self._captured_s = captured_s - self._captured_s, captured_s
+        self._number += 1
+        if away_s < _PROMPT * step_s:
+            self._period_s += _SHARE * (step_s - self._period_s)
+        elif step_s > 0.0:
+            self._number += max(0, round(step_s / self._period_s) - 1)

@@ -9,31 +9,16 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import NamedTuple
 
-from gazerig.drivers.camera.capture_loop import CaptureLoop, Locate, Motion, detection_error
+from gazerig.drivers.camera.capture_loop import CameraParts, CaptureLoop, detection_error
 from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.shared_frames import SlotAddress, SlotWriter
-from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.process.priority import lower_priority
-from gazerig.drivers.types import Detections, FaceDetector
+from gazerig.drivers.types import Detections
 
 NICE = 10  # lower priority than the loop
 LONGEST_END_S = 12.0
 """Time after which a stopped or orphaned process ends, even if it is blocked."""
-
-
-class CameraParts(NamedTuple):
-    """Factories of the parts, called in the process that uses them; all must be picklable.
-
-    source, detector: functions without arguments; motion: also a function without arguments, or
-        None
-    locate: locates detections in the camera's axes; None: the loop does
-    """
-
-    source: Callable[[], FrameSource]
-    detector: Callable[[], FaceDetector]
-    motion: Callable[[], Motion] | None = None
-    locate: Locate | None = None
 
 
 class DetectionMessage(NamedTuple):
@@ -44,6 +29,12 @@ class DetectionMessage(NamedTuple):
     depth: SlotAddress | None
 
 
+class ProcessStart(NamedTuple):
+    """Message that the source is open; is_file: its frames may be any time apart."""
+
+    is_file: bool
+
+
 class ProcessEnd(NamedTuple):
     """Reason for the end of the process.
 
@@ -52,7 +43,7 @@ class ProcessEnd(NamedTuple):
     """
 
     reason: str
-    final: bool
+    final: bool = False
 
 
 def run(
@@ -69,26 +60,24 @@ def run(
     # are analysed.
     cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
     try:
-        motion = parts.motion() if parts.motion is not None else None
-        camera = CaptureLoop(
-            parts.source(), parts.detector(), now_s, recovery, motion, pipe.send, parts.locate
-        )
+        camera = CaptureLoop(parts, now_s, recovery, pipe.send)
         camera.open()
     except SetupError as error:
         pipe.send(error)
         return
+    from gazerig.drivers.camera.file_player import FilePlayer
+
     stop = threading.Event()
-    pipe.send(None)
+    pipe.send(ProcessStart(isinstance(camera.source, FilePlayer)))
     threading.Thread(target=_await_end, args=(pipe, stop), daemon=True).start()
-    slots = SlotWriter(), SlotWriter()
+    images, depths = SlotWriter(), SlotWriter()
     try:
         while (found := camera.next_detections(stop)) is not None:
-            image, depth = found.image, found.depth_m
             pipe.send(
                 DetectionMessage(
                     replace(found, image=None, depth_m=None),
-                    slots[0].put(image) if image is not None else None,
-                    slots[1].put(depth) if depth is not None else None,
+                    images.put(found.image) if found.image is not None else None,
+                    depths.put(found.depth_m) if found.depth_m is not None else None,
                 )
             )
     except OSError:  # the parent has ended
@@ -97,8 +86,8 @@ def run(
         pipe.send(ProcessEnd(str(detection_error(failure)), isinstance(failure, CameraError)))
     finally:
         camera.close()
-        for slot in slots:
-            slot.close()
+        images.close()
+        depths.close()
 
 
 def _await_end(pipe: Connection, stop: threading.Event) -> None:

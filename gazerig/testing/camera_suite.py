@@ -15,6 +15,7 @@ from math import isfinite
 import numpy as np
 import pytest
 
+from gazerig.drivers.camera.capture_loop import CameraParts
 from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
@@ -23,12 +24,6 @@ from gazerig.drivers.types import Camera, DetectedFace, Detections, ImageArray
 
 LONGEST_S = 60.0
 """A camera that takes longer hangs; a working camera needs a thousandth of this time."""
-
-QUICKLY = CameraRecovery(0.001, 0.005, LONGEST_S)
-
-
-def _wait() -> None:
-    time.sleep(0.001)  # noqa: TID251 - waits for a camera's thread
 
 
 @dataclass(frozen=True)
@@ -44,7 +39,7 @@ class CameraBench:
 
     make: Callable[[], Camera]
     now_s: Callable[[], float] = time.monotonic  # noqa: TID251 - that of real cameras
-    wait: Callable[[], None] = _wait
+    wait: Callable[[], None] = lambda: time.sleep(0.001)  # noqa: TID251 - for its thread
     lose: Callable[[], None] | None = None
     restore: Callable[[], None] | None = None
 
@@ -80,10 +75,9 @@ def of_source(
     restore: Callable[[], None] | None = None,
 ) -> CameraBench:
     """Return the bench of a frame source, which a thread reads as in a run."""
-    now_s = time.monotonic  # noqa: TID251 - that of real cameras
-    return CameraBench(
-        lambda: CameraThread(make(), _NoDetections(), now_s, QUICKLY), lose=lose, restore=restore
-    )
+    quickly = CameraRecovery(0.001, 0.005, LONGEST_S)
+    parts = CameraParts(make, _NoDetections), CameraBench.now_s, quickly
+    return CameraBench(lambda: CameraThread(*parts), lose=lose, restore=restore)
 
 
 class CameraSuite:

@@ -12,8 +12,8 @@ from functools import partial
 
 from gazerig.drivers.camera.browser_source import FIELD_DEG, BrowserSource
 from gazerig.drivers.camera.capture_loop import BACK, LOST
-from gazerig.drivers.camera.double_buffer import JpegSlot
 from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.shared_slots import JpegSlot
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera, Detections

@@ -11,25 +11,20 @@ import numpy as np
 from gazerig.config.rig import Rig
 from gazerig.drivers.camera import camera_plugins
 from gazerig.drivers.camera.browser_source import FIELD_DEG
-from gazerig.drivers.camera.camera_plugins import (
-    create_camera_part,
-    create_plugin_source,
-    is_source,
-)
-from gazerig.drivers.camera.capture_loop import Locate, Motion
-from gazerig.drivers.camera.double_buffer import PoseBuffer, PoseSlot
-from gazerig.drivers.camera.orientation import FrameOrientation, UprightSource, upright
+from gazerig.drivers.camera.camera_plugins import create_camera_part, is_source
+from gazerig.drivers.camera.capture_loop import CameraParts, Locate, Motion
+from gazerig.drivers.camera.orientation import FrameOrientation
 from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
-from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import PluginError, SetupError
 from gazerig.drivers.plugins import CAMERA, CameraPlugin, find, is_ours, load
-from gazerig.drivers.types import Camera
+from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
-from gazerig.robot.app.drawn_camera import DrawnCamera, DrawnSource, HeadPose, scene_pixels
+from gazerig.robot.app.drawn_camera import DrawnSource, HeadPose, scene_pixels
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, part_label, require_method
@@ -171,8 +166,10 @@ def drawn_camera(
     own: ProgramParts,
     motion: Callable[[], Motion],
     locate: Locate,
-) -> DrawnCamera:
-    """Return a camera on a drawn scene in real time.
+) -> CameraProcess | CameraThread:
+    """Return a camera on a drawn scene in real time, which is told the pose of the head.
+
+    For a program's own detector, which exists only in that program, it is a thread.
 
     Args:
         rig: Defines its field of view.
@@ -185,15 +182,18 @@ def drawn_camera(
         motion: creates the motion detector.
         locate: locates detections in the camera's axes.
     """
-    poses = PoseSlot()
+    poses = PoseBuffer()
+
+    def tell(now_s: float) -> None:
+        poses.record(now_s, *where(now_s))
+
     make = partial(scene_pixels, scene, mount, rig.camera.horizontal_field_deg, rng)
     source: Callable[[], FrameSource] = partial(DrawnSource, make, poses)
     if own.detector is not None:
-        return DrawnCamera(
-            supervise_source(rig, own, source(), clock, motion, locate), poses, where
-        )
+        parts = CameraParts(source, partial(own.make_detector, rig.detector), motion, locate)
+        return CameraThread(parts, clock.now_s, tell=tell)
     parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
-    return DrawnCamera(CameraProcess(parts, clock.now_s), poses, where)
+    return CameraProcess(parts, clock.now_s, tell=tell)
 
 
 def scene_start_s(camera: Camera) -> float | None:
@@ -254,70 +254,41 @@ def real_camera(
     Raises:
         SetupError: a film, recording or model file cannot be used.
     """
-    detector = partial(face_detector, rig.detector)
     field_rad = radians(placed.horizontal_field_deg)
     motion = partial(MotionSource, rig.motion, placed.lens, field_rad, turns)
-    locate = frame_locator(placed)
+    locate, orientation = frame_locator(placed), frame_orientation(placed)
+    detector: Callable[[], FaceDetector] = partial(face_detector, rig.detector)
+    if own.detector is not None:
+        detector = partial(own.make_detector, rig.detector)
+    source: Callable[[], FrameSource]
+    record = options.record_camera
+    name = options.camera if isinstance(options.camera, str) else None
     if own.camera is not None:
-        return program_camera(rig, own, clock, motion, locate, options.fast)
-    if options.fast:
+        if not is_source(own.camera):
+            require_method(own.camera, "camera", "latest")
+            return cast(Camera, own.camera)
+        if options.fast:
+            raise SetupError(
+                f"{part_label('camera', own.camera)} returns frames in real time: in simulated time "
+                "return detections"
+            )
+        source, record = partial(cast, FrameSource, own.camera), None
+    elif options.fast:
         from gazerig.sim_mock.cameras.video import FilmCamera
 
-        film, delay_s = _film_source(options), options.film_delay_s
-        faces, turned = own.make_detector(rig.detector), frame_orientation(placed)
-        return FilmCamera(film, faces, delay_s, motion=motion(), locate=locate, orientation=turned)
-    name = options.camera if isinstance(options.camera, str) else None
-    if own.detector is not None and (name is None or is_ours(CAMERA, name)):
-        return supervise_source(rig, own, _source_factory(rig, options)(), clock, motion, locate)
-    if name is None or is_ours(CAMERA, name):
-        parts = CameraParts(_source_factory(rig, options), detector, motion, locate)
-        return CameraProcess(parts, clock.now_s)
-    params = _package_camera_params(rig, name)
-    camera = create_camera_part(name, params)
-    if is_source(camera):
-        source = upright(partial(create_plugin_source, name, params), frame_orientation(placed))
-        parts = CameraParts(source, detector, motion, locate)
-        return CameraProcess(parts, clock.now_s)
-    return cast(Camera, camera)
-
-
-def program_camera(
-    rig: Rig,
-    parts: ProgramParts,
-    clock: Clock,
-    motion: Callable[[], Motion | None],
-    locate: Locate,
-    fast: bool,
-) -> Camera:
-    """Return the program's own camera.
-
-    Raises:
-        SetupError: it is not a camera, or it returns frames in simulated time.
-    """
-    camera = parts.camera
-    label = part_label("camera", camera)
-    if not is_source(camera):
-        require_method(camera, "camera", "latest")
-        return cast(Camera, camera)
-    if fast:
-        raise SetupError(
-            f"{label} returns frames in real time: in simulated time return detections"
-        )
-    turned = UprightSource(cast(FrameSource, camera), frame_orientation(rig.camera))
-    return supervise_source(rig, parts, turned, clock, motion, locate)
-
-
-def supervise_source(
-    rig: Rig,
-    parts: ProgramParts,
-    source: FrameSource,
-    clock: Clock,
-    motion: Callable[[], Motion | None],
-    locate: Locate,
-) -> CameraThread:
-    """Return a source of frames with the detector in a thread of this program."""
-    detector = parts.make_detector(rig.detector)
-    return CameraThread(source, detector, clock.now_s, motion=motion(), locate=locate)
+        film, delay_s = cast("FilePlayer", _source_factory(rig, options)()), options.film_delay_s
+        return FilmCamera(film, detector(), delay_s, 0.0, motion(), locate, orientation)
+    elif name is None or is_ours(CAMERA, name):
+        source = _source_factory(rig, options)
+    else:
+        source = partial(create_camera_part, name, _package_camera_params(rig, name))
+        camera = source()
+        if not is_source(camera):
+            return cast(Camera, camera)
+    parts = CameraParts(source, detector, motion, locate, orientation, record)
+    if own.camera is not None or own.detector is not None:
+        return CameraThread(parts, clock.now_s)
+    return CameraProcess(parts, clock.now_s)
 
 
 def frame_locator(placed: CameraParams) -> FrameLocator:
@@ -343,28 +314,13 @@ def _package_camera_params(rig: Rig, name: str) -> object:
         ) from error
 
 
-def _film_source(options: RunOptions) -> "FilePlayer":
-    if options.replay is not None:
-        from gazerig.drivers.camera.playback import CameraReplay
-
-        return CameraReplay(options.replay)
-    from gazerig.drivers.camera.film import Film
-
-    return Film(str(options.video))
-
-
 def _source_factory(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
-    """Return a factory of the source of upright frames, for the process that will use it."""
-    source: Callable[[], FrameSource]
+    """Return a factory of one of our sources, for the process that will use it."""
     if options.replay is not None:
-        source = partial(camera_plugins.recording, options.replay)
-    elif options.video is not None:
-        source = partial(camera_plugins.film, str(options.video))
-    elif options.oak or options.camera == "oak":
-        source = partial(camera_plugins.oak, rig.oak)
-    else:
-        number = options.camera if isinstance(options.camera, int) else 0
-        source = partial(camera_plugins.webcam, number, rig.webcam)
-    if options.record_camera is not None:
-        source = partial(camera_plugins.recorded, source, options.record_camera)
-    return upright(source, frame_orientation(rig.camera))
+        return partial(camera_plugins.recording, options.replay)
+    if options.video is not None:
+        return partial(camera_plugins.film, str(options.video))
+    if options.oak or options.camera == "oak":
+        return partial(camera_plugins.oak, rig.oak)
+    number = options.camera if isinstance(options.camera, int) else 0
+    return partial(camera_plugins.webcam, rig.webcam, number)

@@ -1,8 +1,7 @@
-"""Camera on a drawn scene, which is drawn and analysed in the camera's own process.
+"""Source of a drawn scene's frames, for the camera's own process.
 
 The control loop only sends the pose of the head. The process draws the view from there and detects
-faces and motion in it, so that neither can delay a tick. For a program's own detector, which exists
-only in that program, it is a thread.
+faces and motion in it, so that neither can delay a tick.
 """
 
 import threading
@@ -11,11 +10,9 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from gazerig.drivers.camera.double_buffer import PoseSlot, TimedPose
-from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.shared_slots import TimedPose
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.camera.thread import CameraThread
-from gazerig.drivers.types import DetectedFace, Detections, ImageArray
+from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
@@ -125,46 +122,3 @@ class NoFaces:
     def find(self, bgr: ImageArray) -> tuple[DetectedFace, ...]:
         """Return no faces."""
         return ()
-
-
-class DrawnCamera:
-    """Camera in a drawn scene, which receives the head's pose at each call.
-
-    Args:
-        process: Process or thread that draws and detects.
-        poses: receives the pose of the head.
-        where: returns rotation and position of the head in the world at a time.
-    """
-
-    def __init__(
-        self, process: CameraProcess | CameraThread, poses: PoseSlot, where: HeadPose
-    ) -> None:
-        self.process = process
-        self._poses, self._where = poses, where
-
-    @property
-    def frames(self) -> int:
-        """Return the count of frames since ``open``."""
-        return self.process.frames
-
-    @property
-    def frames_with_face(self) -> int:
-        """Return the count of frames with a face."""
-        return self.process.frames_with_face
-
-    def open(self) -> None:
-        """Start the process; raises its errors."""
-        self.process.open()
-
-    def latest(self, now_s: float) -> Detections | None:
-        """Return the detections of the newest frame, None before the first."""
-        self._poses.record(now_s, *self._where(now_s))
-        return self.process.latest(now_s)
-
-    def events(self) -> tuple[str, ...]:
-        """Return the events since the last call, one line each."""
-        return self.process.events()
-
-    def close(self) -> None:
-        """End the process; safe to call twice."""
-        self.process.close()

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
-from gazerig.drivers.camera.double_buffer import PoseBuffer
+from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.drivers.serial.list_ports import check_exists, check_owner, serial_ports
 from gazerig.drivers.types import ServoBus

@@ -1,6 +1,6 @@
 """Motion detection in images, compensated for the camera's turn by the head's pose."""
 
-from gazerig.drivers.camera.double_buffer import PoseBuffer
+from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.params import MotionParams

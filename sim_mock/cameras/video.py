@@ -42,8 +42,9 @@ class FilmCamera:
         orientation: FrameOrientation = AS_DELIVERED,
     ) -> None:
         self._video = video
-        self._frames = FrameAnalyzer(detector, motion, locate, orientation.rotation)
-        self._orientation = orientation
+        self._frames = FrameAnalyzer(
+            detector, motion, locate, orientation, getattr(video, "is_film", False)
+        )
         self._delay_s = delay_s
         self._start_s = start_s
         self._newest: Detections | None = None
@@ -67,8 +68,7 @@ class FilmCamera:
             CameraError: the film cannot be read any more.
         """
         while (captured_s := self._start_s + self._video.due_s) + self._delay_s <= now_s:
-            shot = self._orientation.turn_shot(self._video.next_shot())
-            found = self._frames.analyze(shot._replace(captured_s=captured_s))
+            found = self._frames.analyze(self._video.next_shot()._replace(captured_s=captured_s))
             self.frames += 1
             self.frames_with_face += bool(found.faces)
             self._newest = found

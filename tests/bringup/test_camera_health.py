@@ -3,25 +3,21 @@
 from functools import cache
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
-from present import present
 from seeing.material import background, noisy, paste, portrait
 
-from gazerig.drivers.camera.health import (
-    CameraHealth,
-    CameraObservation,
-    HealthModel,
-    TurnedFaceSearch,
-)
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer
+from gazerig.drivers.camera.health import CameraHealth
+from gazerig.drivers.camera.orientation import FrameOrientation, Rotation
 from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import Detections
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 WIDTH, HEIGHT = 640, 480
 FAST = {"faces": 0.01}
-GOOD = 200.0
+PERIOD_S = 0.25
 
 
 @cache
@@ -34,30 +30,23 @@ def room(people: int = 2) -> np.ndarray:
     return image
 
 
-def turned(image: np.ndarray, clockwise_deg: float) -> np.ndarray:
-    turn = cv2.getRotationMatrix2D((WIDTH / 2.0, HEIGHT / 2.0), -clockwise_deg, 1.0)
-    return cv2.warpAffine(image, turn, (WIDTH, HEIGHT), borderMode=cv2.BORDER_REPLICATE)
+class Unseen:
+    """Finds no face."""
+
+    def find(self, image: np.ndarray) -> tuple[()]:
+        return ()
 
 
 def looked(
-    images: list[np.ndarray], detector: Any = None, rotation: int = 0
-) -> tuple[list[str], tuple[str, ...]]:
-    """Return the reports on frames that are a second apart, and the conditions at their end."""
-    health, told = CameraHealth(rotation), list[str]()
-    conditions: tuple[str, ...] = ()
+    images: list[np.ndarray], detector: Any = None, **how: Any
+) -> tuple[list[tuple[float, str]], Detections]:
+    """Return the reports on frames with their times, and the last detections."""
+    analyzer = FrameAnalyzer(detector or MtcnnDetector(FaceDetectorParams()), **how)
+    told: list[tuple[float, str]] = []
     for k, image in enumerate(images):
-        faces = detector.find(image) if detector is not None else ()
-        conditions = health.assess(Shot(float(k), k + 1, image), faces, FAST)
-        told += health.events()
-    return told, conditions
-
-
-def stepped(model: HealthModel, count: int, **seen: Any) -> list[str]:
-    return [
-        line
-        for _ in range(count)
-        for line in model.step(CameraObservation(GOOD, True)._replace(**seen))
-    ]
+        found = analyzer.analyze(Shot(PERIOD_S * k, k + 1, image))
+        told += [(PERIOD_S * k, line) for line in analyzer.events()]
+    return told, found
 
 
 @pytest.mark.parametrize(
@@ -69,12 +58,12 @@ def stepped(model: HealthModel, count: int, **seen: Any) -> list[str]:
 )
 def test_a_bad_picture_is_told_as_it_begins_and_as_it_ends(bad, begins, ends):
     good = np.asarray(room())
-    told, conditions = looked([good] * 3 + [bad] * 20)
-    assert len(told) == 1 and told[0].startswith(begins)
-    assert conditions == (told[0].removeprefix("camera: "),)
-    told, conditions = looked([bad] * 20 + [good] * 20)
-    assert len(told) == 2 and told[1].endswith(ends) or ends in told[1]
-    assert conditions == ()
+    told, found = looked([good] * 12 + [bad] * 40, Unseen())
+    assert len(told) == 1 and told[0][1].startswith(begins)
+    assert found.conditions == (told[0][1].removeprefix("camera: "),)
+    told, found = looked([bad] * 40 + [good] * 40, Unseen())
+    assert len(told) == 2 and ends in told[1][1]
+    assert found.conditions == ()
 
 
 @pytest.mark.parametrize(
@@ -88,47 +77,51 @@ def test_a_bad_picture_is_told_as_it_begins_and_as_it_ends(bad, begins, ends):
     ids=["people", "nobody", "dim and noisy", "one colour"],
 )
 def test_good_pictures_are_left_alone(image):
-    detector = MtcnnDetector(FaceDetectorParams())
-    assert looked([image] * 18, detector) == ([], ())
+    for turns_film in (False, True):
+        told, found = looked([image] * 40, turns_film=turns_film)
+        assert (told, found.conditions, found.width_px) == ([], (), WIDTH)
+
+
+def turned(image: np.ndarray, clockwise: Rotation) -> np.ndarray:
+    return FrameOrientation(clockwise).turn_image(image)
 
 
 @pytest.mark.parametrize(
-    ("deg", "says", "rotation", "set_to"),
-    [
-        (180, "turned by 180 deg", 0, 180),
-        (90, "turned by 90 deg", 0, 270),
-        (90, "turned by 90 deg", 90, 0),
-        (180, "turned by 180 deg", 270, 90),
-    ],
+    ("deg", "mounted", "set_to"), [(180, 0, 180), (90, 0, 270), (270, 0, 90), (90, 90, 0)]
 )
-def test_a_turned_camera_is_told_with_its_rotation(deg, says, rotation, set_to):
-    found = TurnedFaceSearch()
-    image = turned(room(), deg)
-    at = [found.find(image) for _ in range(3)]
-    off = [abs((present(one) - deg + 180.0) % 360.0 - 180.0) for one in at if one]
-    assert off and max(off) < 15.0
-    model = HealthModel(rotation)
-    assert not stepped(model, 5, has_upright_face=False)
-    assert model.lacks_upright_faces
-    told = stepped(
-        model, 8, has_upright_face=False, turned_deg=max(at, key=lambda one: abs(one or 0.0))
-    )
-    assert len(told) == 1 and says in told[0]
-    assert told[0].endswith(f"set camera.rotation: {set_to}")
-    assert stepped(model, 20) == ["camera: the picture is upright again"]
+def test_a_turned_camera_is_told_within_five_seconds_with_its_rotation(deg, mounted, set_to):
+    # As the camera delivers it: before its present rotation.
+    as_delivered = turned(room(), (deg - mounted) % 360)
+    told, found = looked([as_delivered] * 40, orientation=FrameOrientation(mounted))
+    ((t_s, line),) = told
+    assert t_s < 5.0 and f"camera is turned by {deg} deg" in line
+    assert line.endswith(f"set camera.rotation: {set_to}") and len(found.conditions) == 1
+    told, found = looked([as_delivered] * 16 + [turned(as_delivered, -deg % 360)] * 40,
+                         orientation=FrameOrientation(mounted))  # fmt: skip
+    assert [line for _, line in told][1:] == ["camera: the picture is upright again"]
+    assert found.conditions == ()
+
+
+@pytest.mark.parametrize("deg", [90, 180, 270])
+def test_a_turned_film_is_turned_upright_and_is_another_scene(deg):
+    told, found = looked([turned(room(), deg)] * 40, turns_film=True)
+    ((t_s, line),) = told
+    assert t_s < 5.0 and line.startswith(f"the film is turned by {deg} deg")
+    assert found.image is not None and np.array_equal(found.image, room())
+    assert len(found.faces) == 2 and found.conditions == () and found.scene >= 1
 
 
 def test_frames_that_come_too_fast_are_told_with_the_stage():
     health, told = CameraHealth(), list[str]()
     for k in range(60):  # 60 a second, of which 8 are looked at
         shot = Shot(k / 8.0, 1 + round(7.5 * k), np.asarray(room()))
-        health.assess(shot, (), {"faces": 0.01, "motion": 0.1})
+        health.assess(shot, {"faces": 0.01, "motion": 0.1})
         told += health.events()
     assert told == [
         "camera: 8 of 60 frames a second are analysed; motion takes 100 of 125 ms a frame: "
         "lower motion.work_px, or set motion.enabled: false"
     ]
     for k in range(60, 200):
-        health.assess(Shot(k / 8.0, 391 + k, np.asarray(room())), (), FAST)
+        health.assess(Shot(k / 8.0, 391 + k, np.asarray(room())), FAST)
         told += health.events()
     assert told[1:] == ["camera: frames are analysed in time again"]

@@ -34,7 +34,7 @@ from seeing.moving_room import (
     turn,
 )
 
-from gazerig.drivers.camera.double_buffer import PoseBuffer
+from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.params import MotionParams

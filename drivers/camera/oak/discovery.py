@@ -90,14 +90,9 @@ _CURES = (
         "not a hub, and connect its power supply",
     ),
     (
-        ("out of memory", "not enough", "cannot allocate", "insufficient", "shaves", "cmx"),
-        "its memory is too small for colour and depth: use an OAK-D",
-    ),
-    (
         ("resolution", "sensor mode", "sensor config", "unsupported size"),
         "its sensor does not support that frame rate: set oak.rate_hz to 30",
     ),
-    (("host only",), "its nodes need a camera"),
 )
 """Parts of messages, in lower case -> cause and remedy."""
 _OTHERWISE = "unplug it, wait a second, plug it in again; if another program uses it, close it"

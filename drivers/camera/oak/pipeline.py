@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gazerig.drivers.camera.depth_roi import resize_depth, to_metres
-from gazerig.drivers.camera.oak.params import OakParams
+from gazerig.drivers.camera.params import OakParams
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import to_bgr
 from gazerig.drivers.types import Depth, ImageArray

@@ -3,12 +3,9 @@
 import threading
 from collections.abc import Callable
 from datetime import timedelta
-from math import inf
 from typing import Any
 
-from gazerig.drivers.camera.clock_sync import ClockSync, FrameRateMonitor
 from gazerig.drivers.camera.oak.discovery import find_oak, load_depthai, start_cure
-from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import (
     COLOUR,
     HEIGHT_PX,
@@ -20,6 +17,7 @@ from gazerig.drivers.camera.oak.pipeline import (
     join_outputs,
     lens_of,
 )
+from gazerig.drivers.camera.params import OakParams
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 
@@ -34,7 +32,7 @@ _FRAME_BYTES = WIDTH_PX * HEIGHT_PX * (1.5 + 2.0)
 _SILENCE_S = 2.0
 """A camera that delivers no frame for longer is lost."""
 _LATENCY_S = 0.02
-"""Shortest delay from exposure to arrival, where the camera's clock does not follow the host's."""
+"""Assumed delay from exposure to arrival, where the camera's clock does not follow the host's."""
 
 
 class OakSource:
@@ -62,12 +60,9 @@ class OakSource:
         self._device: Any = None
         self._pipeline: Any = None
         self._queue: Any = None
-        self._bridge = ClockSync()
         self._in_step = True
         self._number = 0
         self._events: list[str] = []
-        self._slow_line: FrameRateMonitor | None = None
-        self._waited = False  # whether the newest frame arrived during a wait
 
     def open(self) -> None:
         """Find the camera, start it, and check its rate.
@@ -77,7 +72,6 @@ class OakSource:
         """
         self.close()
         self._dai = self._load()
-        self._slow_line = None
         try:
             if self._on_device:
                 info = find_oak(self._dai, self._params.device)
@@ -101,7 +95,7 @@ class OakSource:
         except BaseException:
             self.close()
             raise
-        self._bridge, self._in_step, self._number = ClockSync(), True, 0
+        self._in_step, self._number = True, 0
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for the next frame; its time is the middle of its exposure.
@@ -116,7 +110,6 @@ class OakSource:
             # The newest group of messages; none after a short wait.
             try:
                 group = self._queue.tryGet()
-                self._waited = group is None
                 if group is None:
                     group = self._queue.get(_SLICE)
                 while group is not None and (newer := self._queue.tryGet()) is not None:
@@ -136,7 +129,7 @@ class OakSource:
         return None
 
     def events(self) -> tuple[str, ...]:
-        """Return new events, one line each: USB 2 instead of 3, a clock that jumped."""
+        """Return new events, one line each: USB 2 instead of 3, a clock out of step."""
         reported, self._events = tuple(self._events), []
         return reported
 
@@ -161,9 +154,8 @@ class OakSource:
         self._check_cameras()
         speed = self._device.getUsbSpeed()
         slow = (self._dai.UsbSpeed.LOW, self._dai.UsbSpeed.FULL, self._dai.UsbSpeed.HIGH)
-        if speed in slow:
+        if speed in slow and _FRAME_BYTES * self._params.rate_hz > _USB2_BYTES_S:
             self._events.append(_usb2_text(self._params, speed.name))
-            self._slow_line = FrameRateMonitor("the OAK camera", self._params.rate_hz)
 
     def _check_cameras(self) -> None:
         """Check that the device has a colour camera and a stereo pair.
@@ -188,15 +180,6 @@ class OakSource:
         self._number += 1
         height, width = image.shape[:2]
         captured_s = self._captured_s(group[COLOUR], arrived_s)
-        # A USB 2 line may not carry the requested frames.
-        if self._slow_line is not None:
-            # Before a frame that was queued, others may have been lost because the reader was late.
-            line = self._slow_line.update(captured_s, 0.0 if self._waited else inf)
-            measured_hz = self._slow_line.measured_hz
-            if line and measured_hz is not None:
-                if measured_hz < self._params.rate_hz and "again" not in line:
-                    line = _full_line_text(self._params, measured_hz)
-                self._events.append(line)
         return Shot(captured_s, self._number, image, depth_of(group, width, height), lens_of(group))
 
     def _captured_s(self, frame: Any, arrived_s: float) -> float:
@@ -205,22 +188,16 @@ class OakSource:
         depthai measures the offset of the clocks by round trips, so its stamp in host time contains
         no transport delay. If the stamp is implausible, times of arrival are used.
         """
-        middle = self._dai.CameraExposureOffset.MIDDLE
-        device_s = frame.getTimestampDevice(middle).total_seconds()
-        stamped_s = frame.getTimestamp(middle).total_seconds()
-        jumps = self._bridge.jumps
-        if self._in_step and not 0.0 <= arrived_s - stamped_s <= _OLDEST_STAMP_S:
+        stamped_s = frame.getTimestamp(self._dai.CameraExposureOffset.MIDDLE).total_seconds()
+        if 0.0 <= arrived_s - stamped_s <= _OLDEST_STAMP_S:
+            return float(stamped_s)
+        if self._in_step:
             self._in_step = False
-            self._bridge = ClockSync(_LATENCY_S)
-            jumps = 0
             self._events.append(
                 "the OAK camera's clock is not synchronised with the host's: arrival times minus "
                 f"{1e3 * _LATENCY_S:g} ms are used"
             )
-        host_s = self._bridge.host_s(device_s, stamped_s if self._in_step else arrived_s)
-        if self._bridge.jumps > jumps:
-            self._events.append("the OAK camera's clock jumped: its times are measured again")
-        return host_s
+        return arrived_s - _LATENCY_S
 
 
 def _create_end(pipeline: Any) -> Callable[[], None] | None:
@@ -245,19 +222,8 @@ def _one_line(error: BaseException) -> str:
 
 def _usb2_text(params: OakParams, speed: str) -> str:
     """Return a message about the effect of a USB 2 line on the requested frames."""
-    most_hz = _USB2_BYTES_S / _FRAME_BYTES
-    text = f"the OAK camera runs at USB 2 speed ({speed}), which carries about 30 MB a second"
-    if most_hz >= params.rate_hz:
-        return f"{text}: enough for the requested frames; a USB 3 cable and port reduce the delay"
     return (
-        f"{text}, and {_FRAME_BYTES * params.rate_hz / 1e6:.0f} are requested: use a USB 3 cable "
-        f"(its plug is often blue) and port, or set oak.rate_hz {most_hz:.0f}"
-    )
-
-
-def _full_line_text(params: OakParams, measured_hz: float) -> str:
-    """Return a message about a full USB 2 line, with the remedy."""
-    return (
-        f"the OAK camera's USB 2 line is full: {measured_hz:.1f} of {params.rate_hz:g} frames a "
-        f"second arrive; use a USB 3 cable and port, or set oak.rate_hz {max(1.0, measured_hz):.0f}"
+        f"the OAK camera runs at USB 2 speed ({speed}), which carries about 30 MB a second, and "
+        f"{_FRAME_BYTES * params.rate_hz / 1e6:.0f} are requested: use a USB 3 cable (its plug is "
+        f"often blue) and port, or set oak.rate_hz {_USB2_BYTES_S / _FRAME_BYTES:.0f}"
     )

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from gazerig.drivers.camera.double_buffer import TimedPose
+from gazerig.drivers.camera.shared_slots import TimedPose
 from gazerig.features.world.state_file import HostState, StateReader
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.clock import Clock

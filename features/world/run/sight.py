@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from gazerig.config.rig import Rig
-from gazerig.drivers.camera.capture_loop import Locate
-from gazerig.drivers.camera.double_buffer import PoseBuffer
+from gazerig.drivers.camera.capture_loop import CameraParts, Locate
 from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import FrameSource
-from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.types import Camera, Detections, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.features.world.gl_context import NoRenderer, render_in_calling_thread

@@ -8,7 +8,7 @@ from contextlib import suppress
 import aiohttp
 from aiohttp import web
 
-from gazerig.drivers.camera.double_buffer import MOST_BYTES
+from gazerig.drivers.camera.shared_slots import MOST_BYTES
 from gazerig.robot.dashboard.widgets.widgets import Client, Widgets
 from gazerig.robot.remote.excess import TokenBucket
 

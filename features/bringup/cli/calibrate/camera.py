@@ -13,8 +13,8 @@ import typer
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.capture_loop import CameraParts
 from gazerig.drivers.camera.oak.source import OakSource
-from gazerig.drivers.camera.orientation import UprightSource
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.camera.thread import CameraThread
@@ -218,8 +218,9 @@ def _open_camera(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_
             lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated
         )
         return
-    turned = UprightSource(source, frame_orientation(job.rig.camera))
-    thread = CameraThread(turned, _NullDetector(), clock.now_s)
+    orientation = frame_orientation(job.rig.camera)
+    parts = CameraParts(lambda: source, _NullDetector, orientation=orientation)
+    thread = CameraThread(parts, clock.now_s)
 
     def look() -> Shot | None:
         found = thread.latest(clock.now_s())

@@ -1,0 +1,144 @@
+"""Values in shared memory without a lock, from one process to another.
+
+The writer fills an entry and then increments the count; a reader copies an entry and reads the
+count again. All can be passed as an argument to a new process.
+"""
+
+import multiprocessing
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+_CONTEXT = multiprocessing.get_context("spawn")
+
+MOST_BYTES = 190_000
+"""Largest picture; a JPEG of 640 x 480 in good quality has a third of it."""
+
+
+class Picture(NamedTuple):
+    """An encoded picture: its number since the start, its time of arrival [s] and its bytes."""
+
+    number: int
+    came_s: float
+    data: bytes
+
+
+class JpegSlot:
+    """Slot of the newest picture."""
+
+    def __init__(self) -> None:
+        self._count = _CONTEXT.RawValue("q", 0)
+        self._sizes = _CONTEXT.RawArray("q", 2)
+        self._times = _CONTEXT.RawArray("d", 2)
+        self._entries = _CONTEXT.RawArray("c", 2 * MOST_BYTES)
+
+    def put(self, data: bytes, came_s: float) -> bool:
+        """Store a picture; only one thread writes. Return False if it is too large."""
+        if not 0 < len(data) <= MOST_BYTES:
+            return False
+        entry = self._count.value % 2
+        start = entry * MOST_BYTES
+        self._entries[start : start + len(data)] = data
+        self._sizes[entry], self._times[entry] = len(data), came_s
+        self._count.value += 1
+        return True
+
+    @property
+    def came_s(self) -> float:
+        """Return the time of arrival of the newest picture, -inf before the first."""
+        count = self._count.value
+        return float(self._times[(count - 1) % 2]) if count else float("-inf")
+
+    def newer(self, number: int) -> Picture | None:
+        """Return the newest picture if its number is above this one, otherwise None."""
+        while (count := self._count.value) > number:
+            entry = (count - 1) % 2
+            start, size = entry * MOST_BYTES, self._sizes[entry]
+            data = bytes(self._entries[start : start + size])
+            picture = Picture(count, float(self._times[entry]), data)
+            if self._count.value == count:
+                return picture
+        return None
+
+
+Floats = NDArray[np.float64]
+Row = tuple[float, float, float]
+_ENTRIES = 512  # 2.5 s at 200 Hz
+_WIDTH = 13  # time, the rotation's nine numbers, the position
+_MARGIN = 8  # oldest entries that the writer may be overwriting
+# A frame can be younger than the newest pose by a tick or two.
+_NEWEST_SERVES_S = 0.05
+
+
+class TimedPose(NamedTuple):
+    """Rotation (three rows) and position [m] of the head in the world at a time [s]."""
+
+    t_s: float
+    R_world_head: tuple[Row, Row, Row]
+    p_world_head_m: Row
+
+
+class PoseBuffer:
+    """Poses of the camera or the head over the last few seconds; one process writes."""
+
+    def __init__(self) -> None:
+        self._count = _CONTEXT.RawValue("q", 0)
+        self._first_s = _CONTEXT.RawValue("d", 0.0)
+        self._entries = _CONTEXT.RawArray("d", _ENTRIES * _WIDTH)
+
+    def record(
+        self, t_s: float, R: Sequence[Sequence[float]], p_m: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> None:
+        """Record an orientation (three rows) and a position; times must ascend."""
+        x, y, z = R
+        count = self._count.value
+        if count == 0:
+            self._first_s.value = t_s
+        start = count % _ENTRIES * _WIDTH
+        self._entries[start : start + _WIDTH] = [t_s, *x, *y, *z, *p_m]
+        self._count.value = count + 1
+
+    @property
+    def first_s(self) -> float:
+        """Return the time of the first pose, seconds; 0 before it."""
+        return float(self._first_s.value)
+
+    def newest(self) -> TimedPose | None:
+        """Return the newest pose, None before the first."""
+        count = self._count.value
+        if count == 0:
+            return None
+        start = (count - 1) % _ENTRIES * _WIDTH
+        t_s, *v = self._entries[start : start + _WIDTH]
+        rows = (v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8])
+        return TimedPose(t_s, rows, (v[9], v[10], v[11]))
+
+    def rotation_at(self, t_s: float) -> Floats | None:
+        """Return the rotation (3, 3) at a time; None if it is not stored."""
+        # The complete entries in the order of time: (n, 13).
+        before = int(self._count.value)
+        entries = np.frombuffer(self._entries, np.float64).reshape(_ENTRIES, _WIDTH).copy()
+        after = int(self._count.value)
+        first = 0 if after <= _ENTRIES - _MARGIN else after - _ENTRIES + _MARGIN
+        known = entries[np.arange(first, before) % _ENTRIES, :10]
+        if not len(known) or t_s < known[0, 0] or t_s > known[-1, 0] + _NEWEST_SERVES_S:
+            return None
+        after = int(np.searchsorted(known[:, 0], t_s))
+        if after == len(known):
+            return known[-1, 1:].reshape(3, 3)
+        if after == 0 or known[after, 0] == t_s:
+            return known[after, 1:].reshape(3, 3)
+        (t0, *R0), (t1, *R1) = known[after - 1], known[after]
+        share = (t_s - t0) / (t1 - t0)
+        # Between two orientations one tick apart: the rotation nearest to the mean of the matrices.
+        U, _, Vt = np.linalg.svd(
+            ((1.0 - share) * np.array(R0) + share * np.array(R1)).reshape(3, 3)
+        )
+        return np.asarray(U @ Vt)
+
+    def rotation_between(self, now_s: float, before_s: float) -> Floats | None:
+        """Return R_now_before (3, 3), which turns directions in camera axes; None if unknown."""
+        now, before = self.rotation_at(now_s), self.rotation_at(before_s)
+        return None if now is None or before is None else np.asarray(now.T @ before)
