@@ -175,20 +175,6 @@ def test_the_same_dice_give_the_same_bytes() -> None:
     assert shot(1) == shot(1) != shot(2)
 
 
-def test_a_turn_during_the_exposure_smears_along_the_turn() -> None:
-    def sharpness(turn_deg_s: float) -> float:
-        def head(t_s: float) -> tuple[Mat3, Vec3]:
-            return rotation((radians(turn_deg_s) * t_s, 0.0, 0.0)), ORIGIN
-
-        made = camera(Still(), head, latency_ms=0.0, noise_grey=0.0, exposure_ms=10.0)
-        for now_s in np.arange(0.0, 0.04, 0.005).tolist():
-            found = made.latest(now_s)
-        image = present(present(found).image)
-        return float(np.abs(np.diff(image[60:300].astype(float), axis=1)).mean())
-
-    assert sharpness(200.0) < 0.7 * sharpness(0.0)
-
-
 def test_warmth_lies_where_the_gaze_has_been() -> None:
     trail = GazeTrail()
     for i in range(100):

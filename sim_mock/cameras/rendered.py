@@ -1,13 +1,12 @@
 """A camera that renders the emulated head's view and runs the real detectors on it.
 
 gazerig.sim_mock.cameras.detections simulates a detector's output; here the real detectors work on
-pixels. Frames arrive after a latency, at the camera's rate, with noise, and blurred by the camera's
-turn during the exposure. Not modelled: distortion of the lens, distances.
+pixels. Frames arrive after a latency, at the camera's rate, with noise. Not modelled: distortion of
+the lens, blur of a turning head, distances.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import ceil, hypot
 from typing import Annotated, NamedTuple
 
 import cv2
@@ -16,15 +15,11 @@ import numpy as np
 from gazerig.drivers.camera.capture_loop import Locate
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBlob
-from gazerig.gaze.angles import rotate_back
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.scene_view import PinholeView, SceneView
 from gazerig.sim_mock.cameras.frame_times import FrameParams, FrameTimes
-
-_SHIFT = 4
-"""OpenCV draws lines with a resolution of 1/16 pixel."""
 
 
 class Exposure(NamedTuple):
@@ -45,7 +40,6 @@ class PixelCameraParams(FrameParams):
 
     # fmt: off
     noise_grey: Annotated[float, Bounds(0, 60), "standard deviation of the read-out noise, grey values"] = 3.0
-    exposure_ms: Annotated[float, Bounds(0, 100), "exposure time"] = 8.0
     # fmt: on
 
 
@@ -94,12 +88,10 @@ class PixelCamera:
         self._noise = rng.standard_normal(2 * self._values, np.float32) * np.float32(
             params.noise_grey
         )
-        self._before: tuple[float, Mat3] | None = None
 
     def open(self) -> None:
         """Start; the first frame is taken at the first call of ``latest``."""
         self._times.restart()
-        self._before = None
 
     @property
     def rate_hz(self) -> float:
@@ -111,28 +103,20 @@ class PixelCamera:
         R, p_m = self._mount.pose(*self._head_pose(now_s))
         scene_s = self._times.next_frame_s(now_s)
         if scene_s is not None:
-            shot = Exposure(now_s, self._expose(now_s, scene_s, R, p_m), R)
+            shot = Exposure(now_s, self._expose(scene_s, R, p_m), R)
             blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
             faces = self._detector.find(shot.image)
             found = Detections(
                 now_s, self._times.number, *self._size_px, faces, blobs, image=shot.image
             )
             self._times.send(found.locate_in_camera(self._locate))
-        self._before = now_s, R
         return self._times.arrived(now_s)
 
-    def _expose(self, now_s: float, scene_s: float, R: Mat3, p_m: Vec3) -> ImageArray:
-        before_s, R_before = self._before or (now_s, R)
+    def _expose(self, scene_s: float, R: Mat3, p_m: Vec3) -> ImageArray:
         light = self._view.draw(PinholeView(scene_s, self.lens, self._size_px, R, p_m))
-        share = self._params.exposure_ms / 1e3 / max(now_s - before_s, 1e-9)
-        # The centre of the frame moves by this during the exposure.
-        x, y, z = rotate_back(R_before, (R[0][2], R[1][2], R[2][2]))
-        way_px = -x / z * self.lens.fx_px * share, -y / z * self.lens.fy_px * share
         start = int(self._rng.integers(self._values))
         noise = self._noise[start : start + self._values].reshape(light.shape)
-        image = cv2.add(_blur_along(light, way_px), noise, dtype=cv2.CV_8U).astype(
-            np.uint8, copy=False
-        )
+        image = cv2.add(light, noise, dtype=cv2.CV_8U).astype(np.uint8, copy=False)
         image.setflags(write=False)  # like the frames of real cameras
         return image
 
@@ -144,17 +128,3 @@ class PixelCamera:
     def close(self) -> None:
         """Stop, and free the view."""
         self._view.close()
-
-
-def _blur_along(image: ImageArray, way_px: tuple[float, float]) -> ImageArray:
-    """Blur a frame evenly along a displacement (x, y) in pixels."""
-    length = hypot(*way_px)
-    if length < 1.0:
-        return image
-    half = ceil(0.5 * length)
-    middle, end = np.array((half, half)), 0.5 * np.array(way_px)
-    ends = np.rint((middle - end, middle + end) * np.array(1 << _SHIFT)).astype(int).tolist()
-    kernel = np.zeros((2 * half + 1, 2 * half + 1), np.uint8)
-    cv2.line(kernel, ends[0], ends[1], (255,), 1, cv2.LINE_AA, _SHIFT)
-    blurred = cv2.filter2D(image, -1, kernel / kernel.sum(), borderType=cv2.BORDER_REPLICATE)
-    return blurred.astype(np.uint8, copy=False)
