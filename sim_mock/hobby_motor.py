@@ -1,7 +1,7 @@
 """Motor and controller of a hobby servo with mechanics, which no data sheet contains [A]."""
 
 from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.smart_servo.physics import STEPS_PER_TURN, HobbyMotor, Loop, Physics
+from gazerig.sim_mock.smart_servo.physics import STEPS_PER_TURN, Loop, Motor, Physics
 
 HOBBY_PHYSICS = Physics(rotor_s=0.008, coulomb_share=0.04, viscous_share=0.0, play_deg=0.0)
 """A small motor that reaches full speed in 8 ms without a load; friction of cheap gears."""
@@ -11,7 +11,7 @@ DAMPING = 1.0
 little."""
 
 
-def hobby_motor(spec: HobbySpec, steps_per_turn: float) -> tuple[HobbyMotor, Loop]:
+def hobby_motor(spec: HobbySpec, steps_per_turn: float) -> tuple[Motor, Loop]:
     """Return the motor and the controller of a hobby servo.
 
     Args:
@@ -20,5 +20,5 @@ def hobby_motor(spec: HobbySpec, steps_per_turn: float) -> tuple[HobbyMotor, Loo
     """
     top = spec.speed_steps_s / steps_per_turn * STEPS_PER_TURN / 1000.0
     lag_ms = max(1.0, spec.lag_s * 1000.0)
-    motor = HobbyMotor(spec.stall_torque_nm, 60.0 * spec.speed_steps_s / steps_per_turn)
+    motor = Motor(spec.stall_torque_nm, 60.0 * spec.speed_steps_s / steps_per_turn)
     return motor, Loop(p=(1.0 + DAMPING) / (lag_ms * top), d=DAMPING / top)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.drivers.dynamixel.control_table import MODELS
-from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Physics
+from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Motor, Physics
 from gazerig.sim_mock.smart_servo.shaft import Shaft
 
 P, D = 800 / 128 / 885, 800 / 16 / 885
@@ -17,9 +17,11 @@ SMOOTH: dict[str, Any] = {"coulomb_share": 0.0, "viscous_share": 0.0}
 
 
 def shaft(model: str = "xl330-m077", loop: Loop = PD, weight_nm: float = 0.0, **physics) -> Shaft:
-    made = Shaft(MODELS[model], Physics(**physics), 0.0)
+    sheet = MODELS[model]
+    motor = Motor(sheet.stall_torque_nm, sheet.no_load_rpm)
+    made = Shaft(motor, Physics(**physics), 0.0)
     made.drive(loop)
-    made.set_weight(weight_nm / MODELS[model].stall_torque_nm)
+    made.set_weight(weight_nm / motor.stall_torque_nm)
     return made
 
 

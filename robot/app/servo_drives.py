@@ -43,7 +43,9 @@ def servo_drives(rig: Rig) -> dict[str, ServoDrive]:
     shafts = {}
     for name, joint in rig.joints.items():
         if joint.model in _SMART:
-            shafts[name] = _shaft_drive(_SMART[joint.model], Physics(), smart_loop(joint))
+            model = _SMART[joint.model]
+            motor = Motor(model.stall_torque_nm, model.no_load_rpm)
+            shafts[name] = _shaft_drive(motor, Physics(), smart_loop(joint))
         elif (joint.bus, joint.id) in hobby:
             steps_per_turn = joint.model_facts.steps_per_turn
             motor, loop = hobby_motor(hobby[joint.bus, joint.id], steps_per_turn)

@@ -27,7 +27,7 @@ from gazerig.drivers.dynamixel.control_table import (
     registers_of,
 )
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Motor, ServoSpec
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo, Result
 from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
 
@@ -125,16 +125,18 @@ class DynamixelServo(EmulatedServo):
     memory: DynamixelMemory
 
     def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = create_shaft) -> None:
-        model = MODELS[spec.model]
+        model = self.model = MODELS[spec.model]
         memory = DynamixelMemory(model)
         memory.set("firmware_version", spec.firmware)
         memory.set("id", spec.id)
+        memory.set("present_input_voltage", round(model.rated_v * 10.0))
         self.baud_rates = BAUD_RATES[: (memory.registers["baud_rate"].high or 0) + 1]
         self.fast_reads = spec.firmware >= FAST_READ_SINCE[model.series]
         unit = model.current_unit_ma
         # Models without a current sensor report load in 0.1 %.
         self._current_full = model.stall_current_a * 1000.0 / unit if unit else 1000.0
-        super().__init__(spec, model, memory, now_ms, make_shaft)
+        motor = Motor(model.stall_torque_nm, model.no_load_rpm)
+        super().__init__(spec, motor, memory, now_ms, make_shaft)
 
     def _boot(self) -> None:
         """Reset to power-on."""

@@ -13,7 +13,7 @@ _ENDS = {"count": ("count", "N"), "for": ("seconds", "SECONDS")}
 _WHOLE = ("ID", "BYTES", "BIT", "N")
 _RANGES: dict[str, tuple[float, float]] = {
     "BYTES": (0, 1024), "BIT": (0, 8191), "N": (1, 1_000_000), "SECONDS": (0.0, 1e6),
-    "MS": (0.0, 60_000.0), "PERCENT": (0.0, 100.0), "V": (0.0, 30.0), "C": (-40.0, 200.0),
+    "MS": (0.0, 60_000.0), "PERCENT": (0.0, 100.0), "V": (0.0, 25.0), "C": (0.0, 200.0),
     "STEPS": (-1e6, 1e6),
 }  # fmt: skip
 

@@ -46,7 +46,7 @@ from gazerig.drivers.feetech.scs import SCS_REGISTERS
 from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.sim_mock.feetech.packets import signed, unsigned
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Motor, ServoSpec
 from gazerig.sim_mock.smart_servo.servo import (
     HEAT,
     OVERLOAD,
@@ -154,7 +154,7 @@ class FeetechServo(EmulatedServo):
         models = {**MODELS, **SCS_MODELS}
         if spec.model not in models:
             raise ValueError(f"model {spec.model!r}: Feetech servos are {', '.join(models)}")
-        model = models[spec.model]
+        model = self.model = models[spec.model]
         self._scs = spec.model in SCS_MODELS
         self.group_reads = not self._scs
         order: Order = "big" if self._scs else "little"
@@ -164,7 +164,9 @@ class FeetechServo(EmulatedServo):
         self._top = model.no_load_rpm / 60.0 * TURN / 1000.0
         self._current_full = model.stall_current_a * 1000.0 / CURRENT_UNIT_MA
         memory = FeetechMemory(model, spec.id, spec.firmware)
-        super().__init__(spec, model, memory, now_ms, make_shaft, turn / TURN)
+        memory.set("present_input_voltage", round(model.rated_v * 10.0))
+        motor = Motor(model.stall_torque_nm, model.no_load_rpm)
+        super().__init__(spec, motor, memory, now_ms, make_shaft, turn / TURN)
 
     def _apply_settings(self) -> None:
         """Apply settings that have changed."""

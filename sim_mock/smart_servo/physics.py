@@ -1,16 +1,14 @@
 """Physical parameters of an emulated servo, its specification, and its controller.
 
-Stall torque, stall current and no-load speed belong to the model, in
-gazerig.drivers.dynamixel.control_table. Values that no data sheet contains are assumptions, marked
-[A]; values that follow from a report of users are marked [R]. Inside an emulated servo lengths are
-steps (4096 per turn) and times milliseconds; torque is a share of the stall torque at the rated
-voltage, PWM a share of full PWM.
+Stall torque and no-load speed are the motor's, from the data sheets in the drivers' tables. Values
+that no data sheet contains are assumptions, marked [A]; values that follow from a report of users
+are marked [R]. Inside an emulated servo lengths are steps (4096 per turn) and times milliseconds;
+torque is a share of the stall torque at the rated voltage, PWM a share of full PWM.
 """
 
 from math import inf, pi
 from typing import NamedTuple
 
-from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.robot.model.assumed_servo import GEAR_FRICTION
 
 
@@ -62,14 +60,11 @@ STEPS_PER_RAD = STEPS_PER_TURN / (2.0 * pi)
 MS_S = 0.001
 
 
-class HobbyMotor(NamedTuple):
-    """Motor and gear of a hobby servo."""
+class Motor(NamedTuple):
+    """Motor and gear of a servo, from its data sheet."""
 
     stall_torque_nm: float
     no_load_rpm: float
-
-
-Motor = ServoModel | HobbyMotor
 
 
 class Loop(NamedTuple):
@@ -104,14 +99,14 @@ class Mechanics(NamedTuple):
     play: float
 
 
-def mechanics_of(model: Motor, physics: Physics) -> Mechanics:
-    """Return the mechanics of a model with its physics."""
-    stall_nm = model.stall_torque_nm
-    top_rad_s = model.no_load_rpm * pi / 30.0
+def mechanics_of(motor: Motor, physics: Physics) -> Mechanics:
+    """Return the mechanics of a motor with its physics."""
+    stall_nm = motor.stall_torque_nm
+    top_rad_s = motor.no_load_rpm * pi / 30.0
     inertia = physics.rotor_s * stall_nm / top_rad_s + physics.load_kg_m2
     # Speed in steps/ms that the stall torque adds in 1 ms.
     accel = stall_nm / inertia * STEPS_PER_RAD * MS_S * MS_S
-    top = model.no_load_rpm / 60.0 * STEPS_PER_TURN * MS_S
+    top = motor.no_load_rpm / 60.0 * STEPS_PER_TURN * MS_S
     # Friction is part of the data sheet's no-load speed: the motor alone would be faster.
     rate = (1.0 - physics.coulomb_share - physics.viscous_share) / top
     viscous = physics.viscous_share / top

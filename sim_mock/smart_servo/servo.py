@@ -8,12 +8,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import sin
 
-from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.robot.model.assumed_servo import AMBIENT_C
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.physics import (
     STEPS_PER_RAD,
     STEPS_PER_TURN,
+    Motor,
     ServoSpec,
 )
 from gazerig.sim_mock.smart_servo.shaft import ShaftMaker, create_shaft
@@ -37,8 +37,8 @@ VOLTAGE, HEAT, OVERLOAD = 1, 4, 32
 class EmulatedServo(ABC):
     """One servo on the chain. Its clock counts the chain's whole milliseconds.
 
-    The registers' position is (side * shaft.x + shift) * scale. A make sets ``baud_rates`` before
-    this class's constructor.
+    The registers' position is (side * shaft.x + shift) * scale. A make sets ``baud_rates``, and
+    ``present_input_voltage`` in its memory, before this class's constructor.
 
     Attributes:
         id: its address.
@@ -63,25 +63,24 @@ class EmulatedServo(ABC):
     def __init__(
         self,
         spec: ServoSpec,
-        model: ServoModel,
+        motor: Motor,
         memory: ServoMemory,
         now_ms: int,
         make_shaft: ShaftMaker = create_shaft,
         scale: float = 1.0,
     ) -> None:
         physics = spec.physics
-        self.spec, self.model, self.memory = spec, model, memory
+        self.spec, self.memory = spec, memory
         self._scale = scale
         own = physics._replace(
             stop_low_steps=physics.stop_low_steps / scale,
             stop_high_steps=physics.stop_high_steps / scale,
         )
-        self._gravity = physics.gravity_nm / model.stall_torque_nm
+        self._gravity = physics.gravity_nm / motor.stall_torque_nm
         self._upright = physics.upright_steps / scale
         self._weight_rad = physics.gravity_turns / STEPS_PER_RAD
-        self.shaft = make_shaft(spec.id, model, own, spec.start_steps / scale)
-        self._supply_v = model.rated_v
-        self._temperature_c = AMBIENT_C
+        self.shaft = make_shaft(spec.id, motor, own, spec.start_steps / scale)
+        memory.set("present_temperature", round(AMBIENT_C))
         self.on_address: Callable[[], None] = lambda: None
         self._address = 0, 0
         self._ms = self._booted_ms = self._deaf_until_ms = now_ms
@@ -181,14 +180,12 @@ class EmulatedServo(ABC):
         self.shaft.set_weight(self._gravity * sin(angle))
 
     def _measure(self) -> None:
-        """Update the errors of voltage and temperature, and their registers."""
+        """Update the errors of voltage and temperature."""
         get = self.memory.get
-        volts_01 = round(self._supply_v * 10.0)
         low, high = get("min_voltage_limit"), get("max_voltage_limit")
-        hot = self._temperature_c > get("temperature_limit")
-        self._surroundings = (not low <= volts_01 <= high) * VOLTAGE | hot * HEAT
-        self.memory.set("present_input_voltage", max(0, min(255, volts_01)))
-        self.memory.set("present_temperature", max(0, min(255, round(self._temperature_c))))
+        hot = get("present_temperature") > get("temperature_limit")
+        out = not low <= get("present_input_voltage") <= high
+        self._surroundings = out * VOLTAGE | hot * HEAT
 
     def restart(self) -> None:
         """Restart by instruction or after a dip of the supply; it receives nothing meanwhile."""
@@ -280,7 +277,7 @@ class EmulatedServo(ABC):
         """
         if baud not in self.baud_rates:
             known = ", ".join(map(str, self.baud_rates))
-            raise ValueError(f"baud {baud}: {self.model.name} supports {known}")
+            raise ValueError(f"baud {baud}: {self.spec.model} supports {known}")
         self.memory.set_permanently("baud_rate", self.baud_rates.index(baud))
         self._apply_settings()
 
@@ -290,13 +287,11 @@ class EmulatedServo(ABC):
         """Return its state for ``status``."""
         return {
             "id": self.id,
-            "model": self.model.name,
+            "model": self.spec.model,
             "position": round(self.position_steps),
             "goal": self.memory.get("goal_position"),
             "torque": int(self.torque),
             "error": self.errors,
-            "temperature_c": round(self._temperature_c),
-            "voltage_01v": round(self._supply_v * 10.0),
         }
 
     def overload(self) -> None:
@@ -318,10 +313,10 @@ class EmulatedServo(ABC):
 
     def set_voltage(self, volts: float) -> None:
         """Set the supply voltage."""
-        self._supply_v = volts
+        self.memory.set("present_input_voltage", round(volts * 10.0))
         self._measure()
 
     def set_temperature(self, celsius: float) -> None:
         """Set the temperature of the motor."""
-        self._temperature_c = celsius
+        self.memory.set("present_temperature", round(celsius))
         self._measure()

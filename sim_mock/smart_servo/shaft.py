@@ -49,8 +49,8 @@ class Shaft:
 
     _integral: float
 
-    def __init__(self, model: Motor, physics: Physics, position_steps: float) -> None:
-        self._built = mechanics_of(model, physics)
+    def __init__(self, motor: Motor, physics: Physics, position_steps: float) -> None:
+        self._built = mechanics_of(motor, physics)
         self._weight = self._load = 0.0
         self._stops = self._low, self._high = physics.stop_low_steps, physics.stop_high_steps
         self._loop, self._stuck, self._cruise, self._ramp = DISABLED, False, 0.0, 0.0
@@ -217,6 +217,6 @@ ShaftMaker = Callable[[int, Motor, Physics, float], Shaft]
 """Creates the shaft of a servo from its id, motor, physics and first position in steps."""
 
 
-def create_shaft(servo_id: int, model: Motor, physics: Physics, position_steps: float) -> Shaft:
+def create_shaft(servo_id: int, motor: Motor, physics: Physics, position_steps: float) -> Shaft:
     """Return an independent shaft: only its own load acts on it."""
-    return Shaft(model, physics, position_steps)
+    return Shaft(motor, physics, position_steps)
