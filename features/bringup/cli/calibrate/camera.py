@@ -8,7 +8,6 @@ from math import atan, degrees, radians
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-import numpy as np
 import typer
 
 from gazerig.config.rig import Rig
@@ -61,7 +60,7 @@ from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.frames import CameraParams, LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import NECK, Kinematics
-from gazerig.sim_mock.cameras.charuco_scene import BoardScene
+from gazerig.sim_mock.cameras.charuco_scene import BOARD_LENS, BoardScene
 
 
 class Paper(StrEnum):
@@ -118,7 +117,6 @@ def calibrate_camera(
     out: OutOption = None,
     dry_run: DryRunOption = False,
     yes: AllYesOption = False,
-    seed: Annotated[int, typer.Option(min=0, help="With --mock: seed of the noise.")] = 0,
     mock: Annotated[
         bool, typer.Option("--mock", help="Use emulated servos and a simulated board.")
     ] = False,
@@ -145,7 +143,7 @@ def calibrate_camera(
             loaded, board, stopped, Kinematics(loaded.geometry, loaded.joints, lid_ends(loaded))
         )
         source = OakSource(loaded.oak) if oak else Webcam(camera or 0, loaded.webcam)
-        with _open_camera(job, None if mock else source, seed) as eye:
+        with _open_camera(job, None if mock else source) as eye:
             lens = _find_lens(job, eye, what)
             changes = lens.changes
             if what is not CalibrationTarget.lens:
@@ -208,12 +206,11 @@ class _NullDetector:
 
 
 @contextlib.contextmanager
-def _open_camera(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_CameraView]:
+def _open_camera(job: _Job, source: FrameSource | None) -> Iterator[_CameraView]:
     """Open the camera, or a simulated one."""
     clock = RealClock()
     if source is None:
-        rng = np.random.default_rng(seed)
-        simulated = BoardScene(job.rig.camera, job.board, job.kinematics, rng)
+        simulated = BoardScene(job.rig.camera, job.board, job.kinematics)
         yield _CameraView(
             lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated
         )
@@ -271,7 +268,7 @@ def _find_lens(job: _Job, eye: _CameraView, what: CalibrationTarget) -> _KnownLe
         f"+-{lens.centre_std_px[0]:.1f}, {i.cy_px:.1f} +-{lens.centre_std_px[1]:.1f} px"
     )
     if eye.mock is not None:
-        t = eye.mock.lens
+        t = BOARD_LENS
         say(f"true: {t.fx_px:.1f}, {t.fy_px:.1f} px; axis at {t.cx_px:.1f}, {t.cy_px:.1f} px")
     camera = replace(job.rig.camera, lens=lens.params())
     focal = max(lens.focal_std_px) / i.fx_px * 100.0
@@ -427,7 +424,7 @@ def moving_neck(
     say("hang the board upright, 0.5 to 1 m before the head, where it cannot move; the head")
     say("will look at it from several sides: keep your fingers away; Ctrl-C stops it")
     if mock is not None:
-        mock.hang()
+        mock.head_rad = (0.0, 0.0, 0.0)
     elif not TerminalPerson(Lines(None), stopped, yes).agrees(
         "does the board hang, and is the head free to move?"
     ):
