@@ -1,9 +1,9 @@
 """Drawing of a simulated scene in a camera's view: people of true size in a room.
 
 The people are those of the page's 3-D view; their eyes, noses and mouths are at the landmarks of
-gazerig.robot.model.face_geometry, so that a face detector made for people finds them there. Arms
-are drawn to raised hands only. Shapes are faces in one colour each, the farthest first. Not
-drawn: arms that hang, expression, blinks; the eyes look straight ahead.
+gazerig.robot.model.face_geometry, so that a face detector made for people finds them there.
+Shapes are faces in one colour each, the farthest first. Not drawn: arms, also those of raised
+hands, expression, blinks; the eyes look straight ahead.
 """
 
 from functools import lru_cache
@@ -20,13 +20,11 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.description.mesh import Painted, paint, stored_shape
 from gazerig.robot.description.people import SHIRTS, features, part_of, torso
 from gazerig.robot.model.scene_view import PinholeView
-from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import Scene, ScenePerson
 
 _NEAREST_M = 0.06
 """Nothing nearer is drawn."""
 _CHEST_M, _HAND_M = 0.75, 0.1
-_SHOULDER_M = np.array((0.10, 0.19, -0.17))
-"""Shoulder from the tip of the nose: backwards, to the side, and up."""
 _SPINE_M, _DARKER = -0.117, 0.85
 """Axis of the chest behind the nose, and brightness of the dark fields of a pattern."""
 _TO_LIGHT: Floats = np.array((-0.52, 0.48, 0.71))
@@ -76,13 +74,11 @@ def draw_picture(scene: Scene, seen_by: PinholeView) -> ImageArray:
     for number, person in enumerate(people):
         solids += _person(person, number, eye_m)
         if person.hand is not None:
-            solids += _arm(person, number, np.array(person.hand), eye_m)
+            solids.append(_facing(_palm(number), np.array(person.hand), _HAND_M, 0.0, eye_m))
     for thing in scene.things(seen_by.t_s):
-        if thing.person is not None:
-            person = people[thing.person]
-            solids += _arm(person, thing.person, np.array(thing.p_world_m), eye_m)
-        else:
-            solids.append(_thing(thing, eye_m))
+        shape = _palm(thing.person or 0) if thing.kind == "hand" else _ball()
+        place = np.array(thing.p_world_m)
+        solids.append(_facing(shape, place, thing.radius_m, thing.turned_rad, eye_m))
     for solid in sorted(solids, key=lambda solid: -solid.distance_m):
         _draw_solid(image, seen_by, solid)
     return np.asarray(cv2.GaussianBlur(image, (3, 3), 0.6), np.uint8)
@@ -144,24 +140,6 @@ def _flat(painted: Painted) -> _Shape:
     return _Shape(vertices, faces, normals, painted.colours[faces].mean(axis=1)[:, ::-1])
 
 
-def _arm(person: ScenePerson, number: int, hand_m: Floats, eye_m: Floats) -> list[_Solid]:
-    """Return a straight arm, as long as the hand is far, and the hand."""
-    face_m = np.array(person.p_world_face_m)
-    R_chest = _R_towards(eye_m - face_m)
-    side = 1.0 if (hand_m - face_m) @ R_chest[:, 1] > 0.0 else -1.0
-    shoulder_m = face_m + R_chest @ (_SHOULDER_M * (-1.0, side, 1.0))
-    wrist_m = hand_m - (0.0, 0.0, 0.8 * _HAND_M)
-    return [
-        _link(_sleeve(number), shoulder_m, wrist_m, eye_m),
-        _facing(_palm(number), hand_m, _HAND_M, 0.0, eye_m),
-    ]
-
-
-def _thing(thing: Thing, eye_m: Floats) -> _Solid:
-    shape = _palm(0) if thing.kind == "hand" else _ball()
-    return _facing(shape, np.array(thing.p_world_m), thing.radius_m, thing.turned_rad, eye_m)
-
-
 def _facing(
     shape: _Shape, p_m: Floats, radius_m: float, turned_rad: float, eye_m: Floats
 ) -> _Solid:
@@ -182,25 +160,6 @@ def _ball() -> _Shape:
     _, y, z = ball.mesh.vertices.T
     ball.colours[np.sin(3.0 * np.arctan2(z, y)) > 0.0] = (238, 206, 120)
     return _flat(ball)
-
-
-@lru_cache(maxsize=8)
-def _sleeve(number: int) -> _Shape:
-    """Return an arm of length 1 along z; the radius is in metres."""
-    limb = paint(stored_shape("sleeve").mesh, SHIRTS[number % len(SHIRTS)])
-    return _pattern(limb, 0.0, 4.0, 9.0 * pi)
-
-
-def _link(limb: _Shape, start_m: Floats, end_m: Floats, eye_m: Floats) -> _Solid:
-    """Return a link between two points."""
-    way = end_m - start_m
-    length_m = max(float(np.linalg.norm(way)), 1e-6)
-    up = way / length_m
-    aside = np.cross((0.0, 1.0, 0.0) if abs(up[1]) < 0.9 else (1.0, 0.0, 0.0), up)
-    aside /= np.linalg.norm(aside)
-    R = np.stack((aside, np.cross(up, aside), up * length_m), axis=1)
-    middle_m = 0.5 * (start_m + end_m)
-    return _Solid(limb, R, start_m, float(np.linalg.norm(middle_m - eye_m)))
 
 
 def _draw_solid(image: ImageArray, seen_by: PinholeView, solid: _Solid) -> None:
