@@ -37,7 +37,7 @@ _SHIFT = 4
 _ROOM_M, _ROOM_HEIGHT_M, _FLOOR_M = 3.2, 3.2, -0.72
 """Radius of the round wall, its height up and down, and the height of the floor's far edge."""
 _PX_PER_M = 100.0
-_WALL_BGR, _FLOOR_BGR, _SKIRTING_BGR = (222, 226, 222), (120, 148, 172), (240, 242, 242)
+_WALL_BGR, _FLOOR_BGR = (222, 226, 222), (120, 148, 172)
 _PATCHES: tuple[tuple[float, float], ...] = ((0.06, 10.0), (0.18, 12.0), (0.6, 16.0))
 """Sizes of the soft patches on the wall in metres, and their contrast in grey values."""
 _STEP_PX = 8
@@ -224,10 +224,7 @@ def _wall() -> ImageArray:
         noise = rng.uniform(-contrast, contrast, cells)
         grey += cv2.resize(noise, (width, height), interpolation=cv2.INTER_CUBIC)
     edge = round((_ROOM_HEIGHT_M - _FLOOR_M) * _PX_PER_M)
-    grey[:edge] += np.linspace(-10.0, 10.0, edge)[:, None]
-    grey[edge:] += np.linspace(24.0, -24.0, height - edge)[:, None]
     wall = grey[:, :, None] + np.array(_WALL_BGR)
     wall[edge:] += np.subtract(_FLOOR_BGR, _WALL_BGR)
     image: ImageArray = np.clip(wall, 0.0, 255.0).astype(np.uint8)
-    image[edge - 8 : edge] = _SKIRTING_BGR
     return image

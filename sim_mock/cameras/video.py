@@ -28,7 +28,7 @@ class FilmCamera:
         locate: converts detections from pixels to the camera's axes; None: no conversion.
         orientation: turns frames upright.
 
-    frames, frames_with_face: counts of frames analysed since ``open``
+    frames: count of frames analysed since ``open``
     """
 
     def __init__(
@@ -49,7 +49,6 @@ class FilmCamera:
         self._start_s = start_s
         self._newest: Detections | None = None
         self.frames = 0
-        self.frames_with_face = 0
 
     def open(self) -> None:
         """Open the film at its first frame.
@@ -59,7 +58,7 @@ class FilmCamera:
         """
         self._video.open()
         self._newest = None
-        self.frames = self.frames_with_face = 0
+        self.frames = 0
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the newest detections that have arrived by ``now_s``.
@@ -70,7 +69,6 @@ class FilmCamera:
         while (captured_s := self._start_s + self._video.due_s) + self._delay_s <= now_s:
             found = self._frames.analyze(self._video.next_shot()._replace(captured_s=captured_s))
             self.frames += 1
-            self.frames_with_face += bool(found.faces)
             self._newest = found
         return self._newest
 
