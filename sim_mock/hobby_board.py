@@ -12,6 +12,8 @@ from gazerig.sim_mock.hobby_servo import STEP_S, HobbyServo
 from gazerig.sim_mock.replies import Piece
 
 STEPS_S = round(1.0 / STEP_S)
+MOST_STEPS = 1000
+"""Only the end of a longer time without a command is simulated."""
 
 
 class HobbyBoard(ABC):
@@ -43,9 +45,8 @@ class HobbyBoard(ABC):
         """Return the commanded pulse of a channel, if it differs from the present one."""
         return self.pulse_steps(channel)
 
-    def step_outputs(self) -> bool:
-        """Advance outputs that have a ramp by 10 ms; return whether they are at rest."""
-        return True
+    def step_outputs(self) -> None:  # noqa: B027  # not every board has a ramp
+        """Advance outputs that have a ramp by 10 ms."""
 
     @abstractmethod
     def execute(self, data: bytes) -> Iterator[Piece]:
@@ -82,14 +83,11 @@ class HobbyBoard(ABC):
     def advance(self) -> None:
         """Advance to the present time."""
         until = self._step_number()
+        self._step = max(self._step, until - MOST_STEPS)
         while self._step < until:
             self._step += 1
-            is_resting = self.step_outputs()
+            self.step_outputs()
             for channel, servo in enumerate(self.servos):
-                pulse = self.pulse_steps(channel)
                 if self._step % 2 == 0:
-                    servo.width_steps = pulse
+                    servo.width_steps = self.pulse_steps(channel)
                 servo.step()
-                is_resting = is_resting and servo.is_resting and servo.width_steps == pulse
-            if is_resting:
-                self._step = until

@@ -47,8 +47,8 @@ class HobbyServo:
     width_steps: the present pulses; 0: none
     """
 
-    def __init__(self, spec: HobbySpec | Sequence[float]) -> None:
-        self.spec = HobbySpec(*spec)
+    def __init__(self, spec: HobbySpec) -> None:
+        self.spec = spec
         self.place_steps = self._clip_to_stops(self.spec.start_steps)
         self.stuck = False
         self.width_steps = 0
@@ -59,26 +59,23 @@ class HobbyServo:
         """Return whether it gets no pulses, so that a hand can turn it."""
         return self.width_steps == 0
 
-    @property
-    def is_resting(self) -> bool:
-        """Return whether the next step would not move it."""
-        return self.place_steps == self._next_steps()
-
     def step(self) -> None:
         """Advance by 10 ms."""
-        self.place_steps = self._next_steps()
+        way = self.width_steps - self.place_steps
+        if not (self.stuck or self.is_unpowered or abs(way) <= self.spec.dead_steps):
+            most = self.spec.speed_steps_s * STEP_S
+            self.place_steps = self._clip_to_stops(
+                self.place_steps + min(max(way * self._share, -most), most)
+            )
+
+    def jam(self, stuck: bool = True) -> None:
+        """Jam it at its position, or free it."""
+        self.stuck = stuck
 
     def turn(self, steps: float) -> None:
         """Turn it by hand, as far as its stops allow; a servo with pulses returns."""
         if not self.stuck:
             self.place_steps = self._clip_to_stops(self.place_steps + steps)
-
-    def _next_steps(self) -> float:
-        way = self.width_steps - self.place_steps
-        if self.stuck or self.is_unpowered or abs(way) <= self.spec.dead_steps:
-            return self.place_steps
-        most = self.spec.speed_steps_s * STEP_S
-        return self._clip_to_stops(self.place_steps + min(max(way * self._share, -most), most))
 
     def _clip_to_stops(self, steps: float) -> float:
         return min(max(steps, self.spec.stop_low_steps), self.spec.stop_high_steps)
@@ -89,14 +86,14 @@ HobbyMaker = Callable[[HobbySpec], HobbyServo]
 
 
 def build_servos(
-    specs: Sequence[HobbySpec | Sequence[float]], channels: int, make: HobbyMaker = HobbyServo
+    specs: Sequence[HobbySpec], channels: int, make: HobbyMaker = HobbyServo
 ) -> list[HobbyServo]:
     """Return one servo per channel of a board; channels without a spec have a default one.
 
     Raises:
         ValueError: a spec's channel does not exist or has two servos.
     """
-    given = {int(spec[0]): HobbySpec(*spec) for spec in specs}
+    given = {spec.channel: spec for spec in specs}
     if len(given) < len(specs) or not set(given) <= set(range(channels)):
         raise ValueError(f"servos need different channels from 0 to {channels - 1}")
     return [make(given.get(channel, HobbySpec(channel))) for channel in range(channels)]

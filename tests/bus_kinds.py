@@ -214,7 +214,7 @@ def in_process(
 
 LINE_FAULTS = ("lose {i}", "lose all", "delay {i} 8", "delay all 15", "truncate {i} 5",
                "corrupt {i}", "corrupt all", "unplug")  # fmt: skip
-SERVO_FAULTS = ("brown-out {i}", "echo on", "static 2", "overload {i}", "collide {i}", "stick {i}")
+SERVO_FAULTS = ("brown-out {i}", "echo", "static 2", "overload {i}", "collide {i}", "stick {i}")
 BOARD_FAULTS = ("brown-out", "lose-writes 5", "stick {i}")
 END_OF = {"unplug": "plug", "stick {i}": "free {i}"}
 """Ends of faults that ``clear`` does not end."""

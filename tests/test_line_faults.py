@@ -58,9 +58,9 @@ def test_lost_late_cut_and_damaged_answers(world):
 
 def test_an_echo_and_noise_on_all_bytes(world):
     whole = world.raw()
-    world.faults.command("echo on")
+    world.faults.command("echo")
     assert world.raw().endswith(whole) and len(world.raw()) > len(whole)
-    world.faults.command("echo off")
+    world.faults.command("clear")
     world.faults.command("static 100 for 1")
     assert world.raw() != whole
     world.now_s += 1.0
@@ -96,7 +96,7 @@ def test_faults_last_for_a_count_a_time_or_until_cleared(world):
     assert world.raw(1) and not world.raw(2)
     world.now_s = 5.0
     assert world.raw(2) and not world.raw(3)
-    world.faults.command("clear 3")
+    world.faults.command("clear")
     assert world.raw(3)
 
 

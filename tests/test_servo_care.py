@@ -224,7 +224,7 @@ def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(xl):
 
 def test_an_alert_is_named_though_its_cause_comes_later_and_is_asked_about_seldom():
     rig = DynamixelRig(direct=True)
-    rig.chain[3].set_temperature(90.0)
+    rig.chain[3].sense("temperature", 90.0)
     rig.open()
     for _ in range(8):
         rig.tick()

@@ -56,7 +56,7 @@ def test_all_servos_are_found_at_their_own_rate_and_no_other(family):
         assert scan_ids(bench.port, family, baud) == wanted
 
 
-@pytest.mark.parametrize("fault", ["echo on", "delay all 15"])
+@pytest.mark.parametrize("fault", ["echo", "delay all 15"])
 def test_servos_are_found_whatever_the_adapter_does(family, fault):
     bench = Bench(family, 1_000_000, 1, 2, 3, 40)
     bench.chain.faults.command(fault)

@@ -88,7 +88,7 @@ def test_no_good_answer(rig, spoil):
 
 @pytest.mark.parametrize(
     "command",
-    ["echo on", "delay 2 20"],
+    ["echo", "delay 2 20"],
 )
 def test_answers_that_are_good_all_the_same(rig, command):
     rig.command(command)
@@ -155,7 +155,7 @@ def test_registers_behind_a_lock(sts):
 
 
 @pytest.mark.parametrize("fault", ["lose 4 count 2", "corrupt 4 40 count 2", "delay 4 60 count 1",
-                                   "echo on", "truncate 4 3 count 2"])  # fmt: skip
+                                   "echo", "truncate 4 3 count 2"])  # fmt: skip
 def test_faults_of_answers_with_a_check_of_one_byte(sts, fault):
     sts.command(fault)
     assert sts.registers.read(4, "present_position") == 1928

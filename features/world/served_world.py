@@ -39,13 +39,9 @@ def _push(world: World, body: str, newton: float, to: str, seconds: float = PUSH
 
 COMMANDS = CommandTable(
     {
-        "push": Verb(
-            _push,
-            f"BODY NEWTONS {'|'.join(DIRECTIONS)} [SECONDS]",
-            "push a part of the head, such as head, at its origin; the servos give way",
-        ),
-    },
-    "a body of the rig",
+        # At its origin; the servos give way.
+        "push": Verb(_push, f"BODY NEWTONS {'|'.join(DIRECTIONS)} [SECONDS]"),
+    }
 )
 """Fault commands of a world."""
 

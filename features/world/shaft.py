@@ -297,10 +297,6 @@ class WorldShaft(Shaft):
         self.u, self.effort = u, u - v * self._built.rate
 
 
-REST_STEPS_MS = 1e-3
-"""Speed below which it counts as resting."""
-
-
 class DeadBandShaft(WorldShaft):
     """Shaft that ignores small errors."""
 
@@ -371,11 +367,6 @@ class WorldHobbyServo(HobbyServo):
         if stuck != self._stuck:
             self._stuck = stuck
             self.shaft.jam(stuck)
-
-    @property
-    def is_resting(self) -> bool:
-        """Return whether it does not move."""
-        return -REST_STEPS_MS < self.shaft.v < REST_STEPS_MS
 
     def step(self) -> None:
         """Do nothing: the world moves it."""

@@ -32,7 +32,7 @@ class DynamixelChain(ServoChain):
     status = staticmethod(status)
     span = struct.Struct("<HH")
     misunderstood = INSTRUCTION_ERROR, b""
-    commands = commands_of(252, "id 1, 57600 baud")
+    commands = commands_of(252)
 
     def _execute_group(self, code: int, params: bytes) -> list[Piece]:
         """Execute an instruction to all servos."""

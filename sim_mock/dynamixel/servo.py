@@ -52,8 +52,6 @@ REVERSE = 1
 PWM_SLOPE_V_MS = 0.001977, 0.003955
 """Unit of PWM Slope (62) of the models for 5 V and for 12 V."""
 MULTI_TURN_STEPS = 1_048_575
-HOMING_ACTS_STEPS = 1024
-"""Part of the homing offset that counts in position mode."""
 _SPEED_UNIT = VELOCITY_UNIT_STEPS_S / 1000.0
 _RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
 _IDENTITY = struct.Struct("<HB")
@@ -171,8 +169,6 @@ class DynamixelServo(EmulatedServo):
 
     def _origin(self) -> tuple[int, int]:
         offset = self.memory.get("homing_offset")
-        if self._mode == POSITION:
-            offset = max(-HOMING_ACTS_STEPS, min(HOMING_ACTS_STEPS, offset))
         return -1 if self.memory.get("drive_mode") & REVERSE else 1, offset
 
     def _follow(self) -> None:

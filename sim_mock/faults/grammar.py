@@ -7,7 +7,6 @@ may be.
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-ALL_DEVICES = ("all", "*")
 BOTH, TIME = "count for", "for"
 _ENDS = {"count": ("count", "N"), "for": ("seconds", "SECONDS")}
 _WHOLE = ("ID", "BYTES", "BIT", "N")
@@ -21,24 +20,19 @@ _RANGES: dict[str, tuple[float, float]] = {
 class Verb(NamedTuple):
     """One command.
 
-    words: names of its arguments, optional ones in brackets; ``on|off``: one of these
+    words: names of its arguments, optional ones in brackets
     lasting: further ends of it, ``count for``: it may end with ``count N`` and ``for SECONDS``
     """
 
     action: Callable[..., str]
-    words: str
-    description: str
+    words: str = ""
     lasting: str = ""
 
 
 class CommandTable(NamedTuple):
-    """All fault commands of one kind of device.
-
-    ids: meaning of the word ID, e.g. "a servo's id"
-    """
+    """All fault commands of one kind of device."""
 
     verbs: Mapping[str, Verb]
-    ids: str
     highest_id: int = 0
 
     def obey(self, faults: object, text: str) -> str:
@@ -49,7 +43,7 @@ class CommandTable(NamedTuple):
         """
         first, *words = text.split() or ["help"]
         if first == "help":
-            return self.help()
+            return "\n".join(map(self.usage, self.verbs))
         name, ends = first.replace("_", "-"), dict[str, Any]()
         verb = self.verbs.get(name)
         if verb is None:
@@ -73,12 +67,8 @@ class CommandTable(NamedTuple):
     def _read(self, label: str, text: str) -> Any:
         """Return the value of one word; None for all ids."""
         label = label.strip("[]")
-        if label == "ID" and text in ALL_DEVICES:
+        if label == "ID" and text == "all":
             return None
-        if "|" in label:
-            if text not in label.split("|"):
-                raise ValueError(f"{text!r} is not {label}")
-            return text
         low, high = (0, self.highest_id) if label == "ID" else _RANGES.get(label, (None, None))
         if low is None or high is None:
             return text
@@ -95,9 +85,3 @@ class CommandTable(NamedTuple):
         verb = self.verbs[name]
         ends = [f"[{word} {_ENDS[word][1]}]" for word in verb.lasting.split()]
         return " ".join([name, *verb.words.split(), *ends])
-
-    def help(self) -> str:
-        """Describe all commands, one per line."""
-        lines = [f"{self.usage(verb):46} {self.verbs[verb].description}" for verb in self.verbs]
-        lines.append(f"ID is {self.ids} or all; a fault lasts until clear, or as given by [..]")
-        return "\n".join(lines)

@@ -1,37 +1,28 @@
 """Faults of the hobby servos on any kind of emulated board."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 from gazerig.sim_mock.faults.grammar import CommandTable, Verb
 from gazerig.sim_mock.faults.line import LineFaults
-from gazerig.sim_mock.faults.verbs import ADAPTER_VERBS, CLOSING_VERBS, LINE_VERBS, loss_verb
+from gazerig.sim_mock.faults.verbs import (
+    ADAPTER_VERBS,
+    CLOSING_VERBS,
+    LINE_VERBS,
+    loss_verb,
+    servo_verb,
+)
 from gazerig.sim_mock.hobby_servo import HobbyServo
 
 
 class HobbyFaults(LineFaults):
     """Faults of a line, a board and its servos; an id is a channel."""
 
-    noun = "channel"
-
     def brown_out(self) -> str:
         """Restart the board as after a dip of the supply, which no answer shows."""
         self.chain.restart()
         return "the board restarts"
 
-    def jam(self, channel: int | None, stuck: bool = True) -> str:
-        """Jam a servo at its position, or free it."""
-        for servo in self._servos(channel):
-            servo.stuck = stuck
-        return f"{self.label(channel)} is {'stuck' if stuck else 'free'}"
-
-    def turn(self, channel: int | None, steps: float) -> str:
-        """Turn a servo by hand, unless it is stuck."""
-        for servo in self._servos(channel):
-            servo.turn(steps)
-        return f"{self.label(channel)} was turned by {steps:g} quarter us"
-
-    def _servos(self, channel: int | None) -> Sequence[HobbyServo]:
+    def servos(self, channel: int | None) -> Sequence[HobbyServo]:
         """Return a servo, or all (None), advanced to the present time."""
         self.chain.advance()
         servos: Sequence[HobbyServo] = self.chain.servos
@@ -46,7 +37,6 @@ class HobbyFaults(LineFaults):
         ]
 
 
-# fmt: off
 def hobby_commands(
     highest: int, writes: str, own: Mapping[str, Verb] | None = None
 ) -> CommandTable:
@@ -62,13 +52,12 @@ def hobby_commands(
         "lose-writes": loss_verb("lose_writes", writes),
         **ADAPTER_VERBS,
         **(own or {}),
-        "brown-out": Verb(HobbyFaults.brown_out, "",
-                          "the board restarts as a dip of its supply makes it"),
-        "stick": Verb(HobbyFaults.jam, "ID", "jam the servo at its position"),
-        "free": Verb(partial(HobbyFaults.jam, stuck=False), "ID", "free a jammed servo"),
-        "turn": Verb(HobbyFaults.turn, "ID STEPS",
-                     "turn the servo by hand; with pulses it returns"),
+        "brown-out": Verb(HobbyFaults.brown_out),
+        "stick": servo_verb(HobbyServo.jam, "is stuck"),
+        "free": servo_verb(lambda servo: servo.jam(False), "is free"),
+        "turn": servo_verb(
+            lambda servo, steps: servo.turn(steps), "was turned by {:g} quarter us", "ID STEPS"
+        ),
         **CLOSING_VERBS,
     }
-    return CommandTable(verbs, "a channel", highest)
-# fmt: on
+    return CommandTable(verbs, highest)

@@ -39,9 +39,6 @@ class LineFaults(ABC):
     ``has_any`` is False while no fault of the line is active, which saves further calls.
     """
 
-    noun = "servo"
-    """Name of the object of an id, for messages."""
-
     def __init__(self, chain: Any, commands: CommandTable, seed: int) -> None:
         self.chain = chain
         self.commands = commands
@@ -65,7 +62,7 @@ class LineFaults(ABC):
 
     def label(self, servo_id: int | None) -> str:
         """Return a servo's label for messages."""
-        return "all" if servo_id is None else f"{self.noun} {servo_id}"
+        return "all" if servo_id is None else f"servo {servo_id}"
 
     def begin(
         self,
@@ -97,15 +94,16 @@ class LineFaults(ABC):
         span += "" if seconds is None else f" for {seconds:g} s"
         return text + (span or " until cleared")
 
-    def end(self, kind: str) -> None:
-        """End the faults of a kind."""
-        self._keep(fault for fault in self._faults if fault.kind != kind)
+    def plug(self) -> str:
+        """Reconnect the adapter."""
+        self._keep(fault for fault in self._faults if fault.kind != "unplug")
+        return "plugged in"
 
-    def clear(self, servo_id: int | None = None) -> str:
-        """End every fault of the line (or of one servo's answers); faults of servos stay."""
+    def clear(self) -> str:
+        """End every fault of the line; faults of servos stay."""
         before = len(self._faults)
-        self._keep(f for f in self._faults if servo_id is not None and f.servo_id != servo_id)
-        return f"{before - len(self._faults)} faults cleared"
+        self._keep(())
+        return f"{before} faults cleared"
 
     def status(self) -> str:
         """Return all servos and the active faults as one line of JSON."""

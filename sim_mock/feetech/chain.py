@@ -21,7 +21,7 @@ class FeetechChain(ServoChain):
     status = staticmethod(status)
     span = struct.Struct("<BB")
     misunderstood = None
-    commands = commands_of(HIGHEST_ID, "id 1, 1000000 bit/s")
+    commands = commands_of(HIGHEST_ID)
 
 
 build_feetech = FeetechChain.build

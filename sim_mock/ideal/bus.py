@@ -126,8 +126,6 @@ class IdealBus:
     def _follow(self, goals_steps: Sequence[int]) -> tuple[int, ...]:
         """Start a motion to goals; return the goals within the limits."""
         goals, low, high = tuple(goals_steps), self._lowest, self._highest
-        if len(goals) != len(low):
-            raise ValueError(f"{len(goals)} goals for {len(low)} servos")
         if True in map(lt, goals, low) or True in map(gt, goals, high):
             goals = tuple(map(min, map(max, goals, low), high))
         now_s = self._now_s()

@@ -96,11 +96,10 @@ class EmulatedMaestro(HobbyBoard):
         """Return the present pulse of a channel, quarter microseconds; 0: none."""
         return self.channels[channel].position
 
-    def step_outputs(self) -> bool:
-        """Advance the outputs by 10 ms; return whether they are at rest."""
+    def step_outputs(self) -> None:
+        """Advance the outputs by 10 ms."""
         for channel in self.channels:
             channel.step()
-        return not any(channel.is_moving for channel in self.channels)
 
     def execute(self, data: bytes) -> Iterator[Piece]:
         """Execute the commands in bytes; yield their answers."""
@@ -167,9 +166,7 @@ def _error(faults: HobbyFaults, bit: int) -> str:
     return f"the board has set bit {bit} of its errors"
 
 
-COMMANDS: CommandTable = hobby_commands(
-    23, "targets and limits", {"error": Verb(_error, "BIT", "the board sets a bit of its errors")}
-)
+COMMANDS: CommandTable = hobby_commands(23, "targets and limits", {"error": Verb(_error, "BIT")})
 
 
 def build_board(
@@ -177,7 +174,7 @@ def build_board(
     now_s: Callable[[], float],
     crc: bool = False,
     seed: int = 0,
-    servos: Sequence[HobbySpec | Sequence[float]] = (),
+    servos: Sequence[HobbySpec] = (),
     make_servo: HobbyMaker = HobbyServo,
 ) -> EmulatedMaestro:
     """Build a board; channels without a spec have a default servo.

@@ -142,7 +142,7 @@ def build_bridge(
     now_s: Callable[[], float],
     oscillator_hz: float = NOMINAL_HZ,
     seed: int = 0,
-    servos: Sequence[HobbySpec | Sequence[float]] = (),
+    servos: Sequence[HobbySpec] = (),
     make_servo: HobbyMaker = HobbyServo,
 ) -> Bridge:
     """Build boards at addresses; channels without a spec have a default servo.

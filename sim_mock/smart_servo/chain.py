@@ -131,8 +131,8 @@ class ServoChain(ABC):
         start = (first.position_steps + TWIN_AWAY_STEPS) % 4096
         spec = first.spec._replace(start_steps=start)
         twin = self.servo_type(spec, whole_ms(self.now_s()), create_shaft)
-        for name in ("return_delay_time", "baud_rate"):
-            twin.memory.set_permanently(name, first.memory.get(name))
+        delay = first.memory.get("return_delay_time")
+        twin.memory.set_permanently("return_delay_time", delay)
         twin.set_baud(first.baud)
         self.servos = (*self.servos, twin)
         self.refresh()

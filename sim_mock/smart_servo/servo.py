@@ -311,12 +311,7 @@ class EmulatedServo(ABC):
         """Jam the joint at its position, or free it."""
         self.shaft.jam(stuck)
 
-    def set_voltage(self, volts: float) -> None:
-        """Set the supply voltage."""
-        self.memory.set("present_input_voltage", round(volts * 10.0))
-        self._measure()
-
-    def set_temperature(self, celsius: float) -> None:
-        """Set the temperature of the motor."""
-        self.memory.set("present_temperature", round(celsius))
+    def sense(self, what: str, value: float) -> None:
+        """Set a sensor's register, ``input_voltage`` (0.1 V) or ``temperature`` (degC)."""
+        self.memory.set(f"present_{what}", round(value))
         self._measure()

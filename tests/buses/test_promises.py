@@ -88,7 +88,7 @@ def test_lost_late_cut_and_damaged_answers_are_never_data(name, fault):
 @every_kind(*BOARDS, why="a board has wires of its own for each direction")
 def test_an_adapter_that_echoes_costs_nothing(name):
     bench = in_process(name)
-    bench.command("echo on")
+    bench.command("echo")
     bus = bench.hold()
     assert all(f.missing == () and all(f.torque) for f in bench.ticks(bus, 1.0))
     assert bus.health().errors == {}

@@ -105,8 +105,8 @@ def _restart(faults: ChainFaults, servo_id: int) -> str:
 
 
 COMMANDS = CommandTable(
-    {**LINE_VERBS, **ADAPTER_VERBS, "brown-out": Verb(_restart, "ID", "restart"),
-     "lose-writes": loss_verb("lose_writes", "moves"), **CLOSING_VERBS}, "a servo's id", 253,
+    {**LINE_VERBS, **ADAPTER_VERBS, "brown-out": Verb(_restart, "ID"),
+     "lose-writes": loss_verb("lose_writes", "moves"), **CLOSING_VERBS}, 253,
 )  # fmt: skip
 
 
