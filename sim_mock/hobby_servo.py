@@ -54,15 +54,10 @@ class HobbyServo:
         self.width_steps = 0
         self._share = 1.0 - exp(-STEP_S / self.spec.lag_s)
 
-    @property
-    def is_unpowered(self) -> bool:
-        """Return whether it gets no pulses, so that a hand can turn it."""
-        return self.width_steps == 0
-
     def step(self) -> None:
         """Advance by 10 ms."""
         way = self.width_steps - self.place_steps
-        if not (self.stuck or self.is_unpowered or abs(way) <= self.spec.dead_steps):
+        if not (self.stuck or not self.width_steps or abs(way) <= self.spec.dead_steps):
             most = self.spec.speed_steps_s * STEP_S
             self.place_steps = self._clip_to_stops(
                 self.place_steps + min(max(way * self._share, -most), most)

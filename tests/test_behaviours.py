@@ -17,7 +17,8 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.app.scene_score import BehaviourScore, PlannerScore
 from gazerig.robot.control.loop import Tick, run
-from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.detections import SceneCamera
+from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing, there_and_back
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -228,7 +229,7 @@ def test_e48_back_on_the_face_within_a_second_of_a_distraction(way_m: Vec3) -> N
     def before(own: Camera) -> Camera:
         assert isinstance(own, SceneCamera)
         dice = np.random.default_rng(0)
-        return SceneCamera(SceneCameraParams(), scene, own._mount, own._head_pose, dice)
+        return SceneCamera(FrameParams(), scene, own._mount, own._head_pose, dice)
 
     made = made_for("boxing", rate_hz=100.0, substitutes=Substitutes(camera=before))
     lived = Lived(made, scene, 17.0)

@@ -19,7 +19,7 @@ from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import Value
-from gazerig.sim_mock.cameras.rendered import PixelCameraParams
+from gazerig.sim_mock.cameras.frame_times import FrameParams
 
 KEEPS_TO_THE_FACE: dict[str, Value] = {
     "gaze.looks_away": "none",
@@ -110,7 +110,7 @@ def test_the_step_is_of_40_deg_and_the_loop_sees_it_late(step: Seen) -> None:
     before = step.facing_deg[step.t_s < STEP_AT_S].max()
     assert 37.0 < step.facing_deg[-1] - before < 41.0
     late_s = (step.t_s - step.captured_s)[step.captured_s > 0.0]
-    assert late_s.min() >= PixelCameraParams().latency_ms / 1e3 - 1e-6
+    assert late_s.min() >= FrameParams().latency_ms / 1e3 - 1e-6
     assert late_s.max() < 0.06 + 1.0 / 30.0 + 0.0101
 
 

@@ -17,7 +17,8 @@ from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.track import looks_at_head
 from gazerig.robot.perception.tracker import Tracker
-from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.detections import SceneCamera
+from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import ScenePerson
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -52,7 +53,7 @@ class Turning(EmptyScene):
 def found(scene: Turning, seconds: float = 10.0, seed: int = 0) -> list[Face]:
     """Return the face as perceived, once a frame, after half a second."""
     camera = SceneCamera(
-        SceneCameraParams(),
+        FrameParams(),
         scene,
         AT_EYES,
         lambda _: (LEVEL, (0.0, 0.0, 0.0)),

@@ -100,7 +100,7 @@ def test_a_servo_follows_its_pulses_and_is_limp_without(bench):
     assert place == pytest.approx(0x19A * 122 / 25 * 4, abs=21)
     bench.bridge.faults.command("brown-out")
     bench.wait(0.5)
-    assert bench.bridge.find_servo(0).is_unpowered
+    assert bench.bridge.find_servo(0).width_steps == 0
     assert bench.bridge.positions_steps()[0] == pytest.approx(place, abs=30)
 
 

@@ -26,7 +26,8 @@ from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
-from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
+from gazerig.sim_mock.cameras.frame_times import FrameParams
+from gazerig.sim_mock.cameras.rendered import PixelCamera
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
 SIZE = WIDTH, HEIGHT = 640, 400
@@ -148,7 +149,7 @@ def camera(
 ) -> PixelCamera:
     rng = np.random.default_rng(seed)
     view = DrawnScene(scene)
-    return PixelCamera(PixelCameraParams(**params), view, MOUNT, head, Nobody(), rng)
+    return PixelCamera(FrameParams(**params), view, MOUNT, head, Nobody(), rng)
 
 
 def test_pictures_come_late_at_their_rate_and_a_late_look_skips_some() -> None:

@@ -16,7 +16,8 @@ from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.detections import SceneCamera
+from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 from gazerig.sim_mock.scenes.scene import ScenePerson
 
@@ -52,7 +53,7 @@ def looked_at(scene: StillPeople, seconds: float, seed: int) -> np.ndarray:
     def before(own: Camera) -> Camera:
         assert isinstance(own, SceneCamera)
         rng = np.random.default_rng(seed)
-        return SceneCamera(SceneCameraParams(), scene, own._mount, own._head_pose, rng, own._locate)
+        return SceneCamera(FrameParams(), scene, own._mount, own._head_pose, rng, own._locate)
 
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=50.0))

@@ -41,8 +41,9 @@ from gazerig.robot.model.frames import (
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.motion_source import MotionSource
-from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
+from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -142,16 +143,16 @@ def scene_camera(
     """
     field_deg = rig.camera.horizontal_field_deg
     if not options.pixels:
-        params = SceneCameraParams(horizontal_field_deg=field_deg)
+        params = FrameParams(horizontal_field_deg=field_deg)
         return SceneCamera(params, scene, mount, where, rng, locate)
     if clock is not None and not options.fast:
         motion = partial(MotionSource, rig.motion, rig.camera.lens, radians(field_deg), turns)
         return drawn_camera(rig, scene, mount, where, rng, clock, own, motion, locate)
     # Imported here because drawing and detection need OpenCV.
     from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
-    from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
+    from gazerig.sim_mock.cameras.rendered import PixelCamera
 
-    drawn = PixelCameraParams(horizontal_field_deg=field_deg)
+    drawn = FrameParams(horizontal_field_deg=field_deg)
     faces, moves = own.make_detector(rig.detector), SyntheticMotionDetector(rig.motion)
     return PixelCamera(drawn, DrawnScene(scene), mount, where, faces, rng, moves, locate)
 

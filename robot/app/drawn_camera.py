@@ -16,6 +16,7 @@ from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
+from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -110,9 +111,9 @@ def scene_pixels(
         rng: Random numbers of the noise.
         head: returns the pose of the head.
     """
-    from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
+    from gazerig.sim_mock.cameras.rendered import PixelCamera
 
-    params = PixelCameraParams(horizontal_field_deg=field_deg, latency_ms=0.0)
+    params = FrameParams(horizontal_field_deg=field_deg, latency_ms=0.0)
     return PixelCamera(params, DrawnScene(scene), mount, head, NoFaces(), rng)
 
 

@@ -6,9 +6,7 @@ some are missed. Not modelled: motion blur, light, occlusion, false detections.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import cos, pi, radians
-from typing import Annotated
 
 import numpy as np
 
@@ -16,13 +14,14 @@ from gazerig.drivers.camera.capture_loop import Locate
 from gazerig.drivers.types import DetectedFace, Detections, FaceSigns, MovingBlob
 from gazerig.gaze.angles import add, dot, norm, rotate, rotate_back, rotation, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.params import Bounds
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.frame_times import FrameParams, FrameTimes
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 _FARTHEST_FACE_M = 4.0
+_LANDMARK_NOISE_PX, _DEPTH_NOISE_M, _MISSED_SHARE = 0.5, 0.005, 0.03
+"""Quality of the detector: standard deviations, and the share of faces that it misses."""
 _HAND_RADIUS_M = 0.07
 _FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
 _LEAST_SEEN_PX = 15.0
@@ -34,20 +33,11 @@ _COS_TURNED_AWAY = cos(radians(60.0))
 _LANDMARKS_FACE_M: tuple[Vec3, ...] = tuple((x, y, z) for x, y, z in LANDMARKS_FACE_M.tolist())
 
 
-@dataclass(frozen=True)
-class SceneCameraParams(FrameParams):
-    """Quality of the camera and its detector."""
-
-    landmark_noise_px: Annotated[float, Bounds(0, 20)] = 0.5
-    depth_noise_mm: Annotated[float, Bounds(0, 500)] = 5.0
-    missed_share: Annotated[float, Bounds(0, 1)] = 0.03
-
-
 class SceneCamera:
     """A gazerig.drivers.types.Camera in a scene; frames are computed on demand.
 
     Args:
-        params: resolution, rate and noise of the camera.
+        params: resolution, rate and latency of the camera.
         scene: the scene in front of it.
         mount: pose of the camera on the head.
         head_pose: true rotation (3, 3) and position [m] of the head in the world at a time [s].
@@ -58,7 +48,7 @@ class SceneCamera:
 
     def __init__(
         self,
-        params: SceneCameraParams,
+        params: FrameParams,
         scene: Scene,
         mount: CameraMount,
         head_pose: Callable[[float], tuple[Mat3, Vec3]],
@@ -116,8 +106,8 @@ class SceneCamera:
 
     def _face(self, person: ScenePerson, R: Mat3, p: Vec3, scene_s: float) -> DetectedFace | None:
         """Project the landmarks; a face that is cut off, far or turned away is not detected."""
-        noise = self._rng.normal(0.0, self._params.landmark_noise_px, (5, 2))
-        missed = self._rng.random() < self._params.missed_share
+        noise = self._rng.normal(0.0, _LANDMARK_NOISE_PX, (5, 2))
+        missed = self._rng.random() < _MISSED_SHARE
         yaw, pitch = person.face_yaw_pitch_rad
         R_world_face = rotation((yaw, pitch, 0.0))
         place = person.p_world_face_m
@@ -144,7 +134,7 @@ class SceneCamera:
 
     def _blob(self, thing: Thing, R: Mat3, p: Vec3) -> tuple[MovingBlob, ...]:
         """Project a hand or thing; nothing if it is behind the camera or outside the frame."""
-        noise = self._rng.normal(0.0, self._params.depth_noise_mm / 1e3)
+        noise = self._rng.normal(0.0, _DEPTH_NOISE_M)
         point = rotate_back(R, sub(thing.p_world_m, p))
         if point[2] < 0.1:
             return ()

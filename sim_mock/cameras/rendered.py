@@ -6,8 +6,7 @@ the lens, blur of a turning head, distances.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -16,7 +15,6 @@ from gazerig.drivers.camera.capture_loop import Locate
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBlob
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.scene_view import PinholeView, SceneView
 from gazerig.sim_mock.cameras.frame_times import FrameParams, FrameTimes
@@ -34,20 +32,15 @@ FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
 """Finds motion since the previous exposure."""
 
 
-@dataclass(frozen=True)
-class PixelCameraParams(FrameParams):
-    """Quality of the camera."""
-
-    # fmt: off
-    noise_grey: Annotated[float, Bounds(0, 60), "standard deviation of the read-out noise, grey values"] = 3.0
-    # fmt: on
+_NOISE_GREY = 3.0
+"""Standard deviation of the read-out noise, grey values."""
 
 
 class PixelCamera:
     """A gazerig.drivers.types.Camera that renders; frames are computed on demand.
 
     Args:
-        params: resolution, rate and noise of the camera.
+        params: resolution, rate and latency of the camera.
         view: draws what is in front of it.
         mount: pose of the camera on the head.
         head_pose: true rotation (3, 3) and position [m] of the head in the world at a time [s].
@@ -61,7 +54,7 @@ class PixelCamera:
 
     def __init__(
         self,
-        params: PixelCameraParams,
+        params: FrameParams,
         view: SceneView,
         mount: CameraMount,
         head_pose: Callable[[float], tuple[Mat3, Vec3]],
@@ -85,9 +78,7 @@ class PixelCamera:
         self._rng = rng
         # Fresh noise would cost more than the drawing; pieces of one stock look the same.
         self._values = 3 * params.width_px * params.height_px
-        self._noise = rng.standard_normal(2 * self._values, np.float32) * np.float32(
-            params.noise_grey
-        )
+        self._noise = rng.standard_normal(2 * self._values, np.float32) * np.float32(_NOISE_GREY)
 
     def open(self) -> None:
         """Start; the first frame is taken at the first call of ``latest``."""

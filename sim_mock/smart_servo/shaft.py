@@ -43,7 +43,7 @@ class Shaft:
 
     __slots__ = (
         "_built", "_cruise", "_high", "_integral", "_load", "_loop", "_low", "_ramp", "_rv",
-        "_stops", "_stuck", "_weight",
+        "_stops", "_weight",
         "effort", "goal", "led", "quiet", "r", "r_v", "u", "v", "x",
     )  # fmt: skip
 
@@ -53,7 +53,7 @@ class Shaft:
         self._built = mechanics_of(motor, physics)
         self._weight = self._load = 0.0
         self._stops = self._low, self._high = physics.stop_low_steps, physics.stop_high_steps
-        self._loop, self._stuck, self._cruise, self._ramp = DISABLED, False, 0.0, 0.0
+        self._loop, self._cruise, self._ramp = DISABLED, 0.0, 0.0
         self.place(position_steps)
 
     # --- external events
@@ -67,8 +67,6 @@ class Shaft:
         low, high = self._stops
         self.x = min(max(float(position_steps), low), high)
         self.v = self.u = self.effort = 0.0
-        if self._stuck:
-            self.jam(True)
         self.start()
 
     def turn(self, steps: float) -> None:
@@ -78,7 +76,6 @@ class Shaft:
 
     def jam(self, stuck: bool) -> None:
         """Jam the joint at its position, or free it."""
-        self._stuck = stuck
         self._low, self._high = (self.x, self.x) if stuck else self._stops
         self.resume()
 

@@ -20,9 +20,10 @@ from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
-from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
-from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
+from gazerig.sim_mock.cameras.frame_times import FrameParams
+from gazerig.sim_mock.cameras.rendered import PixelCamera
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
@@ -93,10 +94,10 @@ def frames(scene: Scene, start_s: float, end_s: float) -> Iterator[Frame]:
     def still(_: float) -> tuple[Mat3, Vec3]:
         return rotation((0.0, 0.0, 0.0)), HEAD_M
 
-    truth = SceneCamera(SceneCameraParams(latency_ms=0.0), later, mount, still, rng)
+    truth = SceneCamera(FrameParams(latency_ms=0.0), later, mount, still, rng)
     truth.open()
     field = rig.camera.horizontal_field_deg
-    drawn = PixelCameraParams(latency_ms=0.0, horizontal_field_deg=field)
+    drawn = FrameParams(latency_ms=0.0, horizontal_field_deg=field)
     locate = FrameLocator(None, radians(field))
     motion = SyntheticMotionDetector(rig.motion)
     camera = PixelCamera(drawn, DrawnScene(later), mount, still, faces, rng, motion, locate)

@@ -16,7 +16,8 @@ from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.model.frames import CameraMount
-from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.detections import SceneCamera
+from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.pty.line import BusSettings
 
 pytestmark = pytest.mark.usefixtures("mujoco")
@@ -92,7 +93,7 @@ class Broken(CameraProcess):
 def camera(host: Host, error: SetupError | None) -> WorldCamera:
     def ideal(begin_s: float) -> SceneCamera:
         return SceneCamera(
-            SceneCameraParams(missed_share=0.0), host.world.scene, CameraMount(host.rig.camera),
+            FrameParams(), host.world.scene, CameraMount(host.rig.camera),
             host.poses.head, np.random.default_rng(1), begins_s=begin_s,
         )  # fmt: skip
 

@@ -36,7 +36,7 @@ def test_a_hobby_servo_without_pulses_is_limp() -> None:
     bench = WorldBench("maker")
     joint = bench.rig.names[0]
     servo = bench.servos[joint]
-    assert servo.is_unpowered
+    assert servo.width_steps == 0
     before = servo.place_steps
     servo.turn(300.0)
     bench.pass_ms(200)

@@ -36,7 +36,8 @@ from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.robot.perception.motion_source import MotionSource
-from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.detections import SceneCamera
+from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import WorldCameraParams
 
@@ -155,10 +156,10 @@ class RenderedWorld(NamedTuple):
         Raises:
             NoRenderer: nothing on this machine can render.
         """
-        from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
+        from gazerig.sim_mock.cameras.rendered import PixelCamera
 
         asked = self.params
-        params = PixelCameraParams(
+        params = FrameParams(
             width_px=asked.width_px,
             height_px=asked.height_px,
             horizontal_field_deg=self.camera.horizontal_field_deg,
@@ -231,7 +232,7 @@ def world_camera(
     say: Callable[[str], None],
 ) -> Camera:
     """Return the rig's camera in a world."""
-    scene_params = SceneCameraParams(horizontal_field_deg=world.camera.horizontal_field_deg)
+    scene_params = FrameParams(horizontal_field_deg=world.camera.horizontal_field_deg)
 
     def ideal(begin_s: float) -> SceneCamera:
         return SceneCamera(
