@@ -27,7 +27,6 @@ _DIP_SHARE, _DIP_FRAMES = 0.4, 15
 _LEAST_GAP_S = 0.02
 _LEAST_OPEN_S = 0.05
 _P_CLOSED_S = 0.055
-_LONGEST_PHONEME, _LONGEST_LETTER_S = 2, 0.09
 LONGEST_CLOSURE_S = 0.12
 """Lips part between an m and the next b; a person holds neither longer than this."""
 _CLOSED_SHARE = {"b": 0.5, "m": 0.65}
@@ -71,26 +70,21 @@ class MouthKey(NamedTuple):
 
 
 def phoneme_closures(spoken: Sequence[tuple[str, float]], end_s: float) -> tuple[Closure, ...]:
-    """Return the closures of spoken phonemes or words.
+    """Return the closures of spoken phonemes.
 
-    A p is reported at its release, which the closure precedes; b and m begin with it. The letters
-    of a word follow each other evenly.
+    A p is reported at its release, which the closure precedes; b and m begin with it.
 
     Args:
-        spoken: (name, begin in s): phonemes in the names of espeak-ng or IPA, or words.
+        spoken: (name, begin in s): phonemes in the names of espeak-ng or IPA.
         end_s: End of the last one.
     """
     closures = []
     for (name, begin_s), (_, next_s) in pairwise([*spoken, ("", end_s)]):
-        length_s = (next_s - begin_s) / max(1, len(name))
-        if len(name) > _LONGEST_PHONEME:
-            length_s = min(length_s, _LONGEST_LETTER_S)
-        for i, letter in enumerate(name.lower()):
-            at_s = begin_s + i * length_s
-            if letter == "p":
-                closures.append(Closure(max(0.0, at_s - _P_CLOSED_S), at_s))
-            elif share := _CLOSED_SHARE.get(letter):
-                closures.append(Closure(at_s, at_s + share * length_s))
+        letter = name[:1].lower()
+        if letter == "p":
+            closures.append(Closure(max(0.0, begin_s - _P_CLOSED_S), begin_s))
+        elif share := _CLOSED_SHARE.get(letter):
+            closures.append(Closure(begin_s, begin_s + share * (next_s - begin_s)))
     joined: list[Closure] = []
     for begin_s, last_s in closures:
         if joined and begin_s - joined[-1].end_s < _LEAST_OPEN_S:
