@@ -9,7 +9,7 @@ from math import inf, sin
 
 import pytest
 
-from gazerig.drivers.bus.servo_families import FAMILY_OF
+from gazerig.drivers.bus.servo_models import FAMILY_OF
 from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams

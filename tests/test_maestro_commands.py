@@ -10,14 +10,14 @@ from gazerig.drivers.maestro.board import (
     SET_ACCELERATION,
     SET_SPEED,
     SET_TARGET,
-    MaestroCodec,
+    MaestroParams,
     accel_units,
     crc7,
     name_errors,
     speed_units,
 )
 
-COMPACT = MaestroCodec()
+COMPACT = MaestroParams()
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ COMPACT = MaestroCodec()
         (COMPACT.number(SET_ACCELERATION, 5, 255), "89 05 7F 01"),
         (COMPACT.command(GET_POSITION, 7), "90 07"),
         (COMPACT.command(GET_ERRORS), "A1"),
-        (MaestroCodec(crc=True).number(SET_TARGET, 0, 6000), "84 00 70 2E 2B"),
+        (MaestroParams(crc=True).number(SET_TARGET, 0, 6000), "84 00 70 2E 2B"),
     ],
 )
 def test_commands(packet, expected):
@@ -44,7 +44,7 @@ def test_neighbours_share_a_command_where_the_board_has_it():
     goals = {4: 6000, 1: 4000, 0: 4001, 6: 5000}
     rest = bytes.fromhex("84 04 70 2E 84 06 08 27")
     assert COMPACT.targets(goals) == bytes.fromhex("9F 02 00 21 1F 20 1F") + rest
-    micro = MaestroCodec(channels=6).targets(goals)
+    micro = MaestroParams(channels=6).targets(goals)
     assert micro == bytes.fromhex("84 00 21 1F 84 01 20 1F") + rest
 
 
@@ -64,7 +64,7 @@ def test_what_does_not_fit_is_refused(number):
 
 
 @given(
-    st.builds(MaestroCodec, st.booleans(), st.sampled_from([6, 12, 18, 24])),
+    st.builds(MaestroParams, st.booleans(), st.sampled_from([6, 12, 18, 24])),
     st.dictionaries(st.integers(0, 23), st.integers(0, 16383), min_size=1),
 )
 def test_only_command_bytes_have_the_highest_bit(codec, goals):

@@ -4,18 +4,14 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
-from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from gazerig.drivers.dynamixel.control_table import P_UNIT, PWM_FULL, DynamixelModel
 from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN as STEPS_PER_TURN
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import PluginError
-from gazerig.drivers.feetech.memory_table import (
-    FACTORY_P_GAIN,
-    P_FULL_STEPS,
-    SCS_MODELS,
-    SCS_STEPS,
-)
-from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
-from gazerig.drivers.servo_bus.family import ServoModel
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.memory_table import FACTORY_P_GAIN, P_FULL_STEPS
+from gazerig.drivers.feetech.scs import FEETECH_SCS
+from gazerig.drivers.servo_bus.family import Family, ServoModel
 
 if TYPE_CHECKING:
     from gazerig.drivers.types import ServoConfig
@@ -85,21 +81,22 @@ class ServoModelInfo(NamedTuple):
         return kind == self.bus or (self.bus in HOBBY_KINDS and kind in HOBBY_KINDS)
 
 
-def _smart_servo(bus: BusKind, family: str, model: ServoModel, steps: int) -> ServoModelInfo:
+def _smart_servo(family: Family, model: ServoModel) -> ServoModelInfo:
     """Return the model information of a smart servo."""
     gain, full_steps = FACTORY_P_GAIN, P_FULL_STEPS * model.steps_per_turn / STEPS_PER_TURN
     if isinstance(model, DynamixelModel):
         gain, full_steps = model.gains[4], P_UNIT * PWM_FULL
+    highest = family.registers["max_position_limit"].high
     return ServoModelInfo(
-        bus,
+        family.name.partition(" ")[0],
         model.steps_per_turn,
         0,
-        steps - 1,
-        middle=steps // 2,
+        highest,
+        middle=(highest + 1) // 2,
         hottest_c=float(model.temperature_limit),
         lowest_v=0.1 * model.min_voltage,
         highest_v=0.1 * model.max_voltage,
-        family=family,
+        family=family.name,
         stall_torque_nm=model.stall_torque_nm,
         stall_current_a=model.stall_current_a,
         p_gain=gain,
@@ -107,10 +104,16 @@ def _smart_servo(bus: BusKind, family: str, model: ServoModel, steps: int) -> Se
     )
 
 
+FAMILIES: dict[str, Family] = {one.name: one for one in (DYNAMIXEL, FEETECH, FEETECH_SCS)}
+"""Families of smart servos by name."""
+
+FAMILY_OF: dict[str, Family] = {
+    model: family for family in FAMILIES.values() for model in family.models
+}
+"""Families by the model name in a rig's YAML."""
+
 SERVOS: dict[str, ServoModelInfo] = {
-    **{n: _smart_servo("dynamixel", "dynamixel", m, STEPS_PER_TURN) for n, m in DYNAMIXEL.items()},
-    **{n: _smart_servo("feetech", "feetech", m, m.steps_per_turn) for n, m in FEETECH.items()},
-    **{n: _smart_servo("feetech", "feetech scs", m, SCS_STEPS) for n, m in SCS_MODELS.items()},
+    **{name: _smart_servo(family, family.models[name]) for name, family in FAMILY_OF.items()},
     HOBBY: ServoModelInfo(
         "maestro",
         HOBBY_STEPS_PER_TURN,

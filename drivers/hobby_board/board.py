@@ -66,18 +66,13 @@ class HobbyBoardParams:
 
 
 class Board(ABC):
-    """One board; all methods that send may raise BusLost.
+    """One board on a port that its user opens; all methods that send may raise BusLost.
 
     tx_bytes, rx_bytes, errors: counts since creation
     lateness: delays of this computer
     remedy: remedy if channels output other pulses than commanded
     longest_ramp_s: longest time for which the driver's ramps advance while nothing is sent; inf:
         the board itself ramps pulses
-
-    Args:
-        port: gazerig.drivers.serial.port.BlockingPort, or a port with its methods; not opened here.
-        params: Parameters of the board.
-        timing: Times of the bus.
     """
 
     remedy: ClassVar[str]
@@ -89,8 +84,6 @@ class Board(ABC):
         self.errors: Counter[str] = Counter()
         self.lateness = HostLateness()
         self._owed_bytes = 0
-
-    # --- what a kind of board defines
 
     @abstractmethod
     def find(self, setups: "Sequence[ServoConfig]") -> tuple[int, ...]:
@@ -120,16 +113,6 @@ class Board(ABC):
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop the pulses of channels; on the last try also by stronger means."""
 
-    # --- the line
-
-    def open_port(self) -> None:
-        """Open the port.
-
-        Raises:
-            PortError: it cannot be opened.
-        """
-        open_port(self.port, self.params.baud)
-
     def send(self, packet: bytes) -> None:
         """Send commands that are not answered."""
         self.port.write(packet)
@@ -141,24 +124,19 @@ class Board(ABC):
         Answers have neither address nor checksum, and a late one looks like any other: what has
         arrived since a missing one is discarded.
         """
-        port = self.port
-        if self._owed_bytes:
-            if 0 < port.drain() <= self._owed_bytes:
-                self.lateness.record_late_answer(port.now_s())
-            self._owed_bytes = 0
+        port, owed, self._owed_bytes = self.port, self._owed_bytes, 0
+        if owed and 0 < port.drain() <= owed:
+            self.lateness.record_late_answer(port.now_s())
         wire_s = (len(packet) + length) * BITS_PER_BYTE / self.params.baud
         deadline_s = port.now_s() + wire_s + self.timing.reply_timeout_s
         port.drain(0.0)
-        port.write(packet)
+        self.send(packet)
         answer = port.read_until(length, deadline_s)
-        self.tx_bytes += len(packet)
         self.rx_bytes += len(answer)
         if len(answer) < length:
             self._owed_bytes = length - len(answer)
             self.lateness.record_wait(deadline_s, port.now_s())
         return answer
-
-    # --- what all boards have in common
 
     def read_all(self, setups: "Sequence[ServoConfig]") -> tuple[int, ...]:
         """Read the pulses of servos, twice, as they decide where servos are held.
@@ -172,9 +150,12 @@ class Board(ABC):
             if first is not None and again is not None and all(map(are_alike, first, again)):
                 return again
         silent = (s.label("channel") for s in setups if self.read_pulses((s.id,)) is None)
-        fault = f"{self.port.port_name}: {next(silent, 'a channel')} does not answer"
         remedy = f"{CHECK_SUPPLY}; has the board {self.params.channels} channels?"
-        raise ServoMissing(self.blame(fault, remedy))
+        raise self.missing(f"{next(silent, 'a channel')} does not answer", remedy)
+
+    def missing(self, fault: str, remedy: str) -> ServoMissing:
+        """Return the error of a fault at this port, with its remedy."""
+        return ServoMissing(f"{self.port.port_name}: {self.blame(fault, remedy)}")
 
     def blame(self, fault: str, remedy: str) -> str:
         """Return a fault with its remedy, or with this computer as its cause if it was late."""
@@ -185,10 +166,10 @@ class Board(ABC):
         left, heard = tuple(channels), False
         for attempt in range(TRIES):
             self.stop(left, attempt == TRIES - 1)
-            found = self.read_pulses(left)
-            if found is not None:
+            pulses = self.read_pulses(left)
+            if pulses is not None:
                 heard = True
-                left = tuple(channel for channel, pulse in zip(left, found, strict=True) if pulse)
+                left = tuple(channel for channel, pulse in zip(left, pulses, strict=True) if pulse)
             if not left:
                 break
         return ReleaseResult(left, ()) if heard else ReleaseResult((), left)
@@ -208,6 +189,6 @@ def stop_pulses(board: Board, channels: Sequence[int]) -> tuple[int, ...]:
         PortError: the port cannot be opened.
         BusLost: the port is lost.
     """
-    board.open_port()
+    open_port(board.port, board.params.baud)
     released = board.switch_off(channels)
     return (*released.holding_ids, *released.unconfirmed_ids)

@@ -1,13 +1,8 @@
 """Bus of hobby servos on a board without feedback: a short request and goals in every tick.
 
-Limits of such a board, and so of this bus:
-
-- Nothing is measured: positions are the commanded pulses (``measured`` is False), and a stuck or
-restarted servo is not detected.
-- The position of a servo before its pulses begin is unknown. It moves to the first pulse at its own
-speed, with any armed limit.
-- No watchdog can be armed over the line: when this program dies the servos hold their last goals,
-unless the guardian process stops the pulses (gazerig.robot.guardian).
+Nothing is measured: positions are the commanded pulses (``measured`` is False). Before its first
+pulse a servo's position is unknown: it moves to that pulse at its own speed. No watchdog can be
+armed over the line: if this program dies, the guardian stops the pulses (gazerig.robot.guardian).
 
 After an error or a restart a board outputs no pulses, and has perhaps lost its settings. All
 channels are then enabled again, one after another; if that happens again soon, all stay without.
@@ -24,7 +19,7 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import CHECK_SUPPLY, TRIES, Board, are_alike
 from gazerig.drivers.hobby_board.channel import FINE_STEPS, Channel
 from gazerig.drivers.process.host_lateness import BLAME_S
-from gazerig.drivers.serial.port import wait_until
+from gazerig.drivers.serial.port import open_port, wait_until
 from gazerig.drivers.types import Feedback, ServoConfig
 
 UNMEASURED = "hobby servos report no positions: those shown are their goals"
@@ -59,20 +54,17 @@ class HobbyBoardBus(PortBus):
             raise ValueError("two servos have one channel: each can move one servo only")
         self._log = EventLog()
         self._nothing = Feedback.create_missing(len(setups))
-        self._create_parts()
+        self._reset()
 
-    def _create_parts(self) -> None:
-        """Create the stateful parts in their initial state."""
+    def _reset(self) -> None:
         self._setups = self._target_setups
         self._channels = tuple(Channel(setup, self._board.longest_ramp_s) for setup in self._setups)
         # Whether goals are followed, and whether the board has kept its settings.
         self._engaged, self._may_send = False, True
-        # Channels without a known position, until they are held again.
-        self._pending: list[Channel] = []
         self._failed_tries, self._trouble_s, self._fault = 0, -inf, ""
         self._rearmed, self._turn = False, 0
         self._silent_since_s: float | None = None
-        self._is_silence_reported = False
+        self._report_s = inf  # when a silence is reported
         self._is_down = self._release_due = False
 
     # --- torque on and off
@@ -84,17 +76,20 @@ class HobbyBoardBus(PortBus):
             PortError: the port cannot be opened.
             ServoMissing: the board or a channel does not answer.
         """
-        self._create_parts()
-        self._board.open_port()
+        self._reset()
+        open_port(self._port, self._baud)
         try:
             self._port.drain(0.0)
-            pulses = self._board.find(self._setups)
+            self._adopt(self._board.find(self._setups))
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise
-        self._adopt(pulses)
         self._log.add(UNMEASURED)
         self._opened = True
+
+    def _adopt(self, pulses: Sequence[int]) -> None:
+        for channel, pulse in zip(self._channels, pulses, strict=True):
+            channel.adopt_pulse(pulse)
 
     def enable_torque(self) -> tuple[int, ...]:
         """Hold every channel at its present pulse, clipped to its limits.
@@ -124,12 +119,7 @@ class HobbyBoardBus(PortBus):
             raise
         self._engaged = self._may_send = True
         self._release_due, self._trouble_s, self._fault = False, -inf, ""
-        self._pending.clear()
         return tuple(channel.goal_steps for channel in self._channels)
-
-    def _adopt(self, pulses: Sequence[int]) -> None:
-        for channel, pulse in zip(self._channels, pulses, strict=True):
-            channel.adopt_pulse(pulse)
 
     def _hold_all(self) -> None:
         """Hold every channel; channels without pulses one after another."""
@@ -147,8 +137,7 @@ class HobbyBoardBus(PortBus):
                 if not fault:
                     break
             else:
-                fault = f"{self._port.port_name}: {channel.label} {fault}"
-                raise ServoMissing(board.blame(fault, board.remedy))
+                raise board.missing(f"{channel.label} {fault}", board.remedy)
 
     def _hold(self, channel: Channel, pulse_steps: int = 0) -> str:
         """Hold a channel at its present pulse, or without one at its servo's last position.
@@ -160,20 +149,20 @@ class HobbyBoardBus(PortBus):
             "" if it is held, else the reason why not.
         """
         goal = channel.start(pulse_steps, self._port.now_s())
-        found = None
+        pulses = None
         if self._board.send_limits([channel]):
             self._board.send_goals([channel])
-            found = self._board.read_pulses((channel.id,))
+            pulses = self._board.read_pulses((channel.id,))
         channel.advance(self._port.now_s())
-        if found is None:
+        if pulses is None:
             return "does not answer"
         # A first pulse is exact; another one may have been moving when it was read.
-        is_right = pulse_steps or abs(found[0] - goal) <= FINE_STEPS
-        if is_right and channel.is_expected(found[0]):
+        is_right = pulse_steps or abs(pulses[0] - goal) <= FINE_STEPS
+        if is_right and channel.is_expected(pulses[0]):
             channel.record_hold()
             return ""
-        channel.on = found[0] > 0
-        return channel.difference_text(found[0])
+        channel.on = pulses[0] > 0
+        return channel.difference_text(pulses[0])
 
     def set_limp(self, servos: Collection[int]) -> None:
         """Stop the pulses of these servos, by index; all others that were limp get them again.
@@ -184,14 +173,12 @@ class HobbyBoardBus(PortBus):
         if not self._engaged or self._is_down or self._fault:
             return
         wanted = [self._channels[i] for i in servos]
-        held = [channel for channel in self._channels if channel.held]
+        limp = [one for one in self._channels if not (one.held or one.due or one in wanted)]
         try:
-            if off := [channel for channel in wanted if channel.held]:
+            if off := [channel for channel in wanted if channel.held or channel.due]:
                 self._switch_off(off)
-            for channel in self._channels:
-                is_limp = channel not in (*held, *self._pending, *wanted)
-                if is_limp and self._hold(channel):
-                    self._pending.append(channel)
+            for channel in limp:
+                channel.due = bool(self._hold(channel))
         except BusLost as lost:
             self._record_loss(lost)
 
@@ -215,10 +202,15 @@ class HobbyBoardBus(PortBus):
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
-        self._check_silence(answered, now_s)
         if not answered:
             self._may_send = False
-        return self._estimate() if answered and not self._pending else self._nothing
+            self._check_silence(now_s)
+            return self._nothing
+        self._silent_since_s = None
+        return self._nothing if self._has_due() else self._estimate()
+
+    def _has_due(self) -> bool:
+        return any(channel.due for channel in self._channels)
 
     def _check(self) -> bool:
         """Read the status and one channel's pulse, and act on them; return whether it answered."""
@@ -234,17 +226,16 @@ class HobbyBoardBus(PortBus):
             again = self._read_status(channel)
             if again is None:
                 return False
-            first, pulse, errors = pulse, again[0], (*errors, *again[1])
-            if not channel.is_expected(pulse):
-                if not are_alike(first, pulse):
+            if not channel.is_expected(again[0]):
+                if not are_alike(pulse, again[0]):
                     return False
-                self._handle_trouble(channel, pulse, errors)
+                self._handle_trouble(channel, again[0], (*errors, *again[1]))
         self._may_send |= channel.held
-        if self._pending:
-            self._enable_next()
+        # One channel is enabled again at each read, to spare the supply.
+        if due := [one for one in self._channels if one.due]:
+            self._enable_again(due[self._failed_tries % len(due)])
         for one in self._channels:
-            low, high = one.setup.min_steps, one.setup.max_steps
-            if one.entering and low <= one.pulse_steps <= high:
+            if one.entering and one.setup.min_steps <= one.pulse_steps <= one.setup.max_steps:
                 one.entering = False
                 self._may_send = self._board.send_limits([one])
         return True
@@ -270,43 +261,38 @@ class HobbyBoardBus(PortBus):
         else:
             self._log.add(f"{fault}: set up again")
 
-    def _enable_next(self) -> None:
-        """Enable one channel again; the next one at the next read, to spare the supply."""
-        channel = self._pending.pop(0)
+    def _enable_again(self, channel: Channel) -> None:
         fault = self._hold(channel)
-        if not fault:
-            self._rearmed = True
-            return
-        self._pending.append(channel)
-        self._failed_tries += 1
+        self._rearmed |= not fault
+        self._failed_tries += bool(fault)
         if self._failed_tries >= MOST_TRIES:
             self._stop_all(f"{channel.label} {fault}", self._board.remedy)
 
     def _stop_all(self, fault: str, remedy: str) -> None:
         """Stop the pulses of all channels, which stay without; name why."""
-        self._pending.clear()
         self._fault = self._board.blame(fault, remedy)
         self._log.add(f"no pulses any more: {self._fault}")
+        for channel in self._channels:
+            channel.record_release()
         self._switch_off()
 
-    def _check_silence(self, answered: bool, now_s: float) -> None:
-        """Report a silence of the board.
+    def _check_silence(self, now_s: float) -> None:
+        """Report that the board is silent.
 
         Raises:
             BusLost: it has been silent for longer than ``give_up_s``.
         """
-        if answered:
-            self._silent_since_s, self._is_silence_reported = None, False
+        if self._silent_since_s is None:
+            self._silent_since_s, self._report_s = now_s, now_s + BLAME_S
+        silent_s = now_s - self._silent_since_s
+        if now_s < self._report_s and silent_s < self._give_up_s:
             return
-        since_s = self._silent_since_s = self._silent_since_s or now_s
-        silent_s = now_s - since_s
         fault = f"the board has not answered for {silent_s:.1f} s"
-        fault = self._board.lateness.blame(fault, CHECK_SUPPLY, now_s, since_s)
-        if silent_s >= self._board.timing.give_up_s:
+        fault = self._board.lateness.blame(fault, CHECK_SUPPLY, now_s, self._silent_since_s)
+        if silent_s >= self._give_up_s:
             raise BusLost(f"{self._port.port_name}: {fault}")
-        if silent_s >= BLAME_S and not self._is_silence_reported:
-            self._is_silence_reported = True
-            self._log.add(fault)
+        self._report_s = inf
+        self._log.add(fault)
 
     def _estimate(self) -> Feedback:
         """Return the estimated state of all servos; none is measured."""
@@ -337,7 +323,7 @@ class HobbyBoardBus(PortBus):
         highest = [setup.max_steps for setup in self._setups]
         goals = clip_goals(goals_steps, lowest, highest)
         held = [channel for channel in self._channels if channel.held]
-        if not self._engaged or self._is_down or self._pending or not held:
+        if not self._engaged or self._is_down or not held or self._has_due():
             return
         if self._may_send:
             now_s = self._port.now_s()
@@ -364,7 +350,6 @@ class HobbyBoardBus(PortBus):
 
     def _stop_supervision(self) -> None:
         self._engaged = False
-        self._pending.clear()
         for channel in self._channels:
             channel.record_release()
 
@@ -378,9 +363,6 @@ class HobbyBoardBus(PortBus):
         return released
 
     def _reset_after_reconnect(self) -> None:
-        """Mark every channel that was held to be enabled again."""
         self._failed_tries, self._may_send = 0, True
         for channel in self._channels:
-            if channel.held:
-                channel.record_release()
-                self._pending.append(channel)
+            channel.record_release(due=channel.held or channel.due)

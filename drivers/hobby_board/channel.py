@@ -16,12 +16,10 @@ FINE_STEPS = 24
 class Channel:
     """A servo without feedback, assumed to be at its pulse. Steps are quarter microseconds.
 
-    The pulse moves to its goal at a limited speed, by the board or by the driver.
-
     pulse_steps, mean_steps_s: present pulse, and the mean speed of its last advance
     speed_steps_s: armed limit of its speed
     on: whether it outputs pulses, as far as known
-    held: whether it follows goals
+    held, due: whether it follows goals, or is to be held again
     entering: whether it moves slowly into its limits
 
     Args:
@@ -33,11 +31,10 @@ class Channel:
     def __init__(self, setup: ServoConfig, longest_ramp_s: float = inf) -> None:
         self._longest_ramp_s = longest_ramp_s
         self.id, self.label = setup.id, setup.label("channel")
-        self.on = self.held = self.entering = False
+        self.on = self.held = self.due = self.entering = False
         self.pulse_steps = self.mean_steps_s = 0.0
         self.speed_steps_s = setup.max_speed_steps_s
-        self._is_position_known = False
-        self._at_s = -inf
+        self._is_position_known, self._at_s = False, -inf
         self.set_target(setup)
 
     def set_target(self, setup: ServoConfig) -> None:
@@ -45,9 +42,11 @@ class Channel:
         self.setup = setup
         if not self._is_position_known:
             middle = (setup.min_steps + setup.max_steps) // 2
-            rest = middle if setup.rest_steps is None else setup.rest_steps
-            self.goal_steps = min(max(rest, setup.min_steps), setup.max_steps)
+            self.goal_steps = self._clip(middle if setup.rest_steps is None else setup.rest_steps)
             self.pulse_steps = self.goal_steps
+
+    def _clip(self, steps: int) -> int:
+        return min(max(steps, self.setup.min_steps), self.setup.max_steps)
 
     @property
     def top_speed_steps_s(self) -> float:
@@ -65,22 +64,21 @@ class Channel:
 
     def start(self, pulse_steps: int, now_s: float) -> int:
         """Hold at the present pulse, or at the last position if there is none; return the goal."""
-        wanted = pulse_steps or round(self.pulse_steps)
-        self.goal_steps = min(max(wanted, self.setup.min_steps), self.setup.max_steps)
+        self.goal_steps = self._clip(pulse_steps or round(self.pulse_steps))
         self.entering = pulse_steps not in (0, self.goal_steps)
         # A first pulse is not ramped, as there is no pulse to ramp from.
         self.pulse_steps = pulse_steps or self.goal_steps
-        self.on = True
-        self._at_s = now_s
+        self.on, self._at_s = True, now_s
         return self.goal_steps
 
     def record_hold(self) -> None:
         """Record that it has pulses and follows goals."""
         self.on = self.held = self._is_position_known = True
+        self.due = False
 
-    def record_release(self) -> None:
+    def record_release(self, due: bool = False) -> None:
         """Record that it follows no goals any more; its pulses may continue."""
-        self.held = self.entering = False
+        self.held, self.due, self.entering = False, due, False
 
     def record_stop(self) -> None:
         """Record that it outputs no pulses: its servo has no torque, and is assumed not to move."""
@@ -106,8 +104,5 @@ class Channel:
 
     def difference_text(self, pulse_steps: int) -> str:
         """Return how a pulse differs from the commanded one."""
-        if not pulse_steps:
-            return "has no pulses"
-        return (
-            f"is sent to {self.goal_steps / US_STEPS:g} us and gets {pulse_steps / US_STEPS:g} us"
-        )
+        us, goal_us = pulse_steps / US_STEPS, self.goal_steps / US_STEPS
+        return f"is sent to {goal_us:g} us and gets {us:g} us" if us else "has no pulses"

@@ -7,7 +7,7 @@ line is held low, if its driver can.
 import errno
 import fcntl
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from smbus2 import SMBus, i2c_msg
@@ -43,7 +43,7 @@ class I2cPort:
         self.port_name = port_name
         self._exclusive, self._on_traffic = exclusive, on_traffic or (lambda: None)
         self._bus: Any = None
-        self._status, self._waiting = OK, b""
+        self._waiting = b""
 
     def now_s(self) -> float:
         """Return host monotonic seconds."""
@@ -66,14 +66,13 @@ class I2cPort:
         except OSError as error:
             self.closePort()
             raise PortError(open_failure_text(self.port_name, error.errno)) from error
-        self._status, self._waiting = OK, b""
         return True
 
     def closePort(self) -> None:
         """Close; safe to call twice."""
         if self._bus is not None:
             self._bus.close()
-        self._bus = None
+        self._bus, self._waiting = None, b""
 
     def write(self, data: bytes) -> None:
         """Execute transfers; bytes that they read are kept for ``read_until``.
@@ -81,31 +80,23 @@ class I2cPort:
         Raises:
             BusLost: the bus is gone.
         """
-        self._begin()
-        at = 0
+        self._check_open()
+        at, status = 0, OK
         while at < len(data):
             if data.startswith(READ_STATUS, at):
-                self._waiting += bytes((self._status,))
+                self._waiting += bytes((status,))
                 at += len(READ_STATUS)
+                continue
+            at, messages = transfer_at(data, at)
+            try:
+                self._bus.i2c_rdwr(*messages)
+            except OSError as error:
+                if error.errno in _GONE:
+                    raise self._lost(error) from error
+                status = NO_ACKNOWLEDGE
             else:
-                at, messages = transfer_at(data, at)
-                self._status = self._execute(messages)
-
-    def _begin(self) -> None:
-        self._on_traffic()
-        if self._bus is None:
-            raise self._lost("it is closed")
-
-    def _execute(self, messages: Sequence[Any]) -> int:
-        """Execute one transfer; return its status."""
-        try:
-            self._bus.i2c_rdwr(*messages)
-        except OSError as error:
-            if error.errno in _GONE:
-                raise self._lost(error) from error
-            return NO_ACKNOWLEDGE
-        self._waiting += b"".join([bytes(one) for one in messages if one.flags & READ_FLAG])
-        return OK
+                status = OK
+                self._waiting += b"".join([bytes(one) for one in messages if one.flags & READ_FLAG])
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return up to ``length`` available bytes; if there are none, wait until the deadline.
@@ -113,7 +104,7 @@ class I2cPort:
         Raises:
             BusLost: the bus is gone.
         """
-        self._begin()
+        self._check_open()
         # Transfers have ended when ``write`` returns: no more bytes can arrive.
         if not self._waiting and (left_s := deadline_s - time.monotonic()) > 0.0:
             time.sleep(left_s)
@@ -124,6 +115,11 @@ class I2cPort:
         """Discard received bytes, without waiting; return their number."""
         dropped, self._waiting = len(self._waiting), b""
         return dropped
+
+    def _check_open(self) -> None:
+        self._on_traffic()
+        if self._bus is None:
+            raise self._lost("it is closed")
 
     def _lost(self, reason: object) -> BusLost:
         return BusLost(f"{self.port_name} is gone ({reason}): check the adapter and its cable")

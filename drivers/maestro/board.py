@@ -11,10 +11,8 @@ from functools import lru_cache
 from math import ceil, inf
 from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
 
-from gazerig.drivers.bus.timing import TIMING, BusTiming
-from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.hobby_board.board import TRIES, Board, HobbyBoardParams
-from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port import BusPort, open_port
 from gazerig.params import Choices
 
 if TYPE_CHECKING:  # the guardian starts without numpy
@@ -47,7 +45,7 @@ ERRORS = (
 )
 """Errors by bit of the error register."""
 
-PROTOCOL_ERROR = ERRORS.index("serial protocol error")
+PROTOCOL_ERROR = "serial protocol error"
 
 SPEED_STEPS_S = 100.0
 """Unit of the board's speed limit: a quarter microsecond in 10 ms."""
@@ -56,17 +54,6 @@ ACCEL_STEPS_S2 = SPEED_STEPS_S / 0.08
 """Unit of its acceleration limit: that change of speed in 80 ms."""
 
 MOST_ACCEL = 255
-
-
-@dataclass(frozen=True, slots=True)
-class MaestroParams(HobbyBoardParams):
-    """Communication parameters of one board on its USB command port."""
-
-    # fmt: off
-    crc: Annotated[bool, "Whether the board is set up for a CRC byte after every command; it ignores damaged commands then."] = False
-    channels: Annotated[int, Choices(6, 12, 18, 24), "Number of channels of the board; the Micro Maestro has 6."] = 12
-    # fmt: on
-    pulse_range_us: ClassVar[tuple[float, float, str]] = (64.0, 4080.0, "the range of a Maestro")
 
 
 USB_CHANNELS = {"1ffb:0089": 6, "1ffb:008a": 12, "1ffb:008b": 18, "1ffb:008c": 24}
@@ -90,15 +77,14 @@ def name_errors(register: int) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class MaestroCodec:
-    """Encoder of commands in the form that a board expects.
+class MaestroParams(HobbyBoardParams):
+    """Communication parameters of one board on its USB command port, and its commands."""
 
-    crc: whether every command ends in a check byte
-    channels: number of channels, which decides the available commands
-    """
-
-    crc: bool = False
-    channels: int = 12
+    # fmt: off
+    crc: Annotated[bool, "Whether the board is set up for a CRC byte after every command; it ignores damaged commands then."] = False
+    channels: Annotated[int, Choices(6, 12, 18, 24), "Number of channels of the board; the Micro Maestro has 6."] = 12
+    # fmt: on
+    pulse_range_us: ClassVar[tuple[float, float, str]] = (64.0, 4080.0, "the range of a Maestro")
 
     def command(self, code: int, *data: int) -> bytes:
         """Return the bytes of any command.
@@ -156,10 +142,6 @@ class MaestroBoard(Board):
     remedy = "set its channel to Servo and widen its range in Pololu's program, without a script"
     params: MaestroParams
 
-    def __init__(self, port: BusPort, params: MaestroParams, timing: BusTiming = TIMING) -> None:
-        super().__init__(port, params, timing)
-        self._codec = MaestroCodec(params.crc, params.channels)
-
     def find(self, setups: "Sequence[ServoConfig]") -> tuple[int, ...]:
         """Find the board, stop its own script and return the pulses of these servos.
 
@@ -171,17 +153,16 @@ class MaestroBoard(Board):
                 "take the first of its two USB ports and set it to 'USB Dual Port' in Pololu's "
                 f"program; its CRC must be {'on' if self.params.crc else 'off'}"
             )
-            fault = f"{self.port.port_name}: no Maestro answers"
-            raise ServoMissing(self.blame(fault, remedy))
-        self.send(self._codec.command(STOP_SCRIPT))  # which would also move servos
+            raise self.missing("no Maestro answers", remedy)
+        self.send(self.params.command(STOP_SCRIPT))  # which would also move servos
         return self.read_all(setups)
 
     def read_errors(self) -> tuple[str, ...] | None:
         """Read the board's errors, which clears them; None if it is silent."""
         for _ in range(TRIES):
-            found = self._ask_words(self._codec.command(GET_ERRORS), 1)
-            if found is not None and not found[0] >> len(ERRORS):
-                return name_errors(found[0])
+            answer = self._ask_words(self.params.command(GET_ERRORS), 1)
+            if answer is not None and not answer[0] >> len(ERRORS):
+                return name_errors(answer[0])
         return None
 
     def expects_crc(self) -> bool:
@@ -192,24 +173,24 @@ class MaestroBoard(Board):
         if not self.params.crc:
             return True
         self.read_errors()
-        return ERRORS[PROTOCOL_ERROR] not in (self.read_errors() or ())
+        return PROTOCOL_ERROR not in (self.read_errors() or ())
 
     def read_status(self, channel: int) -> tuple[int, tuple[str, ...]] | None:
         """Read a channel's pulse and the board's errors since the last read; None: no answer."""
-        packet = self._codec.command(GET_POSITION, channel) + self._codec.command(GET_ERRORS)
-        found = self._ask_words(packet, 2)
-        if found is None or found[1] >> len(ERRORS):
+        command = self.params.command
+        answer = self._ask_words(command(GET_POSITION, channel) + command(GET_ERRORS), 2)
+        if answer is None or answer[1] >> len(ERRORS):
             return None  # such errors do not exist: noise
-        return found[0], name_errors(found[1])
+        return answer[0], name_errors(answer[1])
 
     def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Read pulses, quarter microseconds, 0 for none; None without an answer."""
         pulses: tuple[int, ...] = ()
         for channel in channels:  # one by one, as the board's receive buffer is small
-            found = self._ask_words(self._codec.command(GET_POSITION, channel), 1)
-            if found is None:
+            answer = self._ask_words(self.params.command(GET_POSITION, channel), 1)
+            if answer is None:
                 return None
-            pulses += found
+            pulses += answer
         return pulses
 
     def _ask_words(self, packet: bytes, count: int) -> tuple[int, ...] | None:
@@ -218,34 +199,33 @@ class MaestroBoard(Board):
         if len(answer) < 2 * count:
             self.errors["incomplete" if answer else "timeout"] += 1
             return None
-        found = struct.unpack(f"<{count}H", answer)
-        if max(found) > MOST:
+        words = struct.unpack(f"<{count}H", answer)
+        if max(words) > MOST:
             self.errors["damaged"] += 1
             return None
-        return found
+        return words
 
     def send_limits(self, channels: "Sequence[Channel]") -> bool:
         """Arm speed and acceleration; return whether the board has found no error.
 
         On an error it may have stopped all pulses, so no command that moves a servo may follow.
         """
-        packet, codec = b"", self._codec
+        packet, params = b"", self.params
         for channel in channels:
             speed = speed_units(channel.top_speed_steps_s)
             accel = accel_units(channel.setup.max_accel_steps_s2)
             channel.speed_steps_s = speed * SPEED_STEPS_S or inf
-            packet += codec.number(SET_SPEED, channel.id, speed)
-            packet += codec.number(SET_ACCELERATION, channel.id, accel)
-        found = self._ask_words(packet + codec.command(GET_ERRORS), 1)
-        return found is not None and not found[0]
+            packet += params.number(SET_SPEED, channel.id, speed)
+            packet += params.number(SET_ACCELERATION, channel.id, accel)
+        return self._ask_words(packet + params.command(GET_ERRORS), 1) == (0,)
 
     def send_goals(self, channels: "Sequence[Channel]") -> None:
         """Send the goals of channels."""
-        self.send(self._codec.targets({one.id: one.goal_steps for one in channels}))
+        self.send(self.params.targets({one.id: one.goal_steps for one in channels}))
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses, each by its own command, so that a damaged one affects no other."""
-        self.send(b"".join(self._codec.number(SET_TARGET, channel, 0) for channel in channels))
+        self.send(b"".join(self.params.number(SET_TARGET, channel, 0) for channel in channels))
 
 
 class DetectedMaestro(NamedTuple):
@@ -274,7 +254,7 @@ def probe(port: BusPort, params: MaestroParams) -> DetectedMaestro | None:
     """
     for crc in (params.crc, not params.crc):
         board = MaestroBoard(port, replace(params, crc=crc))
-        board.open_port()
+        open_port(port, params.baud)
         port.drain()
         errors = board.read_errors()
         if errors is not None and board.expects_crc():

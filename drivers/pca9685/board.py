@@ -10,11 +10,9 @@ from math import ceil, floor
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from gazerig.drivers.bus.servo_models import US_STEPS
-from gazerig.drivers.bus.timing import TIMING, BusTiming
-from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.hobby_board.board import TRIES, Board, HobbyBoardParams
 from gazerig.drivers.i2c.transfers import OK, READ_STATUS, read, write
-from gazerig.drivers.serial.port import BusPort, wait_until
+from gazerig.drivers.serial.port import BusPort, open_port, wait_until
 from gazerig.params import Bounds
 
 if TYPE_CHECKING:  # the guardian starts without numpy
@@ -80,6 +78,11 @@ class Pca9685Params(HobbyBoardParams):
         return max(LEAST_PRESCALE, round(self.oscillator_hz / (COUNTS * PULSES_HZ)) - 1)
 
     @property
+    def grain_steps(self) -> float:
+        """Return the length of one 4096th of the period, quarter microseconds."""
+        return (self.prescale + 1) / self.oscillator_hz * 1e6 * US_STEPS
+
+    @property
     def channels(self) -> int:
         """Return the number of channels."""
         return CHANNELS
@@ -116,12 +119,7 @@ class Pca9685Board(Board):
     remedy = "is another program using the board? check power, SDA, SCL and ground"
     longest_ramp_s = 0.05
     params: Pca9685Params
-
-    def __init__(self, port: BusPort, params: Pca9685Params, timing: BusTiming = TIMING) -> None:
-        super().__init__(port, params, timing)
-        self.failure = ""
-        # Length of one 4096th of the period, quarter microseconds.
-        self._grain_steps = (params.prescale + 1) / params.oscillator_hz * 1e6 * US_STEPS
+    failure = ""
 
     # --- detection and setup
 
@@ -131,26 +129,25 @@ class Pca9685Board(Board):
         Raises:
             ServoMissing: the board does not answer, or another chip does.
         """
-        found, address = self.is_pca9685(), f"{self.params.address:#x}"
-        if found:
+        is_one, address = self.is_pca9685(), f"{self.params.address:#x}"
+        if is_one:
             return self.read_all(setups)
-        fault = f"no PCA9685 answers at {address}"
-        remedy = (
-            "does the board have its logic supply (VCC, not only V+)? check SDA, SCL and ground; "
-            "its jumpers set the address"
-        )
-        if found is False:
-            fault = f"the chip at {address} is not a PCA9685, or noise has changed its settings"
-            remedy = (
+        if is_one is False:
+            raise self.missing(
+                f"the chip at {address} is not a PCA9685, or noise has changed its settings",
                 "switch its logic supply off and on; if that does not help, another chip has this "
-                "address: close a jumper and write the new one under bus.pca9685.address"
+                "address: close a jumper and write the new one under bus.pca9685.address",
             )
-        elif self.failure != NOT_ACKNOWLEDGED:
-            fault = f"no answer as an I2C bus ({self.failure})"
-            remedy = (
-                "a PCA9685 is reached over an I2C bus such as /dev/i2c-1: write it under bus.port"
+        if self.failure != NOT_ACKNOWLEDGED:
+            raise self.missing(
+                f"no answer as an I2C bus ({self.failure})",
+                "a PCA9685 is reached over an I2C bus such as /dev/i2c-1: write it under bus.port",
             )
-        raise ServoMissing(self.blame(f"{self.port.port_name}: {fault}", remedy))
+        raise self.missing(
+            f"no PCA9685 answers at {address}",
+            "does the board have its logic supply (VCC, not only V+)? check SDA, SCL and ground; "
+            "its jumpers set the address",
+        )
 
     def is_pca9685(self) -> bool | None:
         """Return whether the chip at the address can be one of ours; None without an answer.
@@ -218,11 +215,12 @@ class Pca9685Board(Board):
         A board that was reset sleeps and outputs no pulses, with any content of its registers.
         """
         mode = self._read_single((MODE1,))
-        transfer = read(self.params.address, channel_register(channel), BYTES)
-        output = None if mode is None else self._ask(transfer, BYTES)
-        if mode is None or output is None:
+        if mode is None:
             return None
-        return (round(counts_of(output) * self._grain_steps) if mode[0] == AWAKE else 0), ()
+        output = self._ask(read(self.params.address, channel_register(channel), BYTES), BYTES)
+        if output is None:
+            return None
+        return (round(counts_of(output) * self.params.grain_steps) if mode[0] == AWAKE else 0), ()
 
     def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Read pulses, quarter microseconds, 0 for none; None without an answer."""
@@ -232,7 +230,7 @@ class Pca9685Board(Board):
             found = self._read_single((MODE1, PRESCALE, *outputs))
             if found is None:
                 return None
-            grain_steps = self._grain_steps * (found[1] + 1) / (self.params.prescale + 1)
+            grain_steps = self.params.grain_steps * (found[1] + 1) / (self.params.prescale + 1)
             is_on = not found[0] & SILENT
             pulses.append(round(counts_of(found[2:]) * grain_steps) if is_on else 0)
         return tuple(pulses)
@@ -250,7 +248,7 @@ class Pca9685Board(Board):
         self.send(b"".join([self._goal_transfer(channel) for channel in channels]))
 
     def _goal_transfer(self, channel: "Channel") -> bytes:
-        steps, setup, grain = round(channel.pulse_steps), channel.setup, self._grain_steps
+        steps, setup, grain = round(channel.pulse_steps), channel.setup, self.params.grain_steps
         counts = round(steps / grain)
         if setup.min_steps <= steps <= setup.max_steps:  # then the pulse sent is inside, too
             counts = max(min(counts, floor(setup.max_steps / grain)), ceil(setup.min_steps / grain))
@@ -272,7 +270,7 @@ def probe(port: BusPort) -> tuple[int, ...]:
         BusLost: the port is lost.
     """
     found = []
-    Pca9685Board(port, Pca9685Params()).open_port()
+    open_port(port, Pca9685Params.baud)
     for address in ADDRESSES:
         board = Pca9685Board(port, Pca9685Params(address))
         if board.is_pca9685():

@@ -19,8 +19,7 @@ detected: with such a board on the line, specify the kind of servo.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from gazerig.drivers.bus.servo_families import FAMILY_OF
-from gazerig.drivers.bus.servo_models import BusKind
+from gazerig.drivers.bus.servo_models import FAMILY_OF, BusKind
 from gazerig.drivers.maestro.board import USB_CHANNELS, DetectedMaestro, MaestroParams, probe
 from gazerig.drivers.serial.list_ports import POLOLU
 from gazerig.drivers.serial.port import BusPort

@@ -58,7 +58,7 @@ def releaser(plan: ReleasePlan) -> Releaser:
 
 
 def _smart(plan: ReleasePlan) -> Releaser:
-    from gazerig.drivers.bus.servo_families import FAMILIES
+    from gazerig.drivers.bus.servo_models import FAMILIES
     from gazerig.drivers.servo_bus.torque import disable_torque
 
     family = FAMILIES[plan.family or plan.kind]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
-from gazerig.drivers.maestro.board import MaestroCodec
+from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.calibration.endstop_search import (
     STEPS_PER_DEG,
@@ -476,7 +476,7 @@ def test_eyes_are_measured_and_their_pulses_end() -> None:
 def test_a_channel_that_gives_pulses_does_not_jump(maker_rig: Rig) -> None:
     bench = LinkageBench("eyes_pan", "", "1550", "", "", "1450", "", "")
     bench.port.setBaudRate(115_200)
-    bench.port.write(MaestroCodec(crc=maker_rig.bus.maestro.crc).targets({0: 1534 * 4}))
+    bench.port.write(MaestroParams(crc=maker_rig.bus.maestro.crc).targets({0: 1534 * 4}))
     bench.clock.sleep_until(1.0)
     before = bench.place_us()
     bench.hobby.open()

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import ServoFault, SetupError
-from gazerig.drivers.maestro.board import MaestroCodec
+from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
 from gazerig.features.bringup.cli.record_track import app
@@ -156,7 +156,7 @@ def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees(maker_rig
     bench = Bench(maker_rig)
     limp = bench.see("eyes_pan")
     assert limp.pulse_us == 0.0 and limp.position_deg is None and not limp.torque
-    bench.ports[""].write(MaestroCodec(crc=maker_rig.bus.maestro.crc).targets({0: 1634 * 4}))
+    bench.ports[""].write(MaestroParams(crc=maker_rig.bus.maestro.crc).targets({0: 1634 * 4}))
     bench.clock.sleep_until(0.5)
     seen = bench.see("eyes_pan")
     assert seen.pulse_us == 1634.0 and seen.position_deg == pytest.approx(10.0)

@@ -11,8 +11,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.bus.servo_families import FAMILY_OF
-from gazerig.drivers.bus.servo_models import US_STEPS, BusKind
+from gazerig.drivers.bus.servo_models import FAMILY_OF, US_STEPS, BusKind
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.pca9685.board import probe
 from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c

@@ -22,7 +22,7 @@ from gazerig.drivers.maestro.board import (
     probe,
 )
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
-from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port import BusPort, open_port
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic
 from gazerig.features.bringup.maestro_settings import FACTORY_US, wide_range
@@ -257,7 +257,7 @@ def examine_pca9685(
         BusLost: it has disappeared.
     """
     board = Pca9685Board(port, params)
-    board.open_port()
+    open_port(port, params.baud)
     findings, fitting = [], []
     for setup in setups:
         try:
