@@ -10,11 +10,10 @@ from math import inf, sin
 import pytest
 
 from gazerig.drivers.bus.servo_models import FAMILY_OF
-from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
-from gazerig.drivers.serial.port import BlockingPort, BusPort
+from gazerig.drivers.serial.port import TIMING, BlockingPort, BusPort, BusTiming
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.types import Feedback, ServoBus, ServoConfig

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from gazerig.drivers.bus.timing import TIMING
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
+from gazerig.drivers.serial.port import TIMING
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import PROTOCOL as PROTOCOL_BIT

@@ -4,9 +4,9 @@ import errno
 import os
 from typing import Any
 
-from gazerig.drivers.bus.timing import BusTiming
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
+from gazerig.drivers.serial.port import BusTiming
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort

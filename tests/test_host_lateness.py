@@ -66,7 +66,8 @@ def test_an_adaptor_is_found_again_under_another_name_and_no_other_is_taken_for_
     for name, path in zip(("usb-A", "usb-B"), paths, strict=True):
         (by_id / name).symlink_to(path)
     named.symlink_to(paths[0])
-    port = BlockingPort(str(named), by_id=by_id)
+    port = BlockingPort(str(named))
+    port.by_id = by_id
     assert port.setBaudRate(1_000_000)
     assert port.opened_as == str(named)
     named.unlink()  # back as another ttyUSB

@@ -7,10 +7,10 @@ from maestro_world import IDS, SETUPS, TICK_S, World, target
 from present import present
 from stand_in import StandIn
 
-from gazerig.drivers.bus.timing import BusTiming
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams, probe
+from gazerig.drivers.serial.port import BusTiming
 from gazerig.sim_mock.hobby_servo import HobbySpec
 
 GOALS = (5500, 5600, 6600)

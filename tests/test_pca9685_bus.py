@@ -225,8 +225,9 @@ def kernel(world, monkeypatch):
     made = Kernel(world)
     port = I2cPort("/dev/i2c-7")
     monkeypatch.setattr(i2c_port, "SMBus", made.open)
-    clock = type("Clock", (), {"monotonic": lambda: world.now[0], "sleep": lambda seconds: None})
+    clock = type("Clock", (), {"sleep": lambda seconds: None})
     monkeypatch.setattr(i2c_port, "time", clock)
+    monkeypatch.setattr(I2cPort, "now_s", lambda port: world.now[0])
     board = Pca9685Board(port, BOARD, QUICK._replace(give_up_s=2.0))
     world.bus = HobbyBoardBus(board, world.setups)
     return made

@@ -25,7 +25,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.plugins import ATTENTION, CAMERA, DETECTOR
-from gazerig.drivers.types import Feedback, ServoConfig
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app import run_bus, session
 from gazerig.robot.app.assemble import RIGS_OWN, assemble
 from gazerig.robot.app.options import RunOptions
@@ -201,13 +201,3 @@ def test_goals_are_clipped_and_every_bus_is_released() -> None:
     with pytest.raises(BusLost, match="bus 'b' of b 1: torque-off failed .*: cut the servo power"):
         bus.disable_torque()
     assert released == [1]
-
-
-def test_feedback_that_is_none_is_a_lost_bus() -> None:
-    good = Feedback.create_missing(1)._replace(
-        position_steps=(5.0,), velocity_steps_s=(0.0,), load=(0.0,), at_s=(1.0,), missing=()
-    )
-    for wrong in (None, Feedback.create_missing(2), good._replace(at_s=(inf,))):
-        bus: Any = SimpleNamespace(read=lambda now_s, wrong=wrong: wrong)
-        with pytest.raises(BusLost, match="b 1: read returned no finite feedback of 1 servos"):
-            MultiBus([BusShare("b 1", bus, (0,))], SERVOS[:1]).read(1.0)

@@ -1,8 +1,8 @@
 """Our kinds of servo buses, registered like those of other packages."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from gazerig.drivers.bus.servo_models import FAMILY_OF, SERVOS
+from gazerig.drivers.bus.servo_models import FAMILY_OF
 from gazerig.drivers.dynamixel.control_table import DynamixelParams
 from gazerig.drivers.feetech.memory_table import FeetechParams
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
@@ -20,20 +20,11 @@ def _smart(
     return SmartServoBus(FAMILY_OF[own[0].model], port, own, params.baud)
 
 
-def _plugin(kind: str, params: type, make: Callable[..., ServoBus]) -> BusPlugin:
-    models = {name: model for name, model in SERVOS.items() if model.bus == kind}
-    return BusPlugin(make, params, models)
-
-
-DYNAMIXEL = _plugin("dynamixel", DynamixelParams, _smart)
-FEETECH = _plugin("feetech", FeetechParams, _smart)
-MAESTRO = _plugin(
-    "maestro",
-    MaestroParams,
-    lambda port, own, params: HobbyBoardBus(MaestroBoard(port, params), own),
+DYNAMIXEL = BusPlugin(_smart, DynamixelParams)
+FEETECH = BusPlugin(_smart, FeetechParams)
+MAESTRO = BusPlugin(
+    lambda port, own, params: HobbyBoardBus(MaestroBoard(port, params), own), MaestroParams
 )
-PCA9685 = _plugin(
-    "pca9685",
-    Pca9685Params,
-    lambda port, own, params: HobbyBoardBus(Pca9685Board(port, params), own),
+PCA9685 = BusPlugin(
+    lambda port, own, params: HobbyBoardBus(Pca9685Board(port, params), own), Pca9685Params
 )

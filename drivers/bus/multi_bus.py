@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from contextlib import ExitStack, suppress
 from itertools import chain
-from math import isfinite
 from typing import NamedTuple
 
 from gazerig.drivers.bus.goal_limits import clip_goals
@@ -37,62 +36,44 @@ class MultiBus:
 
     def __init__(self, shares: Sequence[BusShare], setups: Sequence[ServoConfig]) -> None:
         self._shares = tuple(shares)
+        self._buses = tuple(share.bus for share in shares)
         self._setups = self._target_setups = tuple(setups)
         given = [place for share in shares for place in share.servo_indices]
         # Position of each of the rig's servos among those of the buses, one after the other.
         self._order = sorted(range(len(given)), key=given.__getitem__)
 
     def open(self) -> None:
-        """Open every bus; if one cannot be opened, close those opened before it.
-
-        Raises:
-            PortError: a port cannot be opened.
-            ServoMissing: servos are absent or of another model.
-        """
+        """Open every bus; if one cannot be opened, close those opened before it."""
         with ExitStack() as opened:
-            for share in self._shares:
-                share.bus.open()
-                opened.callback(share.bus.close)
+            for bus in self._buses:
+                bus.open()
+                opened.callback(bus.close)
             opened.pop_all()
 
     def read(self, now_s: float) -> Feedback:
-        """Read all servos of all buses.
-
-        Raises:
-            BusLost: no servo of a bus has answered for longer than its ``give_up_s``, or a bus
-                returned something else than the feedback of its servos.
-        """
+        """Read all servos of all buses."""
         feedbacks, lost = list[Feedback](), list[BusLost]()
         for share in self._shares:
             try:
-                feedback = share.bus.read(now_s)
-                _check_feedback(feedback, share)
-                feedbacks.append(feedback)
+                feedbacks.append(share.bus.read(now_s))
             except BusLost as error:  # the others are still read, so that they may reconnect
                 lost.append(error)
         if lost:
             raise lost[0]
         columns = [tuple(chain.from_iterable(parts)) for parts in zip(*feedbacks, strict=True)]
-        missing = (
+        ordered = [tuple([column[i] for i in self._order]) for column in columns[:-1]]
+        missing = [
             share.servo_indices[i]
             for share, feedback in zip(self._shares, feedbacks, strict=True)
             for i in feedback.missing
-        )
-        ordered = [tuple([column[i] for i in self._order]) for column in columns[:-1]]
+        ]
         return Feedback._make((*ordered, tuple(sorted(missing))))
 
     def enable_torque(self) -> tuple[int, ...]:
-        """Switch torque on, bus by bus; if one refuses, release all again.
-
-        Returns:
-            The goals that are now active, in steps.
-
-        Raises:
-            DriverError: raised by the bus at fault.
-        """
+        """Switch torque on, bus by bus, and return the goals; if one refuses, release all again."""
         self._setups = self._target_setups
         try:
-            goals = [goal for share in self._shares for goal in share.bus.enable_torque()]
+            goals = [goal for bus in self._buses for goal in bus.enable_torque()]
         except BaseException:
             with suppress(BusLost):
                 self.disable_torque()
@@ -101,41 +82,32 @@ class MultiBus:
 
     def set_limp(self, servos: Collection[int]) -> None:
         """Switch torque off on these servos; all others that were limp get it again."""
-        for share in self._shares:
-            if isinstance(share.bus, LimpableBus):
-                here = enumerate(share.servo_indices)
-                share.bus.set_limp([k for k, place in here if place in servos])
+        for _, bus, indices in self._shares:
+            if isinstance(bus, LimpableBus):
+                bus.set_limp([k for k, place in enumerate(indices) if place in servos])
 
     def write(self, goals_steps: Sequence[int]) -> None:
-        """Send one goal to every servo; goals are clipped to the limits.
-
-        Raises:
-            ValueError: a goal is not a number, or their number is wrong.
-        """
+        """Send one goal to every servo; goals are clipped to the limits."""
         lowest = [setup.min_steps for setup in self._setups]
         highest = [setup.max_steps for setup in self._setups]
         goals = clip_goals(goals_steps, lowest, highest)
-        for share in self._shares:
-            share.bus.write([goals[place] for place in share.servo_indices])
+        for _, bus, indices in self._shares:
+            bus.write([goals[place] for place in indices])
 
     def faults(self) -> tuple[str, ...]:
         """Return the present servo faults, one line each."""
-        return tuple(fault for share in self._shares for fault in share.bus.faults())
+        return tuple(fault for bus in self._buses for fault in bus.faults())
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
-        return tuple(event for share in self._shares for event in share.bus.events())
+        return tuple(event for bus in self._buses for event in bus.events())
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Store setups for the next time torque is switched on.
-
-        Raises:
-            ValueError: the servos are not the same.
-        """
+        """Store setups for the next time torque is switched on."""
         if len(setups) != len(self._setups):
             raise ValueError("ids and models must not change: create another bus for other servos")
-        for share in self._shares:
-            share.bus.retune([setups[place] for place in share.servo_indices])
+        for _, bus, indices in self._shares:
+            bus.retune([setups[place] for place in indices])
         self._target_setups = tuple(setups)
 
     def disable_torque(self) -> None:
@@ -145,37 +117,24 @@ class MultiBus:
             BusLost: ports are lost; the message names each.
         """
         lost = []
-        for share in self._shares:
+        for name, bus, _ in self._shares:
             try:
-                share.bus.disable_torque()
+                bus.disable_torque()
             except DriverError as error:
                 lost.append(str(error))
             except Exception as error:
                 failed = f"torque-off failed ({describe_error(error)}): cut the servo power"
-                lost.append(f"{share.name}: {failed}")
+                lost.append(f"{name}: {failed}")
         if lost:
             raise BusLost("; ".join(lost))
 
     def health(self) -> BusHealth:
         """Return the sums of byte and error counts."""
-        each = [share.bus.health() for share in self._shares]
-        errors: Counter[str] = Counter()
-        for health in each:
-            errors.update(health.errors)
-        return BusHealth(sum(h.tx_bytes for h in each), sum(h.rx_bytes for h in each), errors)
+        sent, received, errors = zip(*(bus.health() for bus in self._buses), strict=True)
+        return BusHealth(sum(sent), sum(received), sum(map(Counter, errors), Counter[str]()))
 
     def close(self) -> None:
         """Close every port, even if another bus fails."""
         with ExitStack() as stack:
-            for share in reversed(self._shares):
-                stack.callback(share.bus.close)
-
-
-def _check_feedback(feedback: Feedback, share: BusShare) -> None:
-    """Check that a bus, which may be another package's, returned finite values of its servos."""
-    count = len(share.servo_indices)
-    if isinstance(feedback, Feedback) and {*map(len, feedback[:-1])} == {count}:
-        fresh = set(range(count)).difference(feedback.missing)
-        if all(isfinite(column[i]) for column in feedback[:4] for i in fresh):
-            return
-    raise BusLost(f"{share.name}: read returned no finite feedback of {count} servos")
+            for bus in reversed(self._buses):
+                stack.callback(bus.close)

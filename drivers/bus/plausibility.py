@@ -50,10 +50,8 @@ class Plausibility:
         """Accept the next positions without a check, for example after a lost port."""
         count = len(self._fastest)
         # Columns of the last positions and their times, and of the positions and times before.
-        self._last: Sequence[float] = (inf,) * count
-        self._past: Sequence[float] = (inf,) * count
-        self._last_s: Sequence[float] = (-inf,) * count
-        self._past_s: Sequence[float] = (-inf,) * count
+        self._last, self._last_s = [inf] * count, [-inf] * count
+        self._past, self._past_s = [inf] * count, [-inf] * count
         self._odd: list[list[tuple[float, ...]]] = [[] for _ in range(count)]
 
     def record_damaged(self, at_s: float) -> None:
@@ -73,30 +71,26 @@ class Plausibility:
         if max(ways) > self._nearest or min(ways) < -self._nearest:
             return False
         self._past, self._past_s = self._last, self._last_s
-        self._last, self._last_s = positions, (at_s,) * len(positions)
+        self._last, self._last_s = list[float](positions), [at_s] * len(positions)
         return True
 
     def is_plausible(self, slot: int, position: int, at_s: float) -> bool:
         """Return whether one servo's position is plausible; call it once for every answer."""
         odd = self._odd[slot]
         last = self._last[slot], self._last_s[slot], self._past[slot], self._past_s[slot]
-        place = position, at_s, *last[:2]
-        if last[0] == inf or not self._is_near(slot, last, position, at_s):
-            place = position, at_s, position, -inf
-            if odd and not self._is_near(slot, odd[-1], position, at_s):
-                odd.clear()
-            odd.append(place)
-            if last[0] != inf and len(odd) < AGREEING:
-                return False
-        self._store(slot, place)
+        if last[0] != inf and self._is_near(slot, last, position, at_s):
+            self._store(slot, (position, at_s, *last[:2]))
+            return True
+        if odd and not self._is_near(slot, odd[-1], position, at_s):
+            odd.clear()
+        odd.append((position, at_s, position, -inf))
+        if last[0] != inf and len(odd) < AGREEING:
+            return False
+        self._store(slot, odd[-1])
         return True
 
     def _store(self, slot: int, place: tuple[float, ...]) -> None:
-        columns = self._last, self._last_s, self._past, self._past_s
-        self._last, self._last_s, self._past, self._past_s = (
-            (*column[:slot], value, *column[slot + 1 :])
-            for column, value in zip(columns, place, strict=True)
-        )
+        self._last[slot], self._last_s[slot], self._past[slot], self._past_s[slot] = place
         self._odd[slot].clear()
 
     def _is_near(self, slot: int, place: tuple[float, ...], position: float, at_s: float) -> bool:

@@ -1,9 +1,9 @@
 """Base of servo buses: torque off, reconnection of an unplugged port, byte and error counts."""
 
 from abc import ABC, abstractmethod
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from contextlib import suppress
+from typing import Any
 
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import BusLost, PortError
@@ -17,19 +17,12 @@ AGAIN_S = 0.2
 """Interval of attempts to open a lost port."""
 
 
-class Exchange(Protocol):
-    """Byte and error counts of the exchanges on a line."""
-
-    tx_bytes: int
-    rx_bytes: int
-    errors: Counter[str]
-
-
 class PortBus(ABC):
     """The servos on one port; base of implementations of gazerig.drivers.types.ServoBus.
 
     A bus creates its parts before any of these methods is called, and may replace them.
 
+    _line: has the counts tx_bytes, rx_bytes and errors
     _labels: labels of servos for messages, by id
     _give_up_s: longest loss of the port, seconds
     _is_down: whether the port is lost
@@ -37,7 +30,7 @@ class PortBus(ABC):
     """
 
     _port: BusPort
-    _line: Exchange
+    _line: Any
     _log: EventLog
     _labels: Mapping[int, str]
     _setups: tuple[ServoConfig, ...]
@@ -49,11 +42,7 @@ class PortBus(ABC):
 
     @abstractmethod
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
-        """Check that the servos accept these setups.
-
-        Raises:
-            ValueError: a setup is not possible.
-        """
+        """Raise ValueError if a servo cannot have its setup."""
 
     @abstractmethod
     def _stop_supervision(self) -> None:
@@ -61,11 +50,7 @@ class PortBus(ABC):
 
     @abstractmethod
     def _switch_off(self) -> ReleaseResult:
-        """Switch the torque of all servos off and verify that it is off.
-
-        Raises:
-            BusLost: the port is lost.
-        """
+        """Switch the torque of all servos off and verify it; raise BusLost if the port is lost."""
 
     @abstractmethod
     def _reset_after_reconnect(self) -> None:
@@ -101,12 +86,8 @@ class PortBus(ABC):
                 switches torque off.
         """
         self._stop_supervision()
-        if not self._opened:
-            return
-        if self._is_down and not self._reopen():
-            self._release_due = True
-            raise self._release_failure()
-        self._switch_all_off()
+        if self._opened:
+            self._switch_all_off()
 
     def close(self) -> None:
         """Close the port; safe to call twice. Servos keep their last goals."""
@@ -120,22 +101,18 @@ class PortBus(ABC):
         Raises:
             BusLost: it has been lost for longer than ``_give_up_s``.
         """
-        self._now_s = now_s
-        if self._is_down:
-            gone_s = now_s - self._lost_s
-            if now_s >= self._next_s:
-                self._next_s = now_s + AGAIN_S
-                if self._reopen():
-                    self._log.add(f"port back after {gone_s:.1f} s")
-            if self._is_down and gone_s >= self._give_up_s:
-                raise BusLost(
-                    f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
-                )
+        self._now_s, gone_s = now_s, now_s - self._lost_s
+        if self._is_down and now_s >= self._next_s:
+            self._next_s = now_s + AGAIN_S
+            if self._reopen():
+                self._log.add(f"port back after {gone_s:.1f} s")
+        if self._is_down and gone_s >= self._give_up_s:
+            raise BusLost(
+                f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
+            )
         if self._release_due and not self._is_down:
-            try:
+            with suppress(BusLost):
                 self._switch_all_off()
-            except BusLost:
-                return False
         return not self._is_down
 
     def _reopen(self) -> bool:
@@ -152,26 +129,26 @@ class PortBus(ABC):
 
     def _switch_all_off(self) -> None:
         """Switch all torque off, verify it, and report the servos that keep it."""
-        try:
-            released = self._switch_off()
-        except BusLost as lost:
-            self._record_loss(lost)
+        released = None
+        if not self._is_down or self._reopen():
+            try:
+                released = self._switch_off()
+            except BusLost as lost:
+                self._record_loss(lost)
+        if released is None:
             self._release_due = True
-            raise self._release_failure() from lost
+            raise BusLost(
+                f"{self._port.port_name} is gone: torque could not be switched off; servos that "
+                f"have power hold their position or last goal: {CUT} to free them"
+            )
         if self._release_due:
             self._log.add("torque switched off, as requested while the port was gone")
         self._release_due = False
         self._line.errors["refused"] += len(released.holding_ids)
-        for servo_id in (*released.holding_ids, *released.unconfirmed_ids):
-            holds = servo_id in released.holding_ids
-            what = "torque still on" if holds else "torque-off not confirmed"
-            self._log.add(f"{self._labels[servo_id]}: {what}: {CUT}")
-
-    def _release_failure(self) -> BusLost:
-        return BusLost(
-            f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
-            f"power hold their position or last goal: {CUT} to free them"
-        )
+        for servo_id in released.holding_ids:
+            self._log.add(f"{self._labels[servo_id]}: torque still on: {CUT}")
+        for servo_id in released.unconfirmed_ids:
+            self._log.add(f"{self._labels[servo_id]}: torque-off not confirmed: {CUT}")
 
     def _record_loss(self, lost: BusLost) -> None:
         """Record that the port is lost."""

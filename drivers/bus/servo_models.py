@@ -9,7 +9,7 @@ from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN as STEPS_PER_
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.feetech.memory_table import FACTORY_P_GAIN, P_FULL_STEPS
+from gazerig.drivers.feetech.memory_table import FACTORY_P_GAIN, P_FULL_STEPS, SCS_STEPS
 from gazerig.drivers.feetech.scs import FEETECH_SCS
 from gazerig.drivers.servo_bus.family import Family, ServoModel
 
@@ -86,13 +86,13 @@ def _smart_servo(family: Family, model: ServoModel) -> ServoModelInfo:
     gain, full_steps = FACTORY_P_GAIN, P_FULL_STEPS * model.steps_per_turn / STEPS_PER_TURN
     if isinstance(model, DynamixelModel):
         gain, full_steps = model.gains[4], P_UNIT * PWM_FULL
-    highest = family.registers["max_position_limit"].high
+    steps = SCS_STEPS if family is FEETECH_SCS else model.steps_per_turn
     return ServoModelInfo(
         family.name.partition(" ")[0],
         model.steps_per_turn,
         0,
-        highest,
-        middle=(highest + 1) // 2,
+        steps - 1,
+        middle=steps // 2,
         hottest_c=float(model.temperature_limit),
         lowest_v=0.1 * model.min_voltage,
         highest_v=0.1 * model.max_voltage,
@@ -114,10 +114,11 @@ FAMILY_OF: dict[str, Family] = {
 
 SERVOS: dict[str, ServoModelInfo] = {
     **{name: _smart_servo(family, family.models[name]) for name, family in FAMILY_OF.items()},
+    # 500 to 2500 us is what most servos accept.
     HOBBY: ServoModelInfo(
         "maestro",
         HOBBY_STEPS_PER_TURN,
-        500 * US_STEPS,  # to 2500 us: what most servos accept
+        500 * US_STEPS,
         2500 * US_STEPS,
         "us",
         US_STEPS,
@@ -129,22 +130,16 @@ SERVOS: dict[str, ServoModelInfo] = {
 
 
 def add_models(kind: BusKind, models: Mapping[str, ServoModelInfo], label: str) -> None:
-    """Add the servo models of a package's bus to ``SERVOS``.
-
-    Args:
-        kind: Kind of bus.
-        models: Models by name.
-        label: Name of the package in messages.
+    """Add the servo models of a package's bus to ``SERVOS``; ``label`` names it in messages.
 
     Raises:
-        PluginError: a model's name is taken, or a model is not a ``ServoModelInfo``.
+        PluginError: a model's name is taken.
     """
-    for name, model in models.items():
-        if not isinstance(model, ServoModelInfo):
-            raise PluginError(f"{label}: its servo model {name!r} is not a ServoModelInfo")
-        if SERVOS.get(name, model._replace(bus=kind)) != model._replace(bus=kind):
+    own = {name: model._replace(bus=kind) for name, model in models.items()}
+    for name, model in own.items():
+        if SERVOS.get(name, model) != model:
             raise PluginError(f"{label}: another servo model is already named {name!r}")
-    SERVOS.update({name: m._replace(bus=kind) for name, m in models.items()})
+    SERVOS.update(own)
 
 
 def servo_label(setup: "ServoConfig") -> str:

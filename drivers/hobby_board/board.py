@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.bus.servo_models import US_STEPS
-from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.process.host_lateness import HostLateness
-from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort, open_port
+from gazerig.drivers.serial.port import BITS_PER_BYTE, TIMING, BusPort, BusTiming, open_port
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.hobby_board.channel import Channel
+    from gazerig.drivers.hobby_board.bus import Channel
     from gazerig.drivers.types import ServoConfig
 
 TRIES = 3
@@ -121,8 +120,8 @@ class Board(ABC):
     def exchange(self, packet: bytes, length: int) -> bytes:
         """Send requests and return their answers, fewer bytes if they do not come in time.
 
-        Answers have neither address nor checksum, and a late one looks like any other: what has
-        arrived since a missing one is discarded.
+        Answers have neither address nor checksum, and a late one looks like any other: what arrives
+        after a missing one is discarded.
         """
         port, owed, self._owed_bytes = self.port, self._owed_bytes, 0
         if owed and 0 < port.drain() <= owed:

@@ -11,13 +11,13 @@ channels are then enabled again, one after another; if that happens again soon, 
 from collections.abc import Collection, Sequence
 from math import inf
 
-from gazerig.drivers.bus.goal_limits import clip_goals
+from gazerig.drivers.bus.goal_limits import clip_goals, entry_speed_steps_s
 from gazerig.drivers.bus.port_bus import PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
+from gazerig.drivers.bus.servo_models import HOBBY_STEPS_PER_TURN, US_STEPS
 from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import CHECK_SUPPLY, TRIES, Board, are_alike
-from gazerig.drivers.hobby_board.channel import FINE_STEPS, Channel
 from gazerig.drivers.process.host_lateness import BLAME_S
 from gazerig.drivers.serial.port import open_port, wait_until
 from gazerig.drivers.types import Feedback, ServoConfig
@@ -29,6 +29,107 @@ WITHIN_S = 10.0
 
 MOST_TRIES = 300
 """Failed attempts to enable channels again after which all stay without pulses."""
+
+BEHIND_S = 0.1
+"""Longest delay of the board behind the last goals: its period is 20 ms, and lines are slow."""
+
+FINE_STEPS = 24
+"""Tolerance of an expected pulse at rest, half a degree: the grain of a PCA9685 is 20 steps."""
+
+
+class Channel:
+    """A servo without feedback, assumed to be at its pulse. Steps are quarter microseconds.
+
+    pulse_steps, mean_steps_s: present pulse, and the mean speed of its last advance
+    speed_steps_s: armed limit of its speed
+    on: whether it outputs pulses, as far as known
+    held, due: whether it follows goals, or is to be held again
+    entering: whether it moves slowly into its limits
+
+    Args:
+        setup: The servo.
+        longest_ramp_s: Longest time for which the driver's ramp advances while nothing is sent,
+            seconds; inf: the board itself ramps its pulses.
+    """
+
+    def __init__(self, setup: ServoConfig, longest_ramp_s: float = inf) -> None:
+        self._longest_ramp_s = longest_ramp_s
+        self.id, self.label = setup.id, setup.label("channel")
+        self.on = self.held = self.due = self.entering = False
+        self.pulse_steps = self.mean_steps_s = 0.0
+        self.speed_steps_s = setup.max_speed_steps_s
+        self._is_position_known, self._at_s = False, -inf
+        self.set_target(setup)
+
+    def set_target(self, setup: ServoConfig) -> None:
+        """Apply a changed setup of the same servo."""
+        self.setup = setup
+        if not self._is_position_known:
+            middle = (setup.min_steps + setup.max_steps) // 2
+            self.goal_steps = self._clip(middle if setup.rest_steps is None else setup.rest_steps)
+            self.pulse_steps = self.goal_steps
+
+    def _clip(self, steps: int) -> int:
+        return min(max(steps, self.setup.min_steps), self.setup.max_steps)
+
+    @property
+    def top_speed_steps_s(self) -> float:
+        """Return the present speed limit of its pulses, low while it enters its limits."""
+        if self.entering:
+            return entry_speed_steps_s(self.setup, HOBBY_STEPS_PER_TURN)
+        return self.setup.max_speed_steps_s
+
+    def adopt_pulse(self, pulse_steps: int) -> None:
+        """Adopt the pulse of a channel that is not held; 0: none."""
+        self.on = pulse_steps > 0
+        if self.on:
+            self._is_position_known = True
+            self.goal_steps = self.pulse_steps = pulse_steps
+
+    def start(self, pulse_steps: int, now_s: float) -> int:
+        """Hold at the present pulse, or at the last position if there is none; return the goal."""
+        self.goal_steps = self._clip(pulse_steps or round(self.pulse_steps))
+        self.entering = pulse_steps not in (0, self.goal_steps)
+        # A first pulse is not ramped, as there is no pulse to ramp from.
+        self.pulse_steps = pulse_steps or self.goal_steps
+        self.on, self._at_s = True, now_s
+        return self.goal_steps
+
+    def record_hold(self) -> None:
+        """Record that it has pulses and follows goals."""
+        self.on = self.held = self._is_position_known = True
+        self.due = False
+
+    def record_release(self, due: bool = False) -> None:
+        """Record that it follows no goals any more; its pulses may continue."""
+        self.held, self.due, self.entering = False, due, False
+
+    def record_stop(self) -> None:
+        """Record that it outputs no pulses: its servo has no torque, and is assumed not to move."""
+        self.record_release()
+        self.on, self.mean_steps_s = False, 0.0
+
+    def advance(self, now_s: float) -> None:
+        """Advance the estimate to ``now_s``."""
+        spent_s = now_s - self._at_s
+        if self.on and 0.0 < spent_s < inf:
+            most = self.speed_steps_s * min(spent_s, self._longest_ramp_s)
+            way = min(max(self.goal_steps - self.pulse_steps, -most), most)
+            self.pulse_steps += way
+            self.mean_steps_s = way / spent_s
+        self._at_s = now_s
+
+    def is_expected(self, pulse_steps: int) -> bool:
+        """Return whether a pulse can be the commanded one."""
+        if self._longest_ramp_s < inf:
+            return pulse_steps > 0  # the next goals correct it
+        room = FINE_STEPS + BEHIND_S * self.speed_steps_s
+        return pulse_steps > 0 and abs(pulse_steps - self.pulse_steps) <= room
+
+    def difference_text(self, pulse_steps: int) -> str:
+        """Return how a pulse differs from the commanded one."""
+        us, goal_us = pulse_steps / US_STEPS, self.goal_steps / US_STEPS
+        return f"is sent to {goal_us:g} us and gets {us:g} us" if us else "has no pulses"
 
 
 class HobbyBoardBus(PortBus):
@@ -63,19 +164,14 @@ class HobbyBoardBus(PortBus):
         self._engaged, self._may_send = False, True
         self._failed_tries, self._trouble_s, self._fault = 0, -inf, ""
         self._rearmed, self._turn = False, 0
-        self._silent_since_s: float | None = None
-        self._report_s = inf  # when a silence is reported
+        # Begin of a silence of the board, and its length from which on it is reported next.
+        self._silent_since_s, self._report_s = inf, 0.0
         self._is_down = self._release_due = False
 
     # --- torque on and off
 
     def open(self) -> None:
-        """Open the port, find the board and every channel; nothing moves.
-
-        Raises:
-            PortError: the port cannot be opened.
-            ServoMissing: the board or a channel does not answer.
-        """
+        """Open the port, find the board and every channel; nothing moves."""
         self._reset()
         open_port(self._port, self._baud)
         try:
@@ -97,13 +193,6 @@ class HobbyBoardBus(PortBus):
         A channel without pulses begins at its servo's last position, or at rest if it has not been
         held yet: the servo moves there immediately at its own speed, and the next such channel
         follows ``stagger_s`` later. A joint outside its limits moves inside at 30 deg/s.
-
-        Returns:
-            The goals that are now active, in steps.
-
-        Raises:
-            BusLost: the port is lost.
-            ServoMissing: the board does not answer, or a channel does not accept its goal.
         """
         self._setups = self._target_setups
         for channel, setup in zip(self._channels, self._setups, strict=True):
@@ -140,13 +229,9 @@ class HobbyBoardBus(PortBus):
                 raise board.missing(f"{channel.label} {fault}", board.remedy)
 
     def _hold(self, channel: Channel, pulse_steps: int = 0) -> str:
-        """Hold a channel at its present pulse, or without one at its servo's last position.
+        """Hold a channel at its present pulse, or at its last position; return why it is not held.
 
         Speed and acceleration are armed before the goal is sent, and the pulse is read afterwards.
-        A first pulse is not ramped: the servo moves there at its own speed.
-
-        Returns:
-            "" if it is held, else the reason why not.
         """
         goal = channel.start(pulse_steps, self._port.now_s())
         pulses = None
@@ -167,8 +252,8 @@ class HobbyBoardBus(PortBus):
     def set_limp(self, servos: Collection[int]) -> None:
         """Stop the pulses of these servos, by index; all others that were limp get them again.
 
-        Their first pulse is the last one before: a joint that was moved by hand returns there at
-        the servo's own speed, as its position is not known. A channel that does not stop, is held.
+        A joint that was moved by hand returns to its last pulse at the servo's own speed, as its
+        position is not known. A channel that does not stop, is held.
         """
         if not self._engaged or self._is_down or self._fault:
             return
@@ -187,12 +272,8 @@ class HobbyBoardBus(PortBus):
     def read(self, now_s: float) -> Feedback:
         """Read the board's errors and one pulse; return the estimated state of all servos.
 
-        All servos are missing if the board did not answer, or while channels that lost their pulses
-        are not yet held again. A read always takes a bounded time. While the port is lost all
-        servos are missing, and the port is tried again at intervals.
-
-        Raises:
-            BusLost: port or board have been lost for longer than ``give_up_s``.
+        All servos are missing if port or board are silent, or while channels that lost their pulses
+        are not yet held again.
         """
         self._now_s = now_s
         if (self._is_down or self._release_due) and not self._reopen_if_needed(now_s):
@@ -206,11 +287,12 @@ class HobbyBoardBus(PortBus):
             self._may_send = False
             self._check_silence(now_s)
             return self._nothing
-        self._silent_since_s = None
-        return self._nothing if self._has_due() else self._estimate()
+        self._silent_since_s = inf
+        return self._nothing if self._due else self._estimate()
 
-    def _has_due(self) -> bool:
-        return any(channel.due for channel in self._channels)
+    @property
+    def _due(self) -> list[Channel]:
+        return [channel for channel in self._channels if channel.due]
 
     def _check(self) -> bool:
         """Read the status and one channel's pulse, and act on them; return whether it answered."""
@@ -232,7 +314,7 @@ class HobbyBoardBus(PortBus):
                 self._handle_trouble(channel, again[0], (*errors, *again[1]))
         self._may_send |= channel.held
         # One channel is enabled again at each read, to spare the supply.
-        if due := [one for one in self._channels if one.due]:
+        if due := self._due:
             self._enable_again(due[self._failed_tries % len(due)])
         for one in self._channels:
             if one.entering and one.setup.min_steps <= one.pulse_steps <= one.setup.max_steps:
@@ -277,21 +359,18 @@ class HobbyBoardBus(PortBus):
         self._switch_off()
 
     def _check_silence(self, now_s: float) -> None:
-        """Report that the board is silent.
-
-        Raises:
-            BusLost: it has been silent for longer than ``give_up_s``.
-        """
-        if self._silent_since_s is None:
-            self._silent_since_s, self._report_s = now_s, now_s + BLAME_S
+        """Report that the board is silent; give up after ``give_up_s``."""
+        give_up_s = self._give_up_s
+        if self._silent_since_s == inf:
+            self._silent_since_s, self._report_s = now_s, min(BLAME_S, give_up_s)
         silent_s = now_s - self._silent_since_s
-        if now_s < self._report_s and silent_s < self._give_up_s:
+        if silent_s < self._report_s:
             return
         fault = f"the board has not answered for {silent_s:.1f} s"
         fault = self._board.lateness.blame(fault, CHECK_SUPPLY, now_s, self._silent_since_s)
-        if silent_s >= self._give_up_s:
+        if silent_s >= give_up_s:
             raise BusLost(f"{self._port.port_name}: {fault}")
-        self._report_s = inf
+        self._report_s = give_up_s
         self._log.add(fault)
 
     def _estimate(self) -> Feedback:
@@ -312,18 +391,15 @@ class HobbyBoardBus(PortBus):
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every channel in one write; goals are clipped to the limits.
 
-        Nothing is sent while no channel is held or the port is lost. While the board does not
-        answer, pulses do not change: it may have restarted, and would apply goals without any speed
-        limit. Pulses that the driver ramps are repeated then, as a write may have been damaged.
-
-        Raises:
-            ValueError: a goal is not a number, or their number is wrong.
+        While the board does not answer, pulses do not change: it may have restarted, and would
+        apply goals without any speed limit. Pulses that the driver ramps are repeated then, as a
+        write may have been damaged.
         """
         lowest = [setup.min_steps for setup in self._setups]
         highest = [setup.max_steps for setup in self._setups]
         goals = clip_goals(goals_steps, lowest, highest)
         held = [channel for channel in self._channels if channel.held]
-        if not self._engaged or self._is_down or not held or self._has_due():
+        if not self._engaged or self._is_down or not held or self._due:
             return
         if self._may_send:
             now_s = self._port.now_s()

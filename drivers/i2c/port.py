@@ -7,14 +7,14 @@ line is held low, if its driver can.
 import errno
 import fcntl
 import time
-from collections.abc import Callable
 from typing import Any
 
 from smbus2 import SMBus, i2c_msg
 
-from gazerig.drivers.errors import BusLost, PortError
+from gazerig.drivers.errors import PortError
 from gazerig.drivers.i2c.transfers import NO_ACKNOWLEDGE, OK, READ_STATUS, START, STOP
 from gazerig.drivers.serial.list_ports import open_failure_text
+from gazerig.drivers.serial.port import HostPort
 
 I2C_RETRIES, I2C_TIMEOUT = 0x0701, 0x0702
 """Requests of the kernel's i2c-dev."""
@@ -25,36 +25,17 @@ TIMEOUT_10_MS = 2
 _GONE = (errno.ENODEV, errno.ENOENT, errno.EBADF, errno.ESHUTDOWN)
 
 
-class I2cPort:
+class I2cPort(HostPort):
     """A real I2C bus; implements gazerig.drivers.serial.port.BusPort.
 
-    Args:
-        port_name: Its path, e.g. /dev/i2c-1.
-        exclusive: Whether to lock out other servo programs; programs for sensors are not affected.
-        on_traffic: Called whenever bytes are sent or waited for; None if not needed.
+    ``exclusive`` locks out other servo programs; programs for sensors are not affected.
     """
 
-    def __init__(
-        self,
-        port_name: str,
-        exclusive: bool = True,
-        on_traffic: Callable[[], None] | None = None,
-    ) -> None:
-        self.port_name = port_name
-        self._exclusive, self._on_traffic = exclusive, on_traffic or (lambda: None)
-        self._bus: Any = None
-        self._waiting = b""
-
-    def now_s(self) -> float:
-        """Return host monotonic seconds."""
-        return time.monotonic()
+    _bus: Any = None
+    _waiting = b""
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open the bus; its rate is set in the system, not here.
-
-        Raises:
-            PortError: absent, busy or not permitted.
-        """
+        """Open the bus; its rate is set in the system, not here."""
         self.closePort()
         try:
             self._bus = SMBus(self.port_name)
@@ -75,12 +56,10 @@ class I2cPort:
         self._bus, self._waiting = None, b""
 
     def write(self, data: bytes) -> None:
-        """Execute transfers; bytes that they read are kept for ``read_until``.
-
-        Raises:
-            BusLost: the bus is gone.
-        """
-        self._check_open()
+        """Execute transfers; bytes that they read are kept for ``read_until``."""
+        self._on_traffic()
+        if self._bus is None:
+            raise self._lost("it is closed")
         at, status = 0, OK
         while at < len(data):
             if data.startswith(READ_STATUS, at):
@@ -99,14 +78,10 @@ class I2cPort:
                 self._waiting += b"".join([bytes(one) for one in messages if one.flags & READ_FLAG])
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
-        """Return up to ``length`` available bytes; if there are none, wait until the deadline.
-
-        Raises:
-            BusLost: the bus is gone.
-        """
-        self._check_open()
+        """Return up to ``length`` available bytes; if there are none, wait until the deadline."""
+        self._on_traffic()
         # Transfers have ended when ``write`` returns: no more bytes can arrive.
-        if not self._waiting and (left_s := deadline_s - time.monotonic()) > 0.0:
+        if not self._waiting and (left_s := deadline_s - self.now_s()) > 0.0:
             time.sleep(left_s)
         taken, self._waiting = self._waiting[:length], self._waiting[length:]
         return taken
@@ -115,14 +90,6 @@ class I2cPort:
         """Discard received bytes, without waiting; return their number."""
         dropped, self._waiting = len(self._waiting), b""
         return dropped
-
-    def _check_open(self) -> None:
-        self._on_traffic()
-        if self._bus is None:
-            raise self._lost("it is closed")
-
-    def _lost(self, reason: object) -> BusLost:
-        return BusLost(f"{self.port_name} is gone ({reason}): check the adapter and its cable")
 
 
 def transfer_at(data: bytes, at: int) -> tuple[int, list[Any]]:

@@ -16,7 +16,7 @@ from gazerig.drivers.serial.port import BusPort, open_port
 from gazerig.params import Choices
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.hobby_board.channel import Channel
+    from gazerig.drivers.hobby_board.bus import Channel
     from gazerig.drivers.types import ServoConfig
 
 SET_TARGET, SET_TARGETS, SET_SPEED, SET_ACCELERATION = 0x84, 0x9F, 0x87, 0x89
@@ -143,12 +143,8 @@ class MaestroBoard(Board):
     params: MaestroParams
 
     def find(self, setups: "Sequence[ServoConfig]") -> tuple[int, ...]:
-        """Find the board, stop its own script and return the pulses of these servos.
-
-        Raises:
-            ServoMissing: it does not answer, or a channel is not a servo channel.
-        """
-        if self.read_errors() is None or not self.expects_crc():
+        """Find the board, stop its own script and return the pulses of these servos."""
+        if self.detect() is None:
             remedy = (
                 "take the first of its two USB ports and set it to 'USB Dual Port' in Pololu's "
                 f"program; its CRC must be {'on' if self.params.crc else 'off'}"
@@ -165,15 +161,14 @@ class MaestroBoard(Board):
                 return name_errors(answer[0])
         return None
 
-    def expects_crc(self) -> bool:
-        """Return whether the board expects check bytes, if these are sent.
-
-        Other boards answer too, but find an error in every command.
-        """
-        if not self.params.crc:
-            return True
+    def detect(self) -> tuple[str, ...] | None:
+        """Read its errors; None without a board that expects such commands."""
+        errors = self.read_errors()
+        if errors is None or not self.params.crc:
+            return errors
+        # A board without check bytes answers too, but finds an error in every command.
         self.read_errors()
-        return PROTOCOL_ERROR not in (self.read_errors() or ())
+        return None if PROTOCOL_ERROR in (self.read_errors() or ()) else errors
 
     def read_status(self, channel: int) -> tuple[int, tuple[str, ...]] | None:
         """Read a channel's pulse and the board's errors since the last read; None: no answer."""
@@ -256,8 +251,8 @@ def probe(port: BusPort, params: MaestroParams) -> DetectedMaestro | None:
         board = MaestroBoard(port, replace(params, crc=crc))
         open_port(port, params.baud)
         port.drain()
-        errors = board.read_errors()
-        if errors is not None and board.expects_crc():
+        errors = board.detect()
+        if errors is not None:
             for _ in range(TRIES):  # a busy host may have been late, not the board
                 pulses = board.read_pulses(range(MICRO))
                 if pulses is not None:

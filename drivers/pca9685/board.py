@@ -16,7 +16,7 @@ from gazerig.drivers.serial.port import BusPort, open_port, wait_until
 from gazerig.params import Bounds
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.hobby_board.channel import Channel
+    from gazerig.drivers.hobby_board.bus import Channel
     from gazerig.drivers.types import ServoConfig
 
 MODE1, MODE2, LED0, ALL_LED, PRESCALE = 0x00, 0x01, 0x06, 0xFA, 0xFE
@@ -124,11 +124,7 @@ class Pca9685Board(Board):
     # --- detection and setup
 
     def find(self, setups: "Sequence[ServoConfig]") -> tuple[int, ...]:
-        """Check that the board answers and return the pulses of these servos; nothing changes.
-
-        Raises:
-            ServoMissing: the board does not answer, or another chip does.
-        """
+        """Check that the board answers and return the pulses of these servos; nothing changes."""
         is_one, address = self.is_pca9685(), f"{self.params.address:#x}"
         if is_one:
             return self.read_all(setups)

@@ -8,8 +8,7 @@ import select
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from serial import Serial, SerialException
 
@@ -28,8 +27,25 @@ WRITE_S = 0.05
 """Longest time to pass a packet to the adapter."""
 
 
+class BusTiming(NamedTuple):
+    """Times of a bus, seconds.
+
+    reply_timeout_s: longest time-out of an answer, added to the transmission time of its bytes
+    give_up_s: a run ends when the port, or all servos, have been lost for this long
+    stagger_s: delay between the first pulses of one hobby servo and of the next; all at once could
+        overload a weak power supply
+    """
+
+    reply_timeout_s: float = 0.02
+    give_up_s: float = 60.0
+    stagger_s: float = 0.1
+
+
+TIMING = BusTiming()
+
+
 class BusPort(Protocol):
-    """Port interface of the drivers."""
+    """Port interface of the drivers; what sends or reads raises BusLost if the port is lost."""
 
     port_name: str
 
@@ -37,44 +53,33 @@ class BusPort(Protocol):
         """Return the time, seconds."""
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open at a baud rate; return False if the rate is not supported."""
+        """Open at a baud rate; return False if the rate is not supported.
+
+        Raises:
+            PortError: absent, busy or not permitted.
+        """
 
     def closePort(self) -> None:
         """Close; safe to call twice."""
 
     def write(self, data: bytes) -> None:
-        """Send bytes.
-
-        Raises:
-            BusLost: the port is lost.
-        """
+        """Send bytes."""
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
-        """Return up to ``length`` bytes, those received before the deadline.
-
-        Raises:
-            BusLost: the port is lost.
-        """
+        """Return up to ``length`` bytes, those received before the deadline."""
 
     def drain(self, quiet_s: float = QUIET_S) -> int:
-        """Discard bytes until none arrives for ``quiet_s``; return their number.
-
-        Raises:
-            BusLost: the port is lost.
-        """
+        """Discard bytes until none arrives for ``quiet_s``; return their number."""
 
 
-class BlockingPort:
-    """A real serial port.
+class HostPort:
+    """A port of this computer.
 
     Args:
         port_name: Its path.
         exclusive: Whether to open it for this program alone; otherwise it is shared with the
             program that has it open.
         on_traffic: Called whenever bytes are sent or waited for; None if not needed.
-        by_id: Folder of persistent names of adaptors.
-
-    opened_as: the path that was opened last; an adaptor may reconnect under another name
     """
 
     def __init__(
@@ -82,27 +87,33 @@ class BlockingPort:
         port_name: str,
         exclusive: bool = True,
         on_traffic: Callable[[], None] | None = None,
-        by_id: Path = BY_ID,
     ) -> None:
-        self.port_name = self.opened_as = port_name
-        self.baudrate = 0
-        self._lasting: str | None = None
-        self._by_id = by_id
-        self._exclusive = exclusive
-        self._on_traffic = on_traffic or (lambda: None)
-        self._serial: Serial | None = None
-        self._fd = -1
-        self._poll: Callable[[int], object] = _raise_closed
+        self.port_name = port_name
+        self._exclusive, self._on_traffic = exclusive, on_traffic or (lambda: None)
 
-    now_s = staticmethod(time.monotonic)
-    """Host monotonic seconds."""
+    def now_s(self) -> float:
+        """Return host monotonic seconds."""
+        return time.monotonic()
+
+    def _lost(self, reason: object) -> BusLost:
+        return BusLost(f"{self.port_name} is gone ({reason}): check USB cable and servo power")
+
+
+class BlockingPort(HostPort):
+    """A real serial port; implements ``BusPort``.
+
+    by_id: folder of persistent names of adaptors
+    opened_as: the path that was opened last; an adaptor may reconnect under another name
+    """
+
+    by_id = BY_ID
+    opened_as = ""
+    _lasting: str | None = None
+    _serial: Serial | None = None
+    _fd, _poll = -1, select.poll()
 
     def write(self, data: bytes) -> None:
-        """Send bytes; wait at most 50 ms for space in the adapter's buffer.
-
-        Raises:
-            BusLost: the port is lost or accepts no bytes.
-        """
+        """Send bytes; wait at most 50 ms for space in the adapter's buffer."""
         self._on_traffic()
         deadline_s = 0.0
         while data:
@@ -122,21 +133,18 @@ class BlockingPort:
 
         The last wait is rounded up to the milliseconds of poll(), which also finds the bytes that
         arrived while this process did not run.
-
-        Raises:
-            BusLost: the port is lost.
         """
         self._on_traffic()
         got = b""
         while len(got) < length:
             left_s = deadline_s - time.monotonic()
+            if self._fd >= 0 and not self._poll.poll(int(1e3 * left_s) + 1 if left_s > 0.0 else 0):
+                break
             try:
-                if not self._poll(int(1e3 * left_s) + 1 if left_s > 0.0 else 0):
-                    break
                 more = os.read(self._fd, length - len(got))
             except BlockingIOError:
                 continue  # no bytes after all
-            except (OSError, ValueError) as error:
+            except OSError as error:
                 raise self._lost(error) from error
             if not more:
                 raise self._lost("it hung up")
@@ -146,11 +154,7 @@ class BlockingPort:
         return got
 
     def drain(self, quiet_s: float = QUIET_S) -> int:
-        """Discard bytes until none arrives for ``quiet_s``; return their number.
-
-        Raises:
-            BusLost: the port is lost.
-        """
+        """Discard bytes until none arrives for ``quiet_s``; return their number."""
         end_s, dropped = time.monotonic() + BABBLE_S, 0
         while (now_s := time.monotonic()) < end_s:
             more = self.read_until(1, now_s + quiet_s)
@@ -159,15 +163,8 @@ class BlockingPort:
             dropped += len(more) + len(self.read_until(4096, now_s))
         return dropped
 
-    def _lost(self, reason: object) -> BusLost:
-        return BusLost(f"{self.port_name} is gone ({reason}): check USB cable and servo power")
-
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open at a baud rate; return False if the rate is not supported.
-
-        Raises:
-            PortError: absent, busy or not permitted.
-        """
+        """Open at a baud rate; return False if the rate is not supported."""
         self.closePort()
         # Another adaptor may have the path of one that was unplugged.
         where = self._lasting or self.port_name
@@ -178,26 +175,19 @@ class BlockingPort:
         except ValueError:  # pyserial: the adapter does not support this rate
             return False
         self.opened_as = os.path.realpath(where) if where != self.port_name else where
-        self._lasting = persistent_name(where, self._by_id) or self._lasting
-        self._fd = self._serial.fileno()
-        poll = select.poll()
-        poll.register(self._fd, select.POLLIN)
-        self._poll = poll.poll
+        self._lasting = persistent_name(where, self.by_id) or self._lasting
+        self._fd, self._poll = self._serial.fileno(), select.poll()
+        self._poll.register(self._fd, select.POLLIN)
         # An adaptor's driver with a latency timer sets it to 1 ms instead of 16 ms; others refuse.
         with suppress(ValueError, OSError):
             self._serial.set_low_latency_mode(True)
-        self.baudrate = baudrate
         return True
 
     def closePort(self) -> None:
         """Close; safe to call twice."""
         if self._serial is not None:
             self._serial.close()
-        self._serial, self._fd, self._poll = None, -1, _raise_closed
-
-
-def _raise_closed(timeout_ms: int) -> object:
-    raise ValueError("it is closed")
+        self._serial, self._fd = None, -1
 
 
 def open_port(port: BusPort, baud: int) -> None:

@@ -6,10 +6,9 @@ from math import inf
 from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.port_bus import PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
-from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.serial.port import BusPort, open_port
+from gazerig.drivers.serial.port import TIMING, BusPort, BusTiming, open_port
 from gazerig.drivers.servo_bus.discovery import find, name_firmware
 from gazerig.drivers.servo_bus.family import Family, GoalWrite
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns

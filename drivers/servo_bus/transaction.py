@@ -4,9 +4,8 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import inf
 
-from gazerig.drivers.bus.timing import TIMING
 from gazerig.drivers.process.host_lateness import HostLateness
-from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
+from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, TIMING, BusPort
 from gazerig.drivers.servo_bus.family import Family, Status
 from gazerig.drivers.servo_bus.poll_list import silent_servos
 

@@ -4,9 +4,9 @@ from typing import Any
 
 from feedback_rows import rows
 
-from gazerig.drivers.bus.timing import BusTiming
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import BusLost
+from gazerig.drivers.serial.port import BusTiming
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
