@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.robot.cli import emulate as command
 from gazerig.robot.cli.emulate import app
 from gazerig.sim_mock.device_spec import line_of
@@ -82,7 +82,9 @@ def asked(path, data, length, baud=1_000_000):
 
 def ping(port, servo_id):
     """Return a servo's model number and firmware, None without an answer."""
-    return Registers(port, DYNAMIXEL, tries=1).identify(servo_id)
+    line = Transactions(port, DYNAMIXEL)
+    line.tries = 1
+    return line.identify(servo_id)
 
 
 def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):

@@ -12,7 +12,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.scs import FEETECH_SCS
 from gazerig.drivers.servo_bus.discovery import count_corrupt, scan_ids
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.robot.guardian.process import releaser
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, encode
 from gazerig.sim_mock.feetech.chain import build_feetech
@@ -62,7 +62,7 @@ def test_both_series_are_known_by_one_search():
 def test_the_guardian_lets_go_of_servos_without_sync_read():
     bench = Bench()
     for servo_id in (1, 2):
-        assert Registers(bench.port, FEETECH_SCS).write(servo_id, "torque_enable", 1)
+        assert Transactions(bench.port, FEETECH_SCS).write(servo_id, "torque_enable", 1)
     plan = ReleasePlan("feetech", "", 1_000_000, (1, 2), family="feetech scs")
     (again,) = decode(encode((plan,)))
     assert releaser(again)(bench.port) == ()

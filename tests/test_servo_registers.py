@@ -10,7 +10,8 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.servo_bus.family import Identity
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.settings import write_settings
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -27,7 +28,7 @@ class Rig:
         self.sent: list[Any] = []
         self.port = SpoiltPort(self.chain, self.sent.append, sleep_until=self.sleep_until)
         self.port.setBaudRate(1_000_000)
-        self.registers = Registers(self.port, DYNAMIXEL)
+        self.registers = Transactions(self.port, DYNAMIXEL)
 
     def sleep_until(self, t_s):
         self.now_s = max(self.now_s, t_s)
@@ -132,7 +133,7 @@ def test_an_answer_with_an_alert_is_data(rig):
 def sts():
     rig = StsRig([ServoSpec(4, "sts3215", 1928)], setups=[], baud=1_000_000)
     rig.port.setBaudRate(1_000_000)
-    rig.registers = Registers(rig.port, FEETECH)  # type: ignore[attr-defined]
+    rig.registers = Transactions(rig.port, FEETECH)  # type: ignore[attr-defined]
     return rig
 
 
@@ -141,9 +142,9 @@ def test_registers_behind_a_lock(sts):
     assert registers.identify(4) == Identity(777, 353)
     assert registers.identify(5) is None and registers.read(5, "id") is None
     assert registers.read(4, "present_position") == 1928
-    assert registers.write_if_different(4, "torque_limit", 600)
+    assert registers.write(4, "torque_limit", 600)
     assert registers.read(4, "torque_limit") == 600
-    assert registers.write_persistent(4, "position_offset", -85)
+    write_settings(registers, 4, {"position_offset": -85})
     sts.chain[4].restart()
     sts.now_s += 1.0
     assert registers.read(4, "position_offset") == -85

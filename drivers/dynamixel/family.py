@@ -103,5 +103,4 @@ DYNAMIXEL = Family(
     faults_latch=True,
     watchdog_unit_s=WATCHDOG_UNIT_S,
     single_turn=False,
-    duplicate_id_registers=("realtime_tick", "present_position"),
 )

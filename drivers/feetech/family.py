@@ -89,5 +89,4 @@ FEETECH = Family(
     faults_latch=False,
     watchdog_unit_s=None,
     single_turn=True,
-    duplicate_id_registers=("present_position", "present_current"),
 )

@@ -70,5 +70,4 @@ FEETECH_SCS = replace(
     read_spans=(("return_delay_time", "position_i_gain"), ("lock", "lock")),
     wanted_settings=scs_settings,
     single_turn=False,
-    duplicate_id_registers=("present_position", "moving"),
 )

@@ -10,8 +10,7 @@ from typing import NamedTuple
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family, Identity
-from gazerig.drivers.servo_bus.registers import REPLY_S, Registers, transact
-from gazerig.drivers.servo_bus.transaction import ROOM, Transactions
+from gazerig.drivers.servo_bus.transaction import REPLY_S, ROOM, Transactions, sort_answers
 from gazerig.drivers.types import ServoConfig
 
 SCAN_S = 0.004
@@ -43,12 +42,11 @@ def scan_ids(port: BusPort, family: Family, baud: int) -> tuple[tuple[FoundServo
     Raises:
         BusLost: the port is lost.
     """
-    codec, raw = family.codec, b""
+    line, codec, raw = Transactions(port, family, baud), family.codec, b""
+    length = codec.STATUS_OVERHEAD + codec.IDENTITY_LENGTH
     port.drain()
     for servo_id in range(family.highest_id + 1):
-        request = codec.identity_request(servo_id)
-        answer, _ = transact(port, family, request, codec.IDENTITY_LENGTH, SCAN_S)
-        raw += without_echo(answer, request)
+        raw += line.listen(codec.identity_request(servo_id), length, SCAN_S)
     raw += port.read_until(ROOM, port.now_s() + REPLY_S)
     whole = [status for status in codec.parse_statuses(raw) if status.intact]
     used = sum(codec.STATUS_OVERHEAD + len(status.params) for status in whole)
@@ -63,23 +61,15 @@ def _found_servo(family: Family, servo_id: int, identity: Identity, baud: int) -
 
 def has_any_reply(port: BusPort, family: Family) -> bool:
     """Return whether any servo answers a broadcast ping, even if the answers corrupt each other."""
-    question = family.codec.ping(family.codec.BROADCAST)
+    request = family.codec.ping(family.codec.BROADCAST)
     port.drain()
-    port.write(question)
-    received = port.read_until(ROOM, port.now_s() + REPLY_S)
-    return bool(without_echo(received, question))
+    port.write(request)
+    return bool(port.read_until(ROOM, port.now_s() + REPLY_S).replace(request, b"", 1))
 
 
-def without_echo(received: bytes, request: bytes) -> bytes:
-    """Return received bytes without the request, which an adapter with an echo returns first."""
-    return received.replace(request, b"", 1)
-
-
-def ping(
-    port: BusPort, family: Family, servo_id: int, baud: int, tries: int = 2
-) -> FoundServo | None:
+def ping(port: BusPort, family: Family, servo_id: int, baud: int) -> FoundServo | None:
     """Return model and firmware of one servo, None without an intact answer."""
-    identity = Registers(port, family, tries).identify(servo_id)
+    identity = Transactions(port, family, baud).identify(servo_id)
     return None if identity is None else _found_servo(family, servo_id, identity, baud)
 
 
@@ -89,16 +79,18 @@ def count_corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANS
     Two servos with one id answer at the same time and corrupt bytes that differ. Their answers to
     pings are often equal, their positions hardly ever.
     """
-    address, length = family.span(*family.duplicate_id_registers)
-    bad, places = 0, list[int]()
+    line, codec, window = Transactions(port, family), family.codec, family.window
+    request, bad, places = codec.read(servo_id, window.address, window.length), 0, list[int]()
     for _ in range(tries):
         port.drain()
-        request = family.codec.read(servo_id, address, length)
-        raw, status = transact(port, family, request, length, REPLY_S, servo_id)
-        if status is None:
-            bad += bool(without_echo(raw, request))
-        elif len(status.params) == length:
-            places.append(family.decode(address, status.params)["present_position"])
+        raw = line.listen(request, window.length + codec.STATUS_OVERHEAD, REPLY_S)
+        statuses = codec.parse_statuses(raw)
+        good, _ = sort_answers(statuses, (servo_id,), window.length, codec.REFUSAL)
+        if not good:
+            bad += bool(raw)
+        elif good[servo_id].params:
+            values = family.decode(window.address, good[servo_id].params)
+            places.append(values["present_position"])
     # A checksum of one byte over two mixed answers may match by chance, but not the position.
     wide = bool(places) and max(places) - min(places) > family.steps_per_turn // 8
     return max(bad, SHARED if wide else 0)
@@ -112,8 +104,7 @@ def find(line: Transactions, setups: Sequence[ServoConfig]) -> dict[int, int]:
             servos without a setup, one of which may be the missing one.
     """
     family, began_s = line.family, line.port.now_s()
-    registers = Registers(line.port, family, lateness=line.lateness)
-    own = {one.id: registers.identify(one.id) for one in setups}
+    own = {one.id: line.identify(one.id) for one in setups}
     problems = [text for one in setups if (text := _problem(family, one, own[one.id]))]
     if not problems:
         return {servo_id: identity.firmware for servo_id, identity in own.items() if identity}

@@ -213,8 +213,6 @@ class Family:
     watchdog_unit_s: float | None
     single_turn: bool
     """Whether a servo measures its position within one turn when it starts."""
-    duplicate_id_registers: tuple[str, str]
-    """Span in which two servos with the same id differ."""
     prompt_timeout_s: float = 0.002
     """Shortest time-out of an answer in addition to its bytes on the wire."""
 

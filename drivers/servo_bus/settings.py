@@ -35,7 +35,9 @@ def apply_settings(
         if not differences:
             return
         for servo_id, settings in differences.items():
-            _correct(line, servo_id, settings, log)
+            write_settings(line, servo_id, {name: wanted for name, (_, wanted) in settings.items()})
+            for name, (found, wanted) in settings.items():
+                log.add(f"{line.label(servo_id)}: {register_label(name)} {found} -> {wanted}")
     for servo_id, settings in _differences(line, setups, ids).items():
         name, (found, wanted) = next(iter(settings.items()))
         raise ServoMissing(
@@ -66,19 +68,21 @@ def _differences(
     return different
 
 
-def _correct(
-    line: Transactions, servo_id: int, settings: Mapping[str, tuple[int, int]], log: EventLog
-) -> None:
-    """Write settings without torque and with the EEPROM's lock open."""
+def write_settings(line: Transactions, servo_id: int, values: Mapping[str, int]) -> None:
+    """Write settings without torque and with the EEPROM's lock open, and read them back.
+
+    Raises:
+        ServoMissing: the servo does not answer or rejects one.
+        BusLost: the port is lost.
+    """
     lock = line.family.lock_register
     write_verified(line, "torque_enable", {servo_id: 0})
     if lock:
         write_verified(line, lock, {servo_id: 0})
     try:
-        for name, (found, wanted) in settings.items():
+        for name, value in values.items():
             if name != lock:
-                write_verified(line, name, {servo_id: wanted})
-            log.add(f"{line.label(servo_id)}: {register_label(name)} {found} -> {wanted}")
+                write_verified(line, name, {servo_id: value})
     finally:
         if lock:
             write_verified(line, lock, {servo_id: 1})

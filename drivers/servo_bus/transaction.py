@@ -6,7 +6,7 @@ from math import inf
 
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, TIMING, BusPort
-from gazerig.drivers.servo_bus.family import Family, Status
+from gazerig.drivers.servo_bus.family import Family, Identity, Status
 from gazerig.drivers.servo_bus.poll_list import silent_servos
 
 FACTOR, DECAY = 2.0, 0.99
@@ -15,6 +15,13 @@ FACTOR, DECAY = 2.0, 0.99
 TRIES, HURRIED = 3, 2.0
 SETUP_PAUSES_S = 0.1, 0.4
 """Pauses before a silent servo is read again, outside the loop."""
+
+REPLY_S = 0.04
+"""Time-out of a request to one servo, outside the loop: the longest return delay and two turns of a
+16 ms latency timer."""
+
+LATE_S = 0.15
+"""Longest delay of an answer after its time-out."""
 
 ROOM = 4096
 """Largest number of bytes read at once from a line that does not fall silent."""
@@ -61,7 +68,7 @@ class Transactions:
     Args:
         port: Its port.
         family: Family of the servos.
-        baud: Bit/s.
+        baud: Bit/s; 0: that of the open port.
         most_s: Longest time-out of an answer in addition to its bytes on the wire, seconds; the
             first one, and always used outside the loop.
         names: Labels of the servos for messages.
@@ -69,7 +76,8 @@ class Transactions:
     timeout_s: present time-out of an answer in addition to its bytes on the wire
     tx_bytes, rx_bytes: counts since creation
     errors: counts by kind
-    tries: number of attempts to read a servo outside the cyclic exchange; 1 in the loop
+    tries: number of attempts to reach a servo outside the cyclic exchange; 1 in the loop
+    refusal: error number of the newest request to one servo if it was refused, otherwise 0
     starving_s: silence after which a servo's own watchdog trips; inf if none is armed
     starved: whether such a silence has happened
     lateness: delays of this computer: its own silences, answers after their time-outs
@@ -80,7 +88,7 @@ class Transactions:
         self,
         port: BusPort,
         family: Family,
-        baud: int,
+        baud: int = 0,
         most_s: float = TIMING.reply_timeout_s,
         names: Mapping[int, str] | None = None,
     ) -> None:
@@ -90,11 +98,13 @@ class Transactions:
         self.errors: Counter[str] = Counter()
         self._least_s, self.most_s = min(family.prompt_timeout_s, most_s), most_s
         self.timeout_s = most_s
-        self.tries = TRIES
+        self.tries, self.refusal = TRIES, 0
+        self._late_until_s: dict[int, float] = {}
         self.starving_s = inf
         self.starved = self._is_owed = False
         self.lateness = HostLateness()
-        self.baud, self._byte_s = baud, BITS_PER_BYTE / baud
+        self.baud: int = baud or getattr(port, "baudrate", family.factory_baud)
+        self._byte_s = BITS_PER_BYTE / self.baud
         self._sent_s = self._free_s = self.deadline_s = port.now_s()
 
     def label(self, servo_id: int) -> str:
@@ -227,21 +237,93 @@ class Transactions:
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos once; return those of good answers."""
         found: dict[int, bytes] = {}
-        parse, overhead = self.family.codec.parse_statuses, self.family.codec.STATUS_OVERHEAD
         # In the loop other servos wait, and the delay of answers has been measured.
         timeout_s = self.most_s if self.tries > 1 else min(self.most_s, HURRIED * self.timeout_s)
         for asked in [tuple(ids)] if self.family.sync_read else [(one,) for one in ids]:
-            request = self.family.request(asked, address, length)
             self.port.drain(0.0)
-            self.send(request)
-            count = len(asked) * (length + overhead)
-            self.deadline_s = self._free_s + count * self._byte_s + timeout_s
-            raw = self.port.read_until(count, self.deadline_s)
-            self.rx_bytes += len(raw)
-            good, damaged = self.collect(request, raw, asked, length, parse)
-            self.errors["corrupt"] += len(damaged)
+            good = self._request(
+                self.family.request(asked, address, length), asked, length, timeout_s
+            )
             if len(good) < len(asked):
                 self.lateness.record_wait(self.deadline_s, self.port.now_s())
                 self.drain()
             found |= {i: one.params for i, one in good.items() if len(one.params) == length}
         return found
+
+    def _request(
+        self, request: bytes, ids: Collection[int], length: int, timeout_s: float
+    ) -> dict[int, Status]:
+        """Send a request, and return the good answers with ``length`` params, by id."""
+        codec = self.family.codec
+        self.send(request)
+        byte_count = len(ids) * (length + codec.STATUS_OVERHEAD)
+        self.deadline_s = self._free_s + byte_count * self._byte_s + timeout_s
+        good, damaged = self.collect(request, b"", ids, length, codec.parse_statuses)
+        self.errors["corrupt"] += len(damaged)
+        return good
+
+    # --- one servo, each exchange confirmed: for tasks outside the loop
+
+    def identify(self, servo_id: int) -> Identity | None:
+        """Return a servo's model and firmware, None if it does not answer."""
+        codec = self.family.codec
+        request = codec.identity_request(servo_id)
+        status = self._request_one(servo_id, request, codec.IDENTITY_LENGTH)
+        return None if status is None else codec.parse_identity(status)
+
+    def read(self, servo_id: int, name: str) -> int | None:
+        """Return a register's value, None without a good answer."""
+        return self.read_many(servo_id, (name,))[name]
+
+    def read_many(self, servo_id: int, names: Iterable[str]) -> dict[str, int | None]:
+        """Return values by name; adjacent registers are read together.
+
+        The value is None without a good answer. A servo that falls silent is not read further.
+        """
+        values: dict[str, int | None] = dict.fromkeys(names)
+        left = sorted((self.family.registers[name] for name in values), key=lambda r: r.address)
+        while left:
+            start = end = left[0].address
+            while left and left[0].address == end:
+                end += left.pop(0).size
+            request = self.family.codec.read(servo_id, start, end - start)
+            status = self._request_one(servo_id, request, end - start)
+            if status is not None:
+                values |= self.family.decode(start, status.params)
+            elif not self.refusal:
+                break
+        return values
+
+    def write(self, servo_id: int, name: str, value: int) -> bool:
+        """Write a register, again after a refusal; return whether the servo confirmed it."""
+        register = self.family.registers[name]
+        request = self.family.codec.write(servo_id, register.address, register.encode(value))
+        return self._request_one(servo_id, request, 0, insist=True) is not None
+
+    def _request_one(
+        self, servo_id: int, request: bytes, length: int, insist: bool = False
+    ) -> Status | None:
+        """Send a request until a good answer arrives; ``insist``: also after a refusal."""
+        for _ in range(self.tries):
+            # No answer to an earlier request may arrive any more, as it does not contain the
+            # address of its register.
+            self._count_late(self.port.read_until(ROOM, self._late_until_s.pop(servo_id, 0.0)))
+            status = self._request(request, (servo_id,), length, REPLY_S).get(servo_id)
+            self.refusal = 0 if status is None else status.error & self.family.codec.REFUSAL
+            if status is None:
+                self._late_until_s[servo_id] = self.port.now_s() + LATE_S
+            elif not self.refusal:
+                return status
+            elif not insist:
+                break
+        return None
+
+    def listen(self, request: bytes, length: int, timeout_s: float) -> bytes:
+        """Send a request, and return up to ``length`` bytes that follow, without its echo."""
+        self.send(request)
+        deadline_s = self._free_s + length * self._byte_s + timeout_s
+        raw = self.port.read_until(length, deadline_s)
+        if request in raw:
+            raw = raw.replace(request, b"", 1)
+            raw += self.port.read_until(length - len(raw), deadline_s)
+        return raw

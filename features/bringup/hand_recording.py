@@ -8,7 +8,7 @@ import numpy as np
 
 from gazerig.drivers.errors import DriverError, ServoFault, SetupError
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.features.bringup.telemetry import TelemetrySample
 from gazerig.gaze.types import Floats
@@ -50,9 +50,9 @@ def switch_off(joints: Mapping[str, JointParams], port: BusPort) -> None:
     holding = []
     for name, joint in joints.items():
         family = servo_kind(joint.model).family
-        registers = Registers(port, family)
-        registers.write(joint.id, "torque_enable", 0)
-        if registers.read(joint.id, "torque_enable") != 0:
+        line = Transactions(port, family)
+        line.write(joint.id, "torque_enable", 0)
+        if line.read(joint.id, "torque_enable") != 0:
             holding.append(f"{name} (servo {joint.id})")
     if holding:
         raise ServoFault(

@@ -24,7 +24,7 @@ from gazerig.drivers.servo_bus.discovery import (
     ping,
     scan_ids,
 )
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_kinds import ServoKind, Tell
 
@@ -180,46 +180,46 @@ class _Assignment:
 
     def __init__(self, port: BusPort, kind: ServoKind, found: FoundServo) -> None:
         self._port, self._kind, self._found = port, kind, found
-        self._registers = Registers(port, kind.family)
+        self._line = Transactions(port, kind.family)
         self._id, self._baud = found.id, found.baud
         self._done: list[str] = []
 
     def carry_out(self, servo_id: int, baud: int, tell: Tell) -> SetupResult:
         """Write the differences, and verify that the servo answers with them."""
-        registers, kind = self._registers, self._kind
+        line, kind = self._line, self._kind
         self._open(self._found.baud)
         # It then replies to every instruction.
-        registers.write_all((self._id,), "status_return_level", kind.family.answer_level)
-        if registers.read(self._id, "torque_enable"):
-            if not registers.write(self._id, "torque_enable", 0):
+        line.write_all((self._id,), "status_return_level", [kind.family.answer_level])
+        if line.read(self._id, "torque_enable"):
+            if not line.write(self._id, "torque_enable", 0):
                 raise self._refusal("let its torque go")
             self._done.append("torque 1 -> 0")
         if self._id != servo_id:
             tell(f"id {self._id} -> {servo_id}")
             self._unlock()
-            written = registers.write(self._id, "id", servo_id)
+            written = line.write(self._id, "id", servo_id)
             # The confirmation may arrive from either id, or be lost.
-            if not written and ping(self._port, kind.family, servo_id, self._baud, 2) is None:
+            if not written and ping(self._port, kind.family, servo_id, self._baud) is None:
                 raise self._refusal(f"take the id {servo_id}")
             self._done.append(f"id {self._id} -> {servo_id}")
             self._id = servo_id
         rate = kind.family.baud_rates.index(baud)
-        if self._baud != baud or registers.read(self._id, "baud_rate") != rate:
+        if self._baud != baud or line.read(self._id, "baud_rate") != rate:
             tell(f"baud rate {self._baud} -> {baud}")
             self._unlock()
             # Silence may only be a lost confirmation.
-            if not registers.write(self._id, "baud_rate", rate) and registers.refusal:
+            if not line.write(self._id, "baud_rate", rate) and line.refusal:
                 raise self._refusal(f"take {baud} bit/s")
             self._done.append(f"baud rate {self._baud} -> {baud} bit/s")
             self._baud = baud
             self._open(baud)
-        seen = ping(self._port, kind.family, self._id, self._baud, 3)
+        seen = ping(self._port, kind.family, self._id, self._baud)
         if seen is None or seen.number != self._found.number:
             raise ServoMissing(
                 f"{self._port.port_name}: the servo does not answer as id {self._id} at "
                 f"{self._baud} bit/s: gazerig scan finds it"
             )
-        if kind.family.lock_register is not None and not registers.write_if_different(
+        if kind.family.lock_register is not None and not line.write(
             self._id, kind.family.lock_register, 1
         ):
             raise self._refusal("close its lock")
@@ -227,7 +227,7 @@ class _Assignment:
 
     def _unlock(self) -> None:
         lock = self._kind.family.lock_register
-        if lock is not None and not self._registers.write(self._id, lock, 0):
+        if lock is not None and not self._line.write(self._id, lock, 0):
             raise self._refusal("open its lock")
 
     def _open(self, baud: int) -> None:
@@ -237,7 +237,7 @@ class _Assignment:
             )
 
     def _refusal(self, what: str) -> ServoFault:
-        refusal = self._registers.refusal
+        refusal = self._line.refusal
         reason = f"error {refusal}" if refusal else "no answer"
         return ServoFault(
             f"{self._port.port_name}: the servo does not {what} ({reason}); it answered last as id "

@@ -13,7 +13,7 @@ from gazerig.drivers.bus.servo_models import US_STEPS
 from gazerig.drivers.maestro.board import MOST_INPUT, MaestroBoard, MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.features.bringup.servo_kinds import ServoKind
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointParams
@@ -74,12 +74,13 @@ class SmartServoTelemetry:
     """
 
     def __init__(self, port: BusPort, kind: ServoKind) -> None:
-        self._registers, self._kind = Registers(port, kind.family, tries=1), kind
+        self._line, self._kind = Transactions(port, kind.family), kind
+        self._line.tries = 1
         self._names = (*LIVE, kind.family.error_register, kind.family.effort_register)
 
     def read(self, joint: JointParams) -> Telemetry | None:
         """Read a joint's servo; see TelemetryReader."""
-        values = self._registers.read_many(joint.id, self._names)
+        values = self._line.read_many(joint.id, self._names)
         whole = {name: value for name, value in values.items() if value is not None}
         return telemetry_of(self._kind, joint, whole) if len(whole) == len(values) else None
 

@@ -5,7 +5,7 @@ from math import pi
 import pytest
 
 from gazerig.drivers.feetech.memory_table import REGISTERS
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.examination import apply_fixes, examine_bus
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
@@ -68,7 +68,7 @@ class Rig:
         self.chain[servo_id].write(64 if self.kind is DYNAMIXEL else 40, b"\x01")
 
     def get(self, servo_id, name):
-        return Registers(self.port, self.kind.family).read(servo_id, name)
+        return Transactions(self.port, self.kind.family).read(servo_id, name)
 
     def command(self, text):
         self.port.faults.command(text)

@@ -20,7 +20,7 @@ from gazerig.drivers.pca9685.board import (
 )
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.bus_search import SearchRound
 from gazerig.features.bringup.cli.scan import scan_remarks
@@ -48,7 +48,7 @@ def healthy(name):
     if kind is DYNAMIXEL:
         rig.set(1, shutdown=52)  # as from the factory it is worth a note
     found = ping(rig.port, kind.family, 1, BAUD)
-    registers = Registers(rig.port, kind.family)
+    registers = Transactions(rig.port, kind.family)
     state = read_state(registers, CHECKS[kind.name], rig.setups[0], present(found), False)
     assert None not in state.values.values() and worst_level(apply_rules(state)) == "ok"
     return state

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.maestro.board import MaestroParams
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.settings import write_settings
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.features.bringup.calibration.endstop_search import (
     STEPS_PER_DEG,
     StopSearchParams,
@@ -68,7 +69,7 @@ class Bench:
         self.port = InProcessPort(self.chain, sleep_until=self.clock.sleep_until)
         self.port.setBaudRate(1_000_000)
         self.kind = servo_kind(joint.model)
-        self.registers = Registers(self.port, self.kind.family)
+        self.registers = Transactions(self.port, self.kind.family)
         self.why: str | None = None
         self.id = joint.id
         self.script: list[int] = []
@@ -84,7 +85,7 @@ class Bench:
         return value
 
     def put(self, register: str, value: int) -> None:
-        assert self.registers.write_persistent(self.id, register, value)
+        write_settings(self.registers, self.id, {register: value})
 
     def limits(self) -> tuple[int, int]:
         return self.get("min_position_limit"), self.get("max_position_limit")

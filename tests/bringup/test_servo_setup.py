@@ -8,7 +8,7 @@ from doctor_rig import NECK as MODELS
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH
 from gazerig.features.bringup.servo_setup import (
@@ -64,7 +64,7 @@ class Bench:
         assert self.registers().write(servo_id, "torque_enable", 1)
 
     def registers(self):
-        return Registers(self.port, self.kind.family)
+        return Transactions(self.port, self.kind.family)
 
     def kept(self, servo_id):
         return bytes(self.chain[servo_id].memory.bytes[:40])
@@ -97,7 +97,7 @@ def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, b
     bench.sleep_until(bench.now + 1.0)
     bench.chain.refresh()
     bench.port.setBaudRate(BAUD)
-    assert ping(bench.port, kind.family, 7, BAUD, 1) is not None
+    assert ping(bench.port, kind.family, 7, BAUD) is not None
     assert (
         kind.family.lock_register is None
         or bench.registers().read(7, kind.family.lock_register) == 1

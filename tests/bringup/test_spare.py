@@ -16,7 +16,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.serial.port import port_at_path
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.features.bringup.cli.ports import setups_on
 from gazerig.features.bringup.servo_kinds import ServoKind, servo_kind
 from gazerig.robot.app.run_bus import emulated_lines
@@ -48,9 +48,9 @@ class Chain:
         self.file, self.path, self.baud = file, path, rig.bus_named("").section.baud
         self.line, self.command = port_at_path(path), command
 
-    def registers(self, baud: int) -> Registers:
+    def registers(self, baud: int) -> Transactions:
         assert self.line.setBaudRate(baud)
-        return Registers(self.line, self.kind.family)
+        return Transactions(self.line, self.kind.family)
 
     def renew(self, servo_id: int, new_id: int = 1) -> None:
         """Give a servo the id and the baud rate of a new one."""
@@ -115,13 +115,13 @@ every = pytest.mark.parametrize("make", list(TEXTS))
 def writes(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, str, int]]:
     """Return a list of all writes to registers by name."""
     done: list[tuple[int, str, int]] = []
-    write = Registers.write
+    write = Transactions.write
 
-    def noted(self: Registers, servo_id: int, name: str, value: int) -> bool:
+    def noted(self: Transactions, servo_id: int, name: str, value: int) -> bool:
         done.append((servo_id, name, value))
         return write(self, servo_id, name, value)
 
-    monkeypatch.setattr(Registers, "write", noted)
+    monkeypatch.setattr(Transactions, "write", noted)
     return done
 
 
@@ -179,9 +179,9 @@ def test_setup_gives_a_spare_its_id_in_the_chain(
 def test_an_interrupted_adoption_is_continued(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, make: str, words: tuple[str, ...], at: str
 ) -> None:
-    write = Registers.write
+    write = Transactions.write
 
-    def cut(self: Registers, servo_id: int, name: str, value: int) -> bool:
+    def cut(self: Transactions, servo_id: int, name: str, value: int) -> bool:
         done = write(self, servo_id, name, value)
         if name == at:
             raise BusLost("the cable was pulled")
@@ -190,7 +190,7 @@ def test_an_interrupted_adoption_is_continued(
     with chain_of(tmp_path, make) as chain:
         chain.renew(7)
         with monkeypatch.context() as patch:
-            patch.setattr(Registers, "write", cut)
+            patch.setattr(Transactions, "write", cut)
             assert chain.run(*words)[0] != 0
         family = chain.kind.family
         place = (7, chain.baud if at == "baud_rate" else family.factory_baud)

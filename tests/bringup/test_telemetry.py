@@ -16,7 +16,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.maestro.board import MaestroParams
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
 from gazerig.features.bringup.cli.record_track import app
 from gazerig.features.bringup.hand_recording import record_hand_motion, switch_off
@@ -84,8 +84,8 @@ class Bench(EmulatedRig):
         assert seen is not None
         return seen
 
-    def registers(self) -> Registers:
-        return Registers(self.ports[""], KINDS[self.kind].family)
+    def registers(self) -> Transactions:
+        return Transactions(self.ports[""], KINDS[self.kind].family)
 
 
 each = pytest.mark.parametrize("kind", list(KINDS))
@@ -244,7 +244,7 @@ def test_torque_that_comes_on_ends_the_recording(desk_rig: Rig) -> None:
 
     def sample() -> TelemetrySample:
         if next(left, None) is None:  # as another program does
-            Registers(bench.port, KINDS["dynamixel"].family).write(7, "torque_enable", 1)
+            Transactions(bench.port, KINDS["dynamixel"].family).write(7, "torque_enable", 1)
         return bench.monitor.sample()
 
     with pytest.raises(SetupError, match="the torque of neck_yaw came on: another program"):
@@ -253,7 +253,7 @@ def test_torque_that_comes_on_ends_the_recording(desk_rig: Rig) -> None:
 
 def test_a_servo_that_does_not_let_go_is_named_and_all_others_are_off(desk_rig: Rig) -> None:
     bench = HandBench(desk_rig)
-    registers = Registers(bench.port, KINDS["dynamixel"].family)
+    registers = Transactions(bench.port, KINDS["dynamixel"].family)
     joints = desk_rig.joints
     for joint in joints.values():
         assert registers.write(joint.id, "torque_enable", 1)

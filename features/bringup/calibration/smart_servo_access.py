@@ -11,7 +11,8 @@ from collections.abc import Callable
 from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
 from gazerig.drivers.errors import BusLost, DriverError, ServoFault, ServoMissing, SetupError
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.settings import write_settings
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.features.bringup.calibration.endstop_search import (
     STEPS_PER_DEG,
     EndStop,
@@ -90,7 +91,7 @@ class SmartServoAccess:
             )
         self._id, self._model, self._port = joint.id, joint.model, port
         self._clock, self._stopped, self._at_s = clock, stopped, clock.now_s()
-        self._registers = Registers(port, self._kind.family)
+        self._line = Transactions(port, self._kind.family)
         self._guardian = guardian
         self._was: dict[str, int] = {}
 
@@ -102,8 +103,8 @@ class SmartServoAccess:
             ServoFault: it reports an error.
         """
         # A servo may be set to answer only queries; this write needs no answer and changes that.
-        self._registers.write_all((self._id,), "status_return_level", self._family.answer_level)
-        found = self._registers.identify(self._id)
+        self._line.write_all((self._id,), "status_return_level", [self._family.answer_level])
+        found = self._line.identify(self._id)
         if found is None:
             raise ServoMissing(f"{self.who} does not answer: check power, cable, id and baud rate")
         if found.model_number != self._family.models[self._model].number:
@@ -140,8 +141,7 @@ class SmartServoAccess:
         was = self._value(register)
         if was:
             self._torque_off()
-            if not self._registers.write_persistent(self._id, register, 0):
-                raise ServoMissing(f"{self.who} does not take {register} 0: restart its power")
+            write_settings(self._line, self._id, {register: 0})
         return was
 
     def set_middle(self) -> int:
@@ -162,7 +162,7 @@ class SmartServoAccess:
             )
         self._torque_off()
         self._put("lock", 0)
-        self._registers.write(self._id, "torque_enable", self._kind.set_middle)
+        self._line.write(self._id, "torque_enable", self._kind.set_middle)
         self._torque_off()  # some firmware leaves it on
         self._put("lock", 1)
         place = self._value("present_position")
@@ -297,11 +297,11 @@ class SmartServoAccess:
             self._guardian.leave(0)
 
     def _value(self, register: str) -> int:
-        value = self._registers.read(self._id, register)
+        value = self._line.read(self._id, register)
         if value is None:
             raise BusLost(f"{self.who} does not answer any more: check its cable and power")
         return value
 
     def _put(self, register: str, value: int) -> None:
-        if not self._registers.write(self._id, register, value):
+        if not self._line.write(self._id, register, value):
             raise BusLost(f"{self.who} does not take {register} {value}: check its cable and power")

@@ -19,7 +19,7 @@ from gazerig.drivers.servo_bus.discovery import (
     count_corrupt,
     ping,
 )
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix
 from gazerig.features.bringup.doctor.servo_checks import CHECKS
@@ -126,12 +126,12 @@ def examine_bus(
         findings = [ADVICE["spare"].at(servo_label(setup), fix, **facts)]
     else:
         findings = _absences(presence, kind, baud)
-    states, registers = [], Registers(port, kind.family)
+    states, line = [], Transactions(port, kind.family)
     for setup in setups:
         if setup.id in presence.present:
             tell(f"reading {servo_label(setup)}")
             found, is_shared = presence.present[setup.id], setup.id in presence.shared_ids
-            states.append(read_state(registers, CHECKS[kind.family.name], setup, found, is_shared))
+            states.append(read_state(line, CHECKS[kind.family.name], setup, found, is_shared))
     far = find_far({s.setup.name: s.position for s in states if s.position is not None})
     for state in states:
         findings += apply_rules(replace(state, far=far.get(state.setup.name, "")))
@@ -171,7 +171,7 @@ def find_servos(
     for setup in setups:
         if setup.id not in there:
             tell(f"asking {servo_label(setup)}")
-            found = ping(port, kind.family, setup.id, baud, 2)
+            found = ping(port, kind.family, setup.id, baud)
             if found is not None:
                 there[setup.id] = found
                 answers.append(found)

@@ -9,10 +9,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from gazerig.drivers.bus.servo_models import servo_label
+from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.drivers.servo_bus.family import ServoModel
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.settings import write_settings
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix
 from gazerig.features.bringup.doctor.servo_checks import FIX, ServoChecks
@@ -138,7 +140,7 @@ class RegisterRule:
 
 
 def read_state(
-    registers: Registers,
+    line: Transactions,
     checks: ServoChecks,
     setup: ServoConfig,
     found: FoundServo,
@@ -149,7 +151,7 @@ def read_state(
     Raises:
         BusLost: the port has disappeared.
     """
-    values = registers.read_many(setup.id, checks.registers)
+    values = line.read_many(setup.id, checks.registers)
     return ServoState(checks, setup, found, values, shares_id)
 
 
@@ -364,18 +366,18 @@ def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
     Raises:
         BusLost: the port has disappeared.
     """
-    registers, servo_id = Registers(port, kind.family), fix.servo_id
-    torque = registers.read(servo_id, "torque_enable")
-    if not torque and registers.read(servo_id, "status_return_level") != kind.family.answer_level:
+    line, servo_id = Transactions(port, kind.family), fix.servo_id
+    torque = line.read(servo_id, "torque_enable")
+    if not torque and line.read(servo_id, "status_return_level") != kind.family.answer_level:
         # A servo that answers only queries or pings does not confirm the following writes.
-        registers.write_all((servo_id,), "status_return_level", kind.family.answer_level)
-        torque = registers.read(servo_id, "torque_enable")
+        line.write_all((servo_id,), "status_return_level", [kind.family.answer_level])
+        torque = line.read(servo_id, "torque_enable")
     if torque:
         return "its torque is on"
     if torque is None:
-        return "the servo does not take it" if registers.refusal else "the servo does not answer"
-    if not registers.write_persistent(servo_id, fix.register, fix.value):
+        return "the servo does not take it" if line.refusal else "the servo does not answer"
+    try:
+        write_settings(line, servo_id, {fix.register: fix.value})
+    except ServoMissing:
         return "the servo does not take it"
-    if registers.read(servo_id, fix.register) != fix.value:
-        return "it reads back otherwise"
     return ""
