@@ -164,14 +164,14 @@ def poll_list():
 
 def test_silent_servos_are_read_at_once_then_in_turn():
     polled = poll_list()
-    polled.record_silent(1, 10.0)
+    polled.record_failure(1, 10.0)
     assert (polled.group, polled.next_due(10.0)) == ((4, 9), 1)
-    polled.record_silent(1, 10.0)
+    polled.record_failure(1, 10.0)
     assert (polled.next_due(10.0), polled.next_due(10.0 + AGAIN_S)) == (None, 1)
-    polled.record_silent(9, 10.1)
-    polled.record_silent(9, 10.1)
+    polled.record_failure(9, 10.1)
+    polled.record_failure(9, 10.1)
     assert (polled.next_due(10.2), polled.next_due(10.1 + AGAIN_S), polled.group) == (None, 1, (4,))
     polled.record_answer(1)  # the other one may be back, too
     assert (polled.group, polled.next_due(10.25)) == ((4, 1), 9)
     polled.record_answer(9)
-    assert (polled.group, polled.is_troubled) == (IDS, False)
+    assert (polled.group, polled.next_due(11.0)) == (IDS, None)

@@ -78,11 +78,11 @@ DYNAMIXEL = Family(
     updater="Dynamixel Wizard 2.0",
     # Present Current, Velocity and Position (126..135).
     window=Window(126, "<hii", _SENSED),
+    # Between them are addresses without a register, whose reads are refused.
     polled=(
-        # Between them are addresses without a register, whose reads are refused.
-        Window(64, "<B", ("torque_enable",)),
-        Window(70, "<B", ("hardware_error_status",)),
-        Window(144, "<HB", ("present_input_voltage", "present_temperature")),
+        ("torque_enable", "torque_enable"),
+        ("hardware_error_status", "hardware_error_status"),
+        ("present_input_voltage", "present_temperature"),
     ),
     # In this order, as a new operating mode resets gains and profile.
     read_spans=(

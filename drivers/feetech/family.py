@@ -78,8 +78,7 @@ FEETECH = Family(
     updater="Feetech's program FD",
     # Present Position to Status (56..65).
     window=Window(56, "<HHHBBxB", SENSED, SIGNS),
-    # Torque Enable to Torque Limit (40..49).
-    polled=(Window(40, "<BB6xH", ("torque_enable", "acceleration", "torque_limit")),),
+    polled=(("torque_enable", "torque_limit"),),
     read_spans=(("return_delay_time", "operating_mode"), ("torque_limit", "lock")),
     wanted_settings=wanted_settings,
     # Only one bit of Phase is changed; the others keep their values.

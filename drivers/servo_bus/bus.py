@@ -15,7 +15,7 @@ from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import CHECK_SUPPLY, PollList
 from gazerig.drivers.servo_bus.settings import apply_settings
 from gazerig.drivers.servo_bus.supervisor import Supervisor
-from gazerig.drivers.servo_bus.sync_read import GroupRead, ServoReply, SyncReader
+from gazerig.drivers.servo_bus.sync_read import ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import raise_missing, switch_off
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import Feedback, ServoConfig
@@ -87,11 +87,7 @@ class SmartServoBus(PortBus):
             firmware[setup.id] >= since.get(setup.model, inf) for setup in self._setups
         )
         self._reader = SyncReader(line, self._poll_list, is_fast)
-        self._polls = [
-            (slot, GroupRead(family, (servo_id,), window))
-            for window in family.polled
-            for slot, servo_id in enumerate(self._ids)
-        ]
+        self._polls = [(span, servo_id) for span in family.polled for servo_id in self._ids]
         self._supervisor = Supervisor(line, self._by_id, self._feedback, log)
 
     # --- one reading
@@ -118,29 +114,17 @@ class SmartServoBus(PortBus):
 
     def _poll(self, now_s: float) -> None:
         """Read what a group read does not cover of one servo; servos and spans take turns."""
-        line, self._poll_at_s = self._line, now_s + POLL_S
+        self._poll_at_s = now_s + POLL_S
         self._turn = (self._turn + 1) % len(self._polls)
-        slot, group = self._polls[self._turn]
-        (servo_id,) = group.ids
+        span, servo_id = self._polls[self._turn]
         if servo_id not in self._poll_list.group:
             return
-        raw, at_s = line.exchange(group.request, group.reply_length)
-        whole = group.parse_whole(raw)
-        if whole is not None:
-            values: Mapping[str, int] = dict(zip(group.window.fields, whole, strict=False))
-        else:
-            good, damaged = line.collect(group.request, raw, group.ids, group.length, group.parse)
-            line.errors["corrupt"] += len(damaged)
-            if servo_id not in good:
-                line.drain()
-                return
-            values = group.reply(good[servo_id], at_s).values
-        torque, volts = values.get("torque_enable"), values.get("present_input_voltage")
-        if torque is not None:
-            self._feedback.set(slot, torque=torque == 1)
-        if volts is not None:
-            self._feedback.set_climate(slot, volts, values["present_temperature"])
-        self._supervisor.check_polled(servo_id, values)
+        address, length = self._family.span(*span)
+        found = self._line.ask_once((servo_id,), address, length)
+        if servo_id in found:
+            values = self._family.decode(address, found[servo_id])
+            self._feedback.apply_polled(self._slot[servo_id], values)
+            self._supervisor.check_polled(servo_id, values)
 
     # --- public interface
 
@@ -211,7 +195,7 @@ class SmartServoBus(PortBus):
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
-        silent_s = self._poll_list.all_silent_s(now_s) if self._poll_list.is_troubled else 0.0
+        silent_s = self._poll_list.all_silent_s(now_s) if self._poll_list.silent_since_s else 0.0
         if silent_s >= self._give_up_s:
             fault = f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s"
             raise BusLost(line.lateness.blame(fault, CHECK_SUPPLY, now_s, now_s - silent_s))

@@ -196,8 +196,8 @@ class Family:
     """The manufacturer's program that updates the firmware."""
     window: Window
     """Registers read from all servos in every cycle; up to 7 bytes before them can be read."""
-    polled: tuple[Window, ...]
-    """Registers that are read from one servo after the other; fields are their names."""
+    polled: tuple[tuple[str, str], ...]
+    """Spans that are read from one servo after the other."""
     read_spans: tuple[tuple[str, str], ...]
     """Spans of settings."""
     wanted_settings: Callable[["ServoConfig"], Mapping[str, int]]

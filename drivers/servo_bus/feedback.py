@@ -4,7 +4,7 @@ The checksum of an answer misses some damage, so a position that no joint can ha
 last one is rejected (``gazerig.drivers.bus.plausibility``).
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from operator import mul
 from typing import Any
 
@@ -97,37 +97,33 @@ class FeedbackColumns:
         values = reply.values
         if not self.places.is_plausible(slot, values["position"], reply.at_s):
             return False
-        self._set_motion(slot, reply.at_s, **values)
-        return True
-
-    def _set_motion(
-        self,
-        slot: int,
-        at_s: float,
-        position: int,
-        velocity: int = 0,
-        effort: int = 0,
-        **climate: int,
-    ) -> None:
-        missing = tuple([other for other in self.now.missing if other != slot])
-        self.now = self.now._replace(missing=missing)
         self.set(
             slot,
-            position_steps=position,
-            velocity_steps_s=velocity * self._velocity_unit,
-            load=max(-1.0, min(1.0, effort * self._load_units[slot])),
-            at_s=at_s,
+            position_steps=values["position"],
+            velocity_steps_s=values["velocity"] * self._velocity_unit,
+            load=max(-1.0, min(1.0, values["effort"] * self._load_units[slot])),
+            at_s=reply.at_s,
         )
-        if climate:
-            self.set_climate(slot, **climate)
+        if "voltage" in values:
+            self._set_climate(slot, values["voltage"], values["temperature"])
+        return True
+
+    def apply_polled(self, slot: int, values: Mapping[str, int]) -> None:
+        """Apply registers of one servo, by name, that are read at intervals."""
+        if "torque_enable" in values:
+            self.set(slot, torque=values["torque_enable"] == 1)
+        if "present_temperature" in values:
+            self._set_climate(slot, values["present_input_voltage"], values["present_temperature"])
 
     def set(self, slot: int, **values: Any) -> None:
-        """Set a servo's values by column."""
-        columns = {
+        """Set a servo's values by column; one with the time of an answer is no longer missing."""
+        columns: dict[str, tuple[Any, ...]] = {
             name: _replace_value(getattr(self.now, name), slot, value)
             for name, value in values.items()
             if getattr(self.now, name)[slot] != value
         }
+        if "at_s" in values:
+            columns["missing"] = tuple([other for other in self.now.missing if other != slot])
         if columns:
             self.now = self.now._replace(**columns)
 
@@ -136,8 +132,7 @@ class FeedbackColumns:
         torque = tuple([on and slot not in limp for slot in range(len(self.now.torque))])
         self.now = self.now._replace(torque=torque)
 
-    def set_climate(self, slot: int, voltage: int, temperature: int) -> None:
-        """Record a servo's voltage, in 0.1 V, and temperature."""
+    def _set_climate(self, slot: int, voltage: int, temperature: int) -> None:
         self._tenth_volts = ()
         self.set(slot, voltage_v=0.1 * voltage)
         if temperature <= MOST_CELSIUS:
@@ -145,9 +140,9 @@ class FeedbackColumns:
 
     def hold(self, slot: int, position: int, at_s: float, torque: bool) -> None:
         """Set the position of a servo that was just set up and does not move."""
-        self.set(slot, torque=torque)
         self.places.record(slot, position, at_s)
-        self._set_motion(slot, at_s, position)
+        still = {"velocity_steps_s": 0.0, "load": 0.0}
+        self.set(slot, torque=torque, position_steps=position, at_s=at_s, **still)
 
 
 def _replace_value(column: tuple[Any, ...], slot: int, value: Any) -> tuple[Any, ...]:

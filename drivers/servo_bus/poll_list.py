@@ -1,7 +1,8 @@
 """Servos that are read together, and those that are silent.
 
 Later servos in a group read wait for the earlier ones, so a silent servo must leave the group
-immediately. It is then read alone, at once and after that at intervals.
+immediately, and so must one whose answer is damaged, as it may spoil those of others. It is then
+read alone, at once and after that at intervals.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -12,10 +13,6 @@ from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S, HostLatene
 
 AGAIN_S = 0.15
 """Interval of attempts to read silent servos, which take turns; less than a servo's watchdog."""
-
-DAMAGED_IN_A_ROW = 3
-"""Consecutive damaged answers after which a servo leaves the group, as it costs every read its time
-limit."""
 
 BAD_LINE = "a second servo with its id, or a bad cable"
 
@@ -31,7 +28,6 @@ class PollList:
         lateness: Delays of this computer, which are reported as the cause if there were any.
 
     group: ids that are read together
-    is_troubled: whether a servo is out of the group or has answered badly recently
     silent_since_s: beginning of the silence of servos out of the group
     """
 
@@ -39,20 +35,23 @@ class PollList:
         self._labels, self._log, self._lateness = labels, log, lateness
         self._silent: list[int] = []
         self._next_s = -inf
-        self._damaged: dict[int, int] = {}
+        self._damaged: set[int] = set()
         self._reported: set[int] = set()
         self._all_since_s, self._all_until_s = inf, -inf
         self._all_reported = False
         self.group = tuple(labels)
-        self.is_troubled = False
         self.silent_since_s: dict[int, float] = {}
 
     def next_due(self, now_s: float) -> int | None:
         """Return a silent servo to be read alone now."""
         return self._silent[0] if self._silent and now_s >= self._next_s else None
 
-    def record_silent(self, servo_id: int, now_s: float) -> None:
-        """Record that a servo did not answer; it is due immediately the first time."""
+    def record_failure(self, servo_id: int, now_s: float, damaged: bool = False) -> None:
+        """Record that a servo did not answer well; it is due immediately the first time."""
+        if damaged:
+            self._damaged.add(servo_id)
+        else:
+            self._damaged.discard(servo_id)
         if servo_id in self._silent:
             self._silent.remove(servo_id)
             self._silent.append(servo_id)
@@ -63,31 +62,20 @@ class PollList:
         self.silent_since_s.setdefault(servo_id, now_s)
         self._regroup()
 
-    def record_damaged(self, servo_id: int, now_s: float) -> None:
-        """Record that a servo's answer arrived damaged."""
-        self._damaged[servo_id] = self._damaged.get(servo_id, 0) + 1
-        self.is_troubled = True
-        if self._damaged[servo_id] >= DAMAGED_IN_A_ROW or servo_id in self._silent:
-            self.record_silent(servo_id, now_s)
-
     def record_answer(self, servo_id: int) -> None:
         """Record a good answer: the other silent servos need not wait either."""
-        if self._damaged.pop(servo_id, None) is None and servo_id not in self._silent:
-            return
         if servo_id in self._silent:
             self._silent = [i for i in self._silent if i != servo_id and self.group]
             self._next_s = -inf
-        self._regroup()
+            self._regroup()
 
     def restore(self) -> None:
         """Read all servos together again, as the port was lost."""
         self._silent.clear()
-        self._damaged.clear()
         self._regroup()
 
     def _regroup(self) -> None:
         self.group = tuple(servo_id for servo_id in self._labels if servo_id not in self._silent)
-        self.is_troubled = bool(self._silent or self._damaged)
 
     def report(self, answered: bool, now_s: float) -> dict[int, float]:
         """Report silent servos; return those that answer again, with the times of their silence.
@@ -96,7 +84,13 @@ class PollList:
             answered: Whether any servo has answered.
             now_s: Present time.
         """
-        self._report_all(answered, now_s)
+        if not answered:
+            self._all_since_s = min(self._all_since_s, now_s)
+            if self.all_silent_s(now_s) >= BLAME_S and not self._all_reported:
+                self._all_reported = True
+                self._blame("no servo answers", CHECK_SUPPLY, now_s, self._all_since_s)
+        elif self._all_since_s < inf:
+            self._all_since_s, self._all_until_s, self._all_reported = inf, now_s, False
         back = [servo_id for servo_id in self.silent_since_s if servo_id not in self._silent]
         silences_s = {i: now_s - self.silent_since_s.pop(i) for i in back}
         for servo_id in self._reported.intersection(back):
@@ -113,17 +107,6 @@ class PollList:
                     fault, remedy = "answers, but its bytes arrive damaged", BAD_LINE
                 self._blame(f"{self._labels[servo_id]} {fault}", remedy, now_s)
         return silences_s
-
-    def _report_all(self, answered: bool, now_s: float) -> None:
-        """Report that no servo answers."""
-        if answered:
-            if self._all_since_s < inf:
-                self._all_since_s, self._all_until_s, self._all_reported = inf, now_s, False
-            return
-        self._all_since_s = min(self._all_since_s, now_s)
-        if self.all_silent_s(now_s) >= BLAME_S and not self._all_reported:
-            self._all_reported = True
-            self._blame("no servo answers", CHECK_SUPPLY, now_s, self._all_since_s)
 
     def _blame(self, fault: str, remedy: str, now_s: float, since_s: float = inf) -> None:
         self._log.add(self._lateness.blame(fault, remedy, now_s, since_s))

@@ -153,10 +153,8 @@ class SyncReader:
 
         Call this before anything else is sent.
         """
-        replies, spoiler = self._sort(group, raw, at_s, now_s)
+        replies = self._sort(group, raw, at_s, now_s)
         left = tuple(i for i in self.poll_list.group if i in group.ids and i not in replies)
-        # A servo that damages its answer would spoil those of others again.
-        left = tuple(i for i in left if i != spoiler) or left
         if left:
             more = self.read_again(left, now_s)
             replies |= more
@@ -168,7 +166,7 @@ class SyncReader:
         """Read some servos, and record their answers."""
         group = self._prepare(ids)
         raw, at_s = self._line.exchange(group.request, group.reply_length)
-        return self._sort(group, raw, at_s, now_s)[0]
+        return self._sort(group, raw, at_s, now_s)
 
     def _prepare(self, ids: tuple[int, ...]) -> GroupRead:
         key = ids, self._shift
@@ -184,8 +182,8 @@ class SyncReader:
 
     def _sort(
         self, group: GroupRead, raw: bytes, at_s: float, now_s: float
-    ) -> tuple[dict[int, ServoReply], int | None]:
-        """Return the good answers to a read, and the servo that damaged its answer.
+    ) -> dict[int, ServoReply]:
+        """Return the good answers to a read, and record the servos without one.
 
         Of several damaged answers the first is the cause: it may have spoilt those that follow.
         """
@@ -196,10 +194,10 @@ class SyncReader:
         spoiler = next((i for i in group.ids if i in damaged), None)
         if spoiler is not None:
             line.errors["corrupt"] += 1
-            polled.record_damaged(spoiler, now_s)
+            polled.record_failure(spoiler, now_s, damaged=True)
         for servo_id in silent_servos(group.ids, {*good, *damaged}):
             line.errors["timeout"] += 1
-            polled.record_silent(servo_id, now_s)
+            polled.record_failure(servo_id, now_s)
             self._shift = self._shift % MOST_SHIFT + 1
             self._calm_at_s = now_s + CALM_S
-        return {i: group.reply(status, at_s) for i, status in good.items()}, spoiler
+        return {i: group.reply(status, at_s) for i, status in good.items()}

@@ -210,7 +210,7 @@ class Transactions:
             if left and pause_s:
                 self.drain(pause_s)
             while left:
-                answered = self._ask(left, address, length)
+                answered = self.ask_once(left, address, length)
                 values.update(answered)
                 if self.tries == 1 and not answered:
                     break
@@ -234,7 +234,7 @@ class Transactions:
         rows = [register.encode(value) for value in values]
         self.send(self.family.codec.sync_write(ids, register.address, register.size, rows))
 
-    def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
+    def ask_once(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos once; return those of good answers."""
         found: dict[int, bytes] = {}
         # In the loop other servos wait, and the delay of answers has been measured.
