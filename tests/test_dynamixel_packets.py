@@ -9,7 +9,6 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.protocol import (
     instruction,
     parse_statuses,
-    sync_read,
 )
 from gazerig.drivers.servo_bus.family import GoalWrite
 from gazerig.sim_mock.dynamixel.packets import status
@@ -32,8 +31,10 @@ def test_instructions_are_the_protocols():
         "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89"
     )
     assert instruction(1, 8) == vector("FF FF FD 00 01 03 00 08 2F 4E")
-    assert sync_read((1, 2), 132, 4) == vector("FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA")
-    assert sync_read((3, 7, 4), 132, 4, fast=True) == vector(
+    assert DYNAMIXEL.request((1, 2), 132, 4) == vector(
+        "FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA"
+    )
+    assert DYNAMIXEL.request((3, 7, 4), 132, 4, is_fast=True) == vector(
         "FF FF FD 00 FE 0A 00 8A 84 00 04 00 03 07 04 20 F2"
     )
     assert GoalWrite(DYNAMIXEL, (1, 2)).packet((150, 170), (0, 0)) == vector(
@@ -57,7 +58,7 @@ def test_the_everyday_stuffed_status_is_understood():
 
 
 def test_echo_and_noise_are_passed_over():
-    request = sync_read((1,), 126, 10)
+    request = DYNAMIXEL.request((1,), 126, 10)
     found = parse_statuses(request + b"\xff\xff\xfd" + EVERYDAY + b"\x00")
     assert [(s.id, s.intact) for s in found] == [(1, True)]
 

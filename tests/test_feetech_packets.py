@@ -9,26 +9,15 @@ from gazerig.drivers.feetech.memory_table import (
     REGISTERS,
     acceleration_units,
 )
-from gazerig.drivers.feetech.protocol import (
-    PING,
-    answer_frame,
-    checksum,
-    instruction,
-    parse_statuses,
-    read,
-    sync_read,
-    sync_write,
-    write,
-)
-from gazerig.drivers.servo_bus.family import GoalWrite, Status
+from gazerig.drivers.feetech.protocol import answer_frame, checksum, instruction, parse_statuses
+from gazerig.drivers.servo_bus.family import PING, GoalWrite, Status
 
 VECTORS = [
     (instruction(1, PING), "FF FF 01 02 01 FB"),
-    (read(1, 56, 2), "FF FF 01 04 02 38 02 BE"),
-    (write(1, 42, bytes((0x00, 0x08, 0, 0, 0xE8, 0x03))),
-     "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5"),
-    (sync_read((1, 2, 3), 56, 15), "FF FF FE 07 82 38 0F 01 02 03 2B"),
-    (sync_write((1, 2), 40, 1, (b"\x01", b"\x01")), "FF FF FE 08 83 28 01 01 01 02 01 48"),
+    (FEETECH.read(1, 56, 2), "FF FF 01 04 02 38 02 BE"),
+    (FEETECH.write(1, "goal_position", 2048), "FF FF 01 05 03 2A 00 08 C4"),
+    (FEETECH.request((1, 2, 3), 56, 15), "FF FF FE 07 82 38 0F 01 02 03 2B"),
+    (FEETECH.sync_write((1, 2), "torque_enable", (1, 1)), "FF FF FE 08 83 28 01 01 01 02 01 48"),
     (GoalWrite(FEETECH, (1, 2)).packet((2048, 1000), (3000, 500)),
      "FF FF FE 12 83 2A 06 01 00 08 00 00 B8 0B 02 E8 03 00 00 F4 01 8E"),
 ]  # fmt: skip

@@ -9,18 +9,15 @@ FD (stuffing).
 """
 
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from fastcrc.crc16 import umts
 
-from gazerig.drivers.servo_bus.family import AnswerFrame, Identity, Status
+from gazerig.drivers.servo_bus.family import BROADCAST, PING, AnswerFrame, Identity, Status
 
 HEADER = b"\xff\xff\xfd\x00"
 RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
-BROADCAST = 0xFE
 STATUS = 0x55
-PING, READ, WRITE = 0x01, 0x02, 0x03
-SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
 
 STATUS_OVERHEAD = 11
 """Bytes of a status in addition to its params."""
@@ -48,16 +45,13 @@ def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
     return packet + _CRC.pack(umts(packet))
 
 
-span = struct.Struct("<HH").pack
-"""Returns the bytes for an address and a number of bytes."""
+number = struct.Struct("<H").pack
+"""Returns the bytes for an address or a number of bytes."""
 
 
-def ping(servo_id: int) -> bytes:
+def identity_request(servo_id: int) -> bytes:
     """Build a ping; its answer contains model and firmware."""
     return instruction(servo_id, PING)
-
-
-identity_request = ping
 
 
 def parse_identity(status: Status) -> Identity | None:
@@ -65,28 +59,6 @@ def parse_identity(status: Status) -> Identity | None:
     if len(status.params) != IDENTITY_LENGTH or status.error & ERROR_NUMBER:
         return None
     return Identity(*_IDENTITY.unpack(status.params))
-
-
-def read(servo_id: int, address: int, length: int) -> bytes:
-    """Build a request for registers of one servo."""
-    return instruction(servo_id, READ, span(address, length))
-
-
-def write(servo_id: int, address: int, data: bytes) -> bytes:
-    """Build a write to registers of one servo."""
-    return instruction(servo_id, WRITE, address.to_bytes(2, "little") + data)
-
-
-def sync_read(ids: Sequence[int], address: int, length: int, fast: bool = False) -> bytes:
-    """Build a request for the same registers of several servos."""
-    code = FAST_SYNC_READ if fast else SYNC_READ
-    return instruction(BROADCAST, code, span(address, length) + bytes(ids))
-
-
-def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes]) -> bytes:
-    """Build a write to the same registers of several servos, ``size`` bytes each."""
-    body = b"".join(bytes((i,)) + row for i, row in zip(ids, rows, strict=True))
-    return instruction(BROADCAST, SYNC_WRITE, span(address, size) + body)
 
 
 def parse_statuses(raw: bytes) -> list[Status]:

@@ -8,16 +8,14 @@ an answer.
 Source: Feetech, communication protocol of the SCS and STS series.
 """
 
-from collections.abc import Iterable, Sequence
+import struct
+from collections.abc import Sequence
 from typing import Literal
 from zlib import adler32
 
-from gazerig.drivers.servo_bus.family import AnswerFrame, Identity, Status
+from gazerig.drivers.servo_bus.family import READ, AnswerFrame, Identity, Status
 
 HEADER = b"\xff\xff"
-BROADCAST = 0xFE
-PING, READ, WRITE = 0x01, 0x02, 0x03
-SYNC_READ, SYNC_WRITE = 0x82, 0x83
 
 STATUS_OVERHEAD = 6
 """Bytes of a status in addition to its params."""
@@ -57,19 +55,13 @@ def checksum(body: bytes) -> int:
     return ~sum(body) & 0xFF
 
 
-def span(address: int, length: int) -> bytes:
-    """Return the bytes for an address and a number of bytes."""
-    return bytes((address, length))
-
-
-def ping(servo_id: int) -> bytes:
-    """Build a ping."""
-    return instruction(servo_id, PING)
+number = struct.Struct("B").pack
+"""Returns the byte for an address or a number of bytes."""
 
 
 def identity_request(servo_id: int) -> bytes:
     """Build a read of the first registers, which contain model and firmware."""
-    return read(servo_id, 0, IDENTITY_LENGTH)
+    return instruction(servo_id, READ, number(0) + number(IDENTITY_LENGTH))
 
 
 def parse_identity(status: Status) -> Identity | None:
@@ -83,27 +75,6 @@ def parse_identity(status: Status) -> Identity | None:
         return None
     order: Literal["little", "big"] = "big" if data[3] == SCS_SERIES else "little"
     return Identity(int.from_bytes(data[3:5], order), 100 * data[0] + data[1])
-
-
-def read(servo_id: int, address: int, length: int) -> bytes:
-    """Build a request for registers of one servo."""
-    return instruction(servo_id, READ, span(address, length))
-
-
-def write(servo_id: int, address: int, data: bytes) -> bytes:
-    """Build a write to registers of one servo."""
-    return instruction(servo_id, WRITE, bytes((address,)) + data)
-
-
-def sync_read(ids: Sequence[int], address: int, length: int) -> bytes:
-    """Build a request for the same registers of several servos."""
-    return instruction(BROADCAST, SYNC_READ, span(address, length) + bytes(ids))
-
-
-def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes]) -> bytes:
-    """Build a write to the same registers of several servos, ``size`` bytes each."""
-    body = b"".join(bytes((i,)) + row for i, row in zip(ids, rows, strict=True))
-    return instruction(BROADCAST, SYNC_WRITE, span(address, size) + body)
 
 
 def parse_statuses(raw: bytes) -> list[Status]:

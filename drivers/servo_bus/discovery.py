@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.family import Family, Identity
+from gazerig.drivers.servo_bus.family import BROADCAST, PING, Family, Identity
 from gazerig.drivers.servo_bus.transaction import REPLY_S, ROOM, Transactions, sort_answers
 from gazerig.drivers.types import ServoConfig
 
@@ -61,7 +61,7 @@ def _found_servo(family: Family, servo_id: int, identity: Identity, baud: int) -
 
 def has_any_reply(port: BusPort, family: Family) -> bool:
     """Return whether any servo answers a broadcast ping, even if the answers corrupt each other."""
-    request = family.codec.ping(family.codec.BROADCAST)
+    request = family.codec.instruction(BROADCAST, PING)
     port.drain()
     port.write(request)
     return bool(port.read_until(ROOM, port.now_s() + REPLY_S).replace(request, b"", 1))
@@ -80,7 +80,7 @@ def count_corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANS
     pings are often equal, their positions hardly ever.
     """
     line, codec, window = Transactions(port, family), family.codec, family.window
-    request, bad, places = codec.read(servo_id, window.address, window.length), 0, list[int]()
+    request, bad, places = family.read(servo_id, window.address, window.length), 0, list[int]()
     for _ in range(tries):
         port.drain()
         raw = line.listen(request, window.length + codec.STATUS_OVERHEAD, REPLY_S)

@@ -5,7 +5,7 @@ explains how to add one.
 """
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import ModuleType
@@ -16,6 +16,10 @@ if TYPE_CHECKING:  # the guardian starts without numpy
 
 
 Area = Literal["eeprom", "ram"]
+
+BROADCAST = 0xFE
+PING, READ, WRITE, SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x01, 0x02, 0x03, 0x82, 0x83, 0x8A
+"""Id of all servos, and instructions; the protocols of all families have the same ones."""
 
 FASTEST = 32767
 """Largest value of a speed limit."""
@@ -216,11 +220,39 @@ class Family:
     prompt_timeout_s: float = 0.002
     """Shortest time-out of an answer in addition to its bytes on the wire."""
 
-    def request(self, ids: Sequence[int], address: int, length: int) -> bytes:
-        """Return a request for the same registers of some servos; of one if each is read alone."""
-        ask, asked = (self.codec.sync_read, ids) if self.sync_read else (self.codec.read, ids[0])
-        packet: bytes = ask(asked, address, length)
+    def request(
+        self, ids: Sequence[int], address: int, length: int, is_fast: bool = False
+    ) -> bytes:
+        """Build a request for the same registers of some servos; of one if each is read alone."""
+        if not self.sync_read:
+            return self.read(ids[0], address, length)
+        params = self._span(address, length) + bytes(ids)
+        return self._instruction(BROADCAST, FAST_SYNC_READ if is_fast else SYNC_READ, params)
+
+    def read(self, servo_id: int, address: int, length: int) -> bytes:
+        """Build a request for registers of one servo."""
+        return self._instruction(servo_id, READ, self._span(address, length))
+
+    def write(self, servo_id: int, name: str, value: int) -> bytes:
+        """Build a write to a register of one servo, which confirms it."""
+        register = self.registers[name]
+        address: bytes = self.codec.number(register.address)
+        return self._instruction(servo_id, WRITE, address + register.encode(value))
+
+    def sync_write(self, ids: Sequence[int], name: str, values: Iterable[int]) -> bytes:
+        """Build a write to the same register of several servos, which no servo confirms."""
+        register = self.registers[name]
+        rows = [bytes((i,)) + register.encode(v) for i, v in zip(ids, values, strict=True)]
+        params = self._span(register.address, register.size) + b"".join(rows)
+        return self._instruction(BROADCAST, SYNC_WRITE, params)
+
+    def _instruction(self, servo_id: int, code: int, params: bytes) -> bytes:
+        packet: bytes = self.codec.instruction(servo_id, code, params)
         return packet
+
+    def _span(self, address: int, length: int) -> bytes:
+        found: bytes = self.codec.number(address) + self.codec.number(length)
+        return found
 
     def span(self, first: str, last: str) -> tuple[int, int]:
         """Return the address and the number of bytes of a span."""
@@ -259,8 +291,9 @@ class GoalWrite:
         self._count, self._has_speed = len(codes), family.goal_speed
         self._row = [n for servo_id in ids for n in (servo_id, *[0] * (self._count - 1))]
         codec, address = family.codec, family.registers["goal_position"].address
-        self._span = codec.span(address, struct.calcsize(order + codes) - 1)
-        self._instruction = partial(codec.instruction, codec.BROADCAST, codec.SYNC_WRITE)
+        length = struct.calcsize(order + codes) - 1
+        self._span = codec.number(address) + codec.number(length)
+        self._instruction = partial(codec.instruction, BROADCAST, SYNC_WRITE)
 
     def packet(self, goals: Sequence[int], speeds: Sequence[int]) -> bytes:
         """Build the packet with one goal per servo, and one speed if the family sends it."""

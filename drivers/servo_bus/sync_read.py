@@ -59,10 +59,9 @@ class GroupRead:
     ) -> None:
         codec = family.codec
         self.ids, self.window, self.length = tuple(ids), window, window.length
-        self.request: bytes = family.request(ids, window.address, self.length)
+        self.request = family.request(ids, window.address, self.length, is_fast)
         self.parse: Callable[[bytes], list[Status]] = codec.parse_statuses
         if is_fast:
-            self.request = codec.sync_read(ids, window.address, self.length, True)
             self.parse = partial(codec.parse_fast, ids=self.ids, length=self.length)
         self._unpack_one = struct.Struct(window.layout).unpack
         frame = codec.answer_frame(ids, self.length, is_fast)

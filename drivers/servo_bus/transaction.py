@@ -230,9 +230,7 @@ class Transactions:
 
     def write_all(self, ids: Sequence[int], name: str, values: Iterable[int]) -> None:
         """Write one register of several servos; no servo confirms it."""
-        register = self.family.registers[name]
-        rows = [register.encode(value) for value in values]
-        self.send(self.family.codec.sync_write(ids, register.address, register.size, rows))
+        self.send(self.family.sync_write(ids, name, values))
 
     def ask_once(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos once; return those of good answers."""
@@ -286,7 +284,7 @@ class Transactions:
             start = end = left[0].address
             while left and left[0].address == end:
                 end += left.pop(0).size
-            request = self.family.codec.read(servo_id, start, end - start)
+            request = self.family.read(servo_id, start, end - start)
             status = self._request_one(servo_id, request, end - start)
             if status is not None:
                 values |= self.family.decode(start, status.params)
@@ -296,8 +294,7 @@ class Transactions:
 
     def write(self, servo_id: int, name: str, value: int) -> bool:
         """Write a register, again after a refusal; return whether the servo confirmed it."""
-        register = self.family.registers[name]
-        request = self.family.codec.write(servo_id, register.address, register.encode(value))
+        request = self.family.write(servo_id, name, value)
         return self._request_one(servo_id, request, 0, insist=True) is not None
 
     def _request_one(

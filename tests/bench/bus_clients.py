@@ -21,9 +21,7 @@ from rustypot import Sts3215PyController, Xl330PyController
 from serial import Serial
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.protocol import sync_read
 from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.feetech.protocol import sync_read as feetech_sync_read
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
@@ -78,7 +76,7 @@ def ours(kind: str, path: str) -> Iterator[Cycle]:
 @contextmanager
 def bare_dynamixel(path: str) -> Iterator[Cycle]:
     """Select and read, goals and request in one write, every CRC checked."""
-    request, count = sync_read(IDS, 126, 10, fast=True), len(IDS)
+    request, count = DYNAMIXEL.request(IDS, 126, 10, is_fast=True), len(IDS)
     goals = struct.Struct("<4sBHBHH" + "BI" * count)
     layout = struct.Struct("<8s" + "BBhiiH" * count)
     row = [number for servo_id in IDS for number in (servo_id, 0)]
@@ -106,7 +104,7 @@ def bare_dynamixel(path: str) -> Iterator[Cycle]:
 @contextmanager
 def bare_feetech(path: str) -> Iterator[Cycle]:
     """Select and read, goals and request in one write, every checksum checked."""
-    request, count = feetech_sync_read(IDS, 56, 15), len(IDS)
+    request, count = FEETECH.request(IDS, 56, 15), len(IDS)
     goals = struct.Struct("<5B" + "BHHH" * count)
     row = [number for servo_id in IDS for number in (servo_id, 0, 0, 500)]
     with Serial(path, BAUD, timeout=0) as serial:
