@@ -115,7 +115,7 @@ def test_every_room_of_the_robot_has_its_storey() -> None:
 def test_emulated_servos_share_no_codec_with_the_drivers() -> None:
     data_sheets = {
         *("drivers.dynamixel.control_table", "drivers.feetech.memory_table"),
-        *("drivers.feetech.scs", "drivers.servo_bus.family"),
+        "drivers.servo_bus.family",
     }
     for module, path in modules():
         if module.startswith(("sim_mock.smart_servo.", "sim_mock.dynamixel.", "sim_mock.feetech.")):

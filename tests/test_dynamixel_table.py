@@ -11,9 +11,9 @@ from gazerig.drivers.dynamixel.control_table import (
     MODELS,
     STEPS_PER_TURN,
     VELOCITY_UNIT_STEPS_S,
-    registers_of,
 )
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.sim_mock.dynamixel.servo import registers_of
 
 RENAMED = {"secondary_shadow_id": "secondary_id", "present_load": "present_current"}
 

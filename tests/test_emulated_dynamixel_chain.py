@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from servo_bench import READ, DynamixelBench
 
-from gazerig.drivers.dynamixel.control_table import MODELS, registers_of
+from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.dynamixel.servo import (
     ACCESS,
@@ -13,6 +13,7 @@ from gazerig.sim_mock.dynamixel.servo import (
     DATA_RANGE,
     DynamixelMemory,
     DynamixelServo,
+    registers_of,
 )
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 

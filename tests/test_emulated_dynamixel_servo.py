@@ -2,8 +2,8 @@
 
 import pytest
 
-from gazerig.drivers.dynamixel.control_table import MODELS, registers_of
-from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.drivers.dynamixel.control_table import MODELS
+from gazerig.sim_mock.dynamixel.servo import DynamixelServo, registers_of
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 

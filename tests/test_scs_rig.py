@@ -9,8 +9,7 @@ from served_rigs import hide_real_ports, served
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
-from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.feetech.scs import FEETECH_SCS
+from gazerig.drivers.feetech.family import FEETECH, FEETECH_SCS
 from gazerig.drivers.servo_bus.discovery import count_corrupt, scan_ids
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.robot.guardian.process import releaser

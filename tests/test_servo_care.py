@@ -34,14 +34,6 @@ def sts(started):
     return copied(started)
 
 
-def test_a_stranger_is_named_where_a_servo_is_missing():
-    specs = [ServoSpec(i, "sts3215", 2000) for i in (1, 9)]
-    setups = [ServoConfig(i, "sts3215", 1000, 3000, 3000.0, NAMES[i - 1]) for i in (1, 2)]
-    told = r"jaw \(servo 2\) does not answer; unexpected: servo 9 \(sts3215\).*the missing one"
-    with pytest.raises(ServoMissing, match=told):
-        StsRig(specs, setups).bus.open()
-
-
 # --- torque comes on
 
 
@@ -304,8 +296,6 @@ def test_eeprom_that_differs_is_corrected_under_way_without_torque(xl):
 def test_overload_is_named_and_goes(sts):
     sts.run(0.5, [2000] * 4)
     sts.command("overload 2")
-    assert sts.tick([2000] * 4)[1].fault == ""  # once could be noise
-    sts.tick([2000] * 4)
     readings = sts.tick([2000] * 4)
     assert [r.fault for r in readings] == ["", "overload", "", ""]
     assert sts.bus.faults() == sts.bus.events() == ("jaw (servo 2): overload",)

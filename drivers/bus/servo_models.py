@@ -8,9 +8,8 @@ from gazerig.drivers.dynamixel.control_table import P_UNIT, PWM_FULL, DynamixelM
 from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN as STEPS_PER_TURN
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import PluginError
-from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.family import FEETECH, FEETECH_SCS
 from gazerig.drivers.feetech.memory_table import FACTORY_P_GAIN, P_FULL_STEPS, SCS_STEPS
-from gazerig.drivers.feetech.scs import FEETECH_SCS
 from gazerig.drivers.servo_bus.family import Family, ServoModel
 
 if TYPE_CHECKING:

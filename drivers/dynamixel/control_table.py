@@ -187,33 +187,8 @@ _BASE = (
 )
 # fmt: on
 
-REGISTERS: dict[str, Register] = {
-    r.name: r._replace(area="eeprom") if r.address < EEPROM_END else r for r in _BASE
-}
+REGISTERS: dict[str, Register] = {register.name: register for register in _BASE}
 """Registers by name, with values common to all models; addresses are the same in every model."""
-
-
-def registers_of(model: DynamixelModel) -> tuple[Register, ...]:
-    """Return a model's registers with its initial values."""
-    absent = {"pwm_slope"} if model.series == "x430" else set[str]()
-    if model.current_limit is None:
-        absent |= {"current_limit", "goal_current"}
-    initial: dict[str, int | None] = {
-        "model_number": model.number,
-        "temperature_limit": model.temperature_limit,
-        "max_voltage_limit": model.max_voltage,
-        "min_voltage_limit": model.min_voltage,
-        "current_limit": model.current_limit,
-        "velocity_limit": model.velocity_limit,
-        "pwm_slope": 255 if model.name.startswith("xc330-t") else 140,
-        "shutdown": model.shutdown,
-        **dict(zip(GAINS, model.gains, strict=True)),
-    }
-    return tuple(
-        one._replace(initial=initial.get(one.name, one.initial))
-        for one in REGISTERS.values()
-        if one.name not in absent
-    )
 
 
 def acceleration_units(accel_steps_s2: float | None) -> int:

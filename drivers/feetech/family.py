@@ -1,5 +1,6 @@
-"""Feetech STS servos as a family of the servo bus."""
+"""Feetech STS and SCS servos as two families of the servo bus."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from gazerig.drivers.feetech import protocol
@@ -9,7 +10,9 @@ from gazerig.drivers.feetech.memory_table import (
     MODELS,
     MULTI_TURN,
     REGISTERS,
+    SCS_BAUD_RATES,
     SCS_MODELS,
+    SCS_REGISTERS,
     STATUS_ERRORS,
     STEPS_PER_TURN,
     TORQUE_FULL,
@@ -47,8 +50,8 @@ def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
     return wanted
 
 
-SENSED = ("position", "velocity", "effort", "voltage", "temperature", "status")
-SIGNS = (15, 15, 10)
+_SENSED = ("position", "velocity", "effort", "voltage", "temperature", "status")
+_SIGNS = (15, 15, 10)
 """Sign bits of Present Position, Velocity and Load."""
 
 
@@ -77,7 +80,7 @@ FEETECH = Family(
     format_firmware=lambda firmware: f"{firmware // 100}.{firmware % 100}",
     updater="Feetech's program FD",
     # Present Position to Status (56..65).
-    window=Window(56, "<HHHBBxB", SENSED, SIGNS),
+    window=Window(56, "<HHHBBxB", _SENSED, _SIGNS),
     polled=(("torque_enable", "torque_limit"),),
     read_spans=(("return_delay_time", "operating_mode"), ("torque_limit", "lock")),
     wanted_settings=wanted_settings,
@@ -88,4 +91,31 @@ FEETECH = Family(
     faults_latch=False,
     watchdog_unit_s=None,
     single_turn=True,
+)
+
+
+def scs_settings(setup: "ServoConfig") -> dict[str, int]:
+    """Return the required register values of an SCS servo; its strength is Max Torque (16)."""
+    wanted = {name: v for name, v in wanted_settings(setup).items() if name in SCS_REGISTERS}
+    if setup.strength is not None:
+        wanted["max_torque"] = round(setup.strength * TORQUE_FULL)
+    return wanted
+
+
+FEETECH_SCS = replace(
+    FEETECH,
+    name="feetech scs",
+    registers=SCS_REGISTERS,
+    models=SCS_MODELS,
+    steps_per_turn=SCS_MODELS["scs0009"].steps_per_turn,
+    acceleration_units=lambda accel_steps_s2: 0,  # [A]: 41 is not documented
+    goal_layout=">BHHH",
+    sync_read=False,
+    baud_rates=SCS_BAUD_RATES,
+    scan_rates=SCS_BAUD_RATES,
+    window=Window(56, ">HHHBBxB", _SENSED, _SIGNS),
+    polled=(("torque_enable", "torque_enable"),),
+    read_spans=(("return_delay_time", "position_i_gain"), ("lock", "lock")),
+    wanted_settings=scs_settings,
+    single_turn=False,
 )

@@ -1,4 +1,4 @@
-"""Control table of the Feetech STS servos as data.
+"""Control tables of the Feetech STS and SCS servos as data.
 
 Units: position 1 step = 1/4096 turn; speed steps/s; acceleration 100 steps/s^2; load and
 torque limits 0.1 %; voltage 0.1 V; temperature 1 degC; current 6.5 mA; return delay 2 us;
@@ -9,7 +9,7 @@ Sources: Feetech memory table STS3215, and for missing entries the tables of pub
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from gazerig.drivers.servo_bus.family import Register as Register
 from gazerig.drivers.servo_bus.family import ServoModel
@@ -73,23 +73,6 @@ MODELS = {
     )
 }
 
-SCS_STEPS = 1024
-"""Steps of the potentiometer of an SCS servo."""
-
-SCS_BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 57_600, 38_400, 19_200)
-"""Bit/s by the value of an SCS servo's Baud Rate (6)."""
-
-SCS_MODELS = {
-    model.name: model
-    for model in (
-        # 1024 steps cover 300 and 200 deg; the number is extrapolated to a full turn.
-        ServoModel("scs0009", 1284, 1229, 70, 40, 80, 0.226, 6.0, 1.0, 100.0),
-        # Number and stall current of the SCS15 are assumed.
-        ServoModel("scs15", 1295, 1843, 70, 40, 80, 1.47, 6.0, 2.0, 62.5),
-    )
-}
-
-
 # fmt: off
 _ALL: tuple[Register, ...] = (
     Register("firmware_major",           0, 1, initial=3),
@@ -110,15 +93,11 @@ _ALL: tuple[Register, ...] = (
     # Copied to Torque Limit (48) at power-up.
     Register("max_torque",              16, 2, "rw", 1000, 0, TORQUE_FULL),
     Register("phase",                   18, 1, "rw", 12, 0, 254),
-    # Bits as in STATUS_ERRORS: errors that switch torque off, and errors that light the LED.
+    # Bits as in STATUS_ERRORS: errors that switch torque off.
     Register("unloading_condition",     19, 1, "rw", 44, 0, 254),
-    Register("led_alarm_condition",     20, 1, "rw", 47, 0, 254),
     Register("position_p_gain",         21, 1, "rw", 32, 0, 254),
     Register("position_d_gain",         22, 1, "rw", 32, 0, 254),
     Register("position_i_gain",         23, 1, "rw", 0, 0, 254),
-    Register("minimum_startup_force",   24, 2, "rw", 16, 0, 1000),
-    Register("cw_dead_zone",            26, 1, "rw", 1, 0, 32),
-    Register("ccw_dead_zone",           27, 1, "rw", 1, 0, 32),
     Register("protection_current",      28, 2, "rw", 500, 0, 511),
     Register("angular_resolution",      30, 1, "rw", 1, 1, 3),
     Register("position_offset",         31, 2, "rw", 0, -2047, 2047, sign=11),
@@ -149,25 +128,56 @@ _ALL: tuple[Register, ...] = (
 )
 # fmt: on
 
-REGISTERS: dict[str, Register] = {
-    r.name: r._replace(area="eeprom") if r.address < EEPROM_END else r for r in _ALL
-}
+REGISTERS: dict[str, Register] = {register.name: register for register in _ALL}
 """Registers by name, with values common to all models; addresses are the same in every model."""
 
 
-def registers_of(model: ServoModel) -> tuple[Register, ...]:
-    """Return a model's registers with its initial values."""
-    own = {
-        "model_number": model.number,
-        "temperature_limit": model.temperature_limit,
-        "max_voltage_limit": model.max_voltage,
-        "min_voltage_limit": model.min_voltage,
-        "torque_limit": REGISTERS["max_torque"].initial,
-    }
-    return tuple(
-        register._replace(initial=own[name]) if name in own else register
-        for name, register in REGISTERS.items()
+# --- SCS servos
+#
+# They use the packets of the STS series with the high byte first. Their position comes from a
+# potentiometer of 1024 steps over less than a turn, so no position is ambiguous. They have no sync
+# read (each is read alone), no offset, no volatile torque limit, and no present current. Values
+# marked [A] are assumptions, as they are not documented. Sources: Feetech, SCSCL of its SDK
+# (addresses); rustypot's table of the SCS0009.
+
+SCS_STEPS = 1024
+"""Steps of the potentiometer of an SCS servo."""
+
+SCS_BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 57_600, 38_400, 19_200)
+"""Bit/s by the value of an SCS servo's Baud Rate (6)."""
+
+SCS_MODELS = {
+    model.name: model
+    for model in (
+        # 1024 steps cover 300 and 200 deg; the number is extrapolated to a full turn.
+        ServoModel("scs0009", 1284, 1229, 70, 40, 80, 0.226, 6.0, 1.0, 100.0),
+        # Number and stall current of the SCS15 are assumed.
+        ServoModel("scs15", 1295, 1843, 70, 40, 80, 1.47, 6.0, 2.0, 62.5),
     )
+}
+
+
+_ABSENT = {
+    *("protection_current", "angular_resolution", "position_offset", "operating_mode"),
+    *("velocity_p_gain", "velocity_i_gain", "overcurrent_time", "torque_limit", "present_current"),
+    "phase",
+}
+_ELSEWHERE = {"protective_torque": 37, "protection_time": 38, "overload_torque": 39, "lock": 48}
+_OTHERWISE: dict[str, dict[str, Any]] = {
+    "baud_rate": {"high": len(SCS_BAUD_RATES) - 1},
+    "min_position_limit": {"high": SCS_STEPS - 1},
+    "max_position_limit": {"initial": SCS_STEPS - 1, "high": SCS_STEPS - 1},
+    "unloading_condition": {"initial": 0x24},  # [A]: overheating, overload
+}
+
+SCS_REGISTERS: dict[str, Register] = {
+    name: register._replace(
+        address=_ELSEWHERE.get(name, register.address), order="big", **_OTHERWISE.get(name, {})
+    )
+    for name, register in REGISTERS.items()
+    if name not in _ABSENT
+}
+"""Registers of an SCS servo by name."""
 
 
 def acceleration_units(accel_steps_s2: float | None) -> int:

@@ -100,34 +100,26 @@ def find(line: Transactions, setups: Sequence[ServoConfig]) -> dict[int, int]:
     """Find every servo and check its model; return the firmware of each.
 
     Raises:
-        ServoMissing: some are absent or of another model; the message names all of them, and the
-            servos without a setup, one of which may be the missing one.
+        ServoMissing: some are absent or of another model; the message names all of them.
     """
-    family, began_s = line.family, line.port.now_s()
-    own = {one.id: line.identify(one.id) for one in setups}
-    problems = [text for one in setups if (text := _problem(family, one, own[one.id]))]
-    if not problems:
-        return {servo_id: identity.firmware for servo_id, identity in own.items() if identity}
-    servos, _ = scan_ids(line.port, family, line.baud)
-    strangers = [f"{one.id} ({one.model})" for one in servos if one.id not in own]
-    fault, remedy = "; ".join(problems), "check cables and ids"
-    if not any(own.values()) and not strangers:
-        fault, remedy = "no servo answers", "check servo power, cable and baud rate"
-    elif strangers:
-        fault += f"; unexpected: servo {', '.join(strangers)}"
-        if None in own.values():
-            remedy += "; is one of them the missing one?"
-    text = f"{line.port.port_name}: {fault}"
-    raise ServoMissing(line.lateness.blame(text, remedy, line.port.now_s(), began_s))
-
-
-def _problem(family: Family, setup: ServoConfig, found: Identity | None) -> str:
-    """Return the problem of one servo, "" for none."""
-    if found is None:
-        return f"{setup.label()} does not answer"
-    if found.model_number != family.models[setup.model].number:
-        return f"{setup.label()} is {family.model_name(found.model_number)}, not {setup.model}"
-    return ""
+    family, began_s, firmware = line.family, line.port.now_s(), dict[int, int]()
+    problems = []
+    for one in setups:
+        identity = line.identify(one.id)
+        if identity is None:
+            problems.append(f"{one.label()} does not answer")
+            continue
+        firmware[one.id] = identity.firmware
+        if identity.model_number != family.models[one.model].number:
+            name = family.model_name(identity.model_number)
+            problems.append(f"{one.label()} is {name}, not {one.model}")
+    if problems:
+        fault, remedy = "; ".join(problems), "check cables and ids, or ask gazerig doctor"
+        if not firmware:
+            fault, remedy = "no servo answers", "check servo power, cable and baud rate"
+        text = f"{line.port.port_name}: {fault}"
+        raise ServoMissing(line.lateness.blame(text, remedy, line.port.now_s(), began_s))
+    return firmware
 
 
 def name_firmware(

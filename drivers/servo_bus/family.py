@@ -15,8 +15,6 @@ if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
 
 
-Area = Literal["eeprom", "ram"]
-
 BROADCAST = 0xFE
 PING, READ, WRITE, SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x01, 0x02, 0x03, 0x82, 0x83, 0x8A
 """Id of all servos, and instructions; the protocols of all families have the same ones."""
@@ -33,7 +31,6 @@ class Register(NamedTuple):
     signed: whether it is a two's complement
     sign: index of a separate sign bit before a magnitude; None without one
     order: byte order
-    area: memory of the register; EEPROM keeps values without power
     """
 
     name: str
@@ -46,7 +43,6 @@ class Register(NamedTuple):
     signed: bool = False
     sign: int | None = None
     order: Literal["little", "big"] = "little"
-    area: Area = "ram"
 
     def encode(self, value: int) -> bytes:
         """Return a value as bytes.
@@ -164,7 +160,7 @@ class Family:
 
     name: str
     codec: ModuleType
-    """Module of its packets, with the functions of gazerig.drivers.dynamixel.protocol."""
+    """Module of its packets, with the names of gazerig.drivers.feetech.protocol."""
     registers: Mapping[str, Register]
     models: Mapping[str, ServoModel]
     steps_per_turn: int

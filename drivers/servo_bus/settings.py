@@ -15,9 +15,6 @@ from gazerig.drivers.servo_bus.transaction import Transactions
 if TYPE_CHECKING:
     from gazerig.drivers.types import ServoConfig
 
-Differences = dict[int, dict[str, tuple[int, int]]]
-"""Found and wanted values of registers that differ, by servo and name."""
-
 
 def apply_settings(
     line: Transactions, setups: Mapping[int, "ServoConfig"], ids: Sequence[int], log: EventLog
@@ -48,9 +45,9 @@ def apply_settings(
 
 def _differences(
     line: Transactions, setups: Mapping[int, "ServoConfig"], ids: Sequence[int]
-) -> Differences:
-    """Read servos and return the settings that differ."""
-    different: Differences = {}
+) -> dict[int, dict[str, tuple[int, int]]]:
+    """Return the found and wanted values of settings that differ, by servo and name."""
+    different: dict[int, dict[str, tuple[int, int]]] = {}
     family = line.family
     wanted = {servo_id: family.wanted_settings(setups[servo_id]) for servo_id in ids}
     for span in family.read_spans:

@@ -29,8 +29,7 @@ from gazerig.drivers.servo_bus.transaction import TRIES, Transactions
 from gazerig.drivers.types import ServoConfig
 
 AGAIN_S = 0.5
-"""Time between attempts to set a servo up, and between questions about a fault, whose bit may
-flicker at its threshold."""
+"""Time between attempts to set a servo up, and between questions about a fault."""
 
 PAUSE_S = 0.25
 """Time after a failed attempt, for which other servos waited, in which no servo is set up."""
@@ -85,7 +84,6 @@ class Supervisor:
         self._restarts_s = {i: deque[float](maxlen=MOST_RESTARTS) for i in self._ids}
         self._expected: dict[int, dict[str, int]] = {}  # registers under torque
         self._marked: dict[int, float] = {}  # time of the next attempt to set it up
-        self._problems: dict[int, str] = {}  # result of the last attempt
         self._rearmed: dict[int, float] = {}  # end of its slow way, -inf if it has none
         self._set_speeds()
 
@@ -107,7 +105,6 @@ class Supervisor:
         goals, outside = enable(self._line, self._setups, self._ids)
         self.stop_supervision()
         self._marked.clear()
-        self._problems.clear()
         for servo_id in [*self.faults]:
             self._set_fault(servo_id, "")
         for servo_id, setup in self._setups.items():
@@ -247,35 +244,27 @@ class Supervisor:
 
     def _attend(self, servo_id: int, now_s: float) -> None:
         """Set a marked servo up, or find out why that is not possible."""
-        tries, self._line.tries, again_s = self._line.tries, 1, AGAIN_S
-        before = self._problems.pop(servo_id, "")
+        line, again_s = self._line, now_s + AGAIN_S
+        tries, line.tries = line.tries, 1
         try:
             problem = self._set_up(servo_id, now_s)
-            # Damaged bytes may look like a fault: it must be found twice.
-            again_s = AGAIN_S if problem == before else 0.0
         except ServoFault as error:
             problem = f"{NOT_SET_UP}: {error}"
-            switch_off(self._line, (servo_id,))
+            switch_off(line, (servo_id,))
         except ServoMissing:
-            problem = NOT_SET_UP
+            problem = line.lateness.blame(NOT_SET_UP, BAD_LINE, now_s)
             self._pause_until_s = now_s + PAUSE_S
         finally:
-            self._line.tries = tries
-        if not problem:
-            del self._marked[servo_id]
-            self.held.discard(servo_id)
-            if servo_id in self.faults:
-                self._set_fault(servo_id, "")
-                self._log.add(f"{self._line.label(servo_id)}: the fault is gone")
-            return
-        self._problems[servo_id] = problem
-        self._marked[servo_id] = now_s + again_s
-        if problem == before:
-            if problem == AGAIN_AND_AGAIN:
-                self._marked[servo_id] = inf
-            if problem == NOT_SET_UP:
-                problem = self._line.lateness.blame(problem, BAD_LINE, now_s)
+            line.tries = tries
+        if problem:
+            self._marked[servo_id] = inf if problem == AGAIN_AND_AGAIN else again_s
             self._set_fault(servo_id, problem)
+            return
+        del self._marked[servo_id]
+        self.held.discard(servo_id)
+        if servo_id in self.faults:
+            self._set_fault(servo_id, "")
+            self._log.add(f"{line.label(servo_id)}: the fault is gone")
 
     def _set_up(self, servo_id: int, now_s: float) -> str:
         """Set a servo up as at the start, with torque if the others have it; return its fault.
@@ -312,9 +301,7 @@ class Supervisor:
             often = len(restarts_s) == MOST_RESTARTS and now_s - restarts_s[0] < WITHIN_S
             if has_restarted and often:
                 return AGAIN_AND_AGAIN
-            (position,), outside = enable(line, self._setups, ids)
-            if outside:
-                position = read_positions(line, ids)[servo_id]
+            _, outside = enable(line, self._setups, ids)
             self._record_rearmed({servo_id: -inf, **outside})
             line.errors["rearmed"] += 1
             if has_restarted:

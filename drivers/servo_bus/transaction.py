@@ -52,12 +52,6 @@ def sort_answers(
     return good, (damaged - good.keys()) | twofold
 
 
-def read_some(port: BusPort, deadline_s: float) -> bytes:
-    """Return the bytes that arrive next before the deadline."""
-    more = port.read_until(1, deadline_s)
-    return more + port.read_until(ROOM, port.now_s()) if more else more
-
-
 class Transactions:
     """A port with the time-outs of one bus; every method may raise BusLost.
 
@@ -172,9 +166,10 @@ class Transactions:
             good, damaged = sort_answers(statuses, ids, length, self.family.codec.REFUSAL)
             if len(good) + len(damaged) >= len(ids):
                 return good, damaged
-            more = read_some(self.port, self.deadline_s)
+            more = self.port.read_until(1, self.deadline_s)
             if not more:
                 return good, damaged
+            more += self.port.read_until(ROOM, self.port.now_s())
             self.rx_bytes += len(more)
             raw += more
 
@@ -197,12 +192,13 @@ class Transactions:
             self.lateness.record_late_answer(self.port.now_s())
             self.timeout_s = min(self.most_s, FACTOR * self.timeout_s)
 
-    def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
-        """Read the same bytes of several servos.
+    def ask_span(self, ids: Sequence[int], first: str, last: str) -> dict[int, dict[str, int]]:
+        """Read a range of registers of several servos; return their values by id and name.
 
         A silent servo blocks the servos after it: they are read again without it. If several
         attempts are allowed, silent servos are read again, otherwise none if no servo answers.
         """
+        address, length = self.family.span(first, last)
         values: dict[int, bytes] = {}
         # A busy computer may have delayed an answer, and a servo may be restarting.
         for pause_s in (0.0, 0.0, 0.0, *SETUP_PAUSES_S) if self.tries > 1 else (0.0,):
@@ -216,17 +212,11 @@ class Transactions:
                     break
                 blamed = silent_servos(left, values)
                 left = [i for i in left if i not in values and i not in blamed]
-        return values
+        return {i: self.family.decode(address, data) for i, data in values.items()}
 
     def ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
         """Read one register of several servos; return the values of good answers by id."""
         return {i: values[name] for i, values in self.ask_span(ids, name, name).items()}
-
-    def ask_span(self, ids: Sequence[int], first: str, last: str) -> dict[int, dict[str, int]]:
-        """Read a range of registers of several servos; return their values by id and name."""
-        address, length = self.family.span(first, last)
-        found = self.ask_bytes(ids, address, length)
-        return {servo_id: self.family.decode(address, data) for servo_id, data in found.items()}
 
     def write_all(self, ids: Sequence[int], name: str, values: Iterable[int]) -> None:
         """Write one register of several servos; no servo confirms it."""

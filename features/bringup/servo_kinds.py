@@ -12,7 +12,7 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.feetech import memory_table as feetech
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
-from gazerig.drivers.feetech.scs import FEETECH_SCS
+from gazerig.drivers.feetech.family import FEETECH_SCS
 from gazerig.drivers.servo_bus.family import Family
 
 Tell = Callable[[str], None]

@@ -21,10 +21,10 @@ from gazerig.drivers.dynamixel.control_table import (
     GAINS,
     MODELS,
     PWM_FULL,
+    REGISTERS,
     VELOCITY_UNIT_STEPS_S,
     DynamixelModel,
     Register,
-    registers_of,
 )
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Motor, ServoSpec
@@ -75,12 +75,35 @@ def control_loop(get: Get, model: DynamixelModel) -> Loop:
     )
 
 
+def registers_of(model: DynamixelModel) -> tuple[Register, ...]:
+    """Return a model's registers with its initial values."""
+    absent = {"pwm_slope"} if model.series == "x430" else set[str]()
+    if model.current_limit is None:
+        absent |= {"current_limit", "goal_current"}
+    initial: dict[str, int | None] = {
+        "model_number": model.number,
+        "temperature_limit": model.temperature_limit,
+        "max_voltage_limit": model.max_voltage,
+        "min_voltage_limit": model.min_voltage,
+        "current_limit": model.current_limit,
+        "velocity_limit": model.velocity_limit,
+        "pwm_slope": 255 if model.name.startswith("xc330-t") else 140,
+        "shutdown": model.shutdown,
+        **dict(zip(GAINS, model.gains, strict=True)),
+    }
+    return tuple(
+        one._replace(initial=initial.get(one.name, one.initial))
+        for one in REGISTERS.values()
+        if one.name not in absent
+    )
+
+
 class DynamixelMemory(ServoMemory):
     """One servo's control table."""
 
     def __init__(self, model: DynamixelModel) -> None:
         registers = registers_of(model)
-        super().__init__(registers, max(r.address + r.size for r in registers))
+        super().__init__(registers, max(r.address + r.size for r in registers), EEPROM_END)
         self.by_address = {register.address: register for register in registers}
         self._defined = {r.address + i for r in registers for i in range(r.size)}
 

@@ -33,16 +33,16 @@ from gazerig.drivers.feetech.memory_table import (
     EEPROM_END,
     HIGHEST_ID,
     MODELS,
+    REGISTERS,
     SCS_BAUD_RATES,
     SCS_MODELS,
+    SCS_REGISTERS,
     SCS_STEPS,
     SET_MIDDLE,
     TORQUE_FULL,
     Register,
-    registers_of,
 )
 from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN as TURN
-from gazerig.drivers.feetech.scs import SCS_REGISTERS
 from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.sim_mock.feetech.packets import signed, unsigned
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
@@ -86,15 +86,21 @@ class FeetechMemory(ServoMemory):
 
     def __init__(self, model: ServoModel, servo_id: int, firmware: int) -> None:
         scs = model.name in SCS_MODELS
-        own = {"id": servo_id, "return_delay_time": RETURN_DELAY, "firmware_minor": firmware}
-        if scs:
-            own["model_number"] = model.number
+        own = {
+            "id": servo_id,
+            "return_delay_time": RETURN_DELAY,
+            "firmware_minor": firmware,
+            "model_number": model.number,
+            "temperature_limit": model.temperature_limit,
+            "max_voltage_limit": model.max_voltage,
+            "min_voltage_limit": model.min_voltage,
+        }
         registers = [
             register._replace(initial=own.get(register.name, register.initial))
-            for register in (SCS_REGISTERS.values() if scs else registers_of(model))
+            for register in (SCS_REGISTERS if scs else REGISTERS).values()
         ]
         self._kept = bytearray(SIZE)
-        super().__init__(registers, SIZE)
+        super().__init__(registers, SIZE, EEPROM_END)
         writable = [r for r in registers if r.access == "rw"]
         self._writable = {r.address + i for r in writable for i in range(r.size)}
         last_baud = len(SCS_BAUD_RATES if scs else BAUD_RATES) - 1

@@ -9,16 +9,17 @@ class ServoMemory(ABC):
     """One servo's registers.
 
     Args:
-        registers: entries of its make's data sheet, with name, address, size, initial value and
-            area.
+        registers: entries of its make's data sheet, with name, address, size and initial value.
         size: number of bytes.
+        eeprom_end: address of the first register of the RAM.
     """
 
-    def __init__(self, registers: Iterable[Any], size: int) -> None:
+    def __init__(self, registers: Iterable[Any], size: int, eeprom_end: int) -> None:
         self.registers = {register.name: register for register in registers}
         self.bytes = bytearray(size)
-        self.restore("eeprom")
-        self.restore("ram")
+        self._eeprom_end = eeprom_end
+        self.restore(eeprom=True)
+        self.restore(eeprom=False)
 
     def get(self, name: str) -> int:
         """Return a register's value."""
@@ -36,15 +37,16 @@ class ServoMemory(ABC):
         """Set a register so that a restart keeps it."""
         self.set(name, value)
 
-    def restore(self, area: str) -> None:
+    def restore(self, eeprom: bool) -> None:
         """Restore the start values of the EEPROM or of the RAM."""
         for name, register in self.registers.items():
-            if register.initial is not None and register.area == area:
+            is_kept = register.address < self._eeprom_end
+            if register.initial is not None and is_kept == eeprom:
                 self.set_permanently(name, register.initial)
 
     def power_up(self) -> None:
         """Set the registers to their values after power-on."""
-        self.restore("ram")
+        self.restore(eeprom=False)
 
     @abstractmethod
     def decode(self, register: Any, data: bytes | bytearray) -> int:

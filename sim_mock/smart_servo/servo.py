@@ -300,7 +300,7 @@ class EmulatedServo(ABC):
 
     def reset_all(self) -> None:
         """Restore factory settings, id 1, and restart."""
-        self.memory.restore("eeprom")
+        self.memory.restore(eeprom=True)
         self.restart()
 
     def turn(self, steps: float) -> None:
