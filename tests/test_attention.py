@@ -44,14 +44,6 @@ def test_what_spins_about_the_line_of_view_is_attended_to_and_what_spins_across_
     assert found.total == pytest.approx([0.0, 0.35 * (1.0 - exp(-2.0 / 0.35)), 0.0])
 
 
-def test_pulls_rise_with_the_time_constant() -> None:
-    model = BottomUp(BottomUpParams())
-    seen = percept(0.0, body(1, "hand", (1, 0, 0), (0, 1, 0)))
-    for k in range(11):
-        pull = salience(model, seen.bodies, (0, 0, 0), k * 0.01).translation
-    assert pull[0] == pytest.approx(2.0 * (1.0 - np.exp(-1.0)), rel=0.02)
-
-
 @pytest.mark.parametrize(
     ("yaw", "pitch", "seen"),
     [(0, 0, True), (95, 0, True), (105, 0, False), (0, 55, True), (0, 65, False), (0, -70, True),
@@ -61,12 +53,6 @@ def test_field_of_both_eyes(yaw: float, pitch: float, seen: bool) -> None:
     y, p = radians(yaw), radians(pitch)
     far = (100 * np.cos(p) * np.cos(y), 100 * np.cos(p) * np.sin(y), 100 * np.sin(p))
     assert bool(visible_bodies(bodies(body(1, "x", far)).rows(), looking())) is seen
-
-
-def test_field_turns_with_the_eyes() -> None:
-    behind = bodies(body(1, "x", (-0.5, 100.0, 0.0))).rows()
-    assert visible_bodies(behind, looking(40.0)) == {1: "x"}
-    assert visible_bodies(behind, looking(-40.0)) == {}
 
 
 def test_the_face_wins_over_a_resting_hand_and_loses_to_a_waving_one() -> None:

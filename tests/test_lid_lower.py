@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.gaze.lids.blink import LidParams
-from gazerig.gaze.lids.lids import LidOpenings, Lids, Side
+from gazerig.gaze.lids.lids import LidOpenings, Lids
 from gazerig.gaze.types import GazeCommand
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 
@@ -92,17 +92,6 @@ def test_lids_that_meet_have_their_joints_at_the_calibrated_ends() -> None:
     assert joints(shut) == pytest.approx({name: shut for name, (shut, _) in ends.items()})
     assert joints(level)["right_upper_lid"] == pytest.approx(radians(-22.0 + 0.75 * 46.0))
     assert joints(level)["right_lower_lid"] == pytest.approx(radians(-9.0 + 0.8 * 30.0))
-
-
-@pytest.mark.parametrize("side", ["left", "right"])
-def test_a_wink_shuts_both_lids_of_one_eye(side: Side) -> None:
-    model, index = lids(), 3 if side == "left" else 4
-    model.step(0.995, 0.0, None)
-    model.wink(side, 1.0)
-    trace = np.array([model.step(1.0 + k * DT, 0.0, None) for k in range(200)])
-    assert 0.2 <= (trace[:, index] < 0.001).sum() * DT <= 0.25
-    assert (trace[:, 7 - index] == AWAKE).all()
-    assert trace[-1, index] == AWAKE
 
 
 def test_lids_glide_to_what_they_are_retuned_to() -> None:

@@ -51,13 +51,6 @@ def test_e35_transitions_follow_the_normalised_matrix() -> None:
     assert counts[wanted == 0.0].sum() == 0
 
 
-def test_e36_rows_are_from_and_columns_to() -> None:
-    parts = drawn(200_000)
-    share = np.bincount(parts, minlength=8) / len(parts)
-    assert share[WALK.order.index("N")] == pytest.approx(0.222, abs=0.010)
-    assert share[WALK.order.index("RE")] == pytest.approx(0.255, abs=0.010)
-
-
 FACE = Face(
     3,
     (1.0, 0.0, 0.2),
