@@ -38,9 +38,10 @@ def face(nose: Vec3 = NOSE) -> Face:
 
 
 def seen(t_s: float, *rows: Row, nose: Vec3 | None = NOSE) -> Percept:
-    faces = () if nose is None else (face(nose),)
-    found = percept(t_s, *rows)
-    return structs.replace(found, faces=faces)
+    if nose is None:
+        return percept(t_s, *rows)
+    found = percept(t_s, body(1, "face", nose), *rows)
+    return structs.replace(found, faces=(face(nose),))
 
 
 def fist(id: int, p: Vec3, v: Vec3 = (0.0, 0.0, 0.0)) -> Row:
@@ -60,12 +61,12 @@ def stepped(planner: ActionPlanner, percepts: list[Percept], late_s: float = 0.0
 
 
 def test_time_to_contact_is_the_way_to_go_over_the_closing_speed() -> None:
-    (_, one) = approaches(punch(0.0).bodies, EYE, 0.06)
+    (*_, one) = approaches(punch(0.0).bodies, EYE, 0.06)
     assert (one.id, one.kind) == (3, "hand")
     assert one.closing_m_s == pytest.approx(2.5, rel=1e-3)
     assert one.contact_s == pytest.approx(0.5 / 2.5 - 0.06, abs=2e-3)
     assert one.miss_m == pytest.approx(0.02, abs=1e-6)
-    (_, back) = approaches(punch(0.0, speed_m_s=-2.0).bodies, EYE)
+    (*_, back) = approaches(punch(0.0, speed_m_s=-2.0).bodies, EYE)
     assert (back.contact_s, back.miss_m) == (inf, inf) and back.closing_m_s < 0.0
 
 
@@ -81,7 +82,7 @@ def test_a_punch_is_guarded_against_after_the_reaction_time_and_its_fist_is_name
 def test_a_punch_whose_speed_is_certain_is_guarded_against_at_once() -> None:
     for sd_m_s, action in ((0.3, "guard"), (1.2, "wait")):
         one = punch(0.0)
-        cov = np.zeros((2, 6, 6))
+        cov = np.zeros((len(one.bodies.ids), 6, 6))
         cov[:, 3:, 3:] = np.eye(3) * sd_m_s**2
         sure = structs.replace(one, bodies=structs.replace(one.bodies, pv_cov=cov))
         assert ActionPlanner().step(sure, EYE, 0.0).action == action
@@ -131,9 +132,9 @@ def test_guard_lasts_its_shortest_time_and_a_slower_fist_does_not_end_it() -> No
     assert 0.3 - 2 * DT_S < kept * DT_S < 0.3 + DT_S
 
 
-def opened(t_s: float, *, parted: bool) -> Percept:
+def opened(t_s: float, *more: Row, parted: bool) -> Percept:
     z, y = (0.05, 0.25) if parted else (-0.45, 0.16)
-    return seen(t_s, fist(2, (0.9, y, z)), fist(3, (0.9, -y, z)))
+    return seen(t_s, *more, fist(2, (0.9, y, z)), fist(3, (0.9, -y, z)))
 
 
 @pytest.mark.parametrize("parted", [True, False])
@@ -171,17 +172,7 @@ def test_an_opponent_has_two_hands_and_a_third_that_comes_later_protects_nothing
     planner = ActionPlanner()
     stepped(planner, [guarding(k * DT_S) for k in range(9)])
     third = fist(9, (0.6, 0.0, -0.18))
-    frames = []
-    for k in range(30):
-        open_one = opened((9 + k) * DT_S, parted=True)
-        rows = [
-            fist(number, tuple(place))
-            for number, place in zip(
-                open_one.bodies.ids, open_one.bodies.p_world_m.tolist(), strict=True
-            )
-        ]
-        frames.append(seen(open_one.captured_s, third, *rows))
-    plans = stepped(planner, frames)
+    plans = stepped(planner, [opened((9 + k) * DT_S, third, parted=True) for k in range(30)])
     assert any(plan.action == "attack" and "chest" in plan.why for plan in plans)
 
 
@@ -257,27 +248,15 @@ def looks(model: Attention, percepts: list[Percept]) -> list[Target]:
     return [model.choose(one, looking(), one.captured_s) for one in percepts]
 
 
-def with_face(found: Percept) -> Percept:
-    """Return the percept with the face among its bodies, too, as perception gives it."""
-    rows = [body(1, "face", NOSE)] + [
-        body(id, kind, (p[0], p[1], p[2]), (v[0], v[1], v[2]))
-        for id, kind, p, v in zip(
-            found.bodies.ids, found.bodies.kinds, found.bodies.p_world_m.tolist(),
-            found.bodies.v_world_m_s.tolist(), strict=True,
-        )
-    ]  # fmt: skip
-    return structs.replace(percept(found.captured_s, *rows), faces=found.faces)
-
-
 def test_the_place_to_be_hit_is_a_target_of_its_own_that_moves_with_the_opponent() -> None:
     model = planned_attention()
     frames = [guarding(0.0), *(opened((1 + k) * DT_S, parted=True) for k in range(9))]
-    last = looks(model, [with_face(one) for one in frames])[-1]
+    last = looks(model, frames)[-1]
     assert (last.kind, last.id, last.salience, last.top_down) == ("attack_target", -1, 0.9, True)
     assert last.p_world_m == pytest.approx((1.0, 0.0, -0.3))
     assert last.plan.startswith("attack: chest is open")
     moved = structs.replace(opened(10 * DT_S, parted=True), faces=(face((0.95, 0.02, 0.0)),))
-    (then,) = looks(model, [with_face(moved)])
+    (then,) = looks(model, [moved])
     assert then.p_world_m == pytest.approx((0.95, 0.02, -0.3)) and then.shift == last.shift
 
 
@@ -285,7 +264,7 @@ def test_a_choice_of_the_menu_overrules_the_planner_until_it_is_given_back() -> 
     model = planned_attention()
     assert model.top_down.behaviours == ("attack", "guard", "wait", PLANNED)
     assert model.top_down.chosen_behaviour == PLANNED
-    frames = [with_face(guarding(k * DT_S)) for k in range(20)]
+    frames = [guarding(k * DT_S) for k in range(20)]
     looks(model, frames[:2])
     model.top_down.behave("attack")
     target = looks(model, frames[2:4])[-1]
@@ -295,14 +274,14 @@ def test_a_choice_of_the_menu_overrules_the_planner_until_it_is_given_back() -> 
     assert (target.kind, target.plan) == ("hand", "guard: asked for")
     assert model.top_down.chosen_behaviour == "guard"
     model.top_down.behave("wait")
-    punched = [with_face(punch(k * DT_S)) for k in range(6, 12)]
+    punched = [punch(k * DT_S) for k in range(6, 12)]
     assert {one.plan for one in looks(model, punched)} == {"wait: asked for"}
     model.top_down.behave(PLANNED)
     assert looks(model, [structs.replace(punched[-1], captured_s=12 * DT_S)])[0].plan[:5] in (
         "wait:",
         "guard",
     )
-    later = [with_face(punch(k * DT_S)) for k in range(13, 16)]
+    later = [punch(k * DT_S) for k in range(13, 16)]
     assert looks(model, later)[-1].plan.startswith("guard: hand 3 arrives")
 
 
@@ -317,13 +296,13 @@ def test_a_sinking_hand_is_watched_in_a_match(boxes: bool) -> None:
         )
         for k in range(44)
     ]
-    kinds = {one.kind for one in looks(model, [with_face(one) for one in sinks])}
+    kinds = {one.kind for one in looks(model, sinks)}
     assert ("hand" in kinds) == boxes
 
 
 def test_without_a_planner_nothing_is_planned_and_planned_is_no_choice() -> None:
     model = attention()
-    targets = looks(model, [with_face(punch(k * DT_S)) for k in range(6)])
+    targets = looks(model, [punch(k * DT_S) for k in range(6)])
     assert {one.plan for one in targets} == {""} and model.top_down.behaviour == "wait"
     with pytest.raises(ValueError, match="no rule for behaviour 'planned'"):
         model.top_down.behave(PLANNED)
@@ -337,7 +316,7 @@ def test_a_planner_needs_the_rules_it_chooses_between() -> None:
 
 def test_the_planner_switched_off_leaves_the_behaviour_of_the_start() -> None:
     model = planned_attention()
-    looks(model, [with_face(punch(k * DT_S)) for k in range(4)])
+    looks(model, [punch(k * DT_S) for k in range(4)])
     assert model.top_down.behaviour == "guard"
     model.top_down.retune(TopDownParams())
     assert model.top_down.behaviour == "wait" and not model.top_down.plans

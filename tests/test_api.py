@@ -96,26 +96,14 @@ def test_an_order_ends_on_request_or_after_its_time(head: gazerig.SimulatedHead)
     assert timed.wait() == "taken over" and timed.why == "its time is over"
 
 
-def test_a_stopped_head_refuses_orders_until_it_resumes(head: gazerig.SimulatedHead) -> None:
-    head.stop("a hand")
-    assert head.state.stopped == "a hand" and head.state.level == "torque_off"
-    order = head.look_at(1.0, 0.0, 0.3)
-    assert order.wait() == "refused" and "resume first" in order.why and order.refused
-    assert head.resume().refused  # a stop holds two seconds
-    head.step(2.1)
-    assert not head.resume().refused and head.state.stopped == ""
-
-
 @pytest.mark.parametrize(
     ("ask", "rule"),
     [
         (lambda head: head.look_at(nan, 0.0, 0.0), "look_at: .*p_world_m"),
         (lambda head: head.look_at(1.0, 0.0, 0.0, frame="moon"), "expected world or head"),
         (lambda head: head.jog("nose", 1.0), "no joint 'nose'"),
-        (lambda head: head.jog("neck_yaw", 100.0), "outside its range"),
         (lambda head: head.express("smug"), "no expression 'smug'"),
         (lambda head: head.move_opponent(0.7, 0.0, 0.0), "no opponent to move"),
-        (lambda head: head.set({"gaze.head.eye_only_range_deg": 1e9}), "0 to 180 deg"),
         (lambda head: head.get("gaze.hed"), "no key .hed."),
         (lambda head: head.save(), "is part of the program and is never changed"),
         (lambda head: next(head.states(0.0)), "above 0"),
@@ -203,20 +191,6 @@ def test_a_program_sleeps_by_the_head_s_clock(head: gazerig.SimulatedHead) -> No
 def test_a_condition_is_waited_for(head: gazerig.SimulatedHead) -> None:
     assert head.run_until(lambda state: state.gaze.phase == "saccade", 5.0)
     assert not head.run_until(lambda state: state.t_s < 0.0, 0.1)
-
-
-def bytes_sent(seed: int) -> tuple[str | None, float]:
-    with gazerig.open("desk", fast=True, scene="visitor", seed=seed, say=quiet) as head:
-        head.step(0.5)
-        head.look_at(1.0, 0.5, 0.3).wait()
-        head.play("nod")
-        head.step(0.5)
-        sums = sum(joint.commanded_rad for joint in head.joints.values())
-        return head.state.gaze.target, sums
-
-
-def test_the_same_steps_and_orders_give_the_same(head: gazerig.SimulatedHead) -> None:
-    assert bytes_sent(1) == bytes_sent(1) != bytes_sent(2)
 
 
 def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:

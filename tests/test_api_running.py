@@ -129,15 +129,10 @@ def test_a_fork_leaves_the_head_to_its_parent(said: list[str], opened: Open) -> 
     assert_let_go(said)
 
 
-def test_an_exception_in_the_block(said: list[str], opened: Open) -> None:
-    with pytest.raises(ZeroDivisionError), opened():
-        raise ZeroDivisionError
-    assert_let_go(said)
-
-
-def test_an_interrupt_in_the_block(said: list[str], opened: Open) -> None:
-    with pytest.raises(KeyboardInterrupt), opened():
-        raise KeyboardInterrupt
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
+def test_an_error_in_the_block(said: list[str], opened: Open, error: type[BaseException]) -> None:
+    with pytest.raises(error), opened():
+        raise error
     assert_let_go(said)
 
 

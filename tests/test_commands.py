@@ -163,17 +163,6 @@ def test_two_stops_are_one_and_a_resume_of_nothing_is_nothing(running: Running) 
     assert sum("stopped" in event for event in tick.events) == 1
 
 
-def test_the_head_looks_at_a_chosen_point_and_freely_again(running: Running) -> None:
-    point = (1.2, 0.6, 0.3)
-    running.order(LookAt(point, stay=True))
-    ticks = running.go(2.0)
-    assert ticks[0].target.kind == "puppet" and ticks[-1].target.p_world_m == point
-    assert ticks[-1].gaze.gaze_point_world_m == pytest.approx(point, abs=0.02)
-    assert ticks[-1].guard_result.level in ("ok", "limited")
-    running.order(LookAt(None))
-    assert running.go(1.0)[-1].target.kind == "face"
-
-
 def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running) -> None:
     held = running.ticks[-1].guard_result.command_rad
     running.order(Jog((("neck_yaw", radians(25.0)),), stay=True))

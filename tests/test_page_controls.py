@@ -1,25 +1,27 @@
 """Actions on the page reach the rig: menus, joints, parameters; and its answers return."""
 
 import json
+import re
 import socket
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from math import radians
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 import pytest
-from msgspec import structs
 from page_visitor import PATIENCE_S
 from shown_page import PARAM, SNAPSHOT, wait_for
 from stand_in import StandIn
+from test_tuning import Bench
 
+from gazerig.config.load import ConfigError
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
+from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.dashboard.feed.page_process import (
     MESSAGE,
     PARAMS,
@@ -42,7 +44,7 @@ from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.requests.page_requests import PAGE, PageRequestHandler
 from gazerig.robot.dashboard.widgets.widget import TextField
 from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
-from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, Value, set_client
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, set_client
 from gazerig.robot.model.parameter import Parameter
 
 
@@ -139,74 +141,19 @@ def test_a_rig_that_takes_nothing_holds_up_nobody() -> None:
 # --- what the rig makes of it -----------------------------------------------------------------
 
 
-class Refused(Exception):
-    """As the tuning refuses."""
-
-
-class Saved(NamedTuple):
-    path: Path
-    backup: Path | None
-    changes: tuple[object, ...] = ()
-
-
-class OneParam(StandIn):
-    """The parameters of a rig that has one."""
-
-    path = Path("/rigs/mine.yaml")
-    character_name = "none"
-
-    def __init__(self) -> None:
-        self.version = 0
-        self.value: Value = 1.0
-        self.saved_as: Path | None = None
-
-    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
-        if changes.get("a.b") == 99:
-            raise Refused("a.b: 99 is above 10")
-        self.value = changes["a.b"]
-        self.version += 1
-        return ("a.b = 2", "a.c = 3 (at the next start)")
-
-    def save(self, path: Path | None = None) -> Saved:
-        self.saved_as = path
-        return Saved(path or self.path, Path("/rigs/mine.yaml.1"))
-
-    def revert(self) -> tuple[str, ...]:
-        self.value = 1.0
-        return ()
-
-    def parameters(self) -> tuple[Parameter, ...]:
-        live = [structs.replace(PARAM, key=f"a.{n}") for n in range(99)]
-        return (*live, PARAM, structs.replace(PARAM, key="a.c", live="next start"))
-
-    def values(self) -> dict[str, Value]:
-        return {f"a.{n}": (1.0, 2.0) for n in range(99)} | {"a.b": self.value, "a.c": 3.0}
-
-    def unsaved(self) -> tuple[object, ...]:
-        return ()
-
-    def characters(self) -> tuple[str, ...]:
-        return ("none", "calm")
-
-    def apply_character(self, name: str) -> tuple[str, ...]:
-        raise Refused(f"unknown character {name}")
-
-    def get(self, prefix: str) -> dict[str, Value]:
-        return self.values()
-
-
 class Heard(NamedTuple):
     hear: PageRequestHandler
     orders: list[Command]
-    tuning: OneParam
-    saved: list[Path]
+    tuning: ParamStore
+
+
+CLOSE = "gaze.lids.close_ms"
 
 
 @pytest.fixture
 def heard() -> Heard:
     orders: list[Command] = []
-    saved: list[Path] = []
-    tuning = OneParam()
+    tuning = Bench("desk").tuning
 
     def point(x: float, y: float) -> Vec3 | None:
         return (1.0, x, y) if x < 0.9 else None
@@ -216,10 +163,9 @@ def heard() -> Heard:
         tuning,
         point,
         steer=lambda way: f"went {way}",
-        refusals=(Refused,),
-        saved=saved.append,
+        refusals=(ConfigError,),
     )
-    return Heard(hear, orders, tuning, saved)
+    return Heard(hear, orders, tuning)
 
 
 def test_orders_are_obeyed(heard: Heard) -> None:
@@ -251,17 +197,20 @@ def test_a_click_in_the_picture_is_looked_at(heard: Heard) -> None:
 
 
 def test_parameters_are_put_in_force_or_refused(heard: Heard) -> None:
-    words = heard.hear({"do": "set", "changes": {"a.b": [1, 2]}})
-    assert heard.tuning.value == (1, 2)
-    assert words == "a.c = 3 (at the next start)"  # what did work is seen in the controls
-    assert heard.hear({"do": "set", "changes": {"a.b": 99}}) == "refused: a.b: 99 is above 10"
-    assert heard.hear({"do": "character", "name": "mad"}) == "refused: unknown character mad"
-    assert heard.hear({"do": "revert"}) is not None and heard.tuning.value == 1.0
+    words = heard.hear({"do": "set", "changes": {CLOSE: 90, "loop.rate_hz": 100}})
+    assert heard.tuning.get(CLOSE) == {CLOSE: 90.0}
+    # What did work is seen in the controls.
+    assert words == "loop.rate_hz = 100.0 (at the next start)"
+    for wrong in ({"do": "set", "changes": {CLOSE: 9e9}}, {"do": "character", "name": "mad"}):
+        words = heard.hear(wrong)
+        assert words is not None and re.match(r"refused: .*(500 ms|'mad')", words)
+    assert heard.hear({"do": "revert"}) is not None
+    assert heard.tuning.get(CLOSE) == {CLOSE: 75.0}
     assert heard.hear({"steer": "left"}) == "went left"
 
 
-def test_the_feed_tells_all_once_and_then_what_changed() -> None:
-    tuning, sent, room = OneParam(), [], [5]
+def test_the_feed_tells_all_once_and_then_what_changed(heard: Heard) -> None:
+    tuning, sent, room = heard.tuning, [], [5]
 
     def send(message: bytes) -> bool:
         assert len(message) < MESSAGE_BYTES
@@ -277,16 +226,16 @@ def test_the_feed_tells_all_once_and_then_what_changed() -> None:
     room[0] = 100
     feed.step()
     keys = [param["key"] for kind, data in sent if kind == PARAMS for param in data]
-    assert keys == [*(f"a.{n}" for n in range(99)), "a.b"]
+    assert keys == [param.key for param in tuning.parameters() if param.live == PARAM.live]
     values = {k: v for kind, d in sent if kind == VALUES for k, v in d["values"].items()}
-    assert list(values) == keys and values["a.0"] == [1.0, 2.0]
+    assert list(values) == keys and values[CLOSE] == 75.0
     before = len(sent)
     feed.step()
     assert len(sent) == before
-    tuning.set({"a.b": 5.0})
+    tuning.set({CLOSE: 90.0})
     feed.step()
     ((kind, state),) = sent[before:]
-    assert (kind, state["values"], state["path"]) == (VALUES, {"a.b": 5.0}, "/rigs/mine.yaml")
+    assert (kind, state["values"], state["path"]) == (VALUES, {CLOSE: 90.0}, str(tuning.path))
 
 
 # --- Controls of the page: menus, joints and parameters, in every browser

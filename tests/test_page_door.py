@@ -74,9 +74,10 @@ def test_a_foreign_name_for_this_machine_is_refused(near: Rig, host: str) -> Non
 
 @pytest.mark.parametrize("origin", [ELSEWHERE, "null", "http://127.0.0.1:1", None])
 def test_a_page_of_another_origin_gets_no_websocket(near: Rig, origin: str | None) -> None:
-    with pytest.raises(InvalidStatus) as refused:
-        near.knock(origin=origin)
-    assert refused.value.response.status_code == 403
+    for path in ("/view", "/rig/panels"):
+        with pytest.raises(InvalidStatus) as refused:
+            near.knock(path, origin=origin)
+        assert refused.value.response.status_code == 403
 
 
 @pytest.mark.parametrize("origin", [ELSEWHERE, "null", None])
@@ -340,7 +341,7 @@ def test_without_the_token_nothing_moves(either: Rig, cookie: str | None) -> Non
     given = None if cookie is None else f"{either.door._cookie}={cookie}"
     for body in (b'{"do":"resume"}', b'{"do":"stop","why":"x"}'):
         assert either.post(body, Cookie=given)[0] == 403
-    for path in ("/view", "/rig/line"):
+    for path in ("/view", "/rig/line", "/rig/panels"):
         with pytest.raises(InvalidStatus) as refused:
             either.knock(path, Cookie=given)
         assert refused.value.response.status_code == 403

@@ -5,7 +5,6 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -179,29 +178,6 @@ def test_a_page_that_hangs_is_ended_and_one_that_beats_is_not(beats: bool) -> No
     finally:
         page.close()
         theirs.close()
-
-
-def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
-    heard: list[object] = []
-    slow = threading.Event()
-
-    def hear(asked: dict[str, object]) -> str | None:
-        if asked.get("do") == "stop":
-            heard.append(asked["why"])
-        else:
-            slow.wait(PATIENCE_S)  # the request takes for ever
-        return None
-
-    page = PageProcess("127.0.0.1", free_port(), hear)
-    page.open()
-    try:
-        visitor = Visitor(wait_for(page.url, "the page's address"))
-        answers = [visitor.ask({"do": "resume", "pad": "x" * 1500}) for _ in range(20)]
-        assert {*answers} <= {409, 429}  # the rig is busy; or too many at once
-        assert visitor.ask({"do": "stop", "why": "a test"}) == 204 and len(heard) == 1
-    finally:
-        slow.set()
-        page.close()
 
 
 PARENT = """

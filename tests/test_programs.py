@@ -455,15 +455,6 @@ def test_messages_that_are_dropped_are_refused_together() -> None:
     assert "too many requests" in refusal["refused"] and refusal["messages"] == 3
 
 
-def test_a_program_that_sends_a_little_too_much_stays(rig: Rig) -> None:
-    with rig.dial() as end:
-        end.socket.sendall(200 * client_frame('{"do": "status"}'))
-        assert "too many requests" in heard(end, "refused")["refused"]
-        time.sleep(1.0)
-        ask(end, do="status", tag="still there")
-        assert "ok" in heard(end, "tag", "still there")
-
-
 def test_commands_that_wait_are_refused_by_a_stop_and_questions_are_not() -> None:
     async def stop() -> list[Any]:
         program, orders = programs.ProgramSocket(0.0, False), asyncio.Queue[dict[str, Any]]()
