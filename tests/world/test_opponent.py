@@ -100,13 +100,9 @@ def test_the_recording_of_a_moved_opponent_repeats_to_the_bit(tmp_path: Path) ->
 
     options = replace(BOXING, character="strong_boxer")
     rig = with_options(load_rig("desk", "strong_boxer"), options)
-    ticks: list[list[Tick]] = [
-        record(tmp_path / f"{n}.mcap", rig, 3.0, options, order) for n in range(2)
-    ]
-    assert any(tick.target.plan.startswith("guard") for tick in ticks[0])
-    ordered = [one for tick in ticks[0] for one in tick.commands]
+    ticks: list[Tick] = record(tmp_path / "run.mcap", rig, 3.0, options, order)
+    assert any(tick.target.plan.startswith("guard") for tick in ticks)
+    ordered = [one for tick in ticks for one in tick.commands]
     assert len(ordered) == 40 and all(isinstance(one, MoveOpponent) for one in ordered)
-    assert [t.commands for t in ticks[0]] == [t.commands for t in ticks[1]]
-    assert [t.target for t in ticks[0]] == [t.target for t in ticks[1]]
-    found = rerun(RunRecording(tmp_path / "0.mcap"))
+    found = rerun(RunRecording(tmp_path / "run.mcap"))
     assert found.is_same and found.agreeing_ticks == found.ticks == 599
