@@ -3,7 +3,7 @@
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import child_processes
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from recorded_run import Recorded
 
     from gazerig.config.schema import Rig
+    from gazerig.robot.app.assemble import Assembly
 
 # The same examples every time; HYPOTHESIS_PROFILE=search draws others. A busy machine is no fault.
 settings.register_profile("steady", derandomize=True, deadline=None)
@@ -64,6 +65,26 @@ def no_process_outlives_its_test() -> Iterator[None]:
     yield
     if left := child_processes.end_others(before):
         pytest.fail(f"the test left processes that went on: {left}")
+
+
+@pytest.fixture
+def started() -> Iterator["Callable[[Rig], Assembly]"]:
+    """Return what starts a rig before a visitor in simulated time; all are closed at the end."""
+    from gazerig.robot.app.assemble import assemble
+    from gazerig.robot.app.options import RunOptions
+
+    begun = []
+
+    def start(rig: "Rig") -> "Assembly":
+        made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+        begun.append(made)
+        made.robot.start(made.clock)
+        return made
+
+    yield start
+    for made in begun:
+        made.robot.stop()
+        made.close()
 
 
 def shipped_rig(name: str) -> "Rig":

@@ -6,13 +6,13 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from fakes.runs import play
 from msgspec import structs
 from present import present
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.feed.live_feed import LiveRig
@@ -32,10 +32,7 @@ def visit(name: str) -> tuple[Assembly, Tick]:
     """Return a rig, and its tick after 1.2 s: it looks at the mouth of a person."""
     options = RunOptions(rig=name, mock=True, fast=True, seed=0, scene="face-to-face", bus="ideal")
     made, ticks = assemble(load_rig(name), options), list[Tick]()
-    made.robot.start(made.clock)
-    run(made.robot, made.clock, made.loop, lambda s: "over" if s >= 1.2 else None, ticks.append)
-    made.robot.stop()
-    made.close()
+    play(made, 1.2, ticks.append)
     return made, ticks[-1]
 
 

@@ -1,5 +1,6 @@
 """Two servos that move two joints together: geometry, servo limits, feedback, and a run."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import degrees, inf, radians
 from pathlib import Path
@@ -15,9 +16,8 @@ from gazerig.config.load import shipped_path
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Feedback
-from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.bus_wiring import servo_configs
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.coupled_servos import CoupledServos
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.coupling import CouplingParams
@@ -108,11 +108,12 @@ def test_one_servo_of_a_pair_speaks_for_both_joints() -> None:
     assert servos.share_feedback(later, released=True).torque == (True, True, True)
 
 
-def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only() -> None:
+def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
+    started: Callable[[Rig], Assembly],
+) -> None:
     """Joints are measured where they are sent, through two servos that know of no joints."""
     rig = rig_with(COUPLING)
-    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
-    made.robot.start(made.clock)
+    made = started(rig)
     asked = (("neck_pitch", radians(20.0)), ("neck_roll", radians(-15.0)))
     made.robot.command(Jog(asked, stay=True))
     sent: list[list[int]] = []
@@ -135,13 +136,11 @@ def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
     for goal in sent:
         for name, steps in zip(rig.names, goal, strict=True):
             assert setups[name].min_steps - 1 <= steps <= setups[name].max_steps + 1
-    made.close()
 
 
-def test_a_lost_servo_of_a_pair_makes_both_joints_stale() -> None:
+def test_a_lost_servo_of_a_pair_makes_both_joints_stale(started: Callable[[Rig], Assembly]) -> None:
     rig = rig_with(COUPLING)
-    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
-    made.robot.start(made.clock)
+    made = started(rig)
     read = made.robot.body.bus.read
     k = rig.names.index("neck_roll")
 
@@ -160,7 +159,6 @@ def test_a_lost_servo_of_a_pair_makes_both_joints_stale() -> None:
     held = {reason.partition(":")[0] for reason in tick.guard_result.reasons}
     assert {"neck_pitch", "neck_roll"} <= held
     assert inf > min(tick.joints.measured_s) > -inf
-    made.close()
 
 
 def coupled_file(tmp_path: Path) -> str:
@@ -189,7 +187,9 @@ def test_bring_up_of_a_coupled_neck(tmp_path: Path) -> None:
     assert float(row[3]) == pytest.approx(-8.0, abs=0.2)
 
 
-def test_hobby_servos_of_a_coupled_neck_get_the_range_of_both_joints() -> None:
+def test_hobby_servos_of_a_coupled_neck_get_the_range_of_both_joints(
+    started: Callable[[Rig], Assembly],
+) -> None:
     """Channels of a board are checked and armed for pitch and roll at once."""
     rig = load_rig("maker")
     joint = replace(
@@ -209,10 +209,8 @@ def test_hobby_servos_of_a_coupled_neck_get_the_range_of_both_joints() -> None:
     own = joint.setup("neck_pitch")
     wide = found["neck_pitch"].max_steps - found["neck_pitch"].min_steps
     assert wide == pytest.approx(2 * (own.max_steps - own.min_steps), abs=4)
-    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
-    made.robot.start(made.clock)
+    made = started(rig)
     made.robot.command(Jog((("neck_pitch", radians(10.0)), ("neck_roll", radians(8.0))), stay=True))
     tick = ticks(made, 400)[-1]
     at = dict(zip(rig.names, map(degrees, tick.joints.position_rad), strict=True))
     assert (at["neck_pitch"], at["neck_roll"]) == pytest.approx((10.0, 8.0), abs=0.3)
-    made.close()

@@ -2,18 +2,22 @@
 
 import csv
 from collections import Counter
+from collections.abc import Sequence
 from math import cos, degrees, radians, sin
 from pathlib import Path
 
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
-from exported_run import Run, seen
+from fakes.runs import play
 from msgspec.structs import replace
 from present import present
 
+from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import GazeState
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
@@ -21,8 +25,10 @@ from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import (
     MOVEMENTS,
+    GazeAngles,
     GazeTarget,
     LabelledInterval,
+    Labels,
     collect_gaze_angles,
     estimate_lag,
     find_intervals,
@@ -30,6 +36,27 @@ from gazerig.robot.recording.gaze_angles import (
     label_samples,
     speed_deg_s,
 )
+
+RATE_HZ = 200.0
+
+
+def seen(scene: str, seconds: float) -> list[Tick]:
+    """Run a simulated head and give its ticks."""
+    made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene=scene))
+    ticks: list[Tick] = []
+    play(made, seconds, ticks.append)
+    return ticks
+
+
+class Run:
+    """One run with all that is made of it."""
+
+    def __init__(self, ticks: Sequence[Tick]) -> None:
+        self.ticks = ticks
+        self.trace: GazeAngles = collect_gaze_angles(ticks)
+        self.labels: Labels = label_samples(self.trace)
+        self.stretches: tuple[LabelledInterval, ...] = find_intervals(self.trace, self.labels)
+
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 SETTLED_S = 3.0  # at the start the guard lets the eyes follow the plan only slowly

@@ -1,13 +1,13 @@
 """Joints of any name: a jaw, brows, ears."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from expressive_rig import faults
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.model.types import further_joints, order_joints
 
 
@@ -36,14 +36,9 @@ def test_a_jaw_is_a_joint_and_a_misspelt_neck_is_not() -> None:
     )
 
 
-def test_a_jaw_is_read_held_at_rest_and_written() -> None:
-    made = assemble(with_joint("jaw"), RunOptions(mock=True, fast=True, scene="visitor"))
-    try:
-        made.robot.start(made.clock)
-        tick = made.robot.tick(0.005, 0.005)
-        assert made.robot.body.names[-1] == "jaw"
-        assert tick.desired_rad[-1] == 0.0
-        assert len(tick.guard_result.command_rad) == len(tick.desired_rad) == 10
-        made.robot.stop()
-    finally:
-        made.close()
+def test_a_jaw_is_read_held_at_rest_and_written(started: Callable[[Rig], Assembly]) -> None:
+    made = started(with_joint("jaw"))
+    tick = made.robot.tick(0.005, 0.005)
+    assert made.robot.body.names[-1] == "jaw"
+    assert tick.desired_rad[-1] == 0.0
+    assert len(tick.guard_result.command_rad) == len(tick.desired_rad) == 10

@@ -5,8 +5,6 @@ from math import radians
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from gazerig.gaze.lids.blink import LidParams
 from gazerig.gaze.lids.lids import LidOpenings, Lids
@@ -30,15 +28,6 @@ def winked(model: Lids, t_s: float, pitch_deg: float = 0.0) -> LidOpenings:
     model.wink("left", t_s)
     model.wink("right", t_s)
     return model.step(t_s + SHUT_S, radians(pitch_deg), None)
-
-
-@given(st.floats(-60.0, 60.0), st.floats(-60.0, 60.0))
-def test_the_middle_of_the_fissure_goes_where_the_eye_goes(
-    one_deg: float, other_deg: float
-) -> None:
-    model = lids()
-    down, up = (model.step(0.0, radians(a), None) for a in sorted((one_deg, other_deg)))
-    assert up.left >= down.left and up.lower_left <= down.lower_left
 
 
 def test_lower_lids_follow_by_less_than_the_upper_ones_and_evenly() -> None:

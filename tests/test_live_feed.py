@@ -6,6 +6,7 @@ from dataclasses import fields
 from typing import NamedTuple
 
 import pytest
+from fakes.runs import play
 from msgspec import structs
 from page_feed import IN_TIME
 from shown_page import wait_for
@@ -14,7 +15,6 @@ from world_shapes import SmallWorld
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.feed.live_feed import (
@@ -37,15 +37,12 @@ class Run(NamedTuple):
 
 
 @pytest.fixture(scope="module", params=["desk", "maker"])
-def ran(request: pytest.FixtureRequest) -> Iterator[Run]:
+def ran(request: pytest.FixtureRequest) -> Run:
     """Two simulated seconds, so that there are saccades, a fixation and a blink."""
     options = RunOptions(rig=request.param, mock=True, fast=True, seed=0, scene="visitor")
     made, ticks = assemble(load_rig(request.param), options), list[Tick]()
-    made.robot.start(made.clock)
-    run(made.robot, made.clock, made.loop, lambda s: "over" if s >= 2.0 else None, ticks.append)
-    made.robot.stop()
-    yield Run(made, ticks)
-    made.close()
+    play(made, 2.0, ticks.append)
+    return Run(made, ticks)
 
 
 class Page:

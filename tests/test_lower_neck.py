@@ -1,5 +1,6 @@
 """A second pair of neck joints below the neck: gaze allows for the head's displacement."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import cos, degrees, radians, sin
 
@@ -13,8 +14,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, norm, rotate, sub
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Express, Jog, LookAt
 from gazerig.robot.model.frames import PoseHistory
@@ -86,16 +86,16 @@ def error_deg(tick: Tick) -> float:
     )
 
 
-def test_the_eyes_stay_on_their_point_while_the_head_bows() -> None:
+def test_the_eyes_stay_on_their_point_while_the_head_bows(
+    started: Callable[[Rig], Assembly],
+) -> None:
     rig = rig_with_lower_neck()
     assert faults(rig) == []
-    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
-    made.robot.start(made.clock)
+    made = started(rig)
     made.robot.command(LookAt(TARGET, stay=True))
     still = error_deg(ticks(made, 600)[-1])
     made.robot.command(Express("bow"))
     moving = ticks(made, 300)
-    made.close()
     bowed = dict(zip(rig.names, map(degrees, moving[-1].joints.position_rad), strict=True))
     assert bowed["lower_neck_pitch"] == pytest.approx(-20.0, abs=0.5)
     assert bowed["lower_neck_yaw"] == pytest.approx(15.0, abs=0.5)
@@ -103,24 +103,25 @@ def test_the_eyes_stay_on_their_point_while_the_head_bows() -> None:
     assert still < 0.2 and worst < 0.8, (still, worst)
 
 
-def test_what_a_look_will_come_to_counts_the_bent_lower_neck() -> None:
+def test_what_a_look_will_come_to_counts_the_bent_lower_neck(
+    started: Callable[[Rig], Assembly],
+) -> None:
     rig = rig_with_lower_neck()
-    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
-    made.robot.start(made.clock)
+    made = started(rig)
     made.robot.command(Express("bow"))
     ticks(made, 400)
     ticket = made.robot.command(LookAt(TARGET, stay=True))
     ticks(made, 1)
     reply = ticket.wait(0.0)
-    made.close()
     assert reply is not None and reply.error_deg < 0.5, reply
 
 
-def test_people_stay_where_they_are_when_the_lower_neck_turns_the_camera() -> None:
+def test_people_stay_where_they_are_when_the_lower_neck_turns_the_camera(
+    started: Callable[[Rig], Assembly],
+) -> None:
     """The emulated camera is carried by the servos, and frames are placed by what they measure."""
     rig = rig_with_lower_neck()
-    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
-    made.robot.start(made.clock)
+    made = started(rig)
     made.robot.command(Jog((("lower_neck_yaw", radians(15.0)),), stay=True))
     errors = []
     for tick in ticks(made, 700):
@@ -129,5 +130,4 @@ def test_people_stay_where_they_are_when_the_lower_neck_turns_the_camera() -> No
         seen = tick.percept.faces[0].p_world_m
         people = [one[0] for one in made.scene.people(tick.percept.captured_s)]
         errors.append(min(norm(sub(seen, at)) for at in people))
-    made.close()
     assert len(errors) > 200 and max(errors) < 0.04, max(errors)

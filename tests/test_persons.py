@@ -93,12 +93,6 @@ def test_the_newest_came_last_and_who_came_together_is_named_together() -> None:
     assert persons.ids_with_trait("newest") == {1}
 
 
-def test_who_looks_is_told_by_the_faces_of_the_frame() -> None:
-    persons = Persons()
-    persons.update(percept(0.0, {5: LEFT, 2: RIGHT}, looks=(2,)), EYE)
-    assert persons.ids_with_trait("looking") == {2}
-
-
 @pytest.mark.parametrize(
     ("hz", "swing_m", "beside", "waves"),
     [(1.5, 0.11, RIGHT, True), (2.5, 0.06, RIGHT, True), (0.4, 0.11, RIGHT, False),

@@ -7,6 +7,7 @@ from math import atan2, cos, dist, pi, sin
 import numpy as np
 import pytest
 from attention_scene import NO_STAYS
+from fakes.runs import play
 from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import load_rig
@@ -15,7 +16,7 @@ from gazerig.gaze.attention.habituation import Habituation, HabituationParams
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
@@ -60,8 +61,7 @@ def looked_at(scene: StillPeople, seconds: float, seed: int) -> np.ndarray:
     options = RunOptions(mock=True, fast=True, seed=seed, scene="visitor", bus="ideal")
     made = assemble(rig, options, Substitutes(camera=before))
     ticks: list[Tick] = []
-    made.robot.start(made.clock)
-    run(made.robot, made.clock, made.loop, lambda s: "end" if s > seconds else None, ticks.append)
+    play(made, seconds, ticks.append)
     places = [person.p_world_face_m for person in scene.people(0.0)]
     return np.array([_person(tick.target.kind, tick.target.p_world_m, places) for tick in ticks])
 

@@ -92,7 +92,7 @@ def as_csv(path: Path, s: Samples) -> Path:
 def test_labelled_fixations_are_taken_as_they_are(tmp_path: Path) -> None:
     """That a known walk comes back is tested where it is fitted: test_scanpath."""
     looks = "start,duration,part\n" + "".join(
-        f"{0.3 * k},0.25,{'N' if k % 2 else 'RE'}\n" for k in range(80)
+        f"{300 * k},250,{'N' if k % 2 else 'RE'}\n" for k in range(80)
     )
     (tmp_path / "looks.csv").write_text(looks, encoding="utf-8")
     report = fit_to_recording(tmp_path / "looks.csv", None, tmp_path / "mine.yaml")

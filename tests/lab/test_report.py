@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
 from math import cos, radians, sin
@@ -14,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 from command_line import typed
+from fakes.runs import play
 from msgspec import structs
 from typer.testing import CliRunner
 
@@ -56,7 +56,7 @@ from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.types import PARTS, Bodies, Percept, Vec3
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -85,11 +85,7 @@ def looked(rig: Rig, scene: str, seconds: float, **choice: str) -> GazeTrace:
     slower = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     made = assemble(slower, RunOptions(True, True, 0, scene, **choice))  # type: ignore[arg-type]
     gathering = GazeTraceBuilder()
-    made.robot.start(made.clock)
-    over: Callable[[float], str | None] = lambda s: "over" if s > seconds else None  # noqa: E731
-    run(made.robot, made.clock, made.loop, over, gathering.update)
-    made.robot.stop()
-    made.close()
+    play(made, seconds, gathering.update)
     return gathering.trace()
 
 
@@ -261,12 +257,8 @@ STEP_DEG = 360.0 / 4096.0
 
 @pytest.fixture(scope="module")
 def ticks(desk_rig: Rig) -> list[Tick]:
-    made = assemble(desk_rig, RunOptions(True, True, 0, "face-to-face"))
     seen: list[Tick] = []
-    made.robot.start(made.clock)
-    run(made.robot, made.clock, made.loop, lambda s: "over" if s > SECONDS else None, seen.append)
-    made.robot.stop()
-    made.close()
+    play(assemble(desk_rig, RunOptions(True, True, 0, "face-to-face")), SECONDS, seen.append)
     return seen
 
 

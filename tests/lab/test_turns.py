@@ -1,13 +1,74 @@
 """Gaze around turns beside people, in the report and in the export for eye-tracking tools."""
 
-from typing import get_args
+from collections.abc import Iterator
+from math import degrees
+from typing import Any, Literal, get_args
 
+import numpy as np
 import pytest
-from reported_turns import model_alone
 
 from gazerig.features.lab.analysis.human_norms import BY_KEY
 from gazerig.features.lab.report.statistics import judge_without_interval
-from gazerig.features.lab.report.turns import Role, measures
+from gazerig.features.lab.report.turns import STATES, Role, TurnTrace, measures
+from gazerig.gaze.angles import yaw_pitch
+from gazerig.gaze.attention.conversation import (
+    AversionParams,
+    ConversationGaze,
+    ConversationParams,
+)
+from gazerig.gaze.types import Target, TurnState
+
+Script = Literal[Role, "interrupted"]
+
+
+def scripted_turns(role: Script, rng: np.random.Generator) -> Iterator[tuple[TurnState, float]]:
+    """Return states and their durations without end.
+
+    speaking: monologues of 20 to 60 s after a thought; listening: the same of the partner;
+    dialogue: turns of some 3 s by both, with thoughts; interrupted: speech that is interrupted.
+    """
+    while True:
+        if role == "listening":
+            yield "listening", float(rng.uniform(20.0, 60.0))
+        elif role == "dialogue":
+            yield "listening", float(np.clip(rng.lognormal(np.log(3.0), 0.7), 0.7, 9.5))
+            yield "thinking", float(rng.uniform(0.4, 1.0))
+            yield "speaking", float(np.clip(rng.lognormal(np.log(3.5), 0.6), 0.7, 9.5))
+        elif role == "speaking":
+            yield "listening", 1.0
+            yield "thinking", float(rng.uniform(0.5, 1.0))
+            yield "speaking", float(rng.uniform(20.0, 60.0))
+        else:
+            yield "listening", float(rng.uniform(1.0, 4.0))
+            yield "thinking", float(rng.uniform(0.6, 2.0))
+            yield "speaking", float(rng.uniform(1.0, 8.0))
+            yield "interrupted", float(rng.uniform(1.0, 2.0))
+
+
+def model_alone(role: Script, seed: int, minutes: float, step_s: float = 0.02) -> TurnTrace:
+    """Return the trace of looks away and turns, without a robot, before a face at 1 m."""
+    random = [np.random.default_rng((seed, n)) for n in range(4)]
+    attention: Any = type("Unused", (), {"converse": lambda *of: None})()
+    params = AversionParams(), ConversationParams()
+    gaze = ConversationGaze("people", *params, attention, *random[:2])
+    face = Target((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, "face", 1, 1.0, True, None, 0, "a person")
+    script, rests_s, end_s, number, rows = scripted_turns(role, random[2]), 0.0, 0.0, 0, []
+    for t_s in np.arange(0.0, 60.0 * minutes, step_s).tolist():
+        if t_s >= end_s:
+            state, lasts_s = next(script)
+            end_s, number = t_s + lasts_s, number + 1
+            # A speech that will be interrupted was meant to be longer.
+            planned_s = end_s + 10.0 * (role == "interrupted") if state == "speaking" else None
+            gaze.enter(state, 1, planned_s, 0.9, t_s)
+        gaze.step(t_s)
+        target = gaze.look(face, (0.0, 0.0, 0.0), t_s, False, rests_s)
+        if t_s > rests_s:
+            rests_s = t_s + float(random[3].exponential(0.3))  # looks at parts of the face
+        yaw, pitch = yaw_pitch(target.p_world_m)
+        rows.append((t_s, STATES.index(state), number, degrees(yaw), degrees(pitch)))
+    table = np.array(rows)
+    return TurnTrace(table[:, 0], table[:, 1], table[:, 2], table[:, 3:], np.zeros(len(table)))
+
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
