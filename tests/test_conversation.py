@@ -160,7 +160,7 @@ def test_a_short_answer_is_given_with_the_gaze_on_the_face(rig: Running) -> None
 
 def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
     made = assemble(
-        load_rig("desk"), RunOptions(mock=True, fast=True, seed=2, scene="three-people")
+        load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, scene="three-people")
     )
     made.robot.start(made.clock)
     rig = Running(made)

@@ -32,6 +32,8 @@ PUSH_S = 0.5
 
 def _push(world: World, body: str, newton: float, to: str, seconds: float = PUSH_S) -> str:
     """Push a body of the rig."""
+    if to not in DIRECTIONS:
+        raise ValueError(f"{to!r} is not {'|'.join(DIRECTIONS)}")
     x, y, z = DIRECTIONS[to]
     world.push(body, (newton * x, newton * y, newton * z), seconds)
     return f"{body} is pushed {to} with {newton:g} N for {seconds:g} s"

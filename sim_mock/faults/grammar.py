@@ -13,7 +13,7 @@ _WHOLE = ("ID", "BYTES", "BIT", "N")
 _RANGES: dict[str, tuple[float, float]] = {
     "BYTES": (0, 1024), "BIT": (0, 8191), "N": (1, 1_000_000), "SECONDS": (0.0, 1e6),
     "MS": (0.0, 60_000.0), "PERCENT": (0.0, 100.0), "V": (0.0, 25.0), "C": (0.0, 200.0),
-    "STEPS": (-1e6, 1e6),
+    "STEPS": (-1e6, 1e6), "NEWTONS": (0.0, 100.0),
 }  # fmt: skip
 
 
