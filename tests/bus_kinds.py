@@ -154,7 +154,9 @@ class Bench(BusBench):
         board_room = 0.2 if follows else inf
         room = (board_room if self.kind.board else 0.003) * (self.kind.high - self.kind.low)
         for i, places in enumerate(zip(*self.seen, strict=True)):
-            true = [min(at, POTENTIOMETER) for at in places] if self.name == "scs" else places
+            true = (
+                [min(max(at, 0), POTENTIOMETER) for at in places] if self.name == "scs" else places
+            )
             at = feedback.position_steps[i]
             if i not in feedback.missing and not min(true) - room <= at <= max(true) + room:
                 raise WrongValueError(f"{began_s:.3f} s: servo {i} at {at}, truly {true}")
