@@ -171,6 +171,20 @@ def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
     rig.do(Talk("speaking", addressee, seconds=60.0, stay=True), 0.5)
     assert rig.ticks[-1].target.id == addressee
     assert 0.6 < share_on(rig, addressee, 30.0) < 0.95
+    rig.do(Talk("listening", stay=True), 2.0)
+    on, alone, shifts, onset = 0, 0, list[float](), (-1, 0.0)
+    for tick in rig.go(60.0):
+        assert tick.percept is not None
+        speaks = [face.id for face in tick.percept.faces if face.speaks]
+        if len(speaks) == 1:
+            if speaks[0] != onset[0]:
+                onset = (speaks[0], tick.t_s)
+            alone, on = alone + 1, on + (tick.target.id == speaks[0])
+            if tick.target.id == speaks[0] and onset[1] > 0.0:
+                shifts.append(tick.t_s - onset[1])
+                onset = (speaks[0], -1.0)
+    assert on / alone > 0.8
+    assert len(shifts) > 5 and sorted(shifts)[len(shifts) // 2] < 0.4
     # The partner who interrupts is looked at, whoever's mouth has moved before.
     rig.do(Talk("speaking", addressee, seconds=60.0, stay=True))
     for tick in rig.go(30.0):
