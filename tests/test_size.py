@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1]
 LARGEST = {
     "gaze": 58_910,
     "drivers": 91_450,
-    "sim_mock": 35_920,
+    "sim_mock": 36_000,
     "config": 12_000,
     "robot": 170_040,
     "robot/dashboard": 54_580,

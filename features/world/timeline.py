@@ -77,7 +77,7 @@ def _space_faults(script: SceneScript) -> Iterator[Fault]:
         for i, act in enumerate(person.acts):
             if act.do in ("glance", "spin") or act.frees != "face":
                 yield f"people.{name}.acts.{i}.do", f"{act.do} of this kind needs room: none"
-        for key in ("level", "sway"):
+        for key in ("level", "sway", "wave"):
             if getattr(person, key) != getattr(PersonScript(""), key):
                 yield f"people.{name}.{key}", "needs room: none"
     for name, thing in script.things.items():

@@ -41,13 +41,12 @@ class CommandTable(NamedTuple):
         Raises:
             ValueError: the command is invalid; the message names the wrong word and valid ones.
         """
-        first, *words = text.split() or ["help"]
-        if first == "help":
+        name, *words = text.split() or ["help"]
+        if name == "help":
             return "\n".join(map(self.usage, self.verbs))
-        name, ends = first.replace("_", "-"), dict[str, Any]()
-        verb = self.verbs.get(name)
+        verb, ends = self.verbs.get(name), dict[str, Any]()
         if verb is None:
-            raise ValueError(f"{first!r} is not a command; commands: {', '.join(self.verbs)}, help")
+            raise ValueError(f"{name!r} is not a command; commands: {', '.join(self.verbs)}, help")
         try:
             while len(words) > 1 and words[-2] in verb.lasting.split():
                 end, label = _ENDS[words[-2]]

@@ -34,7 +34,7 @@ _SPEEDS_UP_S = 0.25  # time of a walk's acceleration to full speed, and of braki
 _HEAD_SHARE = 0.65
 _FARTHEST_RAD = radians(48.0)
 _TURN_S = 0.6
-_WAVES_HZ, _RAISE_S, _BECKONS_HZ = 1.5, 0.5, 2.0
+_WAVES_HZ, _BECKONS_HZ = 1.5, 2.0
 _FIST_M, _PINWHEEL_M = 0.06, 0.06
 _SPIN_RAD_S = 11.0
 _STEP_S = 1e-4
@@ -211,12 +211,15 @@ class FacesScene:
     def _raised_hand(self, name: str, t_s: float) -> Vec3 | None:
         """Return the hand that waves next to the head, None while it is not raised."""
         person, phase_s = self._script.people[name], t_s % self.round_s
+        wave = person.wave
         for one in self._acts[name]:
-            since_s, left_s = phase_s - one.start_s, one.end_s - phase_s
-            if one.act.do == "wave" and not person.gloves and since_s >= 0.0 and left_s >= 0.0:
-                up = min(1.0, since_s / _RAISE_S, left_s / _RAISE_S)
-                swing = 0.12 * sin(2 * pi * _WAVES_HZ * since_s) * up
-                aside = _SIDES[one.act.side] * 0.26 + swing
+            since_s = phase_s - one.start_s
+            inside_s = min(since_s, one.end_s - phase_s)
+            if one.act.do == "wave" and not person.gloves and inside_s >= 0.0:
+                up = min(1.0, inside_s / wave.raise_s)
+                up = min_jerk(up) if wave.smooth else up
+                swing = wave.swing_m * sin(2 * pi * _WAVES_HZ * since_s) * up
+                aside = _SIDES[one.act.side] * wave.aside_m + swing
                 return add(self.face(name, t_s), (-0.12, aside, -0.30 + 0.28 * up))
         return None
 

@@ -93,6 +93,18 @@ class SwayScript:
 
 
 @dataclass(frozen=True)
+class WaveScript:
+    """Waving of a hand without an arm."""
+
+    # fmt: off
+    aside_m: Annotated[float, Bounds(0, 1), "distance of the hand from the middle of the face"] = 0.25
+    swing_m: Annotated[float, Bounds(0, 0.3), "amplitude of its swing to each side"] = 0.11
+    raise_s: Annotated[float, Bounds(0.1, 2), "time that it takes to rise"] = 0.4
+    smooth: Annotated[bool, "whether it rises with minimum jerk; otherwise with constant speed"] = True
+    # fmt: on
+
+
+@dataclass(frozen=True)
 class PersonScript:
     """One person: appearance, height, and the acts of a round."""
 
@@ -105,6 +117,7 @@ class PersonScript:
     acts: Annotated[tuple[Act, ...], "acts in the order of time"] = ()
     level: Annotated[bool, "without a room: the face does not pitch towards its gaze target"] = False
     sway: Annotated[SwayScript | None, "without a room: small motion; null: none"] = None
+    wave: Annotated[WaveScript, "without a room: waving of the hand"] = field(default_factory=WaveScript)
     # fmt: on
 
 
