@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import pi, sin
+from math import degrees, pi, sin
 from typing import Any
 
 import numpy as np
@@ -136,6 +136,12 @@ def test_a_guard_counts_when_the_fist_arrives(
     assert found["lead_ms"] == (pytest.approx(150.0, abs=11.0) if in_time else None)
 
 
+def test_no_wave_no_feint_and_no_hand_from_aside_is_guarded_against(boxing: Lived) -> None:
+    for event in boxing._scene.events():
+        if event.name in ("wave", "return", "reach", "step"):
+            assert actions(boxing, event.start_s, event.end_s) == ["wait"], event
+
+
 def test_e46_b_the_place_to_be_hit_is_looked_at_before_the_blow(boxing: Lived) -> None:
     figure = boxing.score.figures()["attack"]
     assert figure["of"] == 3
@@ -167,6 +173,15 @@ def test_e46_the_face_otherwise_and_while_they_step_a_waved_hand_and_a_feint_for
     assert figure["seen"] == figure["of"] and figure["of"] == (of or figure["of"]) > 0
     assert share is None or figure["share"] >= share
     assert within_s is None or latency(figure) <= within_s
+
+
+def test_a_hand_that_reaches_in_is_noticed_and_the_head_turns_to_it(boxing: Lived) -> None:
+    assert latency(boxing.score.figures()["reach"]) <= 0.5
+    for event in boxing._scene.events():
+        if event.name == "reach":
+            side = 1.0 if event.place_world_m[1] > 0.0 else -1.0
+            before, *_, last = boxing.within(event.start_s, event.end_s)
+            assert side * degrees(last.pose.head_rad[0] - before.pose.head_rad[0]) > 1.5
 
 
 class Distracted:
@@ -214,3 +229,14 @@ def test_e48_back_on_the_face_within_a_second_of_a_distraction(way_m: Vec3) -> N
     for start_s in scene.starts_s:
         away = [each for each in lived.within(start_s, start_s + 1.5) if each.target.kind != "face"]
         assert len(away) * 0.01 <= 1.0
+
+
+def test_face_to_face_keeps_the_face_through_all_heights() -> None:
+    scene = load_scene("face-to-face")
+    lived = Lived(made_for("face-to-face", rate_hz=100.0), scene, scene.round_s + 0.05)
+    figure = lived.score.figures()["face"]
+    assert figure["seen"] == figure["of"] == 1
+    # Bouts of mutual gaze of 3.6 s on average and looks away of 0.6 s.
+    assert figure["share"] is not None and 0.8 < figure["share"] < 0.95
+    pitch = [degrees(each.pose.head_rad[1]) for each in lived.ticks]
+    assert max(pitch) > 8.0 and min(pitch) < -3.0
