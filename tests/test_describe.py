@@ -49,7 +49,7 @@ def test_all_files_are_read_by_others(written: Path) -> None:
     assert {again.body(i).name for i in range(again.nbody)} >= {"base_link", "head", "jaw_link"}
     scene = trimesh.load_scene(written / "expressive.glb")
     assert {link.name for link in _links("expressive")} <= set(scene.graph.nodes)
-    assert sum(path.stat().st_size for path in written.rglob("*") if path.is_file()) < 13e6
+    assert sum(path.stat().st_size for path in written.rglob("*") if path.is_file()) < 8e6
 
 
 def _links(rig: str) -> tuple[Any, ...]:

@@ -30,16 +30,18 @@ def mesh_files(visual: Visual) -> dict[str, bytes]:
 @lru_cache(maxsize=64)
 def _written(shape: str | OwnMesh, scale: float | tuple[float, float, float]) -> tuple[str, bytes]:
     """Return the points and faces of a shape as text, and its colours as a PNG."""
-    mesh = add_texture(Visual("", shape, scale=scale).painted())
-    # In this format an image begins at its lower left corner.
+    painted = Visual("", shape, scale=scale).painted()
+    (vertices, faces), _, normals = painted
+    mesh = add_texture(painted)
+    # In this format an image begins at its lower left corner; triangles share points and normals.
     points = (
-        _rows("v %.6f %.6f %.6f\n", mesh.vertices)
+        _rows("v %.6f %.6f %.6f\n", vertices)
         + _rows("vt %.5f %.5f\n", mesh.uv * (1.0, -1.0) + (0.0, 1.0))
-        + _rows("vn %.3f %.3f %.3f\n", mesh.normals)
+        + _rows("vn %.3f %.3f %.3f\n", normals)
     )
-    faces = _rows("f %d/%d/%d %d/%d/%d %d/%d/%d\n", np.repeat(mesh.faces + 1, 3, axis=1))
+    table = np.dstack((faces, mesh.faces, faces)) + 1
     _, image = cv2.imencode(".png", cv2.cvtColor(mesh.image, cv2.COLOR_RGB2BGR))
-    return points + faces, bytes(image)
+    return points + _rows("f %d/%d/%d %d/%d/%d %d/%d/%d\n", table.reshape(-1, 9)), bytes(image)
 
 
 def _rows(line: str, values: Floats | np.ndarray) -> str:

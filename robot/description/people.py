@@ -22,7 +22,7 @@ LOOKS = 2
 """Number of looks: short hair, long hair."""
 SHIRTS: tuple[Colour, ...] = (
     (88, 124, 176), (206, 120, 86), (104, 148, 116), (122, 100, 156),
-    (196, 172, 88), (146, 62, 66), (68, 132, 140), (232, 228, 220),
+    (196, 172, 88), (146, 62, 66),
 )  # fmt: skip
 """Colours of the shirts of people, by their numbers."""
 EYE_FACE_M: Vec3 = (-0.0411635, 0.03095, 0.0349735)
