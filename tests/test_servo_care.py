@@ -345,8 +345,8 @@ def test_a_joint_beyond_its_encoders_zero_is_not_led_the_wrong_way():
     rig = StsRig(specs, setups)
     rig.bus.open()
     # It counts on from where it started; only a restart makes it measure within one turn.
-    for _ in range(2):
-        with pytest.raises(ServoFault, match=r"eye \(servo 1\) is beyond .*by hand"):
+    for place in (4090, 4290):
+        with pytest.raises(ServoFault, match=rf"eye \(servo 1\) is at {place}, beyond .*by hand"):
             rig.bus.enable_torque()
         rig.command("turn 1 200")
     assert not any(servo.torque for servo in rig.chain.servos)
@@ -368,7 +368,7 @@ def test_a_joint_beyond_its_encoders_zero_is_not_led_the_wrong_way():
     run(200)
     assert len(rig.bus.faults()) == 1 and FAR_SIDE in rig.bus.faults()[0]
     assert [servo.torque for servo in rig.chain.servos] == [False, True]
-    assert sum("is beyond" in line for line in rig.bus.events()) == 1
+    assert sum(", beyond" in line for line in rig.bus.events()) == 1
     rig.command("turn 1 600")
     rig.command("brown-out 1")
     assert present(run(200)[0]).torque

@@ -75,7 +75,7 @@ def enable(
         away = abs(goals[servo_id] - steps)
         # The servo itself would not take a shorter way across its encoder's zero.
         if family.single_turn and 2 * away > turn - (setup.max_steps - setup.min_steps):
-            raise ServoFault(f"{line.label(servo_id)} is {FAR_SIDE}")
+            raise ServoFault(f"{line.label(servo_id)} is at {steps}, {FAR_SIDE}")
         if away:
             outside[servo_id] = away / entry_speed_steps_s(setup, turn)
     own = [setups[servo_id] for servo_id in ids]
