@@ -30,15 +30,6 @@ def test_set_target_and_get_position(world):
     assert world.errors() == 0
 
 
-def test_set_multiple_targets_as_in_the_guide(world):
-    world.ask("84 03 70 2E 9F 02 03 00 00 70 2E")
-    assert world.positions()[2:6] == [0, 0, 6000, 0]
-    world.ask("9F 0C 00" + "70 2E" * 12)
-    assert world.positions() == [6000] * 12 and world.errors() == 0
-    world.ask("9F 02 0B 70 2E 70 2E")
-    assert world.errors() == PROTOCOL
-
-
 def test_with_a_crc_only_checked_commands_count():
     def check(packet):
         return packet + bytes((crc7(packet),))

@@ -116,10 +116,10 @@ def test_a_running_script_is_stopped(world):
     assert not world.board.is_script_running
 
 
-def test_neighbours_share_one_command_and_all_goals_one_write(held):
+def test_all_goals_are_one_write(held):
     held.packets()
     held.bus.write([5000, 6000, 7000])
-    assert held.packets() == [bytes.fromhex("9F 02 00 08 27 70 2E 84 05 58 36")]
+    assert held.packets() == [bytes.fromhex("84 00 08 27 84 01 70 2E 84 05 58 36")]
 
 
 # --- errors and restarts
@@ -142,7 +142,6 @@ def test_after_a_restart_channels_are_armed_one_by_one_before_any_goal(held):
     for channel in IDS:
         armed = sent.index(bytes((0x87, channel, 120, 0)))
         assert armed < sent.index(bytes((0x84, channel)))
-    assert sent.index(b"\x9f") > sent.index(bytes((0x87, 1)))
     assert "the board restarted: set up again" in held.bus.events()
 
 

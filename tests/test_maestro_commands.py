@@ -24,7 +24,7 @@ COMPACT = MaestroParams()
     ("packet", "expected"),
     [
         (COMPACT.number(SET_TARGET, 0, 6000), "84 00 70 2E"),
-        (COMPACT.targets({3: 0, 4: 6000}), "9F 02 03 00 00 70 2E"),
+        (COMPACT.targets({3: 0, 4: 6000}), "84 03 00 00 84 04 70 2E"),
         (COMPACT.number(SET_SPEED, 5, 140), "87 05 0C 01"),
         (COMPACT.number(SET_ACCELERATION, 5, 255), "89 05 7F 01"),
         (COMPACT.command(GET_POSITION, 7), "90 07"),
@@ -38,14 +38,6 @@ def test_commands(packet, expected):
 
 def test_the_check_byte():
     assert crc7(bytes.fromhex("83 01")) == 0x17
-
-
-def test_neighbours_share_a_command_where_the_board_has_it():
-    goals = {4: 6000, 1: 4000, 0: 4001, 6: 5000}
-    rest = bytes.fromhex("84 04 70 2E 84 06 08 27")
-    assert COMPACT.targets(goals) == bytes.fromhex("9F 02 00 21 1F 20 1F") + rest
-    micro = MaestroParams(channels=6).targets(goals)
-    assert micro == bytes.fromhex("84 00 21 1F 84 01 20 1F") + rest
 
 
 def test_error_names():
@@ -70,7 +62,7 @@ def test_what_does_not_fit_is_refused(number):
 def test_only_command_bytes_have_the_highest_bit(codec, goals):
     packet = codec.targets(goals)
     assert packet[0] >= 0x80
-    assert {byte for byte in packet if byte >= 0x80} <= {0x84, 0x9F}
+    assert {byte for byte in packet if byte >= 0x80} == {0x84}
 
 
 # --- units

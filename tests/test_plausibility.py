@@ -21,8 +21,8 @@ def known(*places):
 
 def test_a_place_out_of_reach_is_not_believed_and_changes_nothing():
     plausible = known(1000, 2000)
-    assert not plausible.are_plausible((1010, STEP), 1.005)
-    assert plausible.are_plausible((1010, 2010), 1.005)
+    assert not plausible.are_plausible((1010, STEP), (1.005,) * 2)
+    assert plausible.are_plausible((1010, 2010), (1.005,) * 2)
     assert not plausible.is_plausible(0, STEP, 1.01)
     assert plausible.is_plausible(0, 1020, 1.015)
 
@@ -57,7 +57,7 @@ def test_no_motion_that_the_motor_can_make_is_refused(speeds, data):
         dt_s = data.draw(st.floats(0.001, 0.05))
         at_s, place = at_s + dt_s, place + speed * dt_s
         place_steps = round(place), 2000
-        if not plausible.are_plausible(place_steps, at_s):
+        if not plausible.are_plausible(place_steps, (at_s,) * 2):
             assert all(plausible.is_plausible(i, one, at_s) for i, one in enumerate(place_steps))
 
 

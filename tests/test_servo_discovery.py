@@ -49,8 +49,7 @@ def family(request):
 
 def test_all_servos_are_found_at_their_own_rate_and_no_other(family):
     bench = Bench(family, 57_600, 1, 7, family.highest_id)
-    assert sorted(family.scan_rates) == sorted(family.baud_rates)
-    for baud in family.scan_rates:
+    for baud in family.baud_rates:
         assert bench.port.setBaudRate(baud)
         wanted = (tuple(bench.names), 0) if baud == bench.baud else ((), 0)
         assert scan_ids(bench.port, family, baud) == wanted

@@ -18,11 +18,7 @@ def clip_goals(steps: Sequence[float], lowest: Sequence[int], highest: Sequence[
         raise ValueError(f"{len(steps)} goals for {len(lowest)} servos")
     if isnan(sum(steps)):
         raise ValueError("a goal is not a number: every goal must be a whole number of steps")
-    ranges = zip(steps, lowest, highest, strict=True)
-    return [
-        round(goal if low <= goal <= high else min(max(goal, low), high))
-        for goal, low, high in ranges
-    ]
+    return list(map(round, map(min, map(max, steps, lowest), highest)))
 
 
 ENTRY_DEG_S = 30.0

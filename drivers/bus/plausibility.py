@@ -49,9 +49,10 @@ class Plausibility:
     def forget(self) -> None:
         """Accept the next positions without a check, for example after a lost port."""
         count = len(self._fastest)
-        # Columns of the last positions and their times, and of the positions and times before.
-        self._last, self._last_s = [inf] * count, [-inf] * count
-        self._past, self._past_s = [inf] * count, [-inf] * count
+        never = (inf,) * count, (-inf,) * count
+        # Positions and their times: the last ones, and those before.
+        self._last: tuple[Sequence[float], Sequence[float]] = never
+        self._past: tuple[Sequence[float], Sequence[float]] = never
         self._odd: list[list[tuple[float, ...]]] = [[] for _ in range(count)]
 
     def record_damaged(self, at_s: float) -> None:
@@ -62,22 +63,21 @@ class Plausibility:
         """Record a position of a resting servo from another source than its cyclic answer."""
         self._store(slot, (position, at_s, position, -inf))
 
-    def are_plausible(self, positions: Sequence[int], at_s: float) -> bool:
+    def are_plausible(self, positions: Sequence[int], times_s: Sequence[float]) -> bool:
         """Return whether all positions are near the last ones; if so, they are recorded.
 
         If some are not, each is to be checked on its own.
         """
-        ways = tuple(map(sub, positions, self._last))
+        ways = tuple(map(sub, positions, self._last[0]))
         if max(ways) > self._nearest or min(ways) < -self._nearest:
             return False
-        self._past, self._past_s = self._last, self._last_s
-        self._last, self._last_s = list[float](positions), [at_s] * len(positions)
+        self._past, self._last = self._last, (positions, times_s)
         return True
 
     def is_plausible(self, slot: int, position: int, at_s: float) -> bool:
         """Return whether one servo's position is plausible; call it once for every answer."""
         odd = self._odd[slot]
-        last = self._last[slot], self._last_s[slot], self._past[slot], self._past_s[slot]
+        last = tuple([column[slot] for column in (*self._last, *self._past)])
         if last[0] != inf and self._is_near(slot, last, position, at_s):
             self._store(slot, (position, at_s, *last[:2]))
             return True
@@ -90,7 +90,11 @@ class Plausibility:
         return True
 
     def _store(self, slot: int, place: tuple[float, ...]) -> None:
-        self._last[slot], self._last_s[slot], self._past[slot], self._past_s[slot] = place
+        columns = [list(column) for column in (*self._last, *self._past)]
+        for column, value in zip(columns, place, strict=True):
+            column[slot] = value
+        last, last_s, past, past_s = columns
+        self._last, self._past = (last, last_s), (past, past_s)
         self._odd[slot].clear()
 
     def _is_near(self, slot: int, place: tuple[float, ...], position: float, at_s: float) -> bool:

@@ -26,10 +26,6 @@ STEEPEST_PWM = 255
 """PWM Slope. With the factory value 140 a motor needs 36 ms from full drive to full brake, during
 which a lid at 600 deg/s overshoots by 4 deg."""
 
-USUAL_RATES = (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600, 4_500_000)
-"""Every baud rate of the servos, the usual ones first."""
-
-
 _SENSED = ("effort", "velocity", "position")
 
 
@@ -71,7 +67,6 @@ DYNAMIXEL = Family(
     sync_read=True,
     fast_read_since={name: FAST_READ_SINCE[model.series] for name, model in MODELS.items()},
     baud_rates=BAUD_RATES,
-    scan_rates=USUAL_RATES,
     factory_baud=57_600,
     highest_id=252,
     format_firmware=str,

@@ -57,7 +57,8 @@ class I2cPort(HostPort):
 
     def write(self, data: bytes) -> None:
         """Execute transfers; bytes that they read are kept for ``read_until``."""
-        self._on_traffic()
+        if self._on_traffic:
+            self._on_traffic()
         if self._bus is None:
             raise self._lost("it is closed")
         at, status = 0, OK
@@ -79,7 +80,8 @@ class I2cPort(HostPort):
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return up to ``length`` available bytes; if there are none, wait until the deadline."""
-        self._on_traffic()
+        if self._on_traffic:
+            self._on_traffic()
         # Transfers have ended when ``write`` returns: no more bytes can arrive.
         if not self._waiting and (left_s := deadline_s - self.now_s()) > 0.0:
             time.sleep(left_s)

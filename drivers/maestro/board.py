@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.hobby_board.bus import Channel
     from gazerig.drivers.types import ServoConfig
 
-SET_TARGET, SET_TARGETS, SET_SPEED, SET_ACCELERATION = 0x84, 0x9F, 0x87, 0x89
+SET_TARGET, SET_SPEED, SET_ACCELERATION = 0x84, 0x87, 0x89
 GET_POSITION, GET_ERRORS, STOP_SCRIPT = 0x90, 0xA1, 0xA4
 
 MOST = 0x3FFF
@@ -30,7 +30,7 @@ MOST_INPUT = 1023
 width."""
 
 MICRO = 6
-"""Channels of the Micro Maestro, which has no command for several targets."""
+"""Channels of the Micro Maestro, the smallest board."""
 
 ERRORS = (
     "serial signal error",
@@ -102,23 +102,8 @@ class MaestroParams(HobbyBoardParams):
         return self.command(code, channel, number & 0x7F, number >> 7)
 
     def targets(self, goals: Mapping[int, int]) -> bytes:
-        """Encode targets: one command for every run of adjacent channels, if the board has it.
-
-        goals: pulse width by channel, quarter microseconds
-        """
-        packet, run = b"", list[int]()
-        for channel in sorted(goals):
-            run.append(channel)
-            if channel + 1 in goals and self.channels > MICRO:
-                continue
-            if len(run) == 1:
-                packet += self.number(SET_TARGET, channel, goals[channel])
-            else:
-                widths = [goals[one] for one in run]
-                data = [part for width in widths for part in (width & 0x7F, width >> 7)]
-                packet += self.command(SET_TARGETS, len(run), run[0], *data)
-            run.clear()
-        return packet
+        """Encode pulse widths by channel; a damaged command affects no other channel."""
+        return b"".join([self.number(SET_TARGET, *goal) for goal in goals.items()])
 
 
 def speed_units(steps_s: float) -> int:
@@ -219,8 +204,8 @@ class MaestroBoard(Board):
         self.send(self.params.targets({one.id: one.goal_steps for one in channels}))
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
-        """Stop pulses, each by its own command, so that a damaged one affects no other."""
-        self.send(b"".join(self.params.number(SET_TARGET, channel, 0) for channel in channels))
+        """Stop pulses."""
+        self.send(self.params.targets(dict.fromkeys(channels, 0)))
 
 
 class DetectedMaestro(NamedTuple):

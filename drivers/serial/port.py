@@ -80,7 +80,11 @@ class HostPort:
         exclusive: Whether to open it for this program alone; otherwise it is shared with the
             program that has it open.
         on_traffic: Called whenever bytes are sent or waited for; None if not needed.
+
+    now_s: returns host monotonic seconds
     """
+
+    now_s = staticmethod(time.monotonic)
 
     def __init__(
         self,
@@ -89,11 +93,7 @@ class HostPort:
         on_traffic: Callable[[], None] | None = None,
     ) -> None:
         self.port_name = port_name
-        self._exclusive, self._on_traffic = exclusive, on_traffic or (lambda: None)
-
-    def now_s(self) -> float:
-        """Return host monotonic seconds."""
-        return time.monotonic()
+        self._exclusive, self._on_traffic = exclusive, on_traffic
 
     def _lost(self, reason: object) -> BusLost:
         return BusLost(f"{self.port_name} is gone ({reason}): check USB cable and servo power")
@@ -114,7 +114,8 @@ class BlockingPort(HostPort):
 
     def write(self, data: bytes) -> None:
         """Send bytes; wait at most 50 ms for space in the adapter's buffer."""
-        self._on_traffic()
+        if self._on_traffic:
+            self._on_traffic()
         deadline_s = 0.0
         while data:
             try:
@@ -134,7 +135,8 @@ class BlockingPort(HostPort):
         The last wait is rounded up to the milliseconds of poll(), which also finds the bytes that
         arrived while this process did not run.
         """
-        self._on_traffic()
+        if self._on_traffic:
+            self._on_traffic()
         got = b""
         while len(got) < length:
             left_s = deadline_s - time.monotonic()

@@ -186,8 +186,6 @@ class Family:
     """First firmware of a model that answers a sync read in one packet."""
     baud_rates: tuple[int, ...]
     """Bit/s, indexed by the value of the servo's register."""
-    scan_rates: tuple[int, ...]
-    """The same, the usual ones first."""
     factory_baud: int
     highest_id: int
     format_firmware: Callable[[int], str]

@@ -69,7 +69,8 @@ class FeedbackColumns:
                 velocity = _to_signed(velocity, of_velocity)
             if max(effort) >= of_effort:
                 effort = _to_signed(effort, of_effort)
-        if not self.places.are_plausible(position, at_s):
+        times_s = (at_s,) * len(position)
+        if not self.places.are_plausible(position, times_s):
             return False
         warm, volts = now.temperature_c, now.voltage_v
         if at_temperature is not None and (celsius := values[at_temperature]) != warm:
@@ -86,7 +87,7 @@ class FeedbackColumns:
             Feedback,
             (
                 position, tuple(map(mul, velocity, self._velocity_units)), load,
-                (at_s,) * len(position), warm, volts, now.torque, now.fault,
+                times_s, warm, volts, now.torque, now.fault,
                 self._none.measured, self._none.rearmed, (),
             ),
         )  # fmt: skip

@@ -37,7 +37,7 @@ ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
 
 RATES: Mapping[BusKind, Sequence[int]] = {
     "maestro": (MaestroParams().baud,),
-    **{kind.name: kind.family.scan_rates for kind in KINDS.values()},
+    **{kind.name: kind.family.baud_rates for kind in KINDS.values()},
 }
 
 

@@ -56,7 +56,7 @@ class SetupResult(NamedTuple):
 
 def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
     """List all baud rates, the most likely ones first."""
-    return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.scan_rates)))
+    return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.baud_rates)))
 
 
 def search_rates(

@@ -15,25 +15,23 @@ from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec, buil
 from gazerig.sim_mock.maestro.channel import EmulatedChannel
 from gazerig.sim_mock.replies import NO_DEVICE, Piece
 
-SET_TARGET, SET_TARGETS, SET_SPEED, SET_ACCELERATION = 0x84, 0x9F, 0x87, 0x89
+SET_TARGET, SET_SPEED, SET_ACCELERATION = 0x84, 0x87, 0x89
 GET_POSITION, GET_ERRORS, STOP_SCRIPT = 0x90, 0xA1, 0xA4
 DATA_BYTES = {
     SET_TARGET: 3,
-    SET_TARGETS: 2,
     SET_SPEED: 3,
     SET_ACCELERATION: 3,
     GET_POSITION: 1,
     GET_ERRORS: 0,
     STOP_SCRIPT: 0,
 }
-"""Number of data bytes; for set-targets those before the targets."""
+"""Number of data bytes."""
 SETTERS = {
     SET_TARGET: EmulatedChannel.set_target,
-    SET_TARGETS: EmulatedChannel.set_target,
     SET_SPEED: EmulatedChannel.limit_speed,
     SET_ACCELERATION: EmulatedChannel.limit_acceleration,
 }
-"""Commands with a number for a channel; set-targets has several for adjacent channels."""
+"""Commands with a number for a channel."""
 
 PROTOCOL, CRC = 4, 3
 """Bits of the error register: a command that does not exist, and one with a wrong CRC."""
@@ -129,34 +127,24 @@ class EmulatedMaestro(HobbyBoard):
     def _size(self, text: bytes) -> int:
         """Return the bytes of the command at the begin of a text, 0 for none."""
         code = text[0]
-        if code not in DATA_BYTES or (code == SET_TARGETS and len(self.channels) <= SIZES[0]):
-            return 0
-        targets = text[1] if code == SET_TARGETS and len(text) > 1 else 0
-        return 1 + DATA_BYTES[code] + 2 * targets + self._crc
+        return 1 + DATA_BYTES[code] + self._crc if code in DATA_BYTES else 0
 
     def _answer(self, code: int, data: bytes) -> tuple[int, bytes] | None:
         """Execute one command; return the channel that answers, and its bytes.
 
         An unknown channel is a protocol error [A].
         """
-        if code in SETTERS:
-            first, *numbers = data[1:] if code == SET_TARGETS else data
-            words = [low | high << 7 for low, high in zip(numbers[::2], numbers[1::2], strict=True)]
-            channels = self.channels[first : first + len(words)]
-            if len(channels) < len(words):
-                self.fail(PROTOCOL)
-                return None
-            for channel, word in zip(channels, words, strict=True):
-                SETTERS[code](channel, word)
-        elif code == GET_POSITION:
-            if data[0] < len(self.channels):
-                return data[0], self.channels[data[0]].position.to_bytes(2, "little")
-            self.fail(PROTOCOL)
-        elif code == GET_ERRORS:
+        if code == GET_ERRORS:
             errors, self.errors = self.errors, 0
             return NO_DEVICE, errors.to_bytes(2, "little")
-        else:
+        if code == STOP_SCRIPT:
             self.is_script_running = False
+        elif data[0] >= len(self.channels):
+            self.fail(PROTOCOL)
+        elif code == GET_POSITION:
+            return data[0], self.channels[data[0]].position.to_bytes(2, "little")
+        else:
+            SETTERS[code](self.channels[data[0]], data[1] | data[2] << 7)
         return None
 
 

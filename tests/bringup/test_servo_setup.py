@@ -25,7 +25,7 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 YAW = ServoConfig(7, "xc330-m288", 1252, 2844, 2000.0, "neck_yaw")
 
-RATES = DYNAMIXEL.family.scan_rates
+RATES = DYNAMIXEL.family.baud_rates
 
 
 class Bench:

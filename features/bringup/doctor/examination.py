@@ -181,7 +181,7 @@ def find_servos(
     missing = tuple(setup for setup in setups if setup.id not in there)
     known = {setup.id for setup in setups}
     strangers = tuple(found for i, found in sorted(there.items()) if i not in known)
-    others = [rate for rate in kind.family.scan_rates if rate != baud and missing]
+    others = [rate for rate in kind.family.baud_rates if rate != baud and missing]
     elsewhere = search_rates(port, kind, others, tell)
     spare = find_spare(port, kind, setups, baud, [*answers, *elsewhere.found])
     _open(port, baud)
