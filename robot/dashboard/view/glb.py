@@ -4,10 +4,8 @@ All shapes but the eyes are lit here, once, by the lights of the scene, so that 
 graphics card does not have to light every pixel of every frame.
 """
 
-import json
-import struct
 from math import pi
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -59,6 +57,11 @@ class Finish(NamedTuple):
     roughness: float = 1.0
     is_lit: bool = True
 
+    @property
+    def is_browser_lit(self) -> bool:
+        """Return whether the browser lights every pixel."""
+        return self.roughness < 1.0
+
 
 _SAMPLER = {"magFilter": 9729, "minFilter": 9985, "wrapS": 10497, "wrapT": 10497}
 """Textures are repeated and smoothed between pixels, not between sizes: without a graphics card
@@ -72,40 +75,15 @@ FLAT = Finish(is_lit=False)
 
 def textured_glb(shape: TexturedMesh, finish: Finish) -> bytes:
     """Return a mesh with a texture as a binary glTF file, lit here."""
-    # Imported only to show a world: it takes half a second of a processor.
-    import trimesh
-    from trimesh.exchange.gltf import export_glb
-
     light = np.ones((len(shape.vertices), 3))
     if finish.is_lit:
         light = shade_colours(light, shape.normals, finish)
     gain = float(light.max())
-    colours = np.ones((len(light), 4))
-    colours[:, :3] = light / gain
     # In glTF the first row of an image is its top, and v grows downwards; trimesh inverts v.
-    visual: Any = trimesh.visual.TextureVisuals(  # type: ignore[no-untyped-call]
-        uv=shape.uv * (1.0, -1.0) + (0.0, 1.0),
-        material=trimesh.visual.material.PBRMaterial(  # type: ignore[no-untyped-call]
-            baseColorTexture=Image.fromarray(shape.image),
-            baseColorFactor=(1.0, 1.0, 1.0, 1.0),
-            metallicFactor=0.0,
-            roughnessFactor=1.0,
-        ),
-    )
-    visual.vertex_attributes["color"] = np.rint(255.0 * colours).astype(np.uint8)
-    mesh = trimesh.Trimesh(shape.vertices, shape.faces, visual=visual, process=False)
-
-    def unlit(tree: dict[str, Any]) -> None:
-        tree["extensionsUsed"] = sorted({*tree.get("extensionsUsed", ()), "KHR_materials_unlit"})
-        for material in tree["materials"]:
-            material["extensions"] = {"KHR_materials_unlit": {}}
-            material["pbrMetallicRoughness"]["baseColorFactor"] = [gain, gain, gain, 1.0]
-        tree["samplers"] = [_SAMPLER]
-        for texture in tree["textures"]:
-            texture["sampler"] = 0
-
-    data: Any = export_glb(mesh, include_normals=False, tree_postprocessor=unlit)  # type: ignore[no-untyped-call]
-    return bytes(data)
+    uv = shape.uv * (1.0, -1.0) + (0.0, 1.0)
+    opaque = np.column_stack((light / gain, np.ones(len(light))))
+    mesh = Mesh(shape.vertices, shape.faces)
+    return _glb(mesh, opaque, None, _material(finish, gain), uv, shape.image)
 
 
 def painted_glb(painted: Painted, finish: Finish, pose: Floats | None = None) -> bytes:
@@ -121,26 +99,82 @@ def painted_glb(painted: Painted, finish: Finish, pose: Floats | None = None) ->
     rgba[:, : colours.shape[1]] = np.clip(colours / 255.0, 0.0, 1.0)
     rgba[:, :3] = _to_linear(rgba[:, :3])
     gain = 1.0
-    by_browser = finish.roughness < 1.0
-    if finish.is_lit and not by_browser:
+    if finish.is_lit and not finish.is_browser_lit:
         rgba[:, :3] = shade_colours(
             rgba[:, :3], normals if pose is None else normals @ pose.T, finish
         )
         gain = float(rgba[:, :3].max())
         rgba[:, :3] /= gain
-    material: dict[str, Any] = {
+    material = _material(finish, gain)
+    if colours.shape[1] == 4:
+        material["alphaMode"] = "BLEND"
+    return _glb(mesh, rgba, normals if finish.is_browser_lit else None, material)
+
+
+def _material(finish: Finish, gain: float) -> dict[str, Any]:
+    """Return a material in the format of glTF; gain: factor of its colours."""
+    return {
         "pbrMetallicRoughness": {
             "metallicFactor": 0.0,
             "roughnessFactor": finish.roughness,
             "baseColorFactor": [gain, gain, gain, 1.0],
         },
         "doubleSided": False,
-        "extensions": {} if by_browser else {"KHR_materials_unlit": {}},
+        "extensions": {} if finish.is_browser_lit else {"KHR_materials_unlit": {}},
     }
-    if colours.shape[1] == 4:
-        material["alphaMode"] = "BLEND"
-    bytes_rgba = np.rint(255.0 * rgba).astype(np.uint8)
-    return glb_file(mesh, bytes_rgba, normals if by_browser else None, material)
+
+
+def _glb(
+    mesh: Mesh,
+    rgba: Floats,
+    normals: Floats | None,
+    material: dict[str, Any],
+    uv: Floats | None = None,
+    image: npt.NDArray[np.uint8] | None = None,
+) -> bytes:
+    """Return a mesh as a binary glTF file.
+
+    Args:
+        mesh: the mesh.
+        rgba: colours (n, 4) of the vertices, 0..1, by which the texture is multiplied.
+        normals: normals (n, 3) of the vertices, for surfaces that the browser lights.
+        material: its material.
+        uv: places (n, 2) of the vertices in the texture, as trimesh counts them.
+        image: the texture.
+    """
+    import trimesh  # half a second of a processor, which a page without a view does not need
+    from trimesh.exchange.gltf import export_glb
+
+    colours = np.rint(255.0 * rgba).astype(np.uint8)
+    look: Any = trimesh.visual.ColorVisuals(vertex_colors=colours)
+    if image is not None:
+        texture: Any = trimesh.visual.material.PBRMaterial(  # type: ignore[no-untyped-call]
+            baseColorTexture=Image.fromarray(image)
+        )
+        look = trimesh.visual.TextureVisuals(uv, texture)  # type: ignore[no-untyped-call]
+        look.vertex_attributes["color"] = colours
+    shape = trimesh.Trimesh(
+        mesh.vertices, mesh.faces, vertex_normals=normals, visual=look, process=False
+    )
+
+    def finish(tree: dict[str, Any]) -> None:
+        surface = material["pbrMetallicRoughness"]
+        for made in tree.get("materials", ()):
+            surface = {
+                **surface,
+                "baseColorTexture": made["pbrMetallicRoughness"]["baseColorTexture"],
+            }
+        tree["materials"] = [{**material, "pbrMetallicRoughness": surface}]
+        tree["meshes"][0]["primitives"][0]["material"] = 0
+        tree["extensionsUsed"] = sorted(material["extensions"])
+        if image is not None:
+            tree["samplers"] = [_SAMPLER]
+            tree["textures"][0]["sampler"] = 0
+
+    data: Any = export_glb(  # type: ignore[no-untyped-call]
+        shape, include_normals=normals is not None, tree_postprocessor=finish
+    )
+    return bytes(data)
 
 
 def shade_colours(colours: Floats, normals: Floats, finish: Finish) -> Floats:
@@ -171,61 +205,6 @@ def shade_colours(colours: Floats, normals: Floats, finish: Finish) -> Floats:
 def _to_linear(share: Floats) -> Floats:
     """Return colours in linear light, as glTF defines vertex colours."""
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
-
-
-_UNSIGNED_BYTE: Final = 5121
-_UNSIGNED_INT: Final = 5125
-_FLOAT: Final = 5126
-_TRIANGLES: Final = 4
-
-
-def glb_file(
-    mesh: Mesh, rgba: npt.NDArray[np.uint8], normals: Floats | None, material: dict[str, Any]
-) -> bytes:
-    """Return a mesh as a binary glTF file.
-
-    Args:
-        mesh: the mesh.
-        rgba: colours (n, 4) of the vertices.
-        normals: normals (n, 3) of the vertices, for surfaces that the browser lights.
-        material: material in the format of glTF.
-    """
-    columns: dict[str, tuple[npt.NDArray[Any], int, str]] = {
-        "": (mesh.faces.astype("<u4").reshape(-1, 1), _UNSIGNED_INT, "SCALAR"),
-        "POSITION": (mesh.vertices.astype("<f4"), _FLOAT, "VEC3"),
-        "COLOR_0": (rgba, _UNSIGNED_BYTE, "VEC4"),
-    }
-    if normals is not None:
-        columns["NORMAL"] = (normals.astype("<f4"), _FLOAT, "VEC3")
-    accessors, views, data = list[dict[str, Any]](), list[dict[str, int]](), b""
-    for number, (values, kind, shape) in enumerate(columns.values()):
-        accessor = {"bufferView": number, "componentType": kind, "count": len(values)}
-        bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
-        normalized = {"normalized": True} if kind == _UNSIGNED_BYTE else {}
-        accessors.append({**accessor, "type": shape, **bounds, **normalized})
-        part = values.tobytes()  # every column consists of whole words of four bytes
-        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(part)})
-        data += part
-    attributes = {name: number for number, name in enumerate(columns) if name}
-    primitive = {"attributes": attributes, "indices": 0, "mode": _TRIANGLES, "material": 0}
-    tree: dict[str, Any] = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [primitive]}],
-        "materials": [material],
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": len(data)}],
-    }
-    if used := sorted(material["extensions"]):
-        tree["extensionsUsed"] = used
-    text = json.dumps(tree, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    body = struct.pack("<I4s", len(text), b"JSON") + text
-    body += struct.pack("<I4s", len(data), b"BIN\0") + data
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
 def glow_disc(inner: tuple[int, int, int, int]) -> Painted:
