@@ -22,7 +22,7 @@ from gazerig.robot.cli.command_list import (
     shipped_commands,
     sort_by_panel,
 )
-from gazerig.robot.cli.examples import EXAMPLES, add_examples
+from gazerig.robot.cli.examples import add_examples, core_examples
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, clear_errors, run_app
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class CommandsByName(UserDict[str, Any]):
         if name in self.data and name not in self._imported:
             app = typer.Typer()
             app.add_typer(import_module(self.entries[name].module).app)
-            add_examples(app, {**EXAMPLES, **self.entries[name].examples})
+            add_examples(app, {**core_examples(), **self.entries[name].examples})
             command: Any = typer.main.get_group(app).commands[name]
             command.rich_help_panel = self.entries[name].panel
             self.data[name] = command
