@@ -176,30 +176,3 @@ def test_cues_loops_and_a_clock_of_a_sound() -> None:
     it.player.step(t + 0.5)
     (playing,) = [one for one in it.choices.states(t + 0.5) if one.is_playing]
     assert 1.0 <= playing.position_s <= 1.5 and playing.cue == "top"
-
-
-def test_the_sum_of_two_tracks_that_turn_an_eye_keeps_its_limits() -> None:
-    def swing(key: str, size: float, period_s: float) -> Track:
-        times = np.arange(period_s, 4.0, period_s)
-        frames = tuple(
-            KeyFrame(float(t), **{key: size * (-1.0) ** i})  # type: ignore[arg-type]
-            for i, t in enumerate(times)
-        )
-        return Track(key, frames, fit="slow")
-
-    # Eyes as fast as the neck, which they compensate.
-    neck = limits(rig().joints)[4]
-    bounds = [
-        one._replace(speed_rad_s=neck.speed_rad_s, accel_rad_s2=neck.accel_rad_s2)
-        for one in limits(rig().joints)
-    ]
-    it = show(head=swing("head_yaw_deg", 4.0, 0.5), eyes=swing("eyes_yaw_deg", 10.0, 0.3))
-    it = it._replace(bounds=bounds)
-    it.play("head", 0.0)
-    it.play("eyes", 0.1)
-    head, eyes = it.player.voices
-    assert eyes.played.speed < 0.9
-    times = np.arange(0.1, 6.0, 0.005).tolist()
-    both = [it.player.state(t) for t in times]
-    speed, acceleration = (np.array([one[i] for one in both]) for i in (1, 2))
-    assert 0.5 < head.played.stretch(speed, acceleration) <= 1.0 + 1e-3

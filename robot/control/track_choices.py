@@ -290,8 +290,6 @@ class TrackChoices:
         state = self._player.state(t_s, replaced)
         fade_s = self._fit.fade_s(state, limits, BLEND_OUT_S)
         base = self._fit.subtract_offset(commanded_rad, self._player.state(t_s))
-        beside = [voice for voice in self._player.voices if voice not in replaced]
-        limits = self._remaining(limits, beside)
         try:
             fitted = self._fit_track(command, base, limits)
         except TrackRefused as refused:
@@ -320,13 +318,6 @@ class TrackChoices:
             since_s=t_s, volume=track.volume,
         )  # fmt: skip
         return CommandReply(track=reply)
-
-    def _remaining(
-        self, limits: Sequence[JointLimit], others: Sequence[Voice]
-    ) -> Sequence[JointLimit]:
-        """Return the limits less the motion of other tracks, which may share a joint: an eye."""
-        played = [voice.played for voice in others]
-        return self._fit.remaining_limits(limits, played)
 
     def ends_show(self, command: Play) -> bool:
         """Return whether a track would replace one that owns joints."""

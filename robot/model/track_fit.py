@@ -1,6 +1,6 @@
 """Fit of a track to a rig's joints, ranges and speeds."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import degrees
 from typing import NamedTuple
 
@@ -32,7 +32,6 @@ from gazerig.robot.model.types import GAZE_JOINTS, further_joints
 _SMALLEST = 0.2
 """Smallest share of a track that a range may leave; less is hardly visible and is not played."""
 _ROUNDING = 1e-6
-_LEFT = 0.25
 _LONGER = tuple(1.25**i for i in range(16))
 _WAITS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
@@ -321,25 +320,6 @@ class TrackFit:
                     sizes[c] = min(sizes[c], there / far)
                     smaller[self.joints[j]] = float(sizes[c])
         return sizes, tuple(smaller.items())
-
-    def remaining_limits(
-        self, limits: Sequence[JointLimit], others: Iterable[PlayedTrack]
-    ) -> list[JointLimit]:
-        """Return the limits less the fastest motion of tracks that move other channels of a joint.
-
-        Their largest values count. A part is always left; the guard limits the rest.
-        """
-        left = list(limits)
-        for played in others:
-            samples = played.motion.samples.scale(np.array(played.sizes), played.speed)
-            matrix = self._matrix_of(played.motion)
-            used = [np.abs(column @ matrix).max(axis=0) / LIMIT_SHARE for column in samples[2:]]
-            for j, limit in enumerate(limits):
-                left[j] = left[j]._replace(
-                    speed_rad_s=max(left[j].speed_rad_s - used[0][j], _LEFT * limit.speed_rad_s),
-                    accel_rad_s2=max(left[j].accel_rad_s2 - used[1][j], _LEFT * limit.accel_rad_s2),
-                )
-        return left
 
     def _matrix_of(self, motion: TrackMotion) -> Floats:
         """Return joint angles per offset: eyes that a track owns do not compensate the head."""
