@@ -49,7 +49,7 @@ class ServoLine:
     def take_arrived(self) -> bytes:
         """Return the bytes that have arrived since the last call."""
         now_s = self.device.now_s()
-        out = list[bytes]()
+        out: list[bytes] = []
         while self._late and self._late[0][0] <= now_s:
             out.append(self._late.popleft()[1])
         return b"".join(out)

@@ -60,7 +60,8 @@ class DynamixelChain(ServoChain):
         """
         length = 1 + sum([4 + read[2] for read in reads])
         before, crc, pack = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0, CRC.pack
-        parts, delays_s, now_ms, fed_ms = list[bytes](), list[float](), self._now_ms, self._fed_ms
+        parts: list[bytes] = []
+        wait_s, now_ms, fed_ms = 0.0, self._now_ms, self._fed_ms
         find, faults = self._by_id.get, self.faults
         faulty = faults.has_any
         for servo_id, address, size in reads:
@@ -80,7 +81,8 @@ class DynamixelChain(ServoChain):
                     own, end = merge(data, own), merge(after, end)
                     following = umts(own, crc)
                 data, after = own, end
-                delays_s.append(servo.delay_s)
+                if not parts:
+                    wait_s = servo.delay_s
             if not data or (faulty and faults.use_fault("lose", servo_id)):
                 break
             crc, before = following, after
@@ -92,7 +94,7 @@ class DynamixelChain(ServoChain):
         parts[-1] += before
         if not faulty:
             parts = [b"".join(parts)]
-        waits_s = [delays_s[0], *[0.0] * len(parts)]
+        waits_s = [wait_s, *[0.0] * len(parts)]
         return [
             Piece(read[0], part, self._end, wait_s)
             for read, part, wait_s in zip(reads, parts, waits_s, strict=False)

@@ -153,22 +153,18 @@ class ServoChain(ABC):
             self._stale = True
         if self._stale:
             self.refresh()
-        pieces = list[Piece]()
-        if self._by_id:
-            for instruction in self._feed(data, now_s):
-                if self._stale:
-                    self.refresh()
-                pieces += self._execute(instruction)
+        pieces: list[Piece] = []
+        if not self._by_id:
+            return pieces
+        if now_s - self._arrived_s >= self.packet_gap_s:
+            self._unfinished = b""
+        self._arrived_s, before = now_s, len(self._unfinished)
+        found, self._unfinished = self.find_instructions(self._unfinished + data, before)
+        for instruction in found:
+            if self._stale:
+                self.refresh()
+            pieces += self._execute(instruction)
         return pieces
-
-    def _feed(self, data: bytes, now_s: float) -> list[Instruction]:
-        """Return the instructions that these bytes complete; they arrive now."""
-        before = len(self._unfinished) if now_s - self._arrived_s < self.packet_gap_s else 0
-        if before:
-            data = self._unfinished + data
-        self._arrived_s = now_s
-        found, self._unfinished = self.find_instructions(data, before)
-        return found
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
         """Execute one instruction on the addressed servos; return the bytes that they send."""
@@ -230,7 +226,8 @@ class ServoChain(ABC):
 
     def _answer_reads(self, reads: Iterable[Read]) -> list[Piece]:
         """Answer a group read with one status per servo, up to the first silent one."""
-        pieces, now_ms, fed_ms = list[Piece](), self._now_ms, self._fed_ms
+        pieces: list[Piece] = []
+        now_ms, fed_ms = self._now_ms, self._fed_ms
         find, faults, end = self._by_id.get, self.faults, self._end
         for servo_id, address, length in reads:
             packet, delay_s = b"", 0.0

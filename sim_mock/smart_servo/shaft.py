@@ -130,7 +130,8 @@ class Shaft:
         """Advance the profile; return its position after each millisecond."""
         if not self.led:
             return [self.goal] * ms
-        goal, cruise, ramp, path = self.goal, self._cruise, self._ramp, list[float]()
+        path: list[float] = []
+        goal, cruise, ramp = self.goal, self._cruise, self._ramp
         r, v, ramped = self.r, self.r_v, ramp > 0.0 < cruise
         for _ in range(ms):
             ahead, speed, after = goal - r, v, cruise
