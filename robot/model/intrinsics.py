@@ -86,11 +86,11 @@ def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
     """Return the undistorted directions (n, 3) through pixels (n, 2), with z = 1."""
     points = np.asarray(points_px, dtype=np.float64).reshape(-1, 2)
     i = intrinsics
-    found = np.ones((len(points), 3))
+    plane = (points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px)
     if i.has_distortion and len(points):
-        found[:, :2] = _undistort((points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px), i.distortion)
-    else:
-        found[:, :2] = (points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px)
+        plane = _undistort(plane, i.distortion)
+    found = np.ones((len(points), 3))
+    found[:, :2] = plane
     return found
 
 

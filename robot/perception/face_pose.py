@@ -39,7 +39,7 @@ from gazerig.gaze.angles import (
     turn_about,
     unit,
 )
-from gazerig.gaze.types import Floats, Mat3, Vec3, vec
+from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.face_geometry import EYES_TO_MOUTH_M, LANDMARKS_FACE_M, PUPIL_DISTANCE_M
 from gazerig.robot.model.intrinsics import rays
 
@@ -106,7 +106,7 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
     points = np.asarray(landmarks_px, dtype=np.float64)
     if points.shape != (5, 2) or not _shows_front(points.tolist()):
         return None
-    seen: list[Vec3] = [vec(ray) for ray in rays(points, intrinsics)]
+    seen: list[Vec3] = rays(points, intrinsics).tolist()
     noise = _NOISE_PX / sqrt(intrinsics.fx_px * intrinsics.fy_px)
     # Axes of a camera turned to the face and rolled until the eyes are level: poses near "looks at
     # the camera" are small rotations wherever the face appears.
@@ -162,8 +162,9 @@ def _fit_face(seen: Points, noise: float) -> tuple[Mat3, Vec3, float] | None:
     variance = noise * noise + (_NOISE_OF_EYES * eyes) ** 2
     # A turn shortens one of the face's two lengths, so the longer one is more reliable.
     away_m = 1.0 / max(eyes / PUPIL_DISTANCE_M, height / EYES_TO_MOUTH_M)
-    weights = np.ones(10)
-    weights[[7, 9]] = variance / (variance + (_MOUTH_HEIGHT_OF_EYES * eyes) ** 2)
+    # Weights of the points' heights, as a root: that of the mouth's corners is hardly known.
+    mouth = sqrt(variance / (variance + (_MOUTH_HEIGHT_OF_EYES * eyes) ** 2))
+    weights = 1.0, 1.0, 1.0, mouth, mouth
     pitch, yaw, long = variance * _PITCH_INFO, variance * _YAW_INFO, variance * _LENGTH_INFO
     prior = np.diag([pitch, yaw, 0.0, 0.0, 0.0, 0.0, long])
     # The nose projects from the plane of eyes and mouth: its image position shows the turn.
@@ -182,14 +183,14 @@ def _fit_face(seen: Points, noise: float) -> tuple[Mat3, Vec3, float] | None:
     p, length, wider, before = (nose[0] * z, nose[1] * z, z), 1.0, 0.0, 0.1
     R, frontal = turn_about(unit(turn), norm(turn)), _FRONTAL_M
     for _ in range(_MOST_STEPS):
-        rows, off = _rows(seen, frontal, R, p, length)
-        weighted = rows.T * weights
+        rows = np.array(_rows(seen, weights, frontal, R, p, length))
+        normal = rows.T @ rows
         # A rotation vector moves with a small turn by that turn and half its product with the
         # vector.
         held = pitch * turn[0], yaw * turn[1], 0.0
         pull = add(held, scale(cross(turn, held), 0.5))
-        wanted = weighted @ off - (*pull, 0.0, 0.0, 0.0, long * (length - 1.0))
-        step = np.linalg.solve(weighted @ rows + prior, wanted).tolist()
+        wanted = normal[:7, 7] - (*pull, 0.0, 0.0, 0.0, long * (length - 1.0))
+        step = np.linalg.solve(normal[:7, :7] + prior, wanted).tolist()
         w = step[0], step[1], step[2]
         turn = add(turn, sub(w, scale(cross(turn, w), 0.5)))
         R, p, length = (
@@ -201,7 +202,8 @@ def _fit_face(seen: Points, noise: float) -> tuple[Mat3, Vec3, float] | None:
             return None
         last = wider
         # The observed width of the mouth at this pose.
-        at_pose = _mouth_width([(x / z, y / z) for x, y, z in _placed(frontal, R, p, length)])
+        placed = [add(p, rotate(R, (x, length * y, z))) for x, y, z in frontal]
+        at_pose = _mouth_width([(x / z, y / z) for x, y, z in placed])
         wider = (1.0 + wider) * width / at_pose - 1.0
         wider = believed * min(max(wider, _NARROWEST), _WIDEST)
         frontal = _smile(wider)
@@ -214,29 +216,41 @@ def _fit_face(seen: Points, noise: float) -> tuple[Mat3, Vec3, float] | None:
 
 
 def _rows(
-    seen: Points, frontal: Sequence[Vec3], R: Mat3, p_m: Vec3, length: float
-) -> tuple[Floats, Floats]:
-    """Return the motion of each image coordinate per step, (10, 7), and its error.
+    seen: Points,
+    weights: Sequence[float],
+    frontal: Sequence[Vec3],
+    R: Mat3,
+    p_m: Vec3,
+    length: float,
+) -> list[tuple[float, ...]]:
+    """Return the motion of each image coordinate per step, and its error: ten rows of 7 + 1.
 
     A step is a small turn w, which moves a point P by w x P, a shift, and a growth of the length.
+    The rows of the heights are multiplied by their weights.
     """
-    rows, off = [], []
-    for (_, y, _), (x_seen, y_seen), placed in zip(
-        frontal, seen, _placed(frontal, R, p_m, length), strict=True
-    ):
-        X, Y, Z = sub(placed, p_m)
-        q = 1.0 / placed[2]
-        u, v = placed[0] * q, placed[1] * q
-        along = (-u * Y, Z + u * X, -Y, 1.0, 0.0, -u, y * (R[0][1] - u * R[2][1]))
-        upright = (-Z - v * Y, v * X, X, 0.0, 1.0, -v, y * (R[1][1] - v * R[2][1]))
-        rows += [[q * one for one in along], [q * one for one in upright]]
-        off += [x_seen - u, y_seen - v]
-    return np.array(rows), np.array(off)
-
-
-def _placed(frontal: Sequence[Vec3], R: Mat3, p_m: Vec3, length: float) -> list[Vec3]:
-    """Return the points of a frontal face at a pose."""
-    return [add(p_m, rotate(R, (x, length * y, z))) for x, y, z in frontal]
+    rows: list[tuple[float, ...]] = []
+    (_, r01, _), (_, r11, _), (_, r21, _) = R
+    for (x, y, z), (x_seen, y_seen), weight in zip(frontal, seen, weights, strict=True):
+        X, Y, Z = rotate(R, (x, length * y, z))
+        q = 1.0 / (Z + p_m[2])
+        u, v = (X + p_m[0]) * q, (Y + p_m[1]) * q
+        rows.append(
+            (
+                -u * Y * q,
+                (Z + u * X) * q,
+                -Y * q,
+                q,
+                0.0,
+                -u * q,
+                y * (r01 - u * r21) * q,
+                x_seen - u,
+            )
+        )
+        off, q = weight * (y_seen - v), weight * q
+        rows.append(
+            ((-Z - v * Y) * q, v * X * q, X * q, 0.0, q, -v * q, y * (r11 - v * r21) * q, off)
+        )
+    return rows
 
 
 def _smile(wider: float) -> tuple[Vec3, ...]:

@@ -245,6 +245,8 @@ def _depth_ratio(
 
     Return None if the camera's depth does not give the distance of this face.
     """
+    if found.depth_m is None:
+        return None
     low, high = face.landmarks_px.min(axis=0), face.landmarks_px.max(axis=0)
     (x, y), (width, height) = low.tolist(), (high - low).tolist()
     depth = _depth(found, (x, y, width, height))
