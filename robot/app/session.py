@@ -19,7 +19,7 @@ from gazerig.robot.control.joint_faults import JointFaults
 from gazerig.robot.control.loop import LoopCount, Tick, TickLoop
 from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
-from gazerig.robot.control.real_time import SWITCH_INTERVAL
+from gazerig.robot.control.real_time import SWITCH_INTERVAL, frozen_objects
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.moved_opponent import BoxingScene
 from gazerig.sim_mock.scenes.scene import Scene
@@ -270,7 +270,7 @@ class Session:
         begun = False
         try:
             with (
-                contextlib.nullcontext() if self._options.fast else SWITCH_INTERVAL,
+                frozen_objects() if self._options.fast else SWITCH_INTERVAL,
                 self._interrupts,
                 prepare_shutdown(
                     assembly, say, self._interrupts, run_observers.show_parking
