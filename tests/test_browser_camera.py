@@ -16,8 +16,8 @@ from websockets.exceptions import ConnectionClosed
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.browser_source import FIELD_DEG, LATENCY_S, BrowserSource
-from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.shared_slots import MOST_BYTES, JpegSlot
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.types import Camera, Detections
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.borrowed_camera import SILENT_S, BorrowedCamera
@@ -108,9 +108,9 @@ class Lent:
             lambda: self.placed.append(self.camera.lent),
         )  # fmt: skip
 
-    def make(self, source: Callable[[], Any], before: int) -> CameraProcess:
+    def make(self, source: Callable[[], Any], before: int) -> CameraWorker:
         self.before.append(before)
-        return cast(CameraProcess, self.browsers)
+        return cast(CameraWorker, self.browsers)
 
     def picture(self) -> None:
         self.camera.take(jpeg())

@@ -5,6 +5,7 @@ import signal
 import threading
 import time
 from functools import partial
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -17,10 +18,9 @@ from gazerig.drivers.camera.film import Film
 from gazerig.drivers.camera.params import RECOVERY, CameraRecovery
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
-from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.recorder import RecordingWriter
-from gazerig.drivers.camera.shared_frames import SlotReader, SlotWriter
 from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
@@ -44,14 +44,12 @@ def recording(tmp_path):
     return tmp_path / "r.mcap"
 
 
-def process(source, care=RECOVERY) -> CameraProcess:
-    return CameraProcess(CameraParts(source, DETECTOR, locate=LOCATOR), time.monotonic, care)
+def process(source, care=RECOVERY) -> CameraWorker:
+    return CameraWorker(CameraParts(source, DETECTOR, locate=LOCATOR), time.monotonic, care)
 
 
-def whole(camera):
-    """Return the newest detections unless their slots have been written again meanwhile."""
-    found = camera.latest(0.0)
-    return found if found.image is not None and found.depth_m is not None else None
+def pid_of(camera: CameraWorker) -> int:
+    return cast(Any, camera)._frames._process.pid
 
 
 def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
@@ -59,10 +57,10 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
     assert camera.latest(0.0) is None
     before_s = time.monotonic()
     camera.open()
-    with pytest.raises(CameraError, match="is already running"):
+    with pytest.raises(CameraError, match="is already open"):
         camera.open()
     wait_for(lambda: camera.frames >= 5)
-    found = present(wait_for(lambda: whole(camera)))
+    found = present(camera.latest(0.0))
     k = (found.number - 1) % 20
     assert (found.width_px, found.height_px, found.faces) == (64, 48, ())
     for values, value in ((present(found.image), 10 * k), (present(found.depth_m), 0.5 + k)):
@@ -92,14 +90,14 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)
     assert present(camera.latest(0.0)).located is not None
-    first, before = present(camera._process).pid, camera.latest(0.0)
-    os.kill(present(first), signal.SIGKILL)
+    first, before = pid_of(camera), camera.latest(0.0)
+    os.kill(first, signal.SIGKILL)
     assert camera.latest(0.0) is not None, "the last picture stays, and its age tells"
     wait_for(lambda: present(camera.latest(0.0)).captured_s > present(before).captured_s + 0.2)
     after = camera.latest(0.0)
     assert present(after).number > present(before).number
-    assert wait_for(lambda: whole(camera)).image is not None
-    assert present(camera._process).pid != first
+    assert present(after).image is not None
+    assert pid_of(camera) != first
     lost, back = camera.events()
     assert lost.startswith("camera lost (the camera process has ended)")
     assert back.startswith("camera back after")
@@ -130,13 +128,13 @@ def test_a_process_that_hangs_is_told_of_and_started_again():
     camera = process(Ticking, CameraRecovery(silent_s=1.0, restart_s=2.0))
     camera.open()
     wait_for(lambda: camera.frames > 20)
-    first = present(camera._process).pid
-    os.kill(present(first), signal.SIGSTOP)
+    first = pid_of(camera)
+    os.kill(first, signal.SIGSTOP)
     before = camera.latest(0.0)
     wait_for(lambda: present(camera.latest(0.0)).number > present(before).number + 20)
     lost, back = camera.events()
     assert lost == "camera lost (no new frame): waiting for it" and back.startswith("camera back")
-    assert present(camera._process).pid != first
+    assert pid_of(camera) != first
     camera.close()
 
 
@@ -144,10 +142,10 @@ def test_a_film_that_pauses_is_no_lost_camera(recording):
     camera = process(partial(CameraReplay, recording), CameraRecovery(silent_s=0.1, restart_s=0.2))
     camera.open()
     wait_for(lambda: camera.frames > 5)
-    os.kill(present(present(camera._process).pid), signal.SIGSTOP)
+    os.kill(pid_of(camera), signal.SIGSTOP)
     before = camera.frames
     time.sleep(1.0)
-    os.kill(present(present(camera._process).pid), signal.SIGCONT)
+    os.kill(pid_of(camera), signal.SIGCONT)
     wait_for(lambda: camera.frames > before)
     assert camera.events() == ()
     camera.close()
@@ -173,16 +171,25 @@ def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     camera.close()
 
 
-def test_slots_carry_arrays_of_any_shape():
-    writer, reader = SlotWriter(), SlotReader()
-    try:
-        for shape in ((3, 4, 3), (480, 640, 3), (2, 2), (600, 800, 3)):
-            array = np.random.default_rng(1).integers(0, 255, shape, np.uint8)
-            assert np.array_equal(present(reader.take(writer.put(array))), array)
-        depth = np.array([[1.5, np.nan]], np.float32)
-        newest = writer.put(depth)
-        assert np.array_equal(present(reader.take(newest)), depth, equal_nan=True)
-    finally:
-        reader.close()
-        writer.close()
-    assert SlotReader().take(newest) is None
+class Flawed(Ticking):
+    """A source that fails at its tenth frame, not as a lost camera does."""
+
+    def take(self, now_s, stop):
+        if self.number == 9:
+            raise RuntimeError("no memory")
+        return super().take(now_s, stop)
+
+
+def test_an_exception_in_the_process_ends_the_camera_with_its_reason():
+    camera = process(Flawed)
+    camera.open()
+
+    def failed() -> bool:
+        try:
+            camera.latest(0.0)
+        except CameraError as error:
+            return "failed (RuntimeError: no memory)" in str(error)
+        return False
+
+    wait_for(failed)
+    camera.close()

@@ -13,7 +13,7 @@ from gazerig.drivers.camera.capture_loop import CameraParts
 from gazerig.drivers.camera.film import Film
 from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.camera.thread import CameraThread
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import DetectedFace
 
@@ -70,6 +70,10 @@ class EveryOther:
         return (FACE,) if self.looked % 2 == 0 else ()
 
 
+def worker(source, detector=EveryOther, care=AT_ONCE, now_s=time.monotonic) -> CameraWorker:
+    return CameraWorker(CameraParts(lambda: source, detector), now_s, care, in_thread=True)
+
+
 @pytest.fixture
 def source():
     return Source()
@@ -77,13 +81,13 @@ def source():
 
 @pytest.fixture
 def camera(source):
-    thread = CameraThread(CameraParts(lambda: source, EveryOther), time.monotonic, AT_ONCE)
+    thread = worker(source)
     thread.open()
     yield thread
     thread.close()
 
 
-def feed(source: Source, camera: CameraThread, count: int) -> None:
+def feed(source: Source, camera: CameraWorker, count: int) -> None:
     goal = camera.frames + count
     for _ in range(count):
         source.fed.release()
@@ -121,7 +125,7 @@ def test_fault_of_the_detector_reaches_the_loop_in_one_line(source):
         def find(self, picture):
             raise RuntimeError("layer 3\nhas no weights")
 
-    thread = CameraThread(CameraParts(lambda: source, Broken), time.monotonic)
+    thread = worker(source, Broken)
     thread.open()
     source.fed.release()
     wait_for(lambda: source.closed)
@@ -149,7 +153,7 @@ def test_waits_between_tries_double_up_to_the_longest(source):
     waits: list[float] = []
     care = CameraRecovery(0.1, 0.35, give_up_s=1.0)
     clock = [0.0]
-    camera = CameraThread(CameraParts(lambda: source, EveryOther), lambda: clock[0], care)
+    camera = worker(source, care=care, now_s=lambda: clock[0])
 
     class Stop(threading.Event):
         def wait(self, timeout=None) -> bool:
@@ -169,7 +173,7 @@ def test_waits_between_tries_double_up_to_the_longest(source):
 
 def test_close_does_not_wait_for_a_lost_camera(source):
     care = CameraRecovery(60.0, 60.0, give_up_s=86_400.0)
-    camera = CameraThread(CameraParts(lambda: source, EveryOther), time.monotonic, care)
+    camera = worker(source, care=care)
     camera.open()
     lose(source)
     wait_for(lambda: source.closed)
@@ -187,10 +191,8 @@ def test_slow_detector_skips_pictures_and_queues_none(tmp_path):
             assert free.acquire(timeout=PATIENCE_S)
             return ()
 
-    camera = CameraThread(
-        CameraParts(lambda: Film(write_film(tmp_path / "film.avi", rate_hz=10.0)), Slow),
-        lambda: clock[0],
-    )
+    film = Film(write_film(tmp_path / "film.avi", rate_hz=10.0))
+    camera = worker(film, Slow, now_s=lambda: clock[0])
     camera.open()
     free.release()
     wait_for(lambda: camera.frames == 1)

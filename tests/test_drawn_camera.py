@@ -6,9 +6,9 @@ from functools import partial
 import numpy as np
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.drawn_camera import DrawnSource, scene_pixels
@@ -64,6 +64,6 @@ def test_only_a_drawn_scene_in_real_time_has_a_process() -> None:
     try:
         lent = made.robot.camera
         assert isinstance(lent, BorrowedCamera)
-        assert isinstance(lent.own, CameraProcess)
+        assert isinstance(lent.own, CameraWorker)
     finally:
         made.close()

@@ -35,6 +35,8 @@ class CameraParts(NamedTuple):
     locate: locates detections in the camera's axes; None: their consumer does
     orientation: turns frames upright
     record: path of a new file for the frames as the source delivers them, None for none
+    before: number of earlier camera processes of the same control loop; the scenes of this one
+        differ from theirs
     """
 
     source: Callable[[], FrameSource]
@@ -43,6 +45,7 @@ class CameraParts(NamedTuple):
     locate: Locate | None = None
     orientation: FrameOrientation = AS_DELIVERED
     record: Path | None = None
+    before: int = 0
 
 
 def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:

@@ -2,136 +2,128 @@
 
 Python runs one thread of a process at a time, so a face detector would sometimes delay a loop in
 the same process by milliseconds; and on few cores the loop's process needs priority. Detections
-return through a pipe, frames through shared memory. A process that crashes, or is blocked in a
-camera's driver, is restarted while the loop continues without frames: the last detections stay,
-and their age shows the loss.
+return through a pipe, frames as memory that is passed with them. A process that crashes, or is
+blocked in a camera's driver, is started again while the loop continues without frames.
 """
 
 import multiprocessing
+import os
+import signal
+import socket
 import threading
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from multiprocessing.reduction import recv_handle, send_handle
+from typing import Any
 
-from gazerig.drivers.camera.capture_loop import BACK, LOST, CameraParts
-from gazerig.drivers.camera.params import RECOVERY, CameraRecovery
-from gazerig.drivers.camera.shared_frames import SlotReader
-from gazerig.drivers.camera.worker import (
-    LONGEST_END_S,
-    DetectionMessage,
-    ProcessEnd,
-    ProcessStart,
-    run,
+from numpy.typing import NDArray
+
+from gazerig.drivers.camera.capture_loop import (
+    BACK,
+    LOST,
+    CameraParts,
+    CaptureLoop,
+    detection_error,
 )
+from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.process.child_process import hide_script
+from gazerig.drivers.process.passed_image import PassedImage, copy_image, take_image
+from gazerig.drivers.process.priority import lower_priority
 from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
 
+LONGEST_END_S = 12.0
+"""Time after which a stopped or orphaned process ends, even if it is blocked."""
+_NICE = 10  # lower priority than the loop
+_LONGEST_START_S = 60.0
 _FIRST_FRAME_S = 15.0
 """Longest time to the first frame: exposure settles, networks are loaded."""
-_LOST_PERIODS, _HUNG_PERIODS, _SHARE = 5.0, 15.0, 0.2
-"""Least numbers of usual frame periods before either; share of a new period in the usual one."""
-_LONGEST_START_S = 60.0
 _POLL_S = 0.1
-_MOST_EVENTS = 100
 _BLOB_IDS = 1_000_000
 """Ids of things reserved for each process; the next process starts above them."""
+# Bytes of messages that wait in the pipe: if the loop is suspended, few frames wait in memory.
+_WAITING_BYTES = 1 << 14
+
+DetectionMessage = tuple[Detections, PassedImage | None, PassedImage | None]
+"""Detections in one frame, then its image and depth; their file descriptors follow the message."""
 
 
-class CameraProcess:
-    """A camera, or a film paced by the real clock, watched from another process.
-
-    While a lost source is reopened the last detections stay, and their age shows the loss.
+class CaptureProcess:
+    """The methods of ``CaptureLoop``, executed in another process.
 
     Args:
         parts: Source and detectors; nothing starts yet.
         now_s: The host's monotonic clock, picklable; all processes share its zero.
-        recovery: Times of reopening a lost camera.
-        before: Number of earlier camera processes of the same loop; the scenes of this one differ
-            from theirs.
-        tell: Called with the time of each call of ``latest``, None for none.
-
-    frames, frames_with_face: counts of analysed frames since open
+        recovery: Times of reopening a lost source.
+        report: Called with each event as one line, immediately.
     """
 
     def __init__(
         self,
         parts: CameraParts,
         now_s: Callable[[], float],
-        recovery: CameraRecovery = RECOVERY,
-        before: int = 0,
-        tell: Callable[[float], None] | None = None,
+        recovery: CameraRecovery,
+        report: Callable[[str], None],
     ) -> None:
         self._parts, self._now_s, self._recovery = parts, now_s, recovery
-        self._before, self._tell = before, tell
+        self._report = report
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
-        self._thread: threading.Thread | None = None
-        self._closing = threading.Event()
-        self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
-        self._forget()
-
-    def _forget(self) -> None:
-        """Reset the state to frame 1."""
-        self.frames = self.frames_with_face = 0
-        self._newest: Detections | None = None
-        self._failure = ""
-        self._number, self._starts, self._is_file = 0, self._before, False
-        self._lost_s: float | None = None
+        self._starts, self._is_retrying = 0, False
 
     def open(self) -> None:
         """Start the process and wait until its source is open.
 
         Raises:
-            CameraError: the source cannot be opened, or is open already.
+            CameraError: the source cannot be opened.
             SetupError: the detector cannot be created.
         """
-        if self._process is not None:
-            raise CameraError(
-                "the camera process is already running: close() it before opening it again"
-            )
-        self._closing.clear()
-        self._events.clear()
-        self._forget()
-        error = self._start()
-        if error is not None:
-            self.close()
-            raise error
-        self._thread = threading.Thread(target=self._supervise, name="camera", daemon=True)
-        self._thread.start()
+        self._starts, self._number = self._parts.before, 0
+        self._lost_s: float | None = None
+        self._start()
 
-    def latest(self, now_s: float) -> Detections | None:
-        """Return the detections of the newest frame, or None before the first.
+    def next_detections(self, stop: threading.Event) -> Detections | None:
+        """Return the detections in the next frame, None if ``stop`` was set meanwhile.
 
         Raises:
-            CameraError: the source has been lost for longer than ``give_up_s``.
+            CameraError: the source is lost permanently, or its process cannot be started again.
         """
-        if self._tell is not None:
-            self._tell(now_s)
-        if self._failure:
-            raise CameraError(self._failure)
-        return self._newest
-
-    def events(self) -> tuple[str, ...]:
-        """Return the events since the last call, one line each."""
-        return tuple([self._events.popleft() for _ in range(len(self._events))])
+        while not stop.is_set():
+            pipe = self._pipe
+            assert pipe is not None
+            try:
+                if not pipe.poll(_POLL_S):
+                    self._judge_silence()
+                    continue
+                message = pipe.recv()
+                self._heard_s = self._now_s()
+                if isinstance(message, tuple):
+                    return self._receive(pipe, message)
+            except (EOFError, OSError):
+                self._restart("the camera process has ended")
+                continue
+            if isinstance(message, SetupError):
+                raise message
+            self._is_retrying = self._is_retrying or message.startswith(LOST)
+            self._report(message)
+        return None
 
     def close(self) -> None:
-        """End the process; safe to call twice."""
-        self._closing.set()
+        """End the process, by force if it does not end in time; safe to call twice."""
         if self._pipe is not None:
             with suppress(OSError):  # it may have ended already
                 self._pipe.send("stop")
-        if self._thread is not None:
-            self._thread.join()
         self._end(LONGEST_END_S)
-        self._thread = None
 
-    def _start(self) -> SetupError | None:
-        """Start a process and wait for its first message; return its error, if any."""
+    def _start(self) -> None:
+        """Start a process and wait until its source is open.
+
+        Raises:
+            SetupError: sent by the process, or it did not start.
+        """
         context = multiprocessing.get_context("spawn")
         pipe, theirs = context.Pipe()
         process = context.Process(
@@ -144,127 +136,73 @@ class CameraProcess:
             process.start()
         theirs.close()
         self._process, self._pipe = process, pipe
+        self._counted = self._number
         self._starts += 1
-        end_s = self._now_s() + _LONGEST_START_S
-        message: object = None
+        message: object = CameraError("the camera process did not start: start it again")
         with suppress(EOFError, OSError):
-            while not self._closing.is_set() and self._now_s() < end_s:
-                if pipe.poll(_POLL_S):
-                    message = pipe.recv()
-                    break
-        if isinstance(message, ProcessStart):
-            self._is_file = message.is_file
-            return None
+            if pipe.poll(_LONGEST_START_S):
+                message = pipe.recv()
         if isinstance(message, SetupError):
-            return message
-        return CameraError("the camera process did not start: start it again")
+            self._end(0.0)
+            raise message
+        self._is_film, self._is_retrying = bool(message), False
+        self._heard_s = self._now_s()
 
     def _end(self, timeout_s: float) -> None:
-        """End the process, by force if it does not end in time; safe to call twice."""
-        process, pipe = self._process, self._pipe
-        if process is None or pipe is None:
-            return
-        process.join(timeout_s)
-        if process.is_alive():
-            process.kill()
-            process.join()
+        if self._process is not None and self._pipe is not None:
+            self._process.join(timeout_s)
+            if self._process.is_alive():
+                self._process.kill()
+                self._process.join()
+            self._pipe.close()
         self._process = self._pipe = None
-        pipe.close()
 
-    def _supervise(self) -> None:
-        """Receive results of a process and restart it when it ends, until the time limit."""
-        while not self._closing.is_set():
-            end = self._receive()
-            while not self._closing.is_set():
-                lost_s = self._lose(f"{end.reason}): starting its process again")
-                if end.final or self._now_s() - lost_s >= self._recovery.give_up_s:
-                    self._failure = end.reason
-                    return
-                self._end(0.0)
-                if self._closing.wait(self._recovery.retry_s):
-                    return
-                error = self._start()
-                if error is None:
-                    break
-                end = ProcessEnd(str(error))
+    def _judge_silence(self) -> None:
+        """Report a camera without new frames, and restart a process that hangs."""
+        silent_s = self._now_s() - self._heard_s
+        is_first = self._number == self._counted
+        # A film may pause; a process that reopens a lost source has reported that.
+        if self._is_retrying or (self._is_film and not is_first):
+            return
+        if silent_s >= (_FIRST_FRAME_S if is_first else self._recovery.restart_s):
+            self._restart("no new frame, and its process hangs")
+        elif silent_s >= self._recovery.silent_s and not is_first:
+            self._lose("no new frame): waiting for it")
 
-    def _lose(self, reason: str) -> float:
-        """Record that no frames arrive; return since when."""
+    def _restart(self, reason: str) -> None:
+        """Start another process.
+
+        Raises:
+            CameraError: the last one has delivered no frame either.
+            SetupError: it cannot be started.
+        """
+        self._end(0.0)
+        if self._number == self._counted:
+            raise CameraError(f"{reason}: start it again")
+        self._lose(f"{reason}): starting its process again")
+        self._start()
+
+    def _lose(self, reason: str) -> None:
+        """Report once that no frames arrive."""
         if self._lost_s is None:
             self._lost_s = self._now_s()
-            self._events.append(f"{LOST} ({reason}")
-        return self._lost_s
+            self._report(f"{LOST} ({reason}")
 
-    def _receive(self) -> ProcessEnd:
-        """Receive results of a process until it ends or hangs; return the reason."""
-        pipe, process = self._pipe, self._process
-        assert pipe is not None and process is not None
-        images, depths = SlotReader(), SlotReader()
-        counted, is_first, is_retrying = self._number, True, False
-        last_s, period_s = self._now_s(), 0.0
-        try:
-            while True:
-                if not pipe.poll(_POLL_S):
-                    if self._closing.is_set():
-                        if not process.is_alive():
-                            return ProcessEnd("closed")
-                        continue
-                    silent_s = self._now_s() - last_s
-                    if self._is_hung(silent_s, period_s, is_first) and not is_retrying:
-                        return ProcessEnd("no new frame, and its process hangs")
-                    continue
-                message = pipe.recv()
-                now_s = self._now_s()
-                if isinstance(message, ProcessEnd):
-                    return message
-                if isinstance(message, DetectionMessage):
-                    if not is_first:
-                        share = _SHARE if period_s else 1.0
-                        period_s += share * (now_s - last_s - period_s)
-                    is_first = is_retrying = False
-                    self._publish(message, counted, images, depths)
-                else:
-                    # The process itself keeps reopening a lost source.
-                    is_retrying = message.startswith(LOST) or (
-                        is_retrying and not message.startswith(BACK)
-                    )
-                    self._events.append(message)
-                last_s = now_s
-        except (EOFError, OSError):
-            return ProcessEnd("the camera process has ended")
-        finally:
-            images.close()
-            depths.close()
-
-    def _is_hung(self, silent_s: float, period_s: float, is_first: bool) -> bool:
-        """Report a camera without new frames; return whether its process must be ended."""
-        if is_first:
-            return silent_s >= _FIRST_FRAME_S
-        if self._is_file:  # a film may pause, and does not hang
-            return False
-        if silent_s >= max(self._recovery.silent_s, _LOST_PERIODS * period_s):
-            self._lose("no new frame): waiting for it")
-        return silent_s >= max(self._recovery.restart_s, _HUNG_PERIODS * period_s)
-
-    def _publish(
-        self, message: DetectionMessage, counted: int, images: SlotReader, depths: SlotReader
-    ) -> None:
-        """Publish detections with their frame."""
-        found = message.detections
-        self.frames += 1
-        self.frames_with_face += bool(found.faces)
-        self._number = counted + found.number
-        if self._starts > 1:
-            found = offset_ids(found, self._starts - 1)
-        self._newest = replace(
+    def _receive(self, pipe: Connection, message: DetectionMessage) -> Detections:
+        """Return detections with their frame."""
+        found, image, depth = message
+        self._number = self._counted + found.number
+        found = replace(
             found,
             number=self._number,
-            image=None if message.image is None else images.take(message.image),
-            depth_m=None if message.depth is None else depths.take(message.depth),
+            image=_receive_image(pipe, image),
+            depth_m=_receive_image(pipe, depth),
         )
+        self._is_retrying = False
         if self._lost_s is not None:
-            self._events.append(f"{BACK} after {self._now_s() - self._lost_s:.1f} s")
+            self._report(f"{BACK} after {self._now_s() - self._lost_s:.1f} s")
             self._lost_s = None
+        return offset_ids(found, self._starts - 1)
 
 
 def offset_ids(found: Detections, starts: int) -> Detections:
@@ -277,6 +215,8 @@ def offset_ids(found: Detections, starts: int) -> Detections:
         found: Detections of the process.
         starts: Number of earlier processes.
     """
+    if not starts:
+        return found
     located, first = found.located, starts * _BLOB_IDS
     if located is not None:
         things = [
@@ -289,3 +229,67 @@ def offset_ids(found: Detections, starts: int) -> Detections:
     blobs = tuple([replace(blob, id=first + blob.id) for blob in found.blobs])
     scene = starts * SCENES_OF_A_PROCESS + found.scene
     return replace(found, blobs=blobs, located=located, scene=scene)
+
+
+def run(
+    pipe: Connection, parts: CameraParts, now_s: Callable[[], float], recovery: CameraRecovery
+) -> None:
+    """Run the process: open, detect and report, until it is stopped or the other side has ended.
+
+    It sends whether the source is a film or a recording, then events and detections; or an error.
+    """
+    import cv2  # the control loop's process imports this module too, without OpenCV
+
+    # Ctrl-C reaches all processes of a terminal; only the loop may end this one.
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    lower_priority(_NICE)
+    # One core is left to the loop: if OpenCV uses all cores, the loop is later and no more frames
+    # are analysed.
+    cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
+    try:
+        camera = CaptureLoop(parts, now_s, recovery, pipe.send)
+        camera.open()
+    except SetupError as error:
+        pipe.send(error)
+        return
+    from gazerig.drivers.camera.file_player import FilePlayer
+
+    stop = threading.Event()
+    with socket.fromfd(pipe.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as link:
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING_BYTES)
+    pipe.send(isinstance(camera.source, FilePlayer))
+    threading.Thread(target=_await_end, args=(pipe, stop), daemon=True).start()
+    try:
+        while (found := camera.next_detections(stop)) is not None:
+            _send_detections(pipe, found)
+    except OSError:  # the parent has ended
+        pass
+    except Exception as failure:
+        pipe.send(detection_error(failure))
+    finally:
+        camera.close()
+
+
+def _await_end(pipe: Connection, stop: threading.Event) -> None:
+    """Wait for a stop request, or until the other side has ended."""
+    with suppress(EOFError, OSError):
+        pipe.recv()
+    stop.set()
+    # A thread that is blocked in a camera's driver would keep that camera busy forever.
+    threading.Event().wait(LONGEST_END_S)
+    os._exit(1)
+
+
+def _send_detections(pipe: Connection, found: Detections) -> None:
+    arrays = found.image, found.depth_m
+    passed = [None if array is None else copy_image(array) for array in arrays]
+    pipe.send((replace(found, image=None, depth_m=None), *passed))
+    for image in passed:
+        if image is not None:
+            send_handle(pipe, image.fd, None)
+            os.close(image.fd)
+
+
+def _receive_image(pipe: Connection, image: PassedImage | None) -> NDArray[Any] | None:
+    return None if image is None else take_image(image._replace(fd=recv_handle(pipe)))

@@ -1,100 +1,109 @@
-"""Main function of the camera's process (see ``process``)."""
+"""Worker that keeps the newest detections of a camera, so that the control loop never waits.
 
-import os
-import signal
+They are kept in one slot: they are an immutable value, and rebinding a Python name is atomic.
+Frames that arrive while the detectors work are skipped.
+"""
+
 import threading
+from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import replace
-from multiprocessing.connection import Connection
-from typing import NamedTuple
 
 from gazerig.drivers.camera.capture_loop import CameraParts, CaptureLoop, detection_error
-from gazerig.drivers.camera.params import CameraRecovery
-from gazerig.drivers.camera.shared_frames import SlotAddress, SlotWriter
-from gazerig.drivers.errors import CameraError, SetupError
-from gazerig.drivers.process.priority import lower_priority
+from gazerig.drivers.camera.params import RECOVERY, CameraRecovery
+from gazerig.drivers.camera.process import LONGEST_END_S, CaptureProcess
+from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Detections
 
-NICE = 10  # lower priority than the loop
-LONGEST_END_S = 12.0
-"""Time after which a stopped or orphaned process ends, even if it is blocked."""
+_MOST_EVENTS = 100
 
 
-class DetectionMessage(NamedTuple):
-    """Detections in one frame, and the address of the frame in shared memory."""
+class CameraWorker:
+    """A camera, or a film paced by the real clock, watched by a process or a thread of its own.
 
-    detections: Detections  # without frame and depth
-    image: SlotAddress | None
-    depth: SlotAddress | None
+    While a lost source is reopened the last detections stay, and their age shows the loss.
 
+    Args:
+        parts: Source and detectors; nothing starts yet.
+        now_s: The host's monotonic clock; for a process picklable, as all share its zero.
+        recovery: Times of reopening a lost camera.
+        tell: Called with the time of each call of ``latest``, None for none.
+        in_thread: Whether the parts run in a thread of this process, for those of a program, which
+            exist only there; otherwise they run in a process, which cannot delay the control loop.
 
-class ProcessStart(NamedTuple):
-    """Message that the source is open; is_file: its frames may be any time apart."""
-
-    is_file: bool
-
-
-class ProcessEnd(NamedTuple):
-    """Reason for the end of the process.
-
-    final: whether the time limit for reopening the camera has passed; otherwise a new process may
-        succeed
+    frames, frames_with_face: counts of analysed frames since open
     """
 
-    reason: str
-    final: bool = False
+    def __init__(
+        self,
+        parts: CameraParts,
+        now_s: Callable[[], float],
+        recovery: CameraRecovery = RECOVERY,
+        tell: Callable[[float], None] | None = None,
+        in_thread: bool = False,
+    ) -> None:
+        self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
+        make = CaptureLoop if in_thread else CaptureProcess
+        self._frames: CaptureLoop | CaptureProcess = make(
+            parts, now_s, recovery, self._events.append
+        )
+        self._tell = tell
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._newest: Detections | None = None
+        self._failure: BaseException | None = None
+        self.frames = self.frames_with_face = 0
 
+    def open(self) -> None:
+        """Open the source and start detection.
 
-def run(
-    pipe: Connection, parts: CameraParts, now_s: Callable[[], float], recovery: CameraRecovery
-) -> None:
-    """Run the process: open, detect and report, until it is stopped or the other side has ended."""
-    import cv2  # the control loop's process imports this module too, without OpenCV
+        Raises:
+            CameraError: the source cannot be opened, or is open already.
+            SetupError: the detector cannot be created.
+        """
+        if self._thread is not None:
+            raise CameraError("the camera is already open: close() it before opening it again")
+        self._events.clear()
+        self._frames.open()
+        self._stop.clear()
+        self._newest, self._failure = None, None
+        self.frames = self.frames_with_face = 0
+        self._thread = threading.Thread(target=self._watch, name="camera", daemon=True)
+        self._thread.start()
 
-    # Ctrl-C reaches all processes of a terminal; only the loop may end this one.
-    for number in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
-    lower_priority(NICE)
-    # One core is left to the loop: if OpenCV uses all cores, the loop is later and no more frames
-    # are analysed.
-    cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
-    try:
-        camera = CaptureLoop(parts, now_s, recovery, pipe.send)
-        camera.open()
-    except SetupError as error:
-        pipe.send(error)
-        return
-    from gazerig.drivers.camera.file_player import FilePlayer
+    def latest(self, now_s: float) -> Detections | None:
+        """Return the detections of the newest frame, or None before the first.
 
-    stop = threading.Event()
-    pipe.send(ProcessStart(isinstance(camera.source, FilePlayer)))
-    threading.Thread(target=_await_end, args=(pipe, stop), daemon=True).start()
-    images, depths = SlotWriter(), SlotWriter()
-    try:
-        while (found := camera.next_detections(stop)) is not None:
-            pipe.send(
-                DetectionMessage(
-                    replace(found, image=None, depth_m=None),
-                    images.put(found.image) if found.image is not None else None,
-                    depths.put(found.depth_m) if found.depth_m is not None else None,
-                )
-            )
-    except OSError:  # the parent has ended
-        pass
-    except Exception as failure:
-        pipe.send(ProcessEnd(str(detection_error(failure)), isinstance(failure, CameraError)))
-    finally:
-        camera.close()
-        images.close()
-        depths.close()
+        Raises:
+            CameraError: the source is lost permanently, or detection has failed.
+        """
+        if self._tell is not None:
+            self._tell(now_s)
+        if self._failure is not None:
+            raise detection_error(self._failure) from self._failure
+        return self._newest
 
+    def events(self) -> tuple[str, ...]:
+        """Return the events since the last call, one line each."""
+        return tuple([self._events.popleft() for _ in range(len(self._events))])
 
-def _await_end(pipe: Connection, stop: threading.Event) -> None:
-    """Wait for a stop request, or until the other side has ended."""
-    with suppress(EOFError, OSError):
-        pipe.recv()
-    stop.set()
-    # A thread that is blocked in a camera's driver would keep that camera busy forever.
-    threading.Event().wait(LONGEST_END_S)
-    os._exit(1)
+    def close(self) -> None:
+        """Stop detection and free the source; safe to call twice."""
+        self._stop.set()
+        if self._thread is not None:
+            # A process that is blocked in a camera's driver is killed; a thread cannot be.
+            self._thread.join(LONGEST_END_S + 1.0)
+            if not self._thread.is_alive():
+                self._thread = None
+
+    def _watch(self) -> None:
+        """Receive the detections of one frame after another until stopped."""
+        try:
+            while (found := self._frames.next_detections(self._stop)) is not None:
+                self.frames += 1
+                self.frames_with_face += bool(found.faces)
+                self._newest = found
+        except BaseException as failure:  # raised to the loop by latest()
+            self._failure = failure
+        finally:
+            # Freed by the thread that reads it, never while a frame is fetched.
+            self._frames.close()

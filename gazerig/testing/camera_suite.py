@@ -18,7 +18,7 @@ import pytest
 from gazerig.drivers.camera.capture_loop import CameraParts
 from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.source import FrameSource
-from gazerig.drivers.camera.thread import CameraThread
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Camera, DetectedFace, Detections, ImageArray
 
@@ -77,7 +77,7 @@ def of_source(
     """Return the bench of a frame source, which a thread reads as in a run."""
     quickly = CameraRecovery(0.001, 0.005, LONGEST_S)
     parts = CameraParts(make, _NoDetections), CameraBench.now_s, quickly
-    return CameraBench(lambda: CameraThread(*parts), lose=lose, restore=restore)
+    return CameraBench(lambda: CameraWorker(*parts, in_thread=True), lose=lose, restore=restore)
 
 
 class CameraSuite:

@@ -12,9 +12,9 @@ from functools import partial
 
 from gazerig.drivers.camera.browser_source import FIELD_DEG, BrowserSource
 from gazerig.drivers.camera.capture_loop import BACK, LOST
-from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.shared_slots import JpegSlot
 from gazerig.drivers.camera.source import FrameSource
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera, Detections
 
@@ -27,7 +27,7 @@ _BEGINS = (
 )
 _ENDS = "the browser's camera has ended: the scene continues"
 
-Make = Callable[[Callable[[], FrameSource], int], CameraProcess]
+Make = Callable[[Callable[[], FrameSource], int], CameraWorker]
 """Function that returns a camera process of a source; the number counts the former ones."""
 
 
@@ -56,7 +56,7 @@ class BorrowedCamera:
         self._place = place
         self._make, self._now_s = make, now_s
         self._pictures = JpegSlot()
-        self._process: CameraProcess | None = None
+        self._process: CameraWorker | None = None
         self._starting: threading.Thread | None = None
         self._begun = 1
         self._closed = False

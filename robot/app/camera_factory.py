@@ -14,10 +14,9 @@ from gazerig.drivers.camera.browser_source import FIELD_DEG
 from gazerig.drivers.camera.camera_plugins import create_camera_part, is_source
 from gazerig.drivers.camera.capture_loop import CameraParts, Locate, Motion
 from gazerig.drivers.camera.orientation import FrameOrientation
-from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import FrameSource
-from gazerig.drivers.camera.thread import CameraThread
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.errors import PluginError, SetupError
 from gazerig.drivers.plugins import CAMERA, CameraPlugin, find, is_ours, load
 from gazerig.drivers.types import Camera, FaceDetector
@@ -167,7 +166,7 @@ def drawn_camera(
     own: ProgramParts,
     motion: Callable[[], Motion],
     locate: Locate,
-) -> CameraProcess | CameraThread:
+) -> CameraWorker:
     """Return a camera on a drawn scene in real time, which is told the pose of the head.
 
     For a program's own detector, which exists only in that program, it is a thread.
@@ -190,11 +189,15 @@ def drawn_camera(
 
     make = partial(scene_pixels, scene, mount, rig.camera.horizontal_field_deg, rng)
     source: Callable[[], FrameSource] = partial(DrawnSource, make, poses)
+    parts = CameraParts(source, _detector_factory(rig, own), motion, locate)
+    return CameraWorker(parts, clock.now_s, tell=tell, in_thread=own.detector is not None)
+
+
+def _detector_factory(rig: Rig, own: ProgramParts) -> Callable[[], FaceDetector]:
+    """Return a function that creates the detector of a program, otherwise that of the rig."""
     if own.detector is not None:
-        parts = CameraParts(source, partial(own.make_detector, rig.detector), motion, locate)
-        return CameraThread(parts, clock.now_s, tell=tell)
-    parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
-    return CameraProcess(parts, clock.now_s, tell=tell)
+        return partial(own.make_detector, rig.detector)
+    return partial(face_detector, rig.detector)
 
 
 def scene_start_s(camera: Camera) -> float | None:
@@ -231,9 +234,9 @@ def make_borrowed_camera(
     motion = partial(MotionSource, rig.motion, None, field_rad, None)
     locate = FrameLocator(None, field_rad)
 
-    def process(source: Callable[[], FrameSource], before: int) -> CameraProcess:
-        parts = CameraParts(source, detector, motion, locate)
-        return CameraProcess(parts, clock.now_s, before=before)
+    def process(source: Callable[[], FrameSource], before: int) -> CameraWorker:
+        parts = CameraParts(source, detector, motion, locate, before=before)
+        return CameraWorker(parts, clock.now_s)
 
     return BorrowedCamera(own, process, clock.now_s, place)
 
@@ -258,9 +261,7 @@ def real_camera(
     field_rad = radians(placed.horizontal_field_deg)
     motion = partial(MotionSource, rig.motion, placed.lens, field_rad, turns)
     locate, orientation = frame_locator(placed), frame_orientation(placed)
-    detector: Callable[[], FaceDetector] = partial(face_detector, rig.detector)
-    if own.detector is not None:
-        detector = partial(own.make_detector, rig.detector)
+    detector = _detector_factory(rig, own)
     source: Callable[[], FrameSource]
     record = options.record_camera
     name = options.camera if isinstance(options.camera, str) else None
@@ -287,9 +288,8 @@ def real_camera(
         if not is_source(camera):
             return cast(Camera, camera)
     parts = CameraParts(source, detector, motion, locate, orientation, record)
-    if own.camera is not None or own.detector is not None:
-        return CameraThread(parts, clock.now_s)
-    return CameraProcess(parts, clock.now_s)
+    in_thread = own.camera is not None or own.detector is not None
+    return CameraWorker(parts, clock.now_s, in_thread=in_thread)
 
 
 def frame_locator(placed: CameraParams) -> FrameLocator:

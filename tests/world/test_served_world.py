@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.gl_context import NoRenderer
 from gazerig.features.world.run.poses import RigInState, WorldPoses
@@ -74,7 +74,7 @@ def test_the_state_is_that_of_physics(host: Host) -> None:
         assert host.poses.state.qpos[at] == pytest.approx(truly[name], abs=1e-3)
 
 
-class Broken(CameraProcess):
+class Broken(CameraWorker):
     """A camera's process in which nothing can render."""
 
     def __init__(self, error: SetupError) -> None:

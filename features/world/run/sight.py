@@ -14,9 +14,9 @@ import numpy as np
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.camera.capture_loop import CameraParts, Locate
-from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import FrameSource
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.types import Camera, Detections, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.features.world.gl_context import NoRenderer, render_in_calling_thread
@@ -60,12 +60,12 @@ class WorldCamera:
 
     def __init__(
         self,
-        process: CameraProcess | None,
+        process: CameraWorker | None,
         ideal: Callable[[float], SceneCamera],
         poses: WorldPoses,
     ) -> None:
         self._process, self._ideal, self._poses = process, ideal, poses
-        self.wrapped_camera: CameraProcess | SceneCamera | None = process
+        self.wrapped_camera: CameraWorker | SceneCamera | None = process
         self._events: list[str] = []
 
     @property
@@ -248,7 +248,7 @@ def world_camera(
                 DrawnSource, partial(served_pixels, world, poses), poses
             )
             parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
-            process = CameraProcess(parts, clock.now_s)
+            process = CameraWorker(parts, clock.now_s)
         return WorldCamera(process, ideal, poses)
     if options.no_pictures:
         return ideal(poses.begin_s)

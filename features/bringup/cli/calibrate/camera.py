@@ -16,8 +16,8 @@ from gazerig.drivers.camera.capture_loop import CameraParts
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import FrameSource, Shot
-from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.webcam import Webcam
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.errors import SetupError, require_package
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.features.bringup.calibration.camera_calibration import (
@@ -217,19 +217,19 @@ def _open_camera(job: _Job, source: FrameSource | None) -> Iterator[_CameraView]
         return
     orientation = frame_orientation(job.rig.camera)
     parts = CameraParts(lambda: source, _NullDetector, orientation=orientation)
-    thread = CameraThread(parts, clock.now_s)
+    camera = CameraWorker(parts, clock.now_s, in_thread=True)
 
     def look() -> Shot | None:
-        found = thread.latest(clock.now_s())
+        found = camera.latest(clock.now_s())
         if found is None or found.image is None:
             return None
         return Shot(found.captured_s, found.number, found.image, lens=found.lens)
 
-    thread.open()
+    camera.open()
     try:
         yield _CameraView(look, clock.now_s, lambda s: clock.sleep_until(clock.now_s() + s), None)
     finally:
-        thread.close()
+        camera.close()
 
 
 def _find_lens(job: _Job, eye: _CameraView, what: CalibrationTarget) -> _KnownLens:
