@@ -11,7 +11,7 @@ from gazerig.gaze.attention.attention import Attention, AttentionParams
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
 from gazerig.gaze.attention.idle import Idle, IdleParams
 from gazerig.gaze.attention.top_down import TopDown, TopDownParams
-from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Vec3
+from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Target, Vec3
 
 IDENTITY = rotation((0.0, 0.0, 0.0))
 
@@ -26,13 +26,15 @@ def looking(eye_yaw_deg: float = 0.0) -> GazeState:
     )
 
 
-def body(
-    id: int, kind: str, p: tuple[float, float, float], v: tuple[float, float, float] = (0, 0, 0)
-) -> tuple[int, str, tuple[float, ...], tuple[float, ...]]:
+Row = tuple[int, str, tuple[float, ...], tuple[float, ...]]
+"""Number, kind, place and velocity of a body."""
+
+
+def body(id: int, kind: str, p: Vec3, v: Vec3 = (0, 0, 0)) -> Row:
     return id, kind, p, v
 
 
-def percept(t: float, *rows: tuple[int, str, tuple[float, ...], tuple[float, ...]]) -> Percept:
+def percept(t: float, *rows: Row) -> Percept:
     ids, kinds, places, speeds = zip(*rows, strict=True) if rows else ((), (), (), ())
     n = len(ids)
     return Percept(
@@ -92,5 +94,11 @@ def attention(
 FACE = body(1, "face", (1.0, 0.0, 0.0))
 
 
-def waving(t: float, speed: float) -> Percept:
-    return percept(t, FACE, body(2, "hand", (0.8, 0.3, -0.05), (0.0, speed, 0.0)))
+def waving(speed: float, x: float = 0.8) -> Row:
+    """Return a hand beside the face that moves sideways."""
+    return body(2, "hand", (x, 0.3, -0.05), (0.0, speed, 0.0))
+
+
+def look(model: Attention, t: float, *rows: Row) -> Target:
+    """Return what is looked at among these bodies, seen at once."""
+    return model.choose(percept(t, *rows), looking(), t)

@@ -5,6 +5,7 @@ from math import radians
 from typing import NamedTuple
 
 import numpy as np
+from gaze_targets import joints_at
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.types import Floats, GazeState
@@ -12,7 +13,6 @@ from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_limits import lid_ends
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.kinematics import LIDS
-from gazerig.robot.model.types import JointState
 
 SHIPPED = (
     "desk", "expressive", "feetech", "maker", "minimal", "six_hobby", "six_xl330", "nine_xl330",
@@ -31,9 +31,8 @@ class Expected(NamedTuple):
 def expected(rig: Rig, angles: Mapping[str, float]) -> Expected:
     """Return where everything is according to robot/model/kinematics.py."""
     kinematics = rig_kinematics(rig)
-    values = tuple(angles[name] for name in rig.names)
-    still = (0.0,) * len(values)
-    state = kinematics.forward(JointState(values, still, still, ()))
+    values = (angles[name] for name in rig.names)
+    state = kinematics.forward(joints_at(*values))
     R, p = CameraMount(rig.camera).pose(state.R_world_head, state.p_world_head_m)
     return Expected(state, (np.array(R), np.array(p)))
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from desk import GAZE_JOINTS, LIDS
-from msgspec import structs
+from gaze_targets import DT, joints_at, target
 
 from gazerig.gaze.angles import add, angle_between, direction, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
@@ -23,7 +23,6 @@ from gazerig.gaze.types import GazeCommand, Target
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
 
-DT = 0.005
 CENTRED = GeometryParams(0.0, 0.0, 0.0)
 DESK = GeometryParams(60.0, 40.0, 50.0)
 NO_RELIEF = HeadParams(goal_model="attention")
@@ -76,7 +75,7 @@ class Rig:
             np.random.default_rng(dice),
             drift,
         )
-        self.joints = JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ())
+        self.joints = joints_at(*[0.0] * 9)
 
     def run(self, where: Callable[[float], Target], seconds: float) -> Trace:
         rows, commands = [], []
@@ -108,6 +107,8 @@ def still(
     yaw_deg: float, salience: float = 1.0, top_down: bool = False, pitch_deg: float = 0.0
 ) -> Callable[[float], Target]:
     point = scale(direction((radians(yaw_deg), radians(pitch_deg))), 10.0)
-    ahead = Target((10.0, 0, 0), (0, 0, 0), 0.0, "thing", 0, salience, top_down, None, 1, "")
-    there = structs.replace(ahead, p_world_m=point, id=1, shift=2)
+    ahead, there = (
+        target(place, kind="thing", id=id, salience=salience, top_down=top_down, shift=1 + id)
+        for id, place in enumerate(((10.0, 0.0, 0.0), point))
+    )
     return lambda t: there if t >= 0.1 else ahead

@@ -1,11 +1,13 @@
 """The action planner of a boxing match: guard, attack or wait, from what is seen."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import hypot, inf
+from typing import Any
 
 import numpy as np
 import pytest
-from attention_scene import attention, body, looking, percept
+from attention_scene import Row, attention, body, looking, percept
 from msgspec import structs
 
 from gazerig.config.schema import load_rules
@@ -19,8 +21,6 @@ from gazerig.gaze.attention.action_planner import (
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.top_down import PLANNED, TopDownParams
 from gazerig.gaze.types import Face, Percept, Target, Vec3
-
-Row = tuple[int, str, tuple[float, ...], tuple[float, ...]]
 
 EYE: Vec3 = (0.0, 0.0, 0.0)
 NOSE: Vec3 = (1.0, 0.0, 0.0)
@@ -56,8 +56,21 @@ def punch(t_s: float, away_m: float = 0.8, speed_m_s: float = 2.5, aside_m: floa
     return seen(t_s, fist(2, LEFT), fist(3, (away_m, -0.02 + aside_m, 0.0), (-speed_m_s, 0.0, 0.0)))
 
 
-def stepped(planner: ActionPlanner, percepts: list[Percept], late_s: float = 0.0) -> list[Plan]:
-    return [planner.step(one, EYE, one.captured_s + late_s) for one in percepts]
+class Bout:
+    """A planner that sees one frame after the other."""
+
+    def __init__(self) -> None:
+        self.planner, self.frame = ActionPlanner(), 0
+
+    def see(self, shown: Callable[..., Percept], frames: int, *more: Row, **how: Any) -> list[Plan]:
+        """See frames of what is shown at their times; return the plans."""
+        first, self.frame = self.frame, self.frame + frames
+        times = [k * DT_S for k in range(first, self.frame)]
+        return [self.planner.step(shown(t, *more, **how), EYE, t) for t in times]
+
+
+def actions(plans: list[Plan]) -> set[str]:
+    return {plan.action for plan in plans}
 
 
 def test_time_to_contact_is_the_way_to_go_over_the_closing_speed() -> None:
@@ -71,9 +84,9 @@ def test_time_to_contact_is_the_way_to_go_over_the_closing_speed() -> None:
 
 
 def test_a_punch_is_guarded_against_after_the_reaction_time_and_its_fist_is_named() -> None:
-    planner = ActionPlanner()
-    stepped(planner, [guarding(k * DT_S) for k in range(5)])
-    plans = stepped(planner, [punch((5 + k) * DT_S) for k in range(3)])
+    bout = Bout()
+    bout.see(guarding, 5)
+    plans = bout.see(punch, 3)
     assert [plan.action for plan in plans] == ["wait", "guard", "guard"]
     assert plans[-1].body_id == 3
     assert plans[-1].text == "guard: hand 3 arrives in 0.20 s"
@@ -92,8 +105,9 @@ def test_a_fist_has_come_on_since_its_picture_was_made() -> None:
     """At 2.5 m/s from 1.7 m it arrives in 0.56 s, which is no threat yet; 0.2 s later it is."""
     for late_s, action in ((0.0, "wait"), (0.2, "guard")):
         planner = ActionPlanner()
-        plans = stepped(planner, [punch(k * 0.001, 1.7) for k in range(40)], late_s)
-        assert plans[-1].action == action
+        for t in (np.arange(40) * 0.001).tolist():
+            plan = planner.step(punch(t, 1.7), EYE, t + late_s)
+        assert plan.action == action
 
 
 @pytest.mark.parametrize(
@@ -108,26 +122,24 @@ def test_a_fist_has_come_on_since_its_picture_was_made() -> None:
     ids=["slowly", "goes back", "passes beside", "raised to the guard", "from afar"],
 )
 def test_what_is_no_punch_is_not_guarded_against(comes: dict[str, float]) -> None:
-    planner = ActionPlanner()
-    plans = stepped(planner, [punch(k * DT_S, **comes) for k in range(10)])
-    assert {plan.action for plan in plans} == {"wait"}
+    assert actions(Bout().see(punch, 10, **comes)) == {"wait"}
 
 
 def test_one_frame_of_a_wrong_speed_is_no_punch() -> None:
-    planner = ActionPlanner()
-    jumps = [punch(k * DT_S) if k % 2 else guarding(k * DT_S) for k in range(10)]
-    assert {plan.action for plan in stepped(planner, jumps)} == {"wait"}
+    bout = Bout()
+    for shown in (guarding, punch) * 5:
+        assert actions(bout.see(shown, 1)) == {"wait"}
 
 
 def test_guard_lasts_its_shortest_time_and_a_slower_fist_does_not_end_it() -> None:
-    planner = ActionPlanner()
-    plans = stepped(planner, [punch(k * DT_S) for k in range(3)])
-    slow = stepped(planner, [punch((3 + k) * DT_S, 0.5, 0.6) for k in range(20)])
-    assert {plan.action for plan in (plans[-1], *slow)} == {"guard"}  # 0.6 * 1.5 > 0.8
+    bout = Bout()
+    plans = bout.see(punch, 3)
+    slow = bout.see(punch, 20, away_m=0.5, speed_m_s=0.6)
+    assert actions([plans[-1], *slow]) == {"guard"}  # 0.6 * 1.5 > 0.8
     fists = fist(2, LEFT), fist(3, RIGHT)  # no face to attack
-    assert planner.step(seen(23 * DT_S, *fists, nose=None), EYE, 23 * DT_S).action == "wait"
-    stepped(planner, [punch((24 + k) * DT_S) for k in range(2)])
-    after = stepped(planner, [seen((26 + k) * DT_S, *fists, nose=None) for k in range(10)])
+    assert actions(bout.see(seen, 1, *fists, nose=None)) == {"wait"}
+    bout.see(punch, 2)
+    after = bout.see(seen, 10, *fists, nose=None)
     kept = sum(plan.action == "guard" for plan in after)
     assert 0.3 - 2 * DT_S < kept * DT_S < 0.3 + DT_S
 
@@ -139,11 +151,9 @@ def opened(t_s: float, *more: Row, parted: bool) -> Percept:
 
 @pytest.mark.parametrize("parted", [True, False])
 def test_an_open_place_is_attacked_once_and_again_after_a_rest(parted: bool) -> None:
-    planner = ActionPlanner()
-    assert {plan.action for plan in stepped(planner, [guarding(k * DT_S) for k in range(9)])} == {
-        "wait"
-    }
-    plans = stepped(planner, [opened((9 + k) * DT_S, parted=parted) for k in range(75)])
+    bout = Bout()
+    assert actions(bout.see(guarding, 9)) == {"wait"}
+    plans = bout.see(opened, 75, parted=parted)
     starts = [
         k for k in range(1, 75) if plans[k].action == "attack" and plans[k - 1].action == "wait"
     ]
@@ -159,29 +169,25 @@ def test_an_open_place_is_attacked_once_and_again_after_a_rest(parted: bool) -> 
 
 def test_nothing_is_open_before_both_hands_are_known() -> None:
     for rows in ((), (fist(2, (0.9, 0.4, -0.2)),)):
-        plans = stepped(ActionPlanner(), [seen(k * DT_S, *rows) for k in range(60)])
+        plans = Bout().see(seen, 60, *rows)
         assert {plan.text for plan in plans} == {"wait: not both hands of the opponent are known"}
-    far = [seen(k * DT_S, fist(2, (2.9, 0.4, -0.6)), nose=(3.0, 0.0, 0.0)) for k in range(60)]
-    assert {plan.text for plan in stepped(ActionPlanner(), far)} == {
-        "wait: no opponent within reach"
-    }
+    far = Bout().see(seen, 60, fist(2, (2.9, 0.4, -0.6)), nose=(3.0, 0.0, 0.0))
+    assert {plan.text for plan in far} == {"wait: no opponent within reach"}
 
 
 def test_an_opponent_has_two_hands_and_a_third_that_comes_later_protects_nothing() -> None:
     """A hand that reaches in from aside, or an arm taken for one, before the chest."""
-    planner = ActionPlanner()
-    stepped(planner, [guarding(k * DT_S) for k in range(9)])
-    third = fist(9, (0.6, 0.0, -0.18))
-    plans = stepped(planner, [opened((9 + k) * DT_S, third, parted=True) for k in range(30)])
+    bout = Bout()
+    bout.see(guarding, 9)
+    plans = bout.see(opened, 30, fist(9, (0.6, 0.0, -0.18)), parted=True)
     assert any(plan.action == "attack" and "chest" in plan.why for plan in plans)
 
 
 def test_a_hand_that_is_not_seen_any_more_is_where_it_was_for_a_while() -> None:
-    planner = ActionPlanner()
-    stepped(planner, [guarding(k * DT_S) for k in range(9)])
+    bout = Bout()
+    bout.see(guarding, 9)
     # One that is seen with another number is the one of those two that was nearer.
-    lone = [seen(t, fist(7, (0.9, 0.4, -0.2))) for t in (np.arange(9, 90) * DT_S).tolist()]
-    plans = stepped(planner, lone)
+    plans = bout.see(seen, 81, fist(7, (0.9, 0.4, -0.2)))
     unknown = next(k for k, plan in enumerate(plans) if "not both hands" in plan.why)
     assert unknown * DT_S == pytest.approx(0.6, abs=2 * DT_S)
     assert all("guard is closed" in plan.why for plan in plans[:unknown])
@@ -193,11 +199,10 @@ def test_hands_that_dropped_out_of_the_picture_leave_the_face_open(
     v_z_m_s: float, opens: bool
 ) -> None:
     """Those that were at rest or on their return to the guard when they were lost still do."""
-    planner = ActionPlanner()
-    stepped(planner, [guarding(k * DT_S) for k in range(9)])
-    moving = seen(9 * DT_S, fist(2, LEFT, (0.0, 0.0, v_z_m_s)), fist(3, RIGHT, (0.0, 0.0, v_z_m_s)))
-    stepped(planner, [moving])
-    plans = stepped(planner, [seen(k * DT_S) for k in range(10, 26)])
+    bout, v = Bout(), (0.0, 0.0, v_z_m_s)
+    bout.see(guarding, 9)
+    bout.see(seen, 1, fist(2, LEFT, v), fist(3, RIGHT, v))
+    plans = bout.see(seen, 16)
     attacked = [k for k, plan in enumerate(plans, 1) if plan.action == "attack"]
     assert bool(attacked) == opens
     if opens:
@@ -206,35 +211,29 @@ def test_hands_that_dropped_out_of_the_picture_leave_the_face_open(
 
 
 def test_after_a_punch_less_room_will_do_for_a_moment() -> None:
-    narrow = seen(0.0, fist(2, (0.88, 0.12, -0.09)), fist(3, (0.88, -0.12, -0.09)))
+    narrow = fist(2, (0.88, 0.12, -0.09)), fist(3, (0.88, -0.12, -0.09))
     room = hit_places(face(), [SeenHand(2, (-0.12, 0.12, -0.09), 0.0)], EYE)[0].clear_m
     assert 0.6 * 0.28 < room < 0.28
-    still = [structs.replace(narrow, captured_s=k * DT_S) for k in range(30)]
-    assert {plan.action for plan in stepped(ActionPlanner(), still)} == {"wait"}
-    planner = ActionPlanner()
-    stepped(planner, [punch(k * DT_S) for k in range(4)])
-    after = stepped(
-        planner, [structs.replace(narrow, captured_s=(4 + k) * DT_S) for k in range(20)]
-    )
-    actions = [plan.action for plan in after]
-    assert actions[0] == "guard" and "attack" in actions
-    assert "after a punch" in after[actions.index("attack")].why
+    assert actions(Bout().see(seen, 30, *narrow)) == {"wait"}
+    bout = Bout()
+    bout.see(punch, 4)
+    after = bout.see(seen, 20, *narrow)
+    chosen = [plan.action for plan in after]
+    assert chosen[0] == "guard" and "attack" in chosen
+    assert "after a punch" in after[chosen.index("attack")].why
 
 
 def test_a_punch_ends_an_attack() -> None:
-    planner = ActionPlanner()
-    stepped(planner, [guarding(0.0)])
-    plans = stepped(planner, [opened((1 + k) * DT_S, parted=True) for k in range(9)])
-    assert plans[-1].action == "attack"
-    plans = stepped(planner, [punch((10 + k) * DT_S) for k in range(2)])
-    assert plans[-1].action == "guard"
+    bout = Bout()
+    bout.see(guarding, 1)
+    assert bout.see(opened, 9, parted=True)[-1].action == "attack"
+    assert bout.see(punch, 2)[-1].action == "guard"
 
 
 def test_a_gap_without_frames_ends_what_was_under_way() -> None:
-    planner = ActionPlanner()
-    stepped(planner, [punch(k * DT_S) for k in range(3)])
-    assert planner.plan.action == "guard"
-    assert planner.step(seen(5.0), EYE, 5.0).action == "wait"
+    bout = Bout()
+    assert bout.see(punch, 3)[-1].action == "guard"
+    assert bout.planner.step(seen(5.0), EYE, 5.0).action == "wait"
 
 
 # The same through attention.

@@ -5,13 +5,13 @@ from math import cos, exp, inf, radians, sin
 
 import numpy as np
 import pytest
-from attention_scene import FACE, attention, body, looking, percept, salience, waving
+from attention_scene import FACE, Row, attention, body, look, looking, percept, salience, waving
 from msgspec import structs
 
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams, motion_terms, saturate
 from gazerig.gaze.attention.top_down import Rule, TopDownParams
 from gazerig.gaze.field_of_view import visible_bodies
-from gazerig.gaze.types import Bodies, Percept
+from gazerig.gaze.types import Bodies
 
 
 def test_e45_eq_1_does_not_depend_on_the_length_of_e() -> None:
@@ -57,9 +57,9 @@ def test_field_of_both_eyes(yaw: float, pitch: float, seen: bool) -> None:
 
 def test_the_face_wins_over_a_resting_hand_and_loses_to_a_waving_one() -> None:
     model = attention()
-    still = model.choose(waving(0.0, 0.05), looking(), 0.0)
+    still = look(model, 0.0, FACE, waving(0.05))
     assert (still.kind, still.top_down, still.salience) == ("face", True, 0.5)
-    moved = model.choose(waving(0.5, 1.0), looking(), 0.5)
+    moved = look(model, 0.5, FACE, waving(1.0))
     assert (moved.kind, moved.top_down) == ("hand", False)
     assert moved.shift == still.shift + 1
     assert "translation" in moved.why and "rule wait" in still.why
@@ -69,7 +69,7 @@ def test_nearly_equal_pulls_do_not_flicker() -> None:
     model, kinds = attention(), []
     for k in range(600):
         speed = 0.35 * (1.1 if k // 6 % 2 else 0.9)  # its salience swings about the face's 0.5
-        kinds.append(model.choose(waving(k / 30, speed), looking(), k / 30).kind)
+        kinds.append(look(model, k / 30, FACE, waving(speed)).kind)
     assert sum(a != b for a, b in zip(kinds[:60], kinds[1:60], strict=False)) <= 1
     stays = [len(list(same)) / 30 for _, same in groupby(kinds)]
     assert len(stays) < 20 and min(stays[1:-1]) > 0.3
@@ -77,29 +77,27 @@ def test_nearly_equal_pulls_do_not_flicker() -> None:
 
 def test_a_winner_is_kept_for_the_shortest_time() -> None:
     model = attention(min_dwell_ms=300.0)
-    model.choose(waving(0.0, 0.0), looking(), 0.0)
-    assert model.choose(waving(0.2, 2.0), looking(), 0.2).kind == "face"
-    assert model.choose(waving(0.4, 2.0), looking(), 0.4).kind == "hand"
+    look(model, 0.0, FACE, waving(0.0))
+    kept = look(model, 0.2, FACE, waving(2.0))
+    assert (kept.kind, kept.saliences[0].kind) == ("face", "face"), "the winner comes first"
+    assert kept.saliences[1].total > kept.saliences[0].total
+    assert look(model, 0.4, FACE, waving(2.0)).kind == "hand"
 
 
 def test_of_two_faces_the_nearer_is_kept_until_the_other_is_clearly_nearer() -> None:
     model = attention(min_dwell_ms=0.0)
 
-    def two(t: float, other_m: float) -> Percept:
-        return percept(t, FACE, body(5, "face", (other_m, 0.3, 0.0)))
-
-    assert model.choose(two(0.0, 1.5), looking(), 0.0).id == 1
-    assert model.choose(two(1.0, 0.9), looking(), 1.0).id == 1
-    assert model.choose(two(2.0, 0.6), looking(), 2.0).id == 5
+    for t, other_m, id in ((0.0, 1.5, 1), (1.0, 0.9, 1), (2.0, 0.6, 5)):
+        assert look(model, t, FACE, body(5, "face", (other_m, 0.3, 0.0))).id == id
 
 
 def test_a_lost_target_is_waited_for_and_then_left() -> None:
     model = attention()
-    seen = model.choose(percept(0.0, FACE), looking(), 0.0)
-    waited = model.choose(percept(0.1), looking(), 0.1)
+    seen = look(model, 0.0, FACE)
+    waited = look(model, 0.1)
     assert (waited.p_world_m, waited.why) == (seen.p_world_m, "lost, waiting")
     assert waited.shift == seen.shift
-    left = model.choose(percept(1.5), looking(), 1.5)
+    left = look(model, 1.5)
     assert (left.kind, left.id) == ("rest", -1)
 
 
@@ -107,7 +105,7 @@ def test_a_target_that_has_left_the_picture_is_waited_for_where_it_was_in_it() -
     model = attention()
     moving = percept(9.0, body(2, "hand", (1.0, 0.3, 0.0), (0.0, 2.0, 0.0)))
     seen = model.choose(moving, looking(), 9.0)
-    waited = model.choose(percept(9.1), looking(), 9.1)
+    waited = look(model, 9.1)
     assert (waited.id, waited.p_world_m, waited.why) == (2, seen.p_world_m, "lost, waiting")
     assert model.choose(moving, looking(), 9.2).id == 2
     blind = model.choose(None, looking(), 10.0)
@@ -116,20 +114,18 @@ def test_a_target_that_has_left_the_picture_is_waited_for_where_it_was_in_it() -
 
 def test_stale_pictures_tell_nothing() -> None:
     model = attention()
-    model.choose(percept(0.0, FACE), looking(), 0.0)
+    look(model, 0.0, FACE)
     assert model.choose(percept(0.0, FACE), looking(), 0.3).why != "lost, waiting"
     assert model.choose(percept(0.0, FACE), looking(), 0.5).why == "lost, waiting"
     assert model.choose(None, looking(), 3.0).kind == "rest"
 
 
-def test_behaviours_follow_their_rules() -> None:
-    model = attention(min_dwell_ms=0.0)
-    both = percept(0.0, FACE, body(9, "attack_target", (0.8, -0.2, 0.0)))
-    assert model.choose(both, looking(), 0.0).id == 1
+def test_behaviours_follow_their_rules_and_do_not_wait_for_the_end_of_a_fixation() -> None:
+    model = attention(min_dwell_ms=5000.0)
+    rows = FACE, body(9, "attack_target", (0.8, -0.2, 0.0))
+    assert look(model, 0.0, *rows).id == 1
     model.top_down.behave("attack")
-    chosen = model.choose(
-        percept(0.1, FACE, body(9, "attack_target", (0.8, -0.2, 0.0))), looking(), 0.1
-    )
+    chosen = look(model, 0.05, *rows)
     assert (chosen.id, chosen.salience, chosen.top_down) == (9, 0.9, True)
     with pytest.raises(ValueError, match="no rule for behaviour 'dance'; rules: attack"):
         model.top_down.behave("dance")
@@ -137,7 +133,7 @@ def test_behaviours_follow_their_rules() -> None:
         TopDownParams(behaviour="x", rules={"wait": Rule("face", 0.5)})
 
 
-def bodies(*rows: tuple[int, str, tuple[float, ...], tuple[float, ...]]) -> Bodies:
+def bodies(*rows: Row) -> Bodies:
     return percept(0.0, *rows).bodies
 
 
@@ -156,8 +152,8 @@ def test_what_only_one_eye_sees_is_seen() -> None:
 def test_ones_own_body_is_not_looked_at_however_it_moves() -> None:
     fist = body(2, "own", (0.4, 0.1, -0.1), (0.0, 3.0, 0.0))
     model = attention()
-    assert model.choose(percept(0.0, FACE, fist), looking(), 0.0).kind == "face"
-    assert attention().choose(percept(0.0, fist), looking(), 0.0).kind == "rest"
+    assert look(model, 0.0, FACE, fist).kind == "face"
+    assert look(attention(), 0.0, fist).kind == "rest"
 
 
 def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:

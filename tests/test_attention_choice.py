@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import hypot, pi, sin
 
 import pytest
-from attention_scene import FACE, attention, body, looking, percept, waving
+from attention_scene import FACE, Row, attention, body, look, waving
 
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
@@ -19,15 +19,15 @@ def by(
 
 
 def test_a_rule_may_name_one_body() -> None:
-    crowd = percept(0.0, FACE, body(7, "face", (2.0, 0.5, 0.0)))
-    target = by("id:7").choose(crowd, looking(), 0.0)
+    crowd = FACE, body(7, "face", (2.0, 0.5, 0.0))
+    target = look(by("id:7"), 0.0, *crowd)
     assert (target.id, target.salience, target.top_down) == (7, 0.9, True)
-    assert by("id:8").choose(crowd, looking(), 0.0).top_down is False
+    assert look(by("id:8"), 0.0, *crowd).top_down is False
 
 
 def test_a_rule_may_name_a_place_with_or_without_bodies_about() -> None:
-    for seen in (percept(0.0), percept(0.0, FACE)):
-        target = by("point", point_world_m=(1.0, 0.5, 0.6)).choose(seen, looking(), 0.0)
+    for seen in ((), (FACE,)):
+        target = look(by("point", point_world_m=(1.0, 0.5, 0.6)), 0.0, *seen)
         assert (target.kind, target.id, target.p_world_m) == ("point", -1, (1.0, 0.5, 0.6))
         assert (target.top_down, target.salience, target.why) == (
             True,
@@ -35,8 +35,8 @@ def test_a_rule_may_name_a_place_with_or_without_bodies_about() -> None:
             "point: rule wait 0.90",
         )
     model = by("point", 0.5, (1.0, 0.5, 0.6))
-    model.choose(waving(0.0, 0.0), looking(), 0.0)
-    assert model.choose(waving(0.7, 2.0), looking(), 0.7).kind == "hand"
+    look(model, 0.0, FACE, waving(0.0))
+    assert look(model, 0.7, FACE, waving(2.0)).kind == "hand"
 
 
 @pytest.mark.parametrize(
@@ -59,39 +59,23 @@ def test_behaviours_are_listed_and_forgotten_at_a_reset() -> None:
     assert model.behaviour == "wait"
 
 
-def test_a_change_of_mind_does_not_wait_for_the_end_of_a_fixation() -> None:
-    model = attention(min_dwell_ms=5000.0)
-    rows = FACE, body(9, "attack_target", (0.8, -0.2, 0.0))
-    assert model.choose(percept(0.0, *rows), looking(), 0.0).kind == "face"
-    model.top_down.behave("attack")
-    assert model.choose(percept(0.05, *rows), looking(), 0.05).kind == "attack_target"
-
-
 def test_every_decision_carries_the_pulls_of_the_winner_and_the_next_three() -> None:
     model = attention()
     rows = [body(k, "hand", (1.0, 0.1 * k, 0.0), (0.0, 0.02 * k, 0.0)) for k in range(2, 9)]
-    target = model.choose(percept(9.0, FACE, *rows), looking(), 9.0)
+    target = look(model, 9.0, FACE, *rows)
     assert [salience.id for salience in target.saliences] == [1, 8, 7, 6]
     face, hand = target.saliences[:2]
     assert face == Salience(1, "face", 0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 0.5)
     d = hypot(1.0, 0.8)
     assert hand.translation == pytest.approx(0.16 / d / d / 0.5)
     assert hand.looming == pytest.approx(0.16 * 0.8 / d / d / 0.5)
-    assert len(model.choose(percept(9.1, FACE), looking(), 9.1).saliences) == 1
-
-
-def test_the_winner_comes_first_even_while_it_is_only_favoured() -> None:
-    model = attention()
-    model.choose(waving(0.0, 0.0), looking(), 0.0)
-    kept = model.choose(waving(0.1, 2.0), looking(), 0.1)
-    assert (kept.kind, kept.saliences[0].kind) == ("face", "face")
-    assert kept.saliences[1].total > kept.saliences[0].total
+    assert len(look(model, 9.1, FACE).saliences) == 1
 
 
 def test_boredom_changes_the_comparison_and_moves_no_head() -> None:
     model = attention()
     times = [9.0 + k / 30 for k in range(30)]
-    looks = [model.choose(waving(t, 1.0), looking(), t) for t in times]
+    looks = [look(model, t, FACE, waving(1.0)) for t in times]
     assert {look.kind for look in looks} == {"hand"}
     assert looks[-1].salience == pytest.approx(looks[0].salience)
     assert looks[-1].saliences[0].habituation == pytest.approx(1.0 - 0.2 * 29 / 30)
@@ -99,16 +83,12 @@ def test_boredom_changes_the_comparison_and_moves_no_head() -> None:
 
 def test_a_target_that_leaves_the_field_is_left() -> None:
     model = attention()
-    moved = percept(9.0, FACE, body(2, "hand", (0.8, 0.3, -0.05), (0.0, 2.0, 0.0)))
-    assert model.choose(moved, looking(), 9.0).kind == "hand"
-    gone = percept(9.1, FACE, body(2, "hand", (-0.5, 0.3, -0.05), (0.0, 2.0, 0.0)))
-    assert model.choose(gone, looking(), 9.1).kind == "face"
+    assert look(model, 9.0, FACE, waving(2.0)).kind == "hand"
+    assert look(model, 9.1, FACE, waving(2.0, x=-0.5)).kind == "face"
 
 
 # Bodies alone: a face with two fists at the chin, looked at 30 times a second. The tests of
 # Mitake et al. 4, with camera, tracker and head: test_behaviours.
-
-Row = tuple[int, str, tuple[float, ...], tuple[float, ...]]
 
 
 def boxer(t: float, face: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> list[Row]:
@@ -131,7 +111,7 @@ def lived(scene: Callable[[float], list[Row]], seconds: float) -> list[tuple[flo
         for i, kind, p, _ in scene(t):
             q = before.get(i, p)
             rows.append((i, kind, p, tuple(30 * (a - b) for a, b in zip(p, q, strict=True))))
-        looks.append((t, model.choose(percept(t, *rows), looking(), t)))
+        looks.append((t, look(model, t, *rows)))
     return looks
 
 

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from fakes.runs import play
+from gaze_targets import target
 from msgspec import structs
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
-from gazerig.gaze.types import Target, Vec3
+from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.scene_files import load_scene
@@ -31,8 +32,8 @@ HAND: Vec3 = (0.7, 0.2, 0.1)
 def tick(t_s: float, kind: str, place: Vec3) -> Tick:
     """Make a tick of which only time and target matter."""
     unread: Any = None
-    target = Target(place, (0.0, 0.0, 0.0), t_s, kind, 1, 0.5, False, None, 0, "")
-    return Tick(t_s, unread, unread, None, None, target, unread, (), unread)
+    seen = target(place, at_s=t_s, kind=kind)
+    return Tick(t_s, unread, unread, None, None, seen, unread, (), unread)
 
 
 class Lived:

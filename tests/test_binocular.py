@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from gaze_targets import DT, joints_at, target
 from gaze_trace_rig import CENTRED, DESK, Rig
 from msgspec import structs
 
@@ -23,9 +24,7 @@ from gazerig.gaze.oculomotor.binocular import BinocularController, EyeGeometry, 
 from gazerig.gaze.oculomotor.gaze_point import OculomotorParams
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams
-from gazerig.robot.model.types import JointState
 
-DT = 0.005
 HALF_M = CENTRED.interocular_mm / 2e3
 FAR_M = 10.0
 
@@ -50,9 +49,7 @@ class Alone:
         self._controller, self._gaze = BinocularController(), (1.0, 0.0, 0.0)
 
     def tick(self, target: Target, head_rad: tuple[float, ...], t: float, dt: float) -> Eyes:
-        state = self.kinematics.forward(
-            JointState((*(0.0,) * 6, *head_rad), (0.0,) * 9, (t,) * 9, ())
-        )
+        state = self.kinematics.forward(joints_at(*(0.0,) * 6, *head_rad))
         on = self.kinematics.eye_angles_to
         view = EyeGeometry(state.R_world_head, state.p_world_head_m, on, lambda eyes: eyes)
         if not self._controller.started:
@@ -77,7 +74,7 @@ def aim(
     """Return a target in a present frame that moves around the head."""
     p = scale(direction((radians(yaw_deg), 0.0)), distance)
     v = scale((-p[1], p[0], 0.0), radians(speed_deg_s))
-    return Target(p, v, t, "thing", 1, 0.2, False, None, 1, "")
+    return target(p, v, t, "thing", salience=0.2)
 
 
 def eyes(
@@ -261,16 +258,15 @@ def test_e29_the_reflex_is_late_by_its_delay_and_no_part_of_a_tick(dt: float) ->
 
 def test_e31_eyes_hold_the_gaze_through_any_turn_of_the_head() -> None:
     alone = Alone(DESK)
-    target = Target((1.5, 0.2, 0.2), (0, 0, 0), 0.0, "thing", 1, 0.2, False, None, 1, "")
-    lost = structs.replace(target, v_world_m_s=(0.0, 1e-9, 0.0))  # the reflex alone holds the gaze
+    seen = target((1.5, 0.2, 0.2), kind="thing", salience=0.2)
+    lost = structs.replace(seen, v_world_m_s=(0.0, 1e-9, 0.0))  # the reflex alone holds the gaze
     lines = []
     for k in range(620):
         share = min(max((k - 400) / 199, 0.0), 1.0)
         head = (radians(40.0) * share, radians(20.0) * share, radians(10.0) * share)
-        eyes = alone.tick(target if k < 390 else lost, head, k * DT, DT)
-        angles = JointState((*eyes[0], *eyes[1], 0.0, 0.0, *head), (0.0,) * 9, (0.0,) * 9, ())
-        seen = alone.kinematics.forward(angles)
-        lines.append(add(line_of_sight(seen, True), line_of_sight(seen, False)))
+        left, right = alone.tick(seen if k < 390 else lost, head, k * DT, DT)
+        state = alone.kinematics.forward(joints_at(*left, *right, 0.0, 0.0, *head))
+        lines.append(add(line_of_sight(state, True), line_of_sight(state, False)))
     # It is late by its delay of 10 ms, and turns of three axes do not commute.
     assert max(degrees(angle_between(one, lines[389])) for one in lines[400:]) < 0.9
 
@@ -299,9 +295,8 @@ def test_a_saccade_prescribes_the_angles_and_pursuit_goes_on_after_it() -> None:
     for k in range(400):
         t = k * DT
         jump, seen_s = 8.0 if t >= 1.0 else 0.0, t - 0.07
-        target = aim(20.0 * seen_s + jump - 20.0, 20.0, t=seen_s)
-        target = structs.replace(target, shift=1 if t < 1.0 else 2)
-        command = rig.tick(target, t, DT)
+        aimed = aim(20.0 * seen_s + jump - 20.0, 20.0, t=seen_s)
+        command = rig.tick(structs.replace(aimed, shift=1 if t < 1.0 else 2), t, DT)
         yaws.append(degrees(0.5 * (command.eye_left_rad[0] + command.eye_right_rad[0])))
         phases.append(command.phase)
     speeds = np.diff(yaws) / DT

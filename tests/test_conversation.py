@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 from commanded_robot import Running, running_desk
+from gaze_targets import target
 
 import gazerig
 from gazerig.config.schema import load_rig
@@ -227,15 +228,11 @@ def gaze(seed: int) -> ConversationGaze:
     return ConversationGaze("people", AversionParams(), ConversationParams(), attention, *rngs)
 
 
-def person(at_m: Vec3, t_s: float = 0.0) -> Target:
-    return Target(at_m, (0.0, 0.0, 0.0), t_s, "face", 1, 1.0, True, None, 0, "a person")
-
-
 def test_a_look_away_stays_beside_a_face_that_moves_into_it() -> None:
     model, head = gaze(2), (0.0, 0.0, 0.0)
 
     def look(at_m: Vec3, t_s: float) -> Target:
-        return model.look(person(at_m, t_s), head, t_s)
+        return model.look(target(at_m, at_s=t_s, top_down=True), head, t_s)
 
     ahead = (1.0, 0.0, 0.0)
     look(ahead, 0.0)
@@ -248,7 +245,7 @@ def test_a_look_away_stays_beside_a_face_that_moves_into_it() -> None:
 
 
 def test_a_look_over_two_turns_is_no_stare() -> None:
-    model, head, face = gaze(1), (0.0, 0.0, 0.0), person((1.0, 0.0, 0.0))
+    model, head, face = gaze(1), (0.0, 0.0, 0.0), target(top_down=True)
     model.look(face, head, 0.0)
     model.enter("speaking", None, 10.0, 1.0, 0.0)
     model.look(face, head, 0.5)

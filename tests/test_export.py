@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
 from fakes.runs import play
+from gaze_targets import joints_at
 from msgspec.structs import replace
 from present import present
 
@@ -21,7 +22,6 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import (
     MOVEMENTS,
@@ -36,8 +36,6 @@ from gazerig.robot.recording.gaze_angles import (
     label_samples,
     speed_deg_s,
 )
-
-RATE_HZ = 200.0
 
 
 def seen(scene: str, seconds: float) -> list[Tick]:
@@ -72,7 +70,7 @@ def pose(left_deg: tuple[float, float], right_deg: tuple[float, float], yaw: flo
     """Eyes in the head, and the head's yaw."""
     kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
     degs = (*left_deg, *right_deg, 0.0, 0.0, yaw, 0.0, 0.0)
-    return kinematics.forward(JointState(tuple(map(radians, degs)), (0.0,) * 9, (0.0,) * 9, ()))
+    return kinematics.forward(joints_at(*map(radians, degs)))
 
 
 # --- angles

@@ -6,7 +6,8 @@ from math import degrees, hypot, radians
 
 import numpy as np
 import pytest
-from gaze_trace_rig import HUMAN, Rig, still
+from gaze_targets import target
+from gaze_trace_rig import HUMAN, Rig, Trace, still
 
 from gazerig.gaze.angles import angle_between, direction, norm, scale, sub, unit
 from gazerig.gaze.oculomotor.gaze_point import OculomotorParams, Refixations, endpoint
@@ -62,23 +63,22 @@ MAX_SPEED_DEG_S = SaccadeParams().max_speed_deg_s
 MAX_ACCELERATION_DEG_S2 = SaccadeParams().max_acceleration_deg_s2
 
 
-def double_step(jump_s: float, first_deg: float = 28.0, then_deg: float = 34.0) -> Rig:
+def double_step(jump_s: float, first_deg: float = 28.0, then_deg: float = 34.0) -> Trace:
     rig = Rig(params=replace(PEOPLE, eye_lag_ms=5.0), saccade=HUMAN)
 
     def where(t: float) -> Target:
         late = t >= jump_s
         place = at(then_deg if late else first_deg)
-        return Target(place, (0, 0, 0), t, "thing", 1, 0.2, False, None, 1 + late, "")
+        return target(place, at_s=t, kind="thing", salience=0.2, shift=1 + late)
 
-    rig.trace = rig.run(where, 0.6)  # type: ignore[attr-defined]
-    return rig
+    return rig.run(where, 0.6)
 
 
 def test_a_target_that_jumps_early_bends_the_saccade_and_a_late_jump_waits_100_ms() -> None:
-    early = double_step(0.010).trace  # type: ignore[attr-defined]
+    early = double_step(0.010)
     assert early.commands[-1].saccades == 1
     assert early.eye[-1] + early.head[-1] == pytest.approx(34.0, abs=0.1)
-    late = double_step(0.040).trace  # type: ignore[attr-defined]
+    late = double_step(0.040)
     assert late.commands[-1].saccades == 2
     phases = [c.phase == "saccade" for c in late.commands]
     landed = phases.index(False, phases.index(True))

@@ -2,15 +2,15 @@
 
 from collections.abc import Callable
 from math import degrees, radians
-from typing import Any
 
 import numpy as np
 import pytest
+from gaze_targets import DT, target, turn
 
 from gazerig.gaze.angles import direction
 from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
-from gazerig.gaze.types import Floats, Target
+from gazerig.gaze.types import Floats
 
 NECK = ((-2.0, 2.0), (-1.0, 1.0))
 EQ_7 = HeadParams(goal_model="attention")
@@ -87,29 +87,16 @@ def test_a_new_goal_in_flight_makes_no_step() -> None:
 
 def test_an_eye_held_aside_is_relieved_slowly() -> None:
     model = HeadModel(HeadParams(eye_only_range_deg=60.0), radians(35.0), NECK)
-    model.reset(0.0, (0.0, 0.0, 0.0))
-    target = Target((1.0, 0.4, 0.0), (0, 0, 0), 0.0, "thing", 1, 0.5, True, None, 1, "")
-    yaw = radians(21.0)
-    trace: list[Any] = []
-    for k in range(1600):
-        t = k * 0.005
-        aside = abs(yaw - (trace[-1] if trace else 0.0))
-        now = model.step(target, (yaw, 0.0), (yaw, 0.0), aside, 1.0, t)
-        trace.append(now[0])
-    moved = np.degrees(np.array(trace))
+    moved = turn(model, 8.0, lambda t: (target(kind="thing", top_down=True), 21.0))
     assert np.abs(moved[:600]).max() == 0.0
     assert moved[-1] == pytest.approx(21.0 - 5.0, abs=0.5)
-    assert np.abs(np.diff(moved)).max() / 0.005 <= 12.0 + 1e-6
+    assert np.abs(np.diff(moved)).max() / DT <= 12.0 + 1e-6
 
 
-def aimed(params: HeadParams, centre: float, point: float, top_down: bool = False) -> float:
-    """Return where a shift brings the head (eye range 20 deg) for a far centre and a point."""
-    model = HeadModel(params, radians(20.0), NECK)
-    target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 0.5, top_down, None, 1, "")
-    facing, gaze, yaw = (radians(centre), 0.0), (radians(point), 0.0), 0.0
-    for k in range(500):
-        yaw = model.step(target, facing, gaze, abs(gaze[0] - yaw), 1.0, k * 0.005)[0]
-    return degrees(yaw)
+def aimed(params: HeadParams, centre: float, point: float, eye_deg: float = 20.0) -> float:
+    """Return where a shift brings the head for a far centre and a point."""
+    model = HeadModel(params, radians(eye_deg), NECK)
+    return float(turn(model, 2.5, lambda t: (target(), point), centre)[-1])
 
 
 def test_head_turns_to_the_centre_but_never_so_that_the_point_is_out_of_reach() -> None:
@@ -123,19 +110,20 @@ def test_alignment_faces_the_target_once_it_is_beyond_the_eyes() -> None:
     assert aimed(params, 19.0, 19.0) == 0.0
 
 
-@pytest.mark.parametrize(("target", "head_deg"), [(30.0, 12.0), (40.0, 22.0), (60.0, 42.0)])
-def test_stahl_share_is_lifted_where_the_eyes_cannot_reach(target: float, head_deg: float) -> None:
+@pytest.mark.parametrize(
+    ("eye_deg", "place", "head_deg"),
+    [
+        (20.0, 30.0, 12.0),
+        (20.0, 40.0, 22.0),
+        (20.0, 60.0, 42.0),
+        (55.0, 40.0, 0.77 * (40.0 - 17.9)),
+    ],
+)
+def test_stahl_share_is_lifted_where_the_eyes_cannot_reach(
+    eye_deg: float, place: float, head_deg: float
+) -> None:
     params = HeadParams(goal_model="stahl")
-    assert aimed(params, target, target) == pytest.approx(head_deg, abs=0.1)
-
-
-def test_stahl_share_of_a_wide_eye_range() -> None:
-    model = HeadModel(HeadParams(goal_model="stahl"), radians(55.0), NECK)
-    target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 0.5, True, None, 1, "")
-    facing = (radians(40.0), 0.0)
-    for k in range(500):
-        yaw = model.step(target, facing, facing, radians(40.0), 1.0, k * 0.005)[0]
-    assert degrees(yaw) == pytest.approx(0.77 * (40.0 - 17.9), abs=0.1)
+    assert aimed(params, place, place, eye_deg) == pytest.approx(head_deg, abs=0.1)
 
 
 def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
@@ -152,25 +140,13 @@ def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
 )
 def test_larger_head_movements_are_faster(size: float, peak: float) -> None:
     model = HeadModel(HeadParams(goal_model="align"), radians(5.0), NECK)
-    model.reset(0.0, (0.0, 0.0, 0.0))
-    target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 2.0, True, None, 1, "")
-    facing = (radians(size), 0.0)
-    trace = [
-        degrees(model.step(target, facing, facing, radians(size), 1.0, k * 0.005)[0])
-        for k in range(400)
-    ]
-    assert np.diff(trace).max() / 0.005 == pytest.approx(peak, abs=1.5)
+    yaws = turn(model, 2.0, lambda t: (target(salience=2.0, top_down=True), size))
+    assert np.diff(yaws).max() / DT == pytest.approx(peak, abs=1.5)
 
 
 def turned(params: HeadParams, yaw: float, salience: Callable[[float], float]) -> Floats:
     """Return the head's yaws of 4 s with a face at a yaw whose salience changes; degrees."""
-    model, yaws = head(35.0, params), [0.0]
-    place = (radians(yaw), 0.0)
-    for k in range(800):
-        t = k * 0.005
-        target = Target((1, 0, 0), (0, 0, 0), t, "face", 1, salience(t), False, None, 0, "")
-        yaws.append(model.step(target, place, place, abs(place[0] - yaws[-1]), 1.0, t)[0])
-    return np.degrees(yaws)
+    return turn(head(35.0, params), 4.0, lambda t: (target(salience=salience(t)), yaw))
 
 
 def test_a_head_does_not_turn_away_because_the_interest_has_fallen() -> None:
@@ -182,18 +158,14 @@ def test_a_head_does_not_turn_away_because_the_interest_has_fallen() -> None:
 def test_an_eye_left_aside_by_a_shift_is_relieved_by_people_alone() -> None:
     """The head stops short of the target; after 3 s it comes after the eyes."""
     yaws = turned(HeadParams(), 50.0, lambda t: 0.2)
-    assert yaws[int(0.6 / 0.005)] < 26.0 and yaws[-1] > yaws[500] + 3.0
+    assert yaws[int(0.6 / DT)] < 26.0 and yaws[-1] > yaws[500] + 3.0
     paper = turned(EQ_7, 50.0, lambda t: 0.2)
     assert paper[-1] == paper[300] and paper[-1] == pytest.approx(20.03, abs=0.1)
 
 
 def test_plans_made_in_full_flight_stay_in_the_neck_range() -> None:
     model = HeadModel(HeadParams(), radians(35.0), ((-0.9, 0.9), (-0.5, 0.5)))
-    places = np.random.default_rng(5).uniform(-1.4, 1.4, 300).tolist()
-    yaws = [0.0]
-    for k in range(12_000):
-        t = k * 0.005
-        place = (places[k // 40], 0.0)
-        target = Target((1, 0, 0), (0, 0, 0), t, "face", 1, 2.0, True, None, 0, "")
-        yaws.append(model.step(target, place, place, abs(place[0] - yaws[-1]), 1.0, t)[0])
-    assert max(map(abs, yaws)) <= 0.9
+    places = np.degrees(np.random.default_rng(5).uniform(-1.4, 1.4, 300)).tolist()
+    seen = target(salience=2.0, top_down=True)
+    yaws = turn(model, 60.0, lambda t: (seen, places[round(t / DT) // 40]))
+    assert np.abs(yaws).max() <= np.degrees(0.9)

@@ -5,6 +5,7 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
+from gaze_targets import joints_at
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,7 +13,6 @@ from gazerig.gaze.angles import angle_between, angles_of, norm, rotate, rotate_b
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import GazeCommand
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.types import JointState
 
 GEOMETRY = GeometryParams(62.0, 38.0, 51.0)
 KINEMATICS = Kinematics(
@@ -24,10 +24,6 @@ KINEMATICS = Kinematics(
     },
 )
 degree = st.floats(-1.0, 1.0)
-
-
-def joints_at(*angles: float) -> JointState:
-    return JointState(tuple(angles), (0.0,) * 9, (0.0,) * 9, ())
 
 
 @given(

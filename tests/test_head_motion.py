@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
+from gaze_targets import DT, target, turn
 
 from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
 from gazerig.gaze.types import Floats, Target
 
-DT = 0.005
 NECK = ((-1.3, 1.3), (-0.6, 0.6))
 ROLL = (-0.4, 0.4)
 
@@ -20,8 +19,8 @@ def model(seed: int | None = 0, **params: Any) -> HeadModel:
     return HeadModel(HeadParams(**params), radians(35.0), NECK, ROLL, rng)
 
 
-def target(t: float, id: int = 1, kind: str = "face", top_down: bool = True) -> Target:
-    return Target((1, 0, 0), (0, 0, 0), t, kind, id, 0.5, top_down, None, id, "")
+def seen(id: int = 1, kind: str = "face") -> Target:
+    return target(kind=kind, id=id, top_down=True, shift=id)
 
 
 def follow(head: HeadModel, place: Floats, kind: str = "face") -> Floats:
@@ -32,7 +31,7 @@ def follow(head: HeadModel, place: Floats, kind: str = "face") -> Floats:
         now, soon = (radians(yaw), 0.0), (radians(place[ahead]), 0.0)
         aside = abs(radians(yaw - yaws[-1]))
         moves = None if soon == now else soon
-        turned = head.step(target(k * DT, kind=kind), now, now, aside, 1.0, k * DT, moves)
+        turned = head.step(seen(kind=kind), now, now, aside, 1.0, k * DT, moves)
         yaws.append(degrees(turned[0]))
     return np.array(yaws[1:])
 
@@ -79,8 +78,8 @@ def test_the_head_goes_on_with_a_walker_during_a_look_away() -> None:
         past = (radians(38.0), 0.0) if away else now
         soon = None if away else (radians(place + 12.0 * head.foresees_s), 0.0)
         aside = abs(past[0] - radians(yaws[-1] if yaws else 0.0))
-        seen = target(t, kind="away" if away else "face")
-        yaws.append(degrees(head.step(seen, now, past, aside, 1.0, t, soon)[0]))
+        on = seen(kind="away" if away else "face")
+        yaws.append(degrees(head.step(on, now, past, aside, 1.0, t, soon)[0]))
     late = round(2.4 / DT)
     assert (yaws[-1] - yaws[late]) / (3.0 - 2.4) == pytest.approx(12.0, abs=1.5)
     assert 0.0 < place - yaws[-1] < 4.0
@@ -109,14 +108,10 @@ def test_recentring_is_late_random_and_slow() -> None:
 def test_the_head_comes_to_face_a_person_in_spite_of_short_looks_elsewhere(
     elsewhere: str, id: int
 ) -> None:
-    yaws = np.zeros((24, round(20.0 / DT)))
-    for seed, row in enumerate(yaws):
-        head, yaw = model(seed), 0.0
-        for k in range(len(row)):
-            t, place = k * DT, (radians(10.0), 0.0)
-            seen = target(t, id, elsewhere) if t % 2.0 > 1.4 else target(t)
-            yaw = head.step(seen, place, place, abs(place[0] - yaw), 1.0, t)[0]
-            row[k] = degrees(yaw)
+    def place(t: float) -> tuple[Target, float]:
+        return seen(id, elsewhere) if t % 2.0 > 1.4 else seen(), 10.0
+
+    yaws = np.array([turn(model(seed), 20.0, place) for seed in range(24)])
     assert np.abs(yaws[:, : round(3.0 / DT)]).max() == 0.0
     turned = yaws[:, -1] > 5.0
     assert 0.7 < turned.mean() < 1.0 and yaws.max() <= 8.01
@@ -131,12 +126,8 @@ def test_the_head_comes_to_face_a_person_in_spite_of_short_looks_elsewhere(
 def test_the_head_recentres_soon_before_what_it_is_most_interested_in(
     salience: float, top_down: bool, turns: bool
 ) -> None:
-    head, place, yaw = model(), (radians(15.0), 0.0), 0.0
-    for k in range(round(2.0 / DT)):
-        t = k * DT
-        seen = replace(target(t, kind="attack_target", top_down=top_down), salience=salience)
-        yaw = head.step(seen, place, place, abs(place[0] - yaw), 1.0, t)[0]
-    assert (degrees(yaw) > 5.0) == turns
+    urgent = target(kind="attack_target", salience=salience, top_down=top_down)
+    assert (turn(model(), 2.0, lambda t: (urgent, 15.0))[-1] > 5.0) == turns
 
 
 def shifts(seed: int | None) -> Floats:
@@ -148,7 +139,7 @@ def shifts(seed: int | None) -> Floats:
         yaw = 0.0
         for k in range(240):
             t = n * 2.0 + k * DT
-            yaw = head.step(target(t, n), place, place, abs(place[0] - yaw), 1.0, t)[0]
+            yaw = head.step(seen(n), place, place, abs(place[0] - yaw), 1.0, t)[0]
         turned.append(degrees(yaw))
     return np.array(turned)
 
@@ -162,11 +153,11 @@ def test_equal_shifts_scatter_within_bounds() -> None:
 
 def test_the_head_is_first_in_half_of_its_own_looks_and_never_in_a_reaction() -> None:
     head = model(5)
-    own = [head.draw_lead_s(target(0.0, -2 - n, "glance"), 0.7) for n in range(600)]
+    own = [head.draw_lead_s(seen(-2 - n, "glance"), 0.7) for n in range(600)]
     assert 0.5 < np.mean(np.array(own) > 0.0) < 0.75
     assert 0.35 < np.mean(np.array(own) > 0.008) < 0.6 and max(own) <= 0.071
-    assert max(head.draw_lead_s(target(0.0, n), 0.7) for n in range(200)) == 0.0
-    assert max(head.draw_lead_s(target(0.0, -2, "glance"), 0.1) for n in range(50)) == 0.0
+    assert max(head.draw_lead_s(seen(n), 0.7) for n in range(200)) == 0.0
+    assert max(head.draw_lead_s(seen(-2, "glance"), 0.1) for n in range(50)) == 0.0
 
 
 def test_a_search_is_completed_by_the_head() -> None:
@@ -180,4 +171,4 @@ def test_the_papers_heads_are_not_random(law: str) -> None:
     place = np.full(200, 50.0)
     one, other = (follow(model(seed, goal_model=law), place) for seed in (1, None))
     assert (one == other).all()
-    assert model(1, goal_model=law).draw_lead_s(target(0.0), 1.0) == 0.0
+    assert model(1, goal_model=law).draw_lead_s(seen(), 1.0) == 0.0

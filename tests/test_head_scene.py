@@ -7,6 +7,7 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
+from gaze_targets import joints_at
 from shown_page import SNAPSHOT
 
 from gazerig.config.load import shipped_path
@@ -19,7 +20,7 @@ from gazerig.robot.dashboard.view.viewpoints import FACE, View, named_view
 from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh, stored_shape
 from gazerig.robot.description.parts import measures_of
 from gazerig.robot.description.people import head, part_of, torso
-from gazerig.robot.model.types import JointState, Snapshot
+from gazerig.robot.model.types import Snapshot
 
 RIGS = sorted(path.stem for path in shipped_path("rigs", "desk").parent.glob("*.yaml"))
 CANVASES = (1.6, 1280 / 720, 1.0, 0.9, 390 / 380)
@@ -31,7 +32,7 @@ def at_rest(name: str) -> Snapshot:
     rig = load_rig(name)
     kinematics = rig_kinematics(rig)
     zero = (0.0,) * len(kinematics.names)
-    pose = kinematics.forward(JointState(zero, zero, zero, ()))
+    pose = kinematics.forward(joints_at(*zero))
     own, _ = kinematics.body_volumes(pose.R_world_head, pose.p_world_head_m)
     return replace(
         SNAPSHOT,

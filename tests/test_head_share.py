@@ -5,12 +5,13 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from gaze_targets import DT, target, turn
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.gaze.angles import angle_between, direction
 from gazerig.gaze.oculomotor.head import HeadModel, HeadParams, HeadShare
-from gazerig.gaze.types import Angles2, Floats, Target
+from gazerig.gaze.types import Angles2, Target
 
 human_norms = pytest.importorskip("gazerig.features.lab.analysis.human_norms")
 
@@ -37,10 +38,10 @@ def ends(
     at = (radians(start[0]), radians(start[1]))
     facing = (radians(place[0]), radians(place[1]))
     head.reset(0.0, (*at, 0.0))
-    target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, salience, False, None, 1, "")
+    seen = target(salience=salience)
     arc = angle_between(direction(at), direction(facing))
     for t in (0.0, 0.4, 2.9):
-        yaw, pitch, _ = head.step(target, facing, facing, arc, 1.0, t)
+        yaw, pitch, _ = head.step(seen, facing, facing, arc, 1.0, t)
     way = direction((yaw, pitch))
     went, left = angle_between(direction(at), way), angle_between(way, direction(facing))
     return degrees(arc), degrees(went), degrees(left)
@@ -86,49 +87,34 @@ def test_e75_the_model_goes_as_far_as_the_report_expects_of_people(
     )
 
 
-def flight(seconds: float, *places: tuple[float, float]) -> Floats:
-    """Return the head's yaws with targets that appear at times; (time, degrees), 5 ms apart."""
-    head = HeadModel(HeadParams(), radians(35.0), NECK, ROLL)
-    yaws = [0.0]
-    for k in range(round(seconds / 0.005)):
-        t = k * 0.005
-        number = sum(at <= t for at, _ in places)
-        facing = (radians(places[number - 1][1]), 0.0)
-        target = Target((1, 0, 0), (0, 0, 0), t, "face", number, 0.5, False, None, number, "")
-        yaws.append(head.step(target, facing, facing, abs(facing[0] - yaws[-1]), 1.0, t)[0])
-    return np.degrees(yaws)
+def model() -> HeadModel:
+    return HeadModel(HeadParams(), radians(35.0), NECK, ROLL)
 
 
 def test_e65_a_head_in_flight_stops_where_it_can_and_not_behind_a_nearer_target() -> None:
-    yaws = flight(2.0, (0.0, 65.0), (0.25, 30.0))
-    switched = yaws[50]
-    assert 3.0 < switched < 20.0
+    yaws = turn(
+        model(), 2.0, lambda t: (target(), 65.0) if t < 0.25 else (target(id=2, shift=2), 30.0)
+    )
+    assert 3.0 < yaws[50] < 20.0
     assert yaws.max() <= 30.0
     assert np.diff(yaws[50:]).min() > -0.02, "it does not swing back"
 
 
 def test_e65_eyes_that_are_being_brought_back_do_not_take_the_head_to_the_next_target() -> None:
-    model, yaws = HeadModel(HeadParams(), radians(35.0), NECK, ROLL), [0.0]
-    for k in range(980):
-        t, first = k * 0.005, k < 800
-        facing = (radians(50.0 if first else 38.0), 0.0)
-        target = Target((1, 0, 0), (0, 0, 0), t, "face", int(first), 0.5, False, None, 0, "")
-        yaws.append(model.step(target, facing, facing, abs(facing[0] - yaws[-1]), 1.0, t)[0])
-    assert degrees(yaws[801]) > degrees(yaws[600]) + 2.0, "it is being brought back"
-    assert degrees(yaws[-1]) == pytest.approx(degrees(yaws[801]), abs=2.0), "the eyes go alone"
+    yaws = turn(model(), 4.9, lambda t: (target(), 50.0) if t < 3.9999 else (target(id=0), 38.0))
+    assert yaws[801] > yaws[600] + 2.0, "it is being brought back"
+    assert yaws[-1] == pytest.approx(yaws[801], abs=2.0), "the eyes go alone"
 
 
 def test_parts_of_a_face_do_not_pull_the_head_further_each_time() -> None:
     """The same person all the while: the law counts from where the head was at first."""
-    head = HeadModel(HeadParams(), radians(50.0), NECK, ROLL)
-    rng, yaw = np.random.default_rng(0), 0.0
-    for k in range(580):
-        t, shift = k * 0.005, k // 60
-        gaze = (radians(45.0 + 2.0 * float(rng.standard_normal())), 0.0)
-        facing = (radians(45.0), 0.0)
-        target = Target((1, 0, 0), (0, 0, 0), t, "face", 1, 0.5, False, None, shift, "")
-        yaw = head.step(target, facing, gaze, abs(gaze[0] - yaw), 1.0, t)[0]
-    assert degrees(yaw) == pytest.approx(0.77 * (45.0 - 17.9), abs=0.5)
+    rng = np.random.default_rng(0)
+
+    def part(t: float) -> tuple[Target, float]:
+        return target(shift=round(t / DT) // 60), 45.0 + 2.0 * float(rng.standard_normal())
+
+    yaws = turn(HeadModel(HeadParams(), radians(50.0), NECK, ROLL), 2.9, part, facing_deg=45.0)
+    assert yaws[-1] == pytest.approx(0.77 * (45.0 - 17.9), abs=0.5)
 
 
 @settings(max_examples=100, deadline=None)
@@ -148,25 +134,21 @@ def test_e75_the_roll_goes_to_the_side_of_the_target_and_grows_with_interest(
 def test_e75_a_roll_does_not_swing_when_the_head_is_called_elsewhere(seed: int) -> None:
     rng, angles = np.random.default_rng(seed), (0.0, 0.0, 0.0)
     facing, name = (0.0, 0.0), 0
-    head = HeadModel(HeadParams(), radians(35.0), NECK, ROLL)
-    rolls = []
+    head, rolls = model(), []
     for k in range(6000):
         if k % 60 == 0 and rng.random() < 0.4:
             facing, name = (radians(float(rng.uniform(-70.0, 70.0))), 0.0), k
-        t = k * 0.005
-        target = Target((1, 0, 0), (0, 0, 0), t, "face", name, 1.0, False, None, name, "")
-        angles = head.step(target, facing, facing, abs(facing[0] - angles[0]), 1.0, t)
+        seen = target(id=name, salience=1.0, shift=name)
+        angles = head.step(seen, facing, facing, abs(facing[0] - angles[0]), 1.0, k * DT)
         rolls.append(degrees(angles[2]))
     assert 3.0 < max(map(abs, rolls)) < 5.5
 
 
 def test_e75_a_neck_without_a_roll_joint_does_not_roll() -> None:
-    facing = (radians(60.0), 0.0)
-    target = Target((1, 0, 0), (0, 0, 0), 0.0, "face", 1, 1.0, False, None, 1, "")
-    rolls = []
+    facing, seen, rolls = (radians(60.0), 0.0), target(salience=1.0), []
     for limits in ((0.0, 0.0), ROLL):
         head = HeadModel(HeadParams(), radians(35.0), NECK, limits)
         for t in (0.0, 0.5, 2.9):
-            roll = head.step(target, facing, facing, radians(60.0), 1.0, t)[2]
+            roll = head.step(seen, facing, facing, radians(60.0), 1.0, t)[2]
         rolls.append(degrees(roll))
     assert rolls[0] == 0.0 and rolls[1] == pytest.approx(-4.0, abs=0.1)

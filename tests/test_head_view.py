@@ -7,6 +7,7 @@ from math import degrees
 import numpy as np
 import pytest
 import viser
+from gaze_targets import joints_at
 from shown_page import SNAPSHOT as SHOT
 from viser import transforms
 
@@ -14,7 +15,6 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.dashboard.view.head_view import HeadView
-from gazerig.robot.model.types import JointState
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer) -> None:
     kinematics, view = rig_kinematics(rig), HeadView(server.scene)
     view.shape = shape_of(rig)
     angles = tuple((0.3 * np.sin(np.arange(len(kinematics.names)))).tolist())
-    pose = kinematics.forward(JointState(angles, angles, angles, ()))
+    pose = kinematics.forward(joints_at(*angles))
     view.show(replace(SHOT, joints=kinematics.names, measured_rad=angles))
     for link, p_world_m in (
         ("head", pose.p_world_head_m),

@@ -5,6 +5,7 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
+from gaze_targets import DT, joints_at, target
 from gaze_trace_rig import EXACT
 
 from gazerig.gaze.lids.blink import LAWS, LidParams, blink_depth, blink_pause_s
@@ -13,11 +14,8 @@ from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.oculomotor.pursuit import Pursuit, PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
-from gazerig.gaze.types import Target
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.types import JointState
 
-DT = 0.005
 AWAKE = 0.75
 
 
@@ -137,11 +135,9 @@ def whole_head(blinking: Lids, reach_deg: float) -> Oculomotor:
 @pytest.mark.parametrize("law", ["people", "nakamoto"])
 def test_e53_no_blink_storm_with_the_head_held_aside(law: str) -> None:
     model = whole_head(lids(2, law=law), 55.0)
-    held = JointState((0.0,) * 6 + (radians(40.0), 0.0, 0.0), (0.0,) * 9, (0.0,) * 9, ())
-    state = KINEMATICS.forward(held)
-    aside = (np.cos(radians(40.0)), np.sin(radians(40.0)), 0.0)
-    target = Target(aside, (0.0, 0.0, 0.0), 0.0, "face", 1, 0.5, True, None, 1, "")
-    commands = [model.step(target, state, k * 0.02, 0.02) for k in range(round(60.0 / 0.02))]
+    state = KINEMATICS.forward(joints_at(*(0.0,) * 6, radians(40.0), 0.0, 0.0))
+    aside = target((cos(radians(40.0)), sin(radians(40.0)), 0.0), top_down=True)
+    commands = [model.step(aside, state, k * 0.02, 0.02) for k in range(round(60.0 / 0.02))]
     assert 5 <= commands[-1].blinks <= 25
 
 
@@ -164,14 +160,14 @@ def test_e74_a_shift_of_3_degrees_brings_no_blink() -> None:
 def test_e74_blinks_of_new_targets_begin_about_when_the_gaze_does_before_it_or_after() -> None:
     """A person moves from side to side every 2 s; eyes and head wait for the lids."""
     model = whole_head(lids(3, blinks_per_min=0.0), 60.0)
-    state = KINEMATICS.forward(JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ()))
+    state = KINEMATICS.forward(joints_at(*[0.0] * 9))
     blinks_s, waits_s, counts, every = [], [], (0, 0), 400
     for k in range(120 * every):
         side = radians(20.0) * (1 if k // every % 2 else -1)
         at = (2.0 * cos(side), 2.0 * sin(side), 0.2)
         seen_s = k // 10 * 10 * DT  # twenty frames a second
-        target = Target(at, (0.0,) * 3, seen_s, "face", 1, 0.5, True, None, k // every, "")
-        command = model.step(target, state, k * DT, DT)
+        seen = target(at, at_s=seen_s, top_down=True, shift=k // every)
+        command = model.step(seen, state, k * DT, DT)
         if command.blinks > counts[1]:
             blinks_s.append((k // every, k % every * DT))
         if command.saccades > counts[0]:

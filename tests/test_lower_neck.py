@@ -9,6 +9,7 @@ import pytest
 from desk import LIDS
 from expressive_rig import faults
 from fakes.runs import ticks
+from gaze_targets import joints_at
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
@@ -19,7 +20,6 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Express, Jog, LookAt
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.types import JointState
 
 LOWER = ("lower_neck_pitch", "lower_neck_yaw")
 GEOMETRY = GeometryParams(170.0, 38.0, 55.0, lower_pitch_axis_height_mm=50.0)
@@ -46,8 +46,8 @@ def kinematics() -> Kinematics:
 
 def test_the_lower_neck_carries_the_head() -> None:
     made, pitch = kinematics(), radians(-30.0)
-    angles = tuple(pitch if name == LOWER[0] else 0.0 for name in made.names)
-    pose = made.forward(JointState(angles, (0.0,) * len(angles), (0.0,) * len(angles), ()))
+    angles = (pitch if name == LOWER[0] else 0.0 for name in made.names)
+    pose = made.forward(joints_at(*angles))
     # From the lower axis: 38 mm ahead and 120 + 55 mm up, pitched down by 30 deg.
     ahead, up = 0.038, 0.175
     assert pose.p_world_head_m == pytest.approx(

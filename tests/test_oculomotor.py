@@ -9,7 +9,8 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
-from gaze_trace_rig import CENTRED, DESK, DT, EXACT, HUMAN, SACCADE, Rig, still
+from gaze_targets import DT, joints_at, target
+from gaze_trace_rig import CENTRED, DESK, EXACT, HUMAN, SACCADE, Rig, still
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import structs
@@ -31,7 +32,7 @@ from gazerig.gaze.oculomotor.drift import Drift
 from gazerig.gaze.oculomotor.gaze_point import OculomotorParams
 from gazerig.gaze.oculomotor.head import HeadParams, HeadShare
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
-from gazerig.gaze.types import ORDERED, Angles2, GazeState, Target, Vec3
+from gazerig.gaze.types import ORDERED, Target
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState
 
@@ -126,8 +127,8 @@ def test_scattered_landings_are_corrected_by_small_saccades() -> None:
 
 def test_drift_moves_the_head_and_not_the_gaze() -> None:
     rig = Rig(geometry=DESK, drift=Drift("people", np.random.default_rng(0)))
-    target = Target((1.0, 0.1, 0.2), (0, 0, 0), 0.0, "thing", 1, 0.2, False, None, 1, "")
-    trace = rig.run(lambda t: target, 12.0)
+    seen = target((1.0, 0.1, 0.2), kind="thing", salience=0.2)
+    trace = rig.run(lambda t: seen, 12.0)
     pitch = np.degrees([c.head_rad[1] for c in trace.commands])
     assert np.ptp(pitch[-800:]) > 0.8
     assert trace.error[100:].max() < 0.05
@@ -141,9 +142,7 @@ def test_the_head_faces_the_centre_while_the_gaze_wanders_over_parts() -> None:
     def where(t: float) -> Target:
         part = int(t / 0.4)
         point = scale(direction((radians(45.0 + 3.0 * (part % 3 - 1)), 0.0)), 1.0)
-        return Target(
-            point, (0, 0, 0), t, "face", 1, 0.6, True, "N", part, "", centre_world_m=centre
-        )
+        return target(point, at_s=t, salience=0.6, top_down=True, shift=part, centre=centre)
 
     trace = rig.run(where, 4.0)
     assert np.ptp(trace.head[400:]) < 1e-6
@@ -156,7 +155,7 @@ def test_e58_a_lost_target_is_followed_for_a_moment_and_then_no_more() -> None:
 
     def where(t: float) -> Target:
         at = min(t, 1.0)
-        return Target((1.0, v * (at - 0.5), 0), (0, v, 0), at, "face", 1, 0.2, False, None, 1, "")
+        return target((1.0, v * (at - 0.5), 0.0), (0.0, v, 0.0), at, salience=0.2)
 
     trace = rig.run(where, 3.0)
     speeds = np.diff(trace.eye) / DT
@@ -172,9 +171,7 @@ def test_a_target_faster_than_pursuit_is_caught_up_with_by_saccades() -> None:
     def where(t: float) -> Target:
         yaw = v * t - 0.6
         point = (float(np.cos(yaw)), float(np.sin(yaw)), 0.0)
-        return Target(
-            point, (-v * point[1], v * point[0], 0), t, "hand", 1, 0.2, False, None, 1, ""
-        )
+        return target(point, (-v * point[1], v * point[0], 0.0), t, "hand", salience=0.2)
 
     trace = Rig(params=PEOPLE).run(where, 0.8)
     assert trace.commands[-1].saccades >= 3
@@ -183,25 +180,19 @@ def test_a_target_faster_than_pursuit_is_caught_up_with_by_saccades() -> None:
 
 def test_e31_eyes_hold_the_gaze_through_any_turn_of_the_head() -> None:
     rig = Rig(geometry=DESK)
-    target = Target((1.5, 0.2, 0.2), (0, 0, 0), 0.0, "thing", 1, 0.2, False, None, 1, "")
-    rig.run(lambda t: target, 1.0)
-    before = None
+    fixed = target((1.5, 0.2, 0.2), kind="thing", salience=0.2)
+    rig.run(lambda t: fixed, 1.0)
     for k in range(200):
         share = k / 199
         turned = (radians(40.0) * share, radians(20.0) * share, radians(10.0) * share)
-        q = rig.joints.position_rad
-        joints = JointState((*q[:6], *turned), (0.0,) * 9, (0.0,) * 9, ())
-        state = rig.kinematics.forward(joints)
-        command = rig.oculomotor.step(target, state, 1.0 + k * DT, DT)
-        seen = rig.kinematics.forward(
-            JointState((*rig.kinematics.inverse(command)[:6], *turned), (0.0,) * 9, (0.0,) * 9, ())
-        )
+        state = rig.kinematics.forward(joints_at(*rig.joints.position_rad[:6], *turned))
+        command = rig.oculomotor.step(fixed, state, 1.0 + k * DT, DT)
+        seen = rig.kinematics.forward(joints_at(*rig.kinematics.inverse(command)[:6], *turned))
         for left in (True, False):
             eye = seen.p_world_eye_left_m if left else seen.p_world_eye_right_m
-            error = angle_between(line_of_sight(seen, left), sub(target.p_world_m, eye))
+            error = angle_between(line_of_sight(seen, left), sub(fixed.p_world_m, eye))
             assert degrees(error) < 0.1
-        before = seen
-    assert before is not None and degrees(before.head_rad[0]) == pytest.approx(40.0)
+    assert degrees(seen.head_rad[0]) == pytest.approx(40.0)
 
 
 def test_e27_vergence_comes_from_geometry() -> None:
@@ -217,7 +208,7 @@ def test_small_errors_are_followed_and_not_jumped_to() -> None:
     walk = 0.2  # m/s at 1 m: 11 deg/s
 
     def where(t: float) -> Target:
-        return Target((1.0, walk * t, 0), (0, walk, 0), t, "thing", 1, 0.2, False, None, 1, "")
+        return target((1.0, walk * t, 0.0), (0.0, walk, 0.0), t, "thing", salience=0.2)
 
     trace = rig.run(where, 2.0)
     assert trace.error[100:].max() < 0.5
@@ -240,7 +231,7 @@ def test_a_target_change_in_flight_waits_for_the_landing() -> None:
 
 def test_a_point_on_the_nose_is_converged_on_no_nearer_than_the_limit() -> None:
     rig = Rig()
-    near = Target((0.02, 0.0, 0.0), (0, 0, 0), 0.0, "thing", 1, 0.5, True, None, 1, "")
+    near = target((0.02, 0.0, 0.0), kind="thing", top_down=True)
     command = rig.run(lambda t: near, 2.0).commands[-1]
     vergence = degrees(command.eye_right_rad[0] - command.eye_left_rad[0])
     assert 17.0 < vergence < 18.0
@@ -249,13 +240,11 @@ def test_a_point_on_the_nose_is_converged_on_no_nearer_than_the_limit() -> None:
 def test_it_begins_where_head_and_eyes_are() -> None:
     rig = Rig(geometry=DESK)
     q = (0.2, -0.1, 0.25, -0.1, 0.0, 0.0, 0.4, 0.1, 0.05)
-    rig.joints = JointState(q, (0.0,) * 9, (0.0,) * 9, ())
-    state: GazeState = rig.kinematics.forward(rig.joints)
-    ahead: Vec3 = add(state.p_world_head_m, rotate(state.R_world_head, (1.0, 0.2, -0.1)))
-    target = Target(ahead, (0, 0, 0), 0.0, "thing", 1, 0.5, True, None, 1, "")
-    first = rig.oculomotor.step(target, state, 0.0, DT)
+    state = rig.kinematics.forward(joints_at(*q))
+    ahead = add(state.p_world_head_m, rotate(state.R_world_head, (1.0, 0.2, -0.1)))
+    first = rig.oculomotor.step(target(ahead, kind="thing", top_down=True), state, 0.0, DT)
     assert first.head_rad == pytest.approx(state.head_rad)
-    eye: Angles2 = first.eye_left_rad
+    eye = first.eye_left_rad
     assert degrees(abs(eye[0] - q[0])) < 3.0 and degrees(abs(eye[1] - q[1])) < 3.0
 
 
@@ -282,20 +271,20 @@ def test_no_eye_beyond_its_limit_nothing_infinite_and_no_gaze_above_the_cap(
         saccade=profile,
     )
     t, shift, before = 0.0, 0, None
-    target = _any_target(rng, 0.0, 0)
+    seen = _any_target(rng, 0.0, 0)
     pushed = np.zeros(3)
     for _ in range(250):
         dt = float(rng.choice((0.0, 0.001, 0.005, 0.005, 0.005, 0.020, 0.2)))
         t += dt
         if rng.random() < 0.08:
             shift += int(rng.integers(0, 2))
-            target = _any_target(rng, t - float(rng.uniform(0.0, 0.3)), shift)
+            seen = _any_target(rng, t - float(rng.uniform(0.0, 0.3)), shift)
         if rng.random() < 0.1:
             pushed = rng.normal(0.0, (0.8, 0.4, 0.2))
         head = np.array(rig.joints.position_rad[6:]) + (pushed * dt if dt < 0.1 else 0.0)
         joints = JointState((*rig.joints.position_rad[:6], *head), (0.0,) * 9, (t,) * 9, ())
         state = rig.kinematics.forward(joints)
-        command = rig.oculomotor.step(target, state, t, dt)
+        command = rig.oculomotor.step(seen, state, t, dt)
         now = rig.kinematics.inverse(command)
         assert np.isfinite(now).all() and np.isfinite(command.gaze_point_world_m).all()
         eyes = (*command.eye_left_rad, *command.eye_right_rad)
@@ -312,12 +301,12 @@ def _any_target(rng: np.random.Generator, at_s: float, shift: int) -> Target:
     yaw, pitch = rng.uniform((-3.2, -1.6), (3.2, 1.6))
     distance = float(10 ** rng.uniform(-2, 1.5))
     point = scale(direction((float(yaw), float(pitch))), distance)
-    x, y, z = rng.normal(0.0, 10 ** rng.uniform(-2, 1.5), 3)
+    x, y, z = rng.normal(0.0, 10 ** rng.uniform(-2, 1.5), 3).tolist()
     centre = add(point, (0.0, 0.1, -0.05)) if rng.random() < 0.5 else None
-    return Target(
-        point, (float(x), float(y), float(z)), at_s, "face", 1, float(rng.uniform(0, 2)),
-        bool(rng.integers(0, 2)), None, shift, "", centre,
-    )  # fmt: skip
+    salience, top_down = float(rng.uniform(0, 2)), bool(rng.integers(0, 2))
+    return target(
+        point, (x, y, z), at_s, salience=salience, top_down=top_down, shift=shift, centre=centre
+    )
 
 
 def test_e19_no_eye_beyond_its_limit_and_no_head_beyond_its_range() -> None:

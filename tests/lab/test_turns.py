@@ -6,6 +6,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 import pytest
+from gaze_targets import target
 
 from gazerig.features.lab.analysis.human_norms import BY_KEY
 from gazerig.features.lab.report.statistics import judge_without_interval
@@ -16,7 +17,7 @@ from gazerig.gaze.attention.conversation import (
     ConversationGaze,
     ConversationParams,
 )
-from gazerig.gaze.types import Target, TurnState
+from gazerig.gaze.types import TurnState
 
 Script = Literal[Role, "interrupted"]
 
@@ -51,7 +52,7 @@ def model_alone(role: Script, seed: int, minutes: float, step_s: float = 0.02) -
     attention: Any = type("Unused", (), {"converse": lambda *of: None})()
     params = AversionParams(), ConversationParams()
     gaze = ConversationGaze("people", *params, attention, *random[:2])
-    face = Target((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, "face", 1, 1.0, True, None, 0, "a person")
+    face = target(salience=1.0, top_down=True)
     script, rests_s, end_s, number, rows = scripted_turns(role, random[2]), 0.0, 0.0, 0, []
     for t_s in np.arange(0.0, 60.0 * minutes, step_s).tolist():
         if t_s >= end_s:
@@ -61,10 +62,10 @@ def model_alone(role: Script, seed: int, minutes: float, step_s: float = 0.02) -
             planned_s = end_s + 10.0 * (role == "interrupted") if state == "speaking" else None
             gaze.enter(state, 1, planned_s, 0.9, t_s)
         gaze.step(t_s)
-        target = gaze.look(face, (0.0, 0.0, 0.0), t_s, False, rests_s)
+        look = gaze.look(face, (0.0, 0.0, 0.0), t_s, False, rests_s)
         if t_s > rests_s:
             rests_s = t_s + float(random[3].exponential(0.3))  # looks at parts of the face
-        yaw, pitch = yaw_pitch(target.p_world_m)
+        yaw, pitch = yaw_pitch(look.p_world_m)
         rows.append((t_s, STATES.index(state), number, degrees(yaw), degrees(pitch)))
     table = np.array(rows)
     return TurnTrace(table[:, 0], table[:, 1], table[:, 2], table[:, 3:], np.zeros(len(table)))
