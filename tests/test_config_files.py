@@ -1,10 +1,9 @@
 """YAML files as they come: unreadable, shipped by name, or any text at all."""
 
-import os
 from pathlib import Path
 
 import pytest
-from fakes.small_config import Rig, one_id_each, write
+from fakes.small_config import Rig, faults_of, one_id_each, write
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
@@ -21,13 +20,6 @@ joints:
 camera:
   fps: 30
 """
-
-
-def faults_of(folder: Path, text: str | bytes) -> list[str]:
-    """Load a rig that is at fault and give its message without the folder."""
-    with pytest.raises(ConfigError) as caught:
-        load(write(folder, text), Rig)
-    return str(caught.value).replace(f"{folder}{os.sep}", "").splitlines()
 
 
 @pytest.mark.parametrize(

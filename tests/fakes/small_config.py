@@ -1,11 +1,15 @@
 """A small schema of a configuration, and files of it."""
 
-from collections.abc import Iterator, Mapping
+import os
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from gazerig.params import Bounds, Unit
+import pytest
+
+from gazerig.config.load import ConfigError, load
+from gazerig.params import Bounds, Choices, Unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +21,7 @@ class Joint:
 
     def __post_init__(self) -> None:
         if self.low_deg >= self.high_deg:
-            raise ValueError("low_deg must be below high_deg")
+            raise ValueError("low_deg must be\nbelow high_deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,10 @@ class Rig:
     gains: Annotated[dict[str, float], Bounds(0, 1e308)] = field(default_factory=dict)
     matrix: tuple[tuple[float, ...], ...] = ()
     baud: int = 57_600
+    line: Annotated[Literal[57_600, 1_000_000], "speed of the line"] = 57_600
+    kind: Annotated[str, Choices("flat", "round")] = "flat"
+    pair: Annotated[tuple[int, int], Bounds(-9, 9)] = (1, 2)
+    tags: tuple[str, ...] = ()
 
 
 def one_id_each(rig: Rig) -> Iterator[tuple[str, str]]:
@@ -45,6 +53,14 @@ def one_id_each(rig: Rig) -> Iterator[tuple[str, str]]:
         if joint.id in owners:
             yield f"joints.{name}.id", f"id {joint.id} is also that of {owners[joint.id]}"
         owners.setdefault(joint.id, name)
+
+
+def faults_of(folder: Path, text: str | bytes, checks: Sequence[Any] = ()) -> list[str]:
+    """Load a rig that is at fault and give its message without the folder."""
+    with pytest.raises(ConfigError) as caught:
+        load(write(folder, text), Rig, checks=checks)
+    assert not [fault for fault in caught.value.faults if "\n" in fault.rule]
+    return str(caught.value).replace(f"{folder}{os.sep}", "").splitlines()
 
 
 def write(folder: Path, text: str | bytes, name: str = "rig.yaml") -> Path:
