@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 
 if TYPE_CHECKING:
+    from commanded_robot import Running
     from recorded_run import Recorded
 
     from gazerig.config.schema import Rig
@@ -85,6 +86,15 @@ def started() -> Iterator["Callable[[Rig], Assembly]"]:
     for made in begun:
         made.robot.stop()
         made.close()
+
+
+@pytest.fixture
+def running() -> Iterator["Running"]:
+    """A desk rig face to face with a person, two seconds on, that ticks on request."""
+    from commanded_robot import running_desk
+
+    with running_desk() as running:
+        yield running
 
 
 def shipped_rig(name: str) -> "Rig":

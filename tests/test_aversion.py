@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from gaze_targets import target
 from msgspec.structs import replace
 
 from gazerig.gaze.angles import angle_between, sub, unit
@@ -26,18 +27,37 @@ EYE: Vec3 = (1.2, 0.13, 0.38)
 
 
 def face(shift: int = 1, name: int = 4) -> Target:
-    return Target(
-        EYE, (0.0, 0.1, 0.0), 0.0, "face", name, 0.5, False, "LE", shift, "left eye of face 4", FACE
-    )
+    eye = target(EYE, (0.0, 0.1, 0.0), id=name, shift=shift, centre=FACE)
+    return replace(eye, part="LE", why="left eye of face 4")
 
 
 ATTENTION: Any = SimpleNamespace(converse=lambda *of: None)
 PARAMS = AversionParams(), ConversationParams()
 
 
-def aversion(seed: int = 0, looks_away: LooksAway = "people") -> ConversationGaze:
+def aversion(
+    seed: int = 0, looks_away: LooksAway = "people", mode: str = "none"
+) -> ConversationGaze:
     rngs = (np.random.default_rng((seed, n)) for n in range(2))
-    return ConversationGaze(looks_away, *PARAMS, ATTENTION, *rngs)
+    model = ConversationGaze(looks_away, *PARAMS, ATTENTION, *rngs)
+    model.choose_mode(mode, 0.0)
+    return model
+
+
+def kinds(
+    model: ConversationGaze, start_s: float, seconds: float, ordered: bool = False
+) -> list[str]:
+    """Return what is looked at in each tick of a time with one face."""
+    times = [start_s + k * DT for k in range(round(seconds / DT))]
+    return [model.look(face(), HEAD, t, ordered=ordered).kind for t in times]
+
+
+def leaves_at(model: ConversationGaze) -> float:
+    """Return when the gaze leaves the face for the first time."""
+    t = 0.0
+    while model.look(face(), HEAD, t).kind == "face":
+        t += DT
+    return t
 
 
 class Stay(NamedTuple):
@@ -69,8 +89,7 @@ def stays(model: ConversationGaze, seconds: float, dt: float = DT) -> list[Stay]
 def test_e54_mutual_gaze(
     mode: str, bout: float, bout_band: float, share: float, share_band: float, seed: int
 ) -> None:
-    model = aversion(seed)
-    model.choose_mode(mode, 0.0)
+    model = aversion(seed, mode=mode)
     found = stays(model, 600.0)
     mutual = [s.seconds for s in found if s.kind == "face"]
     away = [s.seconds for s in found if s.kind == "away"]
@@ -80,16 +99,15 @@ def test_e54_mutual_gaze(
 
 
 def test_who_never_looks_away_passes_targets_untouched() -> None:
-    model, target = aversion(looks_away="none"), face()
+    model, seen = aversion(looks_away="none"), face()
     for k in range(5000):
         if k == 1000:
             model.choose_mode("think", k * DT)
-        assert model.look(target, HEAD, k * DT) is target
+        assert model.look(seen, HEAD, k * DT) is seen
 
 
 def test_only_faces_are_looked_away_from() -> None:
-    model = aversion()
-    model.choose_mode("talk", 0.0)
+    model = aversion(mode="talk")
     hand = replace(face(), kind="hand")
     assert all(model.look(hand, HEAD, k * DT) is hand for k in range(3000))
 
@@ -108,8 +126,7 @@ def angles_and_ways(model: ConversationGaze, seconds: float) -> tuple[np.ndarray
 
 def test_how_far_away_follows_the_published_law() -> None:
     """Beyond the face's outline, whose height is 8 deg here with what is kept beside it."""
-    model = aversion(7)
-    model.choose_mode("talk", 0.0)
+    model = aversion(7, mode="talk")
     far, _ = angles_and_ways(model, 20_000.0)
     beyond = far[far > 9.0] - 9.0
     assert beyond.mean() == pytest.approx(6.9 * (1.0 - np.exp(-18.5 / 6.9)), abs=0.4)
@@ -123,9 +140,9 @@ def test_a_look_away_passes_beside_the_face_however_near_it_is(distance_m: float
     near = replace(face(), p_world_m=(0.05 + distance_m, 0.0, 0.2), centre_world_m=None)
     places = set()
     for k in range(20_000):
-        target = model.look(near, HEAD, 0.05 * k)
-        if target.kind == "away":
-            places.add(target.p_world_m)
+        look = model.look(near, HEAD, 0.05 * k)
+        if look.kind == "away":
+            places.add(look.p_world_m)
     assert len(places) > 100
     for place in places:
         x, y, z = (a - b for a, b in zip(place, HEAD, strict=True))
@@ -146,16 +163,14 @@ def test_a_look_away_leaves_when_the_rest_on_a_part_is_over() -> None:
 
 @pytest.mark.parametrize(("mode", "most"), [("talk", 27.5), ("listen", 22.7), ("think", 27.5)])
 def test_away_is_beside_the_face_and_within_the_cap(mode: str, most: float) -> None:
-    model = aversion(8)
-    model.choose_mode(mode, 0.0)
+    model = aversion(8, mode=mode)
     far, _ = angles_and_ways(model, 4000.0)
     assert far.min() >= 5.0 - 1e-6 and far.max() <= most + 1e-6
     assert far.mean() > 9.0
 
 
 def test_directions_are_those_of_the_table() -> None:
-    model = aversion(9)
-    model.choose_mode("talk", 0.0)
+    model = aversion(9, mode="talk")
     _, ways = angles_and_ways(model, 16_000.0)
     counts = np.bincount(((ways + 22.5) // 45.0).astype(int) % 8, minlength=8)
     expected = np.array(DIRECTIONS_PERCENT) / 100.0
@@ -164,16 +179,14 @@ def test_directions_are_those_of_the_table() -> None:
 
 @pytest.mark.parametrize("before", ["none", "talk", "listen"])
 def test_thinking_looks_away_at_once(before: str) -> None:
-    model = aversion(10)
-    model.choose_mode(before, 0.0)
+    model = aversion(10, mode=before)
     assert model.look(face(), HEAD, 0.0).kind == "face"
     model.choose_mode("think", 0.01)
     assert model.look(face(), HEAD, 0.02).kind == "away"
 
 
 def test_thinking_looks_mostly_up_and_for_longer() -> None:
-    model = aversion(10)
-    model.choose_mode("think", 0.0)
+    model = aversion(10, mode="think")
     found = [s for s in stays(model, 3000.0, 0.05) if s.kind == "away"]
     assert np.mean([s.seconds for s in found]) == pytest.approx(3.54, abs=0.3)
     assert np.std([s.seconds for s in found]) == pytest.approx(1.26, abs=0.25)
@@ -181,8 +194,7 @@ def test_thinking_looks_mostly_up_and_for_longer() -> None:
 
 
 def test_a_place_away_keeps_the_head_with_the_person() -> None:
-    model = aversion(11)
-    model.choose_mode("think", 0.0)
+    model = aversion(11, mode="think")
     model.look(face(), HEAD, 0.0)
     seen = [model.look(face(), HEAD, k * DT) for k in range(500)]
     away = next(t for t in seen if t.kind == "away")
@@ -194,8 +206,7 @@ def test_a_place_away_keeps_the_head_with_the_person() -> None:
 
 
 def test_every_leave_and_return_is_one_new_shift_and_the_count_never_falls() -> None:
-    model = aversion(12)
-    model.choose_mode("talk", 0.0)
+    model = aversion(12, mode="talk")
     # The part beneath changes every 0.4 s, also while the gaze is away.
     seen = [model.look(face(k // 20), HEAD, k * DT) for k in range(5000)]
     turns = 0
@@ -214,24 +225,18 @@ def test_every_leave_and_return_is_one_new_shift_and_the_count_never_falls() -> 
 
 
 def test_another_face_is_looked_at_before_it_is_looked_away_from() -> None:
-    model = aversion(13)
-    model.choose_mode("think", 0.0)
-    t = 0.0
-    while model.look(face(), HEAD, t).kind == "face":
-        t += DT
+    model = aversion(13, mode="think")
+    t = leaves_at(model)
     other = model.look(face(2, name=5), HEAD, t + DT)
     assert (other.kind, other.id) == ("face", 5)
     assert model.look(face(2, name=5), HEAD, t + 2 * DT).kind == "face"
 
 
 def test_a_change_of_the_conversation_returns_to_the_face() -> None:
-    model = aversion(14)
-    model.choose_mode("think", 0.0)
-    t = 0.0
-    while model.look(face(), HEAD, t).kind == "face":
-        t += DT
+    model = aversion(14, mode="think")
+    t = leaves_at(model)
     model.choose_mode("listen", t)
-    assert {model.look(face(), HEAD, t + k * DT).kind for k in range(50)} == {"face"}
+    assert set(kinds(model, t, 1.0)) == {"face"}
     model.choose_mode("listen", t + 1.0)  # the same again changes nothing
 
 
@@ -250,26 +255,21 @@ def test_silent_bouts_of_mutual_gaze_last_as_long_as_people_prefer() -> None:
 
 def test_a_target_that_a_user_has_chosen_is_left_in_a_conversation_only() -> None:
     model = aversion(18)
-    t = 0.0
-    while model.look(face(), HEAD, t).kind == "face":
-        t += DT
-    looks = [model.look(face(), HEAD, t + k * DT, ordered=True) for k in range(1000)]
-    assert {look.kind for look in looks} == {"face"}
-    t += 20.0
-    again = [model.look(face(), HEAD, t + k * DT).kind for k in range(1000)]
+    t = leaves_at(model)
+    assert set(kinds(model, t, 20.0, ordered=True)) == {"face"}
+    again = kinds(model, t + 20.0, 20.0)
     assert again[0] == "face" and "away" in again
-    model.choose_mode("talk", t + 20.0)
-    kinds = {model.look(face(), HEAD, t + 20.0 + k * DT, ordered=True).kind for k in range(2000)}
-    assert kinds == {"face", "away"}
+    model.choose_mode("talk", t + 40.0)
+    assert set(kinds(model, t + 40.0, 40.0, ordered=True)) == {"face", "away"}
 
 
 def test_looking_away_in_silence_can_be_switched_on_and_off_while_it_runs() -> None:
     model = aversion(19, looks_away="none")
     assert {s.kind for s in stays(model, 60.0)} == set()
     model.retune("people", *PARAMS)
-    assert "away" in {model.look(face(), HEAD, 60.0 + k * DT).kind for k in range(1000)}
+    assert "away" in kinds(model, 60.0, 20.0)
     model.retune("none", *PARAMS)
-    assert {model.look(face(), HEAD, 90.0 + k * DT).kind for k in range(2000)} == {"face"}
+    assert set(kinds(model, 90.0, 40.0)) == {"face"}
 
 
 def test_turns_look_aside_or_as_in_eyes_alive_and_for_the_given_times() -> None:

@@ -1,11 +1,10 @@
 """Commands to a running robot: checked, executed at the next tick, and safe."""
 
-from collections.abc import Iterator
 from math import degrees, inf, nan, pi, radians
 
 import msgspec
 import pytest
-from commanded_robot import YAW, Running, running_desk
+from commanded_robot import YAW, Running
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.session import shut_down
@@ -29,12 +28,7 @@ from gazerig.robot.model.commands import (
 from gazerig.robot.model.requests import read_request
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
-
-
-@pytest.fixture
-def running() -> Iterator[Running]:
-    with running_desk() as running:
-        yield running
+GENTLE_RAD_S = radians(load_rig("desk").guard.soft_start_speed_deg_s)
 
 
 ORDERS: list[Command] = [
@@ -76,6 +70,23 @@ def test_orders_cross_processes_and_recordings_as_they_are(order: Command) -> No
         ({"do": "look_at_person", "id": 10**30}, "out of range|<= 9007199254740992"),
         ({"do": "opponent", "p_world_m": [2.0, 0.0, 0.0]}, "<= 1.2"),
         ({"do": "tune", "changes": [["a", 1]]}, "request"),
+        ({"do": "look_at", "p_world_m": None, "for_s": 0}, "> 0.0 - at `.*for_s"),
+        ({"do": "look_at_in_head", "p_head_m": None}, "p_head_m"),
+        ({"do": "look_at_direction", "direction_rad": [4.0, 0.0]}, "<= 3.14"),
+        ({"do": "look_at_direction", "direction_rad": [0.0, 1.7]}, "<= 1.57"),
+        ({"do": "look_at_direction", "direction_rad": [0, 0], "distance_m": 0}, "> 0.0"),
+        ({"do": "look_at_person", "id": True}, "got `bool`"),
+        ({"do": "look_at_pixel", "pixel_px": [1.0]}, "length 2"),
+        ({"do": "look_at_pixel", "pixel_px": [1, 2], "captured_s": 10**400}, "out of range"),
+        (
+            {"do": "talk", "state": "talking"},
+            "talk has state .listening, thinking, speaking, idle, interrupt.",
+        ),
+        ({"do": "talk"}, "missing required field `state`"),
+        ({"do": "talk", "state": "listening", "person": -1}, ">= 0 - at `.*person`"),
+        ({"do": "talk", "state": "speaking", "seconds": 0}, "> 0.0 - at `.*seconds`"),
+        ({"do": "talk", "state": "speaking", "seconds": 3600}, "<= 600.0"),
+        ({"do": "talk", "state": "speaking", "words": [["a", nan]]}, "at `.*words"),
     ],
 )
 def test_what_is_no_order_is_refused_with_place_and_rule(data: object, words: str) -> None:
@@ -123,10 +134,9 @@ def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running) -> No
     assert not ticks[0].stopped and all(ticks[2].joints.torque)
     start = ticks[0].guard_result.command_rad
     assert start == pytest.approx(before.joints.position_rad, abs=radians(0.5))
-    gentle = radians(load_rig("desk").guard.soft_start_speed_deg_s)
     for a, b in zip(ticks, ticks[1:100], strict=False):
         for old, new in zip(a.guard_result.command_rad, b.guard_result.command_rad, strict=True):
-            assert abs(new - old) <= gentle * (b.t_s - a.t_s) * 1.01 + 1e-9
+            assert abs(new - old) <= GENTLE_RAD_S * (b.t_s - a.t_s) * 1.01 + 1e-9
     assert ticks[-1].guard_result.level in ("ok", "limited")
     assert ticks[-1].target.kind == "face"
 
@@ -172,12 +182,11 @@ def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running
     assert all(
         abs(a - b) < 1e-3 for i, (a, b) in enumerate(zip(end, held, strict=True)) if i != YAW
     )
-    gentle = radians(load_rig("desk").guard.soft_start_speed_deg_s)
     steps = [
         abs(b.guard_result.command_rad[YAW] - a.guard_result.command_rad[YAW]) / (b.t_s - a.t_s)
         for a, b in zip(ticks, ticks[1:], strict=False)
     ]
-    assert max(steps) <= gentle * 1.01
+    assert max(steps) <= GENTLE_RAD_S * 1.01
     running.order(Jog(()))
     assert running.go(2.0)[-1].target.kind == "face"
 
@@ -194,9 +203,6 @@ def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
         running.order(Ask("mood", "x"))
     with pytest.raises(ValueError, match="available: wink left"):
         running.order(Ask("lids", "x"))
-
-
-# Clients that may end a stop, and the duration of control
 
 
 # Clients that may resume, and the time
@@ -291,9 +297,10 @@ def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None
         "a show (process 7): jog neck_yaw 17.2: not renewed, so the gaze models are in control again"
         in words
     )
-    gentle = radians(load_rig("desk").guard.soft_start_speed_deg_s)
     yaw = [tick.guard_result.command_rad[YAW] for tick in ticks]
-    assert max(abs(b - a) for a, b in zip(yaw, yaw[1:], strict=False)) <= gentle * 0.005 * 1.01
+    assert (
+        max(abs(b - a) for a, b in zip(yaw, yaw[1:], strict=False)) <= GENTLE_RAD_S * 0.005 * 1.01
+    )
 
 
 def test_a_lead_holds_while_it_is_renewed_by_the_one_who_leads(running: Running) -> None:

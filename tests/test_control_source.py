@@ -1,9 +1,7 @@
 """The source of control of the head is one value with the same words everywhere."""
 
-from collections.abc import Iterator
-
 import pytest
-from commanded_robot import Running, running_desk
+from commanded_robot import Running
 
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import head_activity, tick_control_source
@@ -15,12 +13,6 @@ from gazerig.robot.model.control_source import ControlSource, control_sentence
 from gazerig.robot.model.types import Snapshot
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
-
-
-@pytest.fixture
-def running() -> Iterator[Running]:
-    with running_desk() as running:
-        yield running
 
 
 def shown(tick: Tick) -> Snapshot:

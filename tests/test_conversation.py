@@ -1,14 +1,13 @@
 """Conversation: the state that a voice agent reports, its end, and what the gaze makes of it."""
 
-from collections.abc import Iterator
-from math import inf, nan, radians
+from math import inf, radians
 from types import SimpleNamespace
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
-from commanded_robot import Running, running_desk
+from commanded_robot import Running
 from gaze_targets import target
 
 import gazerig
@@ -27,55 +26,34 @@ from gazerig.robot.control.head_state import HeadState, head_state
 from gazerig.robot.dashboard.door.programs import ProgramSocket
 from gazerig.robot.model.commands import LookAt, Renew, Talk
 from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.model.requests import read_request
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
-@pytest.fixture
-def rig() -> Iterator[Running]:
-    with running_desk() as running:
-        yield running
-
-
-@pytest.mark.parametrize(
-    ("fields", "words"),
-    [
-        ({"state": "talking"}, "talk has state .listening, thinking, speaking, idle, interrupt."),
-        ({}, "missing required field `state`"),
-        ({"state": "listening", "person": -1}, ">= 0 - at `.*person`"),
-        ({"state": "speaking", "seconds": 0}, "> 0.0 - at `.*seconds`"),
-        ({"state": "speaking", "seconds": 3600}, "<= 600.0"),
-        ({"state": "speaking", "words": [["a", nan]]}, "at `.*words"),
-    ],
-)
-def test_an_impossible_report_is_refused_with_the_rule(fields: Any, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        read_request({"do": "talk", **fields})
-
-
-def test_states_follow_each_other_and_are_in_tick_and_state(rig: Running) -> None:
-    person = rig.do(Talk("listening", 1, who="a", stay=True))[1][-1].conversation
+def test_states_follow_each_other_and_are_in_tick_and_state(running: Running) -> None:
+    person = running.do(Talk("listening", 1, who="a", stay=True))[1][-1].conversation
     assert (person.number, person.state, person.partner, person.who) == (1, "listening", 1, "a")
-    assert rig.do(Talk("thinking", who="a", stay=True))[1][-1].conversation.partner == 1
-    spoken = rig.do(Talk("speaking", seconds=2.0, who="a", stay=True))[1][-1].conversation
+    assert running.do(Talk("thinking", who="a", stay=True))[1][-1].conversation.partner == 1
+    spoken = running.do(Talk("speaking", seconds=2.0, who="a", stay=True))[1][-1].conversation
     assert spoken.ends_s == spoken.since_s + 2.0 and spoken.confidence > 0.8
-    rig.go(1.0)
-    longer = rig.do(Talk("speaking", text="x" * 30, who="a", stay=True))[1][-1]
+    running.go(1.0)
+    longer = running.do(Talk("speaking", text="x" * 30, who="a", stay=True))[1][-1]
     changed = longer.conversation  # the plan is corrected, the state continues
     assert (changed.number, changed.since_s) == (spoken.number, spoken.since_s)
     assert changed.ends_s == pytest.approx(longer.t_s + 2.0, abs=0.01)
     assert changed.confidence < 0.5
-    blank = rig.do(Talk("speaking", text=" ", who="a", stay=True))[1][-1].conversation
+    blank = running.do(Talk("speaking", text=" ", who="a", stay=True))[1][-1].conversation
     assert blank.ends_s is None
     words = Talk("speaking", words=(("a", 0.0), ("b", 3.0)), who="a", stay=True)
-    timed = rig.do(words)[1][-1].conversation
-    assert timed.ends_s == pytest.approx(rig.ticks[-1].t_s + 3.4, abs=0.01)
-    state = head_state(rig.ticks[-1])
+    timed = running.do(words)[1][-1].conversation
+    assert timed.ends_s == pytest.approx(running.ticks[-1].t_s + 3.4, abs=0.01)
+    state = head_state(running.ticks[-1])
     assert state.conversation == timed
     assert msgspec.json.decode(msgspec.json.encode(state), type=HeadState) == state
-    assert rig.do(Talk("interrupt", who="a", stay=True))[1][-1].conversation.state == "interrupted"
-    assert rig.do(Talk("idle", who="a"))[1][-1].conversation.state == "idle"
+    assert (
+        running.do(Talk("interrupt", who="a", stay=True))[1][-1].conversation.state == "interrupted"
+    )
+    assert running.do(Talk("idle", who="a"))[1][-1].conversation.state == "idle"
 
 
 @pytest.mark.parametrize(
@@ -88,10 +66,10 @@ def test_states_follow_each_other_and_are_in_tick_and_state(rig: Running) -> Non
     ],
 )
 def test_a_state_ends_without_its_program(
-    rig: Running, given: Talk, lasts_s: float, reason: str
+    running: Running, given: Talk, lasts_s: float, reason: str
 ) -> None:
-    start_s = rig.do(given)[1][0].t_s
-    ticks = rig.go(lasts_s + 0.5)
+    start_s = running.do(given)[1][0].t_s
+    ticks = running.go(lasts_s + 0.5)
     ended = next(tick for tick in ticks if tick.conversation.state == "idle")
     assert ended.t_s - start_s == pytest.approx(lasts_s, abs=0.03)
     assert reason in ended.conversation.end_reason
@@ -99,64 +77,64 @@ def test_a_state_ends_without_its_program(
     assert ticks[-1].target.kind in ("face", "away")
 
 
-def test_one_heartbeat_renews_gaze_and_conversation_of_one_client(rig: Running) -> None:
-    rig.do(LookAt((1.0, 0.0, 0.3), who="a"))
-    rig.do(Talk("listening", who="a"))
+def test_one_heartbeat_renews_gaze_and_conversation_of_one_client(running: Running) -> None:
+    running.do(LookAt((1.0, 0.0, 0.3), who="a"))
+    running.do(Talk("listening", who="a"))
     for _ in range(4):
-        rig.go(0.5)
-        assert not rig.do(Renew(who="a"))[0].refused
-        assert rig.do(Renew(who="b"))[0].refused
-    assert rig.ticks[-1].controlled_by and rig.ticks[-1].conversation.state == "listening"
-    rig.do(LookAt(None, who="a"))
-    assert not rig.do(Renew(who="a"))[0].refused  # it still has the conversation
+        running.go(0.5)
+        assert not running.do(Renew(who="a"))[0].refused
+        assert running.do(Renew(who="b"))[0].refused
+    assert running.ticks[-1].controlled_by and running.ticks[-1].conversation.state == "listening"
+    running.do(LookAt(None, who="a"))
+    assert not running.do(Renew(who="a"))[0].refused  # it still has the conversation
 
 
-def test_the_newer_of_two_agents_has_the_conversation(rig: Running) -> None:
-    rig.do(Talk("speaking", seconds=5.0, who="a"))
-    ticks = rig.do(Talk("listening", who="b"))[1]
+def test_the_newer_of_two_agents_has_the_conversation(running: Running) -> None:
+    running.do(Talk("speaking", seconds=5.0, who="a"))
+    ticks = running.do(Talk("listening", who="b"))[1]
     assert [text for one in ticks for text in one.events] == ["conversation: b takes over from a"]
-    assert rig.do(Renew(who="a"))[0].refused == "the head is no longer controlled by a"
-    rig.go(0.9)
-    rig.do(Renew(who="b"))
-    assert rig.go(0.5)[-1].conversation.who == "b"
+    assert running.do(Renew(who="a"))[0].refused == "the head is no longer controlled by a"
+    running.go(0.9)
+    running.do(Renew(who="b"))
+    assert running.go(0.5)[-1].conversation.who == "b"
 
 
 # Gaze
 
 
-def share_on(rig: Running, face: int, seconds: float) -> float:
+def share_on(running: Running, face: int, seconds: float) -> float:
     """Return the share of the time in which a person is the target, also while looking away."""
-    ticks = rig.go(seconds)
+    ticks = running.go(seconds)
     return sum(one.target.id == face for one in ticks) / len(ticks)
 
 
-def wait_for(rig: Running, kind: str, within_s: float) -> float:
+def wait_for(running: Running, kind: str, within_s: float) -> float:
     """Return the time until the target is of a kind, inf if it is not in time."""
-    start_s = rig.ticks[-1].t_s
-    for tick in rig.go(within_s):
+    start_s = running.ticks[-1].t_s
+    for tick in running.go(within_s):
         if tick.target.kind == kind:
             return tick.t_s - start_s
     return inf
 
 
-def test_a_turn_is_thought_spoken_and_interrupted_with_the_gaze(rig: Running) -> None:
-    rig.do(Talk("listening", stay=True), 2.0)
-    rig.do(Talk("thinking", stay=True))
-    assert wait_for(rig, "away", 0.3) < 0.05
-    rig.do(Talk("speaking", seconds=8.0, stay=True), 0.5)
-    assert rig.ticks[-1].target.kind == "away"  # the look of thinking continues
-    late = [tick for tick in rig.go(9.0) if tick.t_s > rig.ticks[-1].t_s - 2.0]
+def test_a_turn_is_thought_spoken_and_interrupted_with_the_gaze(running: Running) -> None:
+    running.do(Talk("listening", stay=True), 2.0)
+    running.do(Talk("thinking", stay=True))
+    assert wait_for(running, "away", 0.3) < 0.05
+    running.do(Talk("speaking", seconds=8.0, stay=True), 0.5)
+    assert running.ticks[-1].target.kind == "away"  # the look of thinking continues
+    late = [tick for tick in running.go(9.0) if tick.t_s > running.ticks[-1].t_s - 2.0]
     assert {tick.target.kind for tick in late} == {"face"}  # the end, and the time after it
-    rig.do(Talk("thinking", stay=True), 0.5)
-    assert rig.ticks[-1].target.kind == "away"
-    rig.do(Talk("interrupt", stay=True))
-    assert wait_for(rig, "face", 0.3) < 0.02
+    running.do(Talk("thinking", stay=True), 0.5)
+    assert running.ticks[-1].target.kind == "away"
+    running.do(Talk("interrupt", stay=True))
+    assert wait_for(running, "face", 0.3) < 0.02
 
 
-def test_a_short_answer_is_given_with_the_gaze_on_the_face(rig: Running) -> None:
-    rig.do(Talk("thinking", stay=True), 1.0)
-    rig.do(Talk("speaking", text="Yes, of course.", stay=True))
-    assert {tick.target.kind for tick in rig.go(1.2)} == {"face"}
+def test_a_short_answer_is_given_with_the_gaze_on_the_face(running: Running) -> None:
+    running.do(Talk("thinking", stay=True), 1.0)
+    running.do(Talk("speaking", text="Yes, of course.", stay=True))
+    assert {tick.target.kind for tick in running.go(1.2)} == {"face"}
 
 
 def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
@@ -164,17 +142,17 @@ def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
         load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, scene="three-people")
     )
     made.robot.start(made.clock)
-    rig = Running(made)
-    rig.go(12.0)
-    percept = rig.ticks[-1].percept
+    running = Running(made)
+    running.go(12.0)
+    percept = running.ticks[-1].percept
     assert percept is not None
-    addressee = next(face.id for face in percept.faces if face.id != rig.ticks[-1].target.id)
-    rig.do(Talk("speaking", addressee, seconds=60.0, stay=True), 0.5)
-    assert rig.ticks[-1].target.id == addressee
-    assert 0.6 < share_on(rig, addressee, 30.0) < 0.95
-    rig.do(Talk("listening", stay=True), 2.0)
+    addressee = next(face.id for face in percept.faces if face.id != running.ticks[-1].target.id)
+    running.do(Talk("speaking", addressee, seconds=60.0, stay=True), 0.5)
+    assert running.ticks[-1].target.id == addressee
+    assert 0.6 < share_on(running, addressee, 30.0) < 0.95
+    running.do(Talk("listening", stay=True), 2.0)
     on, alone, shifts, onset = 0, 0, list[float](), (-1, 0.0)
-    for tick in rig.go(60.0):
+    for tick in running.go(60.0):
         assert tick.percept is not None
         speaks = [face.id for face in tick.percept.faces if face.speaks]
         if len(speaks) == 1:
@@ -187,14 +165,14 @@ def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
     assert on / alone > 0.8
     assert len(shifts) > 5 and sorted(shifts)[len(shifts) // 2] < 0.4
     # The partner who interrupts is looked at, whoever's mouth has moved before.
-    rig.do(Talk("speaking", addressee, seconds=60.0, stay=True))
-    for tick in rig.go(30.0):
+    running.do(Talk("speaking", addressee, seconds=60.0, stay=True))
+    for tick in running.go(30.0):
         assert tick.percept is not None
         seen = {face.id: face.speaks for face in tick.percept.faces}
         if tick.target.id not in (-1, addressee) and addressee in seen and any(seen.values()):
             break
-    rig.do(Talk("interrupt", stay=True), 0.1)
-    assert {tick.target.id for tick in rig.go(1.0)} == {addressee}
+    running.do(Talk("interrupt", stay=True), 0.1)
+    assert {tick.target.id for tick in running.go(1.0)} == {addressee}
     made.robot.stop()
     made.close()
 

@@ -150,16 +150,10 @@ def test_people_are_looked_at_for_times_as_their_nearness(away_m: tuple[float, .
     assert measured == pytest.approx(weights / weights.sum(), abs=0.03)
 
 
-def test_nobody_of_three_is_left_out() -> None:
-    three = bodies("face face face", (1, 0.4, 0), (1.1, 0, 0), (1, -0.4, 0))
-    targets = watch(three, 120.0)
-    assert min(shares(targets).values()) > 0.25 and min(stays_s(targets)) > 1.0
-
-
-@pytest.mark.parametrize("n", [4, 6, 8])
+@pytest.mark.parametrize("n", [3, 4, 6, 8])
 def test_nobody_of_many_waits_for_long_and_no_look_is_a_glance(n: int) -> None:
     targets = watch(arc(*[1.5] * n), 90.0)
-    assert max(waits_s(targets, n)) < 15.0
+    assert max(waits_s(targets, n)) < 15.0 and min(shares(targets).values()) > 0.75 / n
     assert min(stays_s(targets)) > 1.0
 
 
