@@ -22,9 +22,9 @@ def running() -> dict[int, str]:
     own = (resource_tracker._resource_tracker, forkserver._forkserver)
     kept = {getattr(one, name, None) for one in own for name in ("_pid", "_forkserver_pid")}
     found = {}
-    for pid in _children(os.getpid()):
-        if pid not in kept and (command := _command(pid)):
-            found[pid] = command
+    for pid in children(os.getpid()):
+        if pid not in kept and (words := command(pid)):
+            found[pid] = words
     return found
 
 
@@ -42,7 +42,7 @@ def end_others(kept: Container[int]) -> dict[int, str]:
 def end(pids: Iterable[int]) -> None:
     """Kill processes and all that these have started."""
     for pid in pids:
-        family = [pid, *_descendants(pid)]
+        family = [pid, *descendants(pid)]
         for one in family:
             with suppress(ProcessLookupError):
                 os.kill(one, signal.SIGKILL)
@@ -50,23 +50,29 @@ def end(pids: Iterable[int]) -> None:
             os.waitpid(pid, 0)
 
 
-def _children(pid: int) -> Iterator[int]:
+def children(pid: int) -> Iterator[int]:
     """Return the children of a process; each of its threads has a list of its own."""
     with suppress(OSError):
         # Twice in each test: by names alone, in half the time of paths.
         for thread in os.listdir(f"/proc/{pid}/task"):
-            with suppress(OSError), open(f"/proc/{pid}/task/{thread}/children", "rb") as children:
-                yield from map(int, children.read().split())
+            with suppress(OSError), open(f"/proc/{pid}/task/{thread}/children", "rb") as listed:
+                yield from map(int, listed.read().split())
 
 
-def _descendants(pid: int) -> Iterator[int]:
-    for child in _children(pid):
+def descendants(pid: int) -> Iterator[int]:
+    """Return the children of a process, theirs, and so on."""
+    for child in children(pid):
         yield child
-        yield from _descendants(child)
+        yield from descendants(child)
 
 
-def _command(pid: int) -> str:
-    """Return the command line of a process; nothing if it has ended and is not yet reaped."""
+def running_as(parent: int, words: str) -> list[int]:
+    """Return the children of a process whose command line has these words."""
+    return [pid for pid in children(parent) if words in command(pid)]
+
+
+def command(pid: int) -> str:
+    """Return the command line of a process; nothing if it has ended, reaped or not."""
     with suppress(OSError):
         return (_PROC / str(pid) / "cmdline").read_bytes().replace(b"\0", b" ").decode().strip()
     return ""

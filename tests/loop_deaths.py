@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from branch import Branch
+from child_processes import running_as
 from feedback_rows import rows
 
 from gazerig.config.rig import BusConfig, Rig
@@ -107,17 +107,7 @@ class Driven(NamedTuple):
 
     def guardians(self) -> list[int]:
         """Return the process ids of the loop's guardians."""
-        found = []
-        for entry in Path("/proc").iterdir():
-            if entry.name.isdigit():
-                try:
-                    words = (entry / "cmdline").read_bytes().split(b"\0")
-                    parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
-                except OSError:
-                    continue
-                if b"gazerig.robot.guardian.process" in words and parent == self.loop.pid:
-                    found.append(int(entry.name))
-        return found
+        return running_as(self.loop.pid, "gazerig.robot.guardian.process")
 
     def holding(self) -> list[bool]:
         """Return which servos are under torque, or get pulses."""

@@ -44,25 +44,6 @@ def page_here() -> int | None:
     return found[0] if found else None
 
 
-def page_process(parent: int) -> int | None:
-    """The process of the page that another one has started, alive or stopped."""
-    for entry in Path("/proc").iterdir():
-        if not entry.name.isdigit():
-            continue
-        try:
-            words = (entry / "cmdline").read_bytes().split(b"\0")
-            state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
-        except OSError:  # it has ended meanwhile
-            continue
-        if b"gazerig.robot.dashboard.page_main" in words and state != "Z":
-            _fd, _stop_fd, its_parent, *_ = words[
-                words.index(b"gazerig.robot.dashboard.page_main") + 1 :
-            ]
-            if int(its_parent) == parent:
-                return int(entry.name)
-    return None
-
-
 def test_sending_side_needs_no_viewer_and_no_opencv() -> None:
     check = (
         "import gazerig.robot.dashboard.feed.page_process, sys;"
@@ -201,10 +182,10 @@ def test_page_ends_when_the_parent_is_killed(habit: str) -> None:
     with subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
         sibling = int(parent.stdout.readline())
-        assert page_process(parent.pid) is not None
+        (page,) = child_processes.running_as(parent.pid, "gazerig.robot.dashboard.page_main")
         parent.kill()
         try:
-            wait_for(lambda: page_process(parent.pid) is None, "the end of the page")
+            wait_for(lambda: not child_processes.command(page), "the end of the page")
         finally:
             if sibling > 0:
                 os.kill(sibling, signal.SIGKILL)

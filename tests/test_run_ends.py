@@ -8,18 +8,7 @@ from pathlib import Path
 
 import pytest
 from branch import Branch, gazerig
-
-DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
-
-
-def rig_at(file: Path, rate_hz: float) -> str:
-    """Write the desk rig with another rate."""
-    desk = DESK.read_text(encoding="utf-8")
-    assert desk.count("rate_hz: 200.0  # Hz, 20") == 1
-    file.write_text(
-        desk.replace("rate_hz: 200.0  # Hz, 20", f"rate_hz: {rate_hz}  # Hz, 20"), encoding="utf-8"
-    )
-    return str(file)
+from slow_rigs import at_rate
 
 
 def begun(*words: str) -> "subprocess.Popen[str]":
@@ -38,7 +27,7 @@ def begun(*words: str) -> "subprocess.Popen[str]":
 
 @pytest.mark.slow
 def test_signals_park_and_switch_torque_off(tmp_path: Path) -> None:
-    rig = rig_at(tmp_path / "rig.yaml", 50.0)
+    rig = at_rate(tmp_path, "desk", 50.0)
     numbers = (signal.SIGINT, signal.SIGTERM)
     processes = [begun(rig) for _ in numbers]
     time.sleep(2.0)

@@ -23,7 +23,8 @@ from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from attack.ways_out import RIGS, START, Bench, bench, children, wait_until
+from attack.ways_out import RIGS, START, Bench, bench, wait_until
+from child_processes import children, end, running_as
 
 LONGEST_S = 20.0
 
@@ -146,7 +147,7 @@ class Target(NamedTuple):
 
     def guardians(self) -> list[int]:
         """Return the guardians of the heads."""
-        return [one for one in children(self.pid) if _runs(one, b"guardian")]
+        return running_as(self.pid, "guardian")
 
 
 Strike = Callable[[Target], None]
@@ -274,20 +275,8 @@ def held(interface: str, benches: list[Bench], begin: Begin) -> Iterator[Target]
             alive = wait_until(lambda: _holds(program, benches))
             yield Target(program, program.pid if alive else 0, folder)
         finally:
-            for number in (signal.SIGCONT, signal.SIGKILL):
-                for one in {program.pid, *_descendants(program.pid)}:
-                    with suppress(ProcessLookupError):
-                        os.kill(one, number)
+            end([program.pid])
             program.wait()
-
-
-def _runs(pid: int, word: bytes) -> bool:
-    return word in Path(f"/proc/{pid}/cmdline").read_bytes()
-
-
-def _descendants(pid: int) -> list[int]:
-    direct = children(pid)
-    return [*direct, *(one for child in direct for one in _descendants(child))]
 
 
 def _holds(program: "subprocess.Popen[bytes]", benches: list[Bench]) -> bool:

@@ -37,6 +37,7 @@ from present import present
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from board_rig import on_pca9685
+from child_processes import running_as
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.rig_limits import park_rad
@@ -260,21 +261,10 @@ def stop_tty(run: Started) -> None:
 
 def kill_page(run: Started) -> None:
     """The page dies; a while later a request to end."""
-    pages = [
-        child
-        for child in children(run.pid)
-        if b"gazerig.robot.dashboard.page_main" in Path(f"/proc/{child}/cmdline").read_bytes()
-    ]
-    for page in pages:
+    for page in running_as(run.pid, "gazerig.robot.dashboard.page_main"):
         os.kill(page, signal.SIGKILL)
     time.sleep(1.0)
     run.process.send_signal(signal.SIGTERM)
-
-
-def children(pid: int) -> list[int]:
-    """Return the children of all threads of a process."""
-    found = [p.read_text().split() for p in Path(f"/proc/{pid}/task").glob("*/children")]
-    return [int(one) for words in found for one in words]
 
 
 def nothing(run: Started) -> None:
