@@ -1,6 +1,7 @@
 """Shared by all tests: steady examples, the environment, marks and fixtures."""
 
 import os
+import resource
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -95,6 +96,15 @@ def running() -> Iterator["Running"]:
 
     with running_desk() as running:
         yield running
+
+
+@pytest.fixture
+def small_disk() -> Iterator[None]:
+    """Let no file grow beyond 60 kB, as on a disk that is nearly full."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def shipped_rig(name: str) -> "Rig":

@@ -233,21 +233,6 @@ def test_an_order_that_crossed_processes_is_checked_in_its_tick() -> None:
     assert any("gaze.lid: unknown key" in line for line in tick.events)
 
 
-def test_orders_of_a_run_do_it_again_bit_for_bit() -> None:
-    def play() -> list[list[int]]:
-        running = started("boxing")
-        running.go(50)
-        running.made.robot.command(
-            Tune((("joints.neck_yaw.max_deg", 5.0), ("gaze.head.goal_model", "align")))
-        )
-        running.go(100)
-        running.made.robot.command(Tune((("gaze.scanpath.model", "random"),)))
-        running.go(100)
-        return running.goals
-
-    assert play() == play()
-
-
 def test_a_joint_outside_its_new_range_is_led_inside_slowly() -> None:
     running = started()
     jog(running, "neck_yaw", 40.0, 300)

@@ -5,15 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from desk import GAZE_JOINTS
 from mixed_rig import mixed_rig, mixed_text
 
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
-from gazerig.drivers.bus.multi_bus import MultiBus
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
-from gazerig.robot.app.options import RunOptions
 
 DESK = shipped_path("rigs", "desk")
 
@@ -28,17 +25,6 @@ def broken(tmp_path: Path, *changes: tuple[str, str]) -> tuple[str, ...]:
     with pytest.raises(ConfigError) as caught:
         load_rig(str(path))
     return tuple(str(fault) for fault in caught.value.faults)
-
-
-def test_the_desk_rig_is_the_head_described() -> None:
-    rig = load_rig("desk")
-    assert [rig.joints[name].id for name in GAZE_JOINTS] == list(range(1, 10))
-    assert {rig.joints[name].model for name in GAZE_JOINTS[:6]} == {"xl330-m077"}
-    assert {rig.joints[name].model for name in GAZE_JOINTS[6:]} == {"xc330-m288"}
-    assert rig.bus.dynamixel.baud == 1_000_000
-    assert rig.geometry.interocular_mm == 61.9
-    pan, tilt = rig.joints["left_eye_pan"], rig.joints["right_eye_tilt"]
-    assert (pan.min_deg, pan.max_deg, tilt.min_deg, tilt.max_deg) == (-35, 35, -30, 30)
 
 
 def test_shipped_profiles_characters_and_walks_load() -> None:
@@ -184,17 +170,3 @@ def test_ports_are_named_by_their_bus(mixed: Rig) -> None:
     with pytest.raises(SetupError, match="expected PORT, neck=PORT, tilt=PORT"):
         bus_ports(mixed, "lids=/dev/z")
     assert bus_ports(load_rig("maker"), "/dev/z") == {"": "/dev/z"}
-
-
-def test_one_bus_is_itself_and_several_are_one(mixed: Rig) -> None:
-    from gazerig.robot.app.assemble import assemble
-
-    made = assemble(mixed, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
-    assert isinstance(made.robot.body.bus, MultiBus)
-    alone = assemble(load_rig("maker"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
-    assert not isinstance(alone.robot.body.bus, MultiBus)
-    made.close()
-    alone.close()
-
-
-# RIG is a word of every command, the first one; options of earlier versions still work

@@ -2,8 +2,6 @@
 
 import json
 import os
-import resource
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -101,15 +99,6 @@ def test_a_file_is_not_written_over_unasked(tmp_path: Path) -> None:
 
 
 # --- what goes wrong while it runs
-
-
-@pytest.fixture
-def small_disk() -> Iterator[None]:
-    """Let no file grow beyond 60 kB, as on a disk that is nearly full."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_path: Path) -> None:

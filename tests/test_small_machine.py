@@ -78,6 +78,3 @@ def test_systemd_finds_no_fault_in_the_service(tmp_path: Path) -> None:
         capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
     assert done.returncode == 0 and not done.stderr, done.stderr
-
-
-# ---- the wheels

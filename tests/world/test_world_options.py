@@ -54,11 +54,3 @@ def test_a_world_that_is_not_there_is_said_with_those_that_are(tmp_path: Path) -
         world_of(rig, replace(ASKED, world="living-rom"))
     with pytest.raises(SetupError, match="there is no such file"):
         world_of(rig, replace(ASKED, world=str(tmp_path / "mine.xml")))
-
-
-def test_a_script_at_fault_is_said_with_file_line_and_key(tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text("room: living-room\npeople:\n  anna:\n    start: dor\n")
-    with pytest.raises(ConfigError) as found:
-        world_of(load_rig("desk"), replace(ASKED, world=str(file)))
-    assert "mine.yaml:4" in str(found.value) and "people.anna.start" in str(found.value)
