@@ -4,33 +4,20 @@ import json
 import re
 import signal
 import time
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from command_line import invoked
 from commands_started import hear, start, status
 from fakes.pty_bus import PtyBus
-from served_rigs import Served, hide_real_ports, rig_files, served
+from served_rigs import served
 
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.features.bringup.cli import ports
 from gazerig.features.bringup.manual_control import ManualControl
 from gazerig.sim_mock.devices import MaestroLine
 
-pytestmark = pytest.mark.usefixtures("simulated_wires")
+pytestmark = pytest.mark.usefixtures("simulated_wires", "no_real_ports")
 ROW = r"(\d) +[│|] ([\w-]+) +[│|] ([\d.]+) +[│|] (\d+) +[│|] "
-
-
-@pytest.fixture(autouse=True)
-def no_real_ports(monkeypatch):
-    hide_real_ports(monkeypatch)
-
-
-@pytest.fixture
-def mixed(tmp_path):
-    """Return the path of a rig with eyes on a Maestro, a Dynamixel and a Feetech neck servo."""
-    return rig_files(tmp_path)["mixed"]
 
 
 # --- scan
@@ -93,7 +80,8 @@ def test_doctor_finds_and_fixes():
     assert "nothing that --fix" in invoked("doctor", "--port", "/dev/ttyNONE", "--fix").out
 
 
-def test_doctor_examines_every_bus_and_says_which(mixed):
+def test_doctor_examines_every_bus_and_says_which(rigs):
+    mixed = rigs["mixed"]
     with served(mixed) as (ports, paths, command):
         command("error 4")
         command("overload 7", "neck")
@@ -133,30 +121,18 @@ def test_setup_in_steps_with_answers(rig, found, done):
 # --- jog and monitor as they are typed, on rigs of every kind
 
 
-@pytest.fixture
-def rigs(tmp_path: Path) -> dict[str, str]:
-    """Return the paths of rigs of one's own by kind."""
-    return rig_files(tmp_path)
-
-
-@pytest.fixture
-def desk() -> Iterator[Served]:
-    with served("desk") as buses:
-        yield buses
-
-
 @pytest.mark.pty
-def test_sigterm_while_jogging_parks_and_lets_go(desk: Served) -> None:
-    path = desk.ports
-    process = start("jog", "neck_yaw", "60", "--speed", "15", "--port", path)
-    hear(process.stderr, "torque on")
-    time.sleep(0.3)
-    process.send_signal(signal.SIGTERM)
-    _, words = process.communicate(timeout=30)
-    assert process.returncode == 1 and "SIGTERM" in words
-    # A starved machine has no time left for the motion.
-    assert re.search(r"parked( \(not there in time\))?, torque off on all servos", words)
-    assert not any(status(desk.command, servo_id)["torque"] for servo_id in range(1, 10))
+def test_sigterm_while_jogging_parks_and_lets_go() -> None:
+    with served("desk") as desk:
+        process = start("jog", "neck_yaw", "60", "--speed", "15", "--port", desk.ports)
+        hear(process.stderr, "torque on")
+        time.sleep(0.3)
+        process.send_signal(signal.SIGTERM)
+        _, words = process.communicate(timeout=30)
+        assert process.returncode == 1 and "SIGTERM" in words
+        # A starved machine has no time left for the motion.
+        assert re.search(r"parked( \(not there in time\))?, torque off on all servos", words)
+        assert not any(status(desk.command, servo_id)["torque"] for servo_id in range(1, 10))
 
 
 def test_a_servo_that_does_not_confirm_its_torque_off_is_named(
@@ -173,10 +149,17 @@ def test_a_servo_that_does_not_confirm_its_torque_off_is_named(
     assert "torque off on all servos; neck_roll (servo 9): torque-off not confirmed" in done.err
 
 
-def test_nonsense_is_refused_before_the_torque_is_on() -> None:
-    for words in (("jog", "nose", "3"), ("jog", "neck_yaw", "nan")):
-        done = invoked(*words, "--mock")
-        assert done.code == 2 and "torque on" not in done.err
+@pytest.mark.parametrize(
+    ("joint", "angle", "says"),
+    [
+        ("nose", "3", "no joint 'nose'; available: left_eye_pan"),
+        ("neck_yaw", "nan", "not an angle"),
+        ("left_eye_pan", "50", "50.0 deg is outside its range, -35..35 deg"),
+    ],
+)
+def test_nonsense_is_refused_before_the_torque_is_on(joint, angle, says) -> None:
+    done = invoked("jog", joint, angle, "--mock")
+    assert done.code == 2 and says in done.err and "torque on" not in done.err
 
 
 # --- hobby servos and rigs of several kinds

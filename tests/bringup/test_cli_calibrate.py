@@ -1,18 +1,14 @@
 """gazerig calibrate joints, camera, board and face as they are typed, against emulated buses."""
 
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from command_line import Invoked, answers_in, invoked
 from commands_started import hear, start, status
-from desk import GAZE_JOINTS
-from fakes.pty_bus import PtyBus
-from served_rigs import rig_files
+from served_rigs import served
 
 from gazerig.config.schema import load_rig
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")
 
@@ -26,26 +22,6 @@ def calibrated(*words: str) -> Invoked:
     done = calibrate(*words)
     assert done.code == 0, done.err
     return done
-
-
-@pytest.fixture
-def rigs(tmp_path: Path) -> dict[str, str]:
-    """Return the paths of rigs of one's own by kind."""
-    return rig_files(tmp_path)
-
-
-@pytest.fixture
-def rig(rigs: dict[str, str]) -> Path:
-    """Return a rig file of one's own."""
-    return Path(rigs["desk"])
-
-
-@pytest.fixture
-def bus() -> Iterator[tuple[PtyBus, str]]:
-    joints = load_rig("desk").joints
-    with PtyBus() as served:
-        specs = [ServoSpec(joints[name].id, joints[name].model) for name in GAZE_JOINTS]
-        yield served, served.start(specs)
 
 
 # --- joints
@@ -122,18 +98,16 @@ def test_what_cannot_be_is_said(
 
 
 @pytest.mark.pty
-def test_ctrl_c_while_calibrating_lets_go_and_writes_nothing(
-    rig: Path, bus: tuple[PtyBus, str]
-) -> None:
-    served, path = bus
+def test_ctrl_c_while_calibrating_lets_go_and_writes_nothing(rig: Path) -> None:
     before = rig.read_bytes()
-    words = ("--joint", "left_eye_pan", "--by", "motion", "--yes", "--port", path)
-    process = start("calibrate", str(rig), *words)
-    hear(process.stderr, "torque on")
-    process.send_signal(signal.SIGINT)
-    _, words_said = process.communicate(timeout=20)
-    assert process.returncode == 1 and "stopped by SIGINT" in words_said
-    assert not status(served.command, 1)["torque"] and rig.read_bytes() == before
+    with served(str(rig)) as buses:
+        words = ("--joint", "left_eye_pan", "--by", "motion", "--yes", "--port", buses.ports)
+        process = start("calibrate", str(rig), *words)
+        hear(process.stderr, "torque on")
+        process.send_signal(signal.SIGINT)
+        _, words_said = process.communicate(timeout=20)
+        assert process.returncode == 1 and "stopped by SIGINT" in words_said
+        assert not status(buses.command, 1)["torque"] and rig.read_bytes() == before
 
 
 # --- a camera

@@ -1,13 +1,12 @@
 """calibrate face as it is typed: keys, scripts, what is written and what is not."""
 
-import socket
 from pathlib import Path
 
 import pytest
 from command_line import Invoked, answers_in, invoked
 from commands_started import OnTerminal
 from page_visitor import Visitor
-from served_rigs import rig_files
+from shown_page import free_port
 
 from gazerig.config.schema import load_rig
 from gazerig.features.bringup.cli.calibration_keys import (
@@ -20,11 +19,6 @@ from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 def run(*words: str) -> Invoked:
     return invoked("calibrate", "face", *words)
-
-
-@pytest.fixture
-def rig(tmp_path: Path) -> Path:
-    return Path(rig_files(tmp_path)["desk"])
 
 
 def script(tmp_path: Path, *lines: str) -> tuple[str, str]:
@@ -120,11 +114,9 @@ def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
 
 @pytest.mark.slow
 def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
-    with socket.socket() as trial:
-        trial.bind(("127.0.0.1", 0))
-        port = trial.getsockname()[1]
-    url = f"http://127.0.0.1:{port}"
-    with sitting_at(rig, "--page", f"127.0.0.1:{port}") as sitting:
+    address = f"127.0.0.1:{free_port()}"
+    url = f"http://{address}"
+    with sitting_at(rig, "--page", address) as sitting:
         sitting.reads(f"the page is at {url}/?token=")
         sitting.reads("\n")
         visitor = Visitor(f"{url}/?token={sitting.before.strip()}")

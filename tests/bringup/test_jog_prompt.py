@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from command_line import answers_in
 from commands_started import OnTerminal
-from served_rigs import rig_files
 
 from gazerig.config.schema import load_rig
 from gazerig.features.bringup.calibration.linkage_calibration import HobbyMarker
@@ -44,8 +43,8 @@ def test_lines_move_a_servo_until_enter(tmp_path: Path, capsys: pytest.CaptureFi
     assert capsys.readouterr().err.count("moves it by so many us") == 2
 
 
-def test_keys_steer_a_hobby_servo_at_the_terminal(tmp_path: Path) -> None:
-    rig = rig_files(tmp_path)["maker"]
+def test_keys_steer_a_hobby_servo_at_the_terminal(rigs: dict[str, str]) -> None:
+    rig = rigs["maker"]
     words = (rig, "--mock", "--yes", "--joint", "eyes_tilt", "--more", "0", "--margin", "0")
     with OnTerminal("calibrate", *words) as terminal:
         terminal.reads("shall it begin? [1510]")

@@ -1,7 +1,7 @@
 """Moving rigs of every kind slowly by command, over emulated buses in simulated time."""
 
 from collections.abc import Iterator
-from math import degrees, nan, radians
+from math import degrees, radians
 from typing import Any, cast
 
 import pytest
@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig
-from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.rig_limits import limits, park_rad
@@ -107,8 +106,6 @@ def test_no_goal_is_faster_than_asked_nor_outside_the_range(
 
 
 def test_out_of_range_is_held_back_at_the_limit_and_says_so(bench: Bench) -> None:
-    with pytest.raises(SetupError, match="50.0 deg is outside its range, -35..35 deg"):
-        bench.control.jog("left_eye_pan", 50.0)
     moved = bench.control.pose({"left_eye_pan": 50.0})
     part = moved.joint_move("left_eye_pan")
     assert not moved.arrived and moved.end_reason == "held back"
@@ -117,27 +114,26 @@ def test_out_of_range_is_held_back_at_the_limit_and_says_so(bench: Bench) -> Non
     assert "commanded 35.0 (out of range)" in str(part)
 
 
-def test_a_stuck_joint_is_named_and_not_pushed(bench: Bench) -> None:
-    bench.command("stick 7")
+@pytest.mark.parametrize(
+    ("fault", "after_s", "reason", "end_reason"),
+    [
+        ("stick 7", 0.0, "not moving", "held back"),
+        ("lose 7", 0.0, "stale joints", "held back"),
+        ("overload 7", 0.5, "overload", "torque_off"),
+    ],
+)
+def test_a_joint_that_cannot_is_named_and_not_pushed(
+    bench: Bench, fault: str, after_s: float, reason: str, end_reason: str
+) -> None:
+    bench.at[bench.clock.now_s() + after_s] = fault
     before = bench.where()["neck_yaw"]
     moved = bench.control.jog("neck_yaw", 30.0)
-    assert not moved.arrived
-    assert any("not moving" in reason for reason in moved.joint_move("neck_yaw").reasons)
-    assert moved.joint_move("neck_yaw").commanded == pytest.approx(before, abs=15.0)
-
-
-def test_a_silent_servo_is_named(bench: Bench) -> None:
-    bench.command("lose 7")
-    moved = bench.control.jog("neck_yaw", 30.0)
-    assert not moved.arrived and "stale joints" in moved.joint_move("neck_yaw").reasons
+    part = moved.joint_move("neck_yaw")
+    assert not moved.arrived and moved.end_reason == end_reason
+    assert any(reason in one for one in part.reasons)
+    assert (moved.level == "torque_off") == (end_reason == "torque_off")
+    assert part.commanded == pytest.approx(before, abs=15.0)
     assert bench.where()["neck_yaw"] < 10.0
-
-
-def test_a_latched_fault_ends_it(bench: Bench) -> None:
-    bench.at[bench.clock.now_s() + 0.5] = "overload 7"
-    moved = bench.control.jog("neck_yaw", 40.0)
-    assert moved.end_reason == "torque_off" and moved.level == "torque_off"
-    assert any("overload" in reason for reason in moved.joint_move("neck_yaw").reasons)
 
 
 def test_a_stop_ends_the_way_and_parking_goes_on(bench: Bench, desk_rig: Rig) -> None:
@@ -157,18 +153,6 @@ def test_several_joints_arrive_together(bench: Bench) -> None:
     halfway = bench.steps[len(bench.steps) // 3]
     i, j = GAZE_JOINTS.index("left_eye_pan"), GAZE_JOINTS.index("neck_yaw")
     assert halfway.desired_rad[i] < radians(6.0) and halfway.desired_rad[j] > radians(-12.0)
-
-
-@pytest.mark.parametrize(
-    ("joint", "angle", "says"),
-    [("neck", 0.0, "no joint 'neck'; available: left_eye_pan"), ("neck_yaw", nan, "not an angle")],
-)
-def test_nonsense_is_refused_before_anything_moves(
-    bench: Bench, joint: str, angle: float, says: str
-) -> None:
-    with pytest.raises(SetupError, match=says):
-        bench.control.jog(joint, angle)
-    assert bench.steps == []
 
 
 # --- other kinds of servo

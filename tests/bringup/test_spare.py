@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 from command_line import invoked
 from scs_rig import scs_text
-from served_rigs import hide_real_ports
 
 from gazerig.config.load import shipped_path
 from gazerig.config.rig import Rig
@@ -23,14 +22,9 @@ from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-pytestmark = pytest.mark.usefixtures("simulated_wires")
+pytestmark = pytest.mark.usefixtures("simulated_wires", "no_real_ports")
 
 YAW = "neck_yaw (servo 7)"
-
-
-@pytest.fixture(autouse=True)
-def no_real_ports(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    hide_real_ports(monkeypatch)
 
 
 TEXTS: dict[str, Callable[[], str]] = {
