@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from board_rig import on_pca9685
+
 from gazerig.config.schema import Rig, load_rig
 
 MAKER = Path(__file__).parents[1] / "config" / "rigs" / "maker.yaml"
@@ -40,5 +42,7 @@ def mixed_rig(folder: Path) -> Rig:
 
 
 def rig_of(name: str, folder: Path) -> Rig:
-    """Load a shipped rig, or the mixed one."""
-    return mixed_rig(folder) if name == "mixed" else load_rig(name)
+    """Load a shipped rig, the mixed one, or the maker's on a PCA9685."""
+    if name == "mixed":
+        return mixed_rig(folder)
+    return load_rig(on_pca9685(folder) if name == "pca9685" else name)

@@ -5,6 +5,7 @@ from math import degrees, radians
 
 import msgspec
 import pytest
+from guarded_desk import joints_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -17,7 +18,7 @@ from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.control.reachability import look_reply
 from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.model.types import JointAngles, JointState
+from gazerig.robot.model.types import JointAngles
 
 RIGS = ("desk", "feetech", "maker")
 DT_S = 0.01
@@ -41,7 +42,7 @@ def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[Com
     q: JointAngles = tuple(min(max(0.0, one.low_rad), one.high_rad) for one in spans)
     for tick in range(int(seconds / DT_S)):
         t_s = tick * DT_S
-        state = JointState(q, (0.0,) * len(q), (t_s,) * len(q), ())
+        state = joints_at(q, t_s)
         gaze = oculomotor.step(
             replace(target_at(point), at_s=t_s), kinematics.forward(state), t_s, DT_S
         )
@@ -50,7 +51,7 @@ def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[Com
             min(max(angle, one.low_rad), one.high_rad)
             for angle, one in zip(desired, spans, strict=True)
         )
-    pose = kinematics.forward(JointState(q, (0.0,) * len(q), (0.0,) * len(q), ()))
+    pose = kinematics.forward(joints_at(q, 0.0))
     return reply, degrees(gaze_error(point, pose, not kinematics.one_pan).whole)
 
 

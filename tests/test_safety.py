@@ -9,29 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
-from msgspec.structs import replace
+from guarded_desk import DT, EYE, LIMITS, NECK, ZERO, guarding, joints_at
 
-from gazerig.robot.model.guard_params import GuardParams
-from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.types import GuardResult, JointState
+from gazerig.robot.model.types import GuardResult
 from gazerig.robot.safety.guard import Guard
 
-EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
-NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500))
-LIMITS = (EYE,) * 6 + (NECK,) * 3
-DT = 0.005
 SLACK = 1e-9
-
-
-def measured(t_s: float, position: tuple[float, ...] = (0.0,) * 9) -> JointState:
-    return JointState(position, (0.0,) * 9, (t_s,) * 9, ())
-
-
-def ready(start: tuple[float, ...] = (0.0,) * 9, limits: tuple[JointLimit, ...] = LIMITS) -> Guard:
-    guard = Guard(GuardParams(), limits, GAZE_JOINTS)
-    guard.reset(0.0, start)
-    guard._gentle = [False] * 9  # the slow start has tests of its own
-    return guard
 
 
 def but(i: int, angle: float, others: float = 0.0) -> tuple[float, ...]:
@@ -47,20 +30,20 @@ def driven(
     position = tuple(guard._motion.command)
     for desired in wishes:
         t_s += DT
-        verdicts.append(guard.check(desired, measured(t_s, position), 0.0, t_s))
+        verdicts.append(guard.check(desired, joints_at(position, t_s), 0.0, t_s))
         position = verdicts[-1].command_rad
     return verdicts
 
 
 def test_a_wish_inside_everything_passes_unchanged() -> None:
     wishes = [(0.05 * (1.0 - cos(2.0 * k * DT)),) * 9 for k in range(1, 400)]
-    for desired, verdict in zip(wishes, driven(ready(), wishes), strict=True):
+    for desired, verdict in zip(wishes, driven(guarding(), wishes), strict=True):
         assert verdict.command_rad == pytest.approx(desired, abs=1e-12)
         assert verdict.level == "ok" and verdict.reasons == () and verdict.why == ()
 
 
 def test_whoever_commands_is_told_what_became_of_every_joint() -> None:
-    verdict = driven(ready(), [but(6, radians(51.0), 0.0001)])[0]
+    verdict = driven(guarding(), [but(6, radians(51.0), 0.0001)])[0]
     permitted = verdict.command_rad[6]
     assert 0.0 < permitted < radians(0.1)
     assert verdict.applied("neck_yaw") == (radians(51.0), permitted, "out of range")
@@ -75,7 +58,7 @@ def test_range_is_swept_densely_at_its_edges(joint: int) -> None:
     limit = LIMITS[joint]
     for edge in (limit.low_rad, limit.high_rad):
         for off in [*np.linspace(-0.01, 0.01, 41).tolist(), -1e-12, 1e-12, -2e-9, 2e-9]:
-            verdict = driven(ready(but(joint, edge)), [but(joint, edge + off)])[0]
+            verdict = driven(guarding(but(joint, edge)), [but(joint, edge + off)])[0]
             assert limit.low_rad <= verdict.command_rad[joint] <= limit.high_rad
             beyond = max(limit.low_rad - edge - off, edge + off - limit.high_rad)
             assert (verdict.applied(GAZE_JOINTS[joint]).reason == "out of range") == (beyond > 1e-9)
@@ -88,7 +71,7 @@ def test_speed_is_swept_densely_at_its_limit(joint: int, way: float) -> None:
     soft = tuple(limit._replace(accel_rad_s2=1e9) for limit in LIMITS)
     for share in [*np.linspace(0.95, 1.05, 21).tolist(), 1.0 - 1e-12, 1.0 + 1e-6]:
         step = way * LIMITS[joint].speed_rad_s * DT * share
-        verdict = driven(ready(limits=soft), [but(joint, step)])[0]
+        verdict = driven(guarding(limits=soft), [but(joint, step)])[0]
         assert abs(verdict.command_rad[joint]) <= abs(step / share) * (1.0 + 1e-12)
         assert (verdict.applied(GAZE_JOINTS[joint]).reason == "too fast") == (share > 1.0 + 1e-9)
 
@@ -98,7 +81,7 @@ def test_speed_is_swept_densely_at_its_limit(joint: int, way: float) -> None:
 def test_acceleration_is_swept_densely_at_its_limit(joint: int, way: float) -> None:
     for share in [*np.linspace(0.95, 1.05, 21).tolist(), 1.0 - 1e-12]:
         step = way * LIMITS[joint].accel_rad_s2 * DT * DT * share
-        verdict = driven(ready(), [but(joint, step)])[0]
+        verdict = driven(guarding(), [but(joint, step)])[0]
         assert abs(verdict.command_rad[joint]) <= abs(step / share) * (1.0 + 1e-12)
         assert (verdict.applied(GAZE_JOINTS[joint]).reason == "too hard") == (share > 1.0 + 1e-9)
 
@@ -111,7 +94,7 @@ def test_braking_before_the_end_of_the_range_is_swept_densely(joint: int, way: f
     for share in np.linspace(0.1, 1.0, 10).tolist():
         pace = way * limit.speed_rad_s * share * DT
         began = int(0.9 * (limit.high_rad - limit.low_rad) / abs(pace))
-        guard = ready(but(joint, edge - began * pace))
+        guard = guarding(but(joint, edge - began * pace))
         wishes = [but(joint, edge + (k - began) * pace) for k in range(began + 40)]
         path = np.array([verdict.command_rad[joint] for verdict in driven(guard, wishes)])
         speeds = np.diff(path, prepend=edge - began * pace) / DT
@@ -123,10 +106,10 @@ def test_braking_before_the_end_of_the_range_is_swept_densely(joint: int, way: f
 @pytest.mark.parametrize("tick", [0.001, 0.005, 0.02, 0.1])
 def test_a_wish_that_jumps_is_met_without_running_past_it(joint: int, tick: float) -> None:
     for jump in np.linspace(-0.5, 0.5, 15).tolist():
-        guard, t, path = ready(), 0.0, [0.0]
+        guard, t, path = guarding(), 0.0, [0.0]
         for _ in range(max(40, int(1.5 / tick))):
             t += tick
-            state = measured(t, but(joint, path[-1]))
+            state = joints_at(but(joint, path[-1]), t)
             path.append(guard.check(but(joint, jump), state, 0.0, t).command_rad[joint])
         assert path[-1] == pytest.approx(jump, abs=1e-9)
         assert max(abs(p) for p in path) <= abs(jump) + LIMITS[joint].accel_rad_s2 * tick**2
@@ -134,36 +117,36 @@ def test_a_wish_that_jumps_is_met_without_running_past_it(joint: int, tick: floa
 
 def test_a_wish_that_moves_is_caught_up_with() -> None:
     wishes = [(0.2 + 0.5 * k * DT,) * 9 for k in range(120)]  # a jump, then a steady pace
-    last = driven(ready(), wishes)[-1]
+    last = driven(guarding(), wishes)[-1]
     assert last.level == "ok" and last.command_rad == pytest.approx(wishes[-1])
 
 
 def test_a_loop_that_was_stopped_goes_on_without_a_leap() -> None:
-    guard = ready()
-    guard.check((0.0,) * 9, measured(DT), 0.0, DT)
-    verdict = guard.check((0.5,) * 9, measured(10.0), 0.0, 10.0)  # ten seconds later
+    guard = guarding()
+    guard.check(ZERO, joints_at(ZERO, DT), 0.0, DT)
+    verdict = guard.check((0.5,) * 9, joints_at(ZERO, 10.0), 0.0, 10.0)  # ten seconds later
     assert 0.0 < verdict.command_rad[6] <= NECK.speed_rad_s * 0.1
     assert verdict.reasons
 
 
 def test_not_finite_wishes_hold_and_say_so() -> None:
     for bad in (nan, inf, -inf):
-        verdict = ready().check((bad,) * 9, measured(DT), 0.0, DT)
+        verdict = guarding().check((bad,) * 9, joints_at(ZERO, DT), 0.0, DT)
         assert verdict.level == "hold"
-        assert verdict.command_rad == (0.0,) * 9
+        assert verdict.command_rad == ZERO
         assert "neck_roll: not finite" in verdict.reasons
 
 
 @pytest.mark.parametrize("joint", range(9))
 def test_ages_of_joints_and_picture_are_swept_densely(joint: int) -> None:
     for off in [*np.linspace(-0.01, 0.01, 21).tolist(), -1e-6, 1e-6, inf, nan]:
-        guard, t = ready(), 1.0
-        ages = replace(measured(t), measured_s=but(joint, t - 0.15 - off, t))
+        guard, t = guarding(), 1.0
+        ages = joints_at(ZERO, t, measured_s=but(joint, t - 0.15 - off, t))
         verdict = guard.check((0.0001,) * 9, ages, 0.0, t)
         stale = not off <= 0.0
         assert (verdict.applied(GAZE_JOINTS[joint]).reason == "stale joints") == stale
         assert verdict.command_rad == but(joint, 0.0 if stale else 0.0001, 0.0001)
-        verdict = ready().check((0.0001,) * 9, measured(t), 1.5 + off, t)
+        verdict = guarding().check((0.0001,) * 9, joints_at(ZERO, t), 1.5 + off, t)
         assert (verdict.level == "hold") == stale
         moved = stale and joint >= 6
         assert (verdict.applied(GAZE_JOINTS[joint]).reason == "stale frame") == moved
@@ -173,19 +156,18 @@ def test_ages_of_joints_and_picture_are_swept_densely(joint: int) -> None:
 def test_a_neck_without_pictures_holds_whatever_is_wished() -> None:
     for wish in (0.0001, 0.5):
         for age_s, held in ((1.499, False), (1.501, True)):
-            verdict = ready().check((wish,) * 9, measured(DT), age_s, DT)
+            verdict = guarding().check((wish,) * 9, joints_at(ZERO, DT), age_s, DT)
             assert (verdict.command_rad[6] == 0.0) == held
             assert (verdict.applied("neck_yaw").reason == "stale frame") == held
             assert verdict.command_rad[0] > 0.0
 
 
 def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish() -> None:
-    guard = Guard(GuardParams(soft_start_speed_deg_s=60.0), LIMITS, GAZE_JOINTS)
-    guard.reset(0.0, (0.5,) * 9)
+    guard = guarding((0.5,) * 9, gentle=True, soft_start_speed_deg_s=60.0)
     path, t = [0.5], 0.0
     while guard.is_gentle and t < 3.0:
         t += DT
-        verdict = guard.check((0.0,) * 9, measured(t, (path[-1],) * 9), 0.0, t)
+        verdict = guard.check(ZERO, joints_at((path[-1],) * 9, t), 0.0, t)
         path.append(verdict.command_rad[0])
     speeds = np.diff(path) / DT
     assert np.abs(speeds).max() <= radians(60.0) + 1e-9
@@ -197,30 +179,29 @@ def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish(
 
 def test_going_gently_in_flight_brakes_within_the_joints_own_strength() -> None:
     path: list[Any] = []
-    guard, t = ready(), 0.0
+    guard, t = guarding(), 0.0
     for k in range(60):
         t += DT
         if k == 15:
             guard.start_gently()
         position = (0.0,) * 6 + ((path[-1] if path else 0.0),) * 3
         desired = (0.0,) * 6 + (0.8,) * 3
-        path.append(guard.check(desired, measured(t, position), 0.0, t).command_rad[6])
+        path.append(guard.check(desired, joints_at(position, t), 0.0, t).command_rad[6])
     speeds = np.diff(path) / DT
     assert np.abs(np.diff(speeds)).max() / DT <= NECK.accel_rad_s2 + 1e-6
     assert speeds[-1] <= radians(60.0) + 1e-9
 
 
 def test_a_start_outside_the_range_is_brought_to_its_edge() -> None:
-    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
-    guard.reset(0.0, (2.0,) * 9)
-    assert guard.check((2.0,) * 9, measured(DT), 0.0, DT).command_rad[0] == EYE.high_rad
+    guard = guarding((2.0,) * 9, gentle=True)
+    assert guard.check((2.0,) * 9, joints_at(ZERO, DT), 0.0, DT).command_rad[0] == EYE.high_rad
 
 
 def test_time_that_stands_still_moves_nothing() -> None:
-    guard = ready()
-    guard.check((0.1,) * 9, measured(DT), 0.0, DT)
+    guard = guarding()
+    guard.check((0.1,) * 9, joints_at(ZERO, DT), 0.0, DT)
     for odd in (DT, 0.0, nan, inf, -inf):
-        again = guard.check((0.2,) * 9, measured(DT), 0.0, odd)
+        again = guard.check((0.2,) * 9, joints_at(ZERO, DT), 0.0, odd)
         assert again.level == "hold" and again.reasons == ("all: time does not advance",)
         assert again.applied("neck_yaw").reason == "time does not advance"
         assert again.command_rad == tuple(guard._motion.command)
@@ -237,9 +218,7 @@ class World:
 
     def __init__(self, joint: int, lag_s: float = 0.02, band_deg: float = 0.0) -> None:
         self.joint = joint
-        self.guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
-        self.guard.reset(0.0, (0.0,) * 9)
-        self.guard._gentle = [False] * 9
+        self.guard = guarding()
         self.t_s = 0.0
         self.at = 0.0
         self.wall: float | None = None
@@ -261,7 +240,7 @@ class World:
             self._seen = round(self.at / STEP) * STEP
         one = [self._seen if k == self.joint else 0.0 for k in range(9)]
         ages = [self.answered_s if k == self.joint else self.t_s for k in range(9)]
-        joints = JointState(tuple(one), (0.0,) * 9, tuple(ages), ())
+        joints = joints_at(one, self.t_s, measured_s=tuple(ages))
         wishes = tuple(desired if k == self.joint else 0.0 for k in range(9))
         self.verdict = self.guard.check(wishes, joints, 0.0, self.t_s)
         self.path.append(self.verdict.command_rad[self.joint])
@@ -359,10 +338,10 @@ def test_a_slow_start_is_no_jam() -> None:
 @pytest.mark.parametrize("off_deg", np.linspace(2.5, 3.5, 21).tolist())
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_the_distance_is_swept_densely(off_deg: float, way: float) -> None:
-    guard, found = ready(), False
+    guard, found = guarding(), False
     for k in range(1, 60):
-        joints = JointState((-way * radians(off_deg),) * 9, (0.0,) * 9, (k * DT,) * 9, ())
-        verdict = guard.check((0.0,) * 9, joints, 0.0, k * DT)
+        joints = joints_at((-way * radians(off_deg),) * 9, k * DT)
+        verdict = guard.check(ZERO, joints, 0.0, k * DT)
         found = found or verdict.level == "hold"
         assert not found or set(verdict.why) == {"not moving"}
     assert found == (off_deg > 3.0 + 1e-9)
@@ -370,10 +349,10 @@ def test_the_distance_is_swept_densely(off_deg: float, way: float) -> None:
 
 @pytest.mark.parametrize("creep_deg_s", [1.0, 2.5, 3.0, 3.7, 4.0, 6.0, -1.0, -6.0, -20.0])
 def test_only_motion_towards_the_command_counts(creep_deg_s: float) -> None:
-    guard, found = ready((0.6,) * 9), False
+    guard, found = guarding((0.6,) * 9), False
     for k in range(1, 100):
         at = radians(5.0 + creep_deg_s * k * DT)
-        joints = JointState((at,) * 9, (0.0,) * 9, (k * DT,) * 9, ())
+        joints = joints_at((at,) * 9, k * DT)
         found = found or guard.check((0.6,) * 9, joints, 0.0, k * DT).level == "hold"
     assert found == (creep_deg_s < 0.5 / 0.15)
 
@@ -387,12 +366,11 @@ def test_a_silent_joint_is_stale_and_not_stuck() -> None:
 
 
 def test_a_stuck_joint_lets_the_others_move() -> None:
-    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
-    guard.reset(0.0, (0.0,) * 9)
-    command: tuple[float, ...] = (0.0,) * 9
+    guard = guarding(gentle=True)
+    command: tuple[float, ...] = ZERO
     verdict = None
     for k in range(1, 500):
-        joints = JointState((0.0, *command[1:]), (0.0,) * 9, (k * DT,) * 9, ())
+        joints = joints_at((0.0, *command[1:]), k * DT)
         verdict = guard.check((0.3,) * 9, joints, 0.0, k * DT)
         command = verdict.command_rad
     assert verdict is not None and command[1:] == pytest.approx((0.3,) * 8)

@@ -6,17 +6,12 @@ from math import degrees, radians
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
+from guarded_desk import DT, ZERO, guarding, joints_at
 
 from gazerig.config.validation import validate
 from gazerig.robot.model.guard_params import CollisionParams, GuardParams
-from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.types import GuardResult, JointState
-from gazerig.robot.safety.guard import Guard
+from gazerig.robot.model.types import GuardResult
 
-EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
-NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500))
-LIMITS = (EYE,) * 6 + (NECK,) * 3
-DT = 0.005
 LEFT, RIGHT, PITCH = (
     GAZE_JOINTS.index(n) for n in ("left_upper_lid", "right_upper_lid", "neck_pitch")
 )
@@ -27,10 +22,9 @@ class World:
     """Joints one tick behind their commands."""
 
     def __init__(self, *pairs: CollisionParams, **start_deg: float) -> None:
-        self.guard = Guard(GuardParams(collisions=pairs), LIMITS, GAZE_JOINTS)
-        self.pairs = pairs
         start = tuple(radians(start_deg.get(name, 0.0)) for name in GAZE_JOINTS)
-        self.guard.reset(0.0, start)
+        self.guard = guarding(start, gentle=True, collisions=pairs)
+        self.pairs = pairs
         self.t_s = 0.0
         self.path = [start]
         self.measured: Callable[[tuple[float, ...]], tuple[float, ...]] = lambda angles: angles
@@ -41,7 +35,7 @@ class World:
 
     def tick(self, dt_s: float = DT, **desired_deg: float) -> GuardResult:
         self.t_s += dt_s
-        joints = JointState(self.measured(self.path[-1]), (0.0,) * 9, (self.t_s,) * 9, ())
+        joints = joints_at(self.measured(self.path[-1]), self.t_s)
         desired = tuple(radians(desired_deg.get(name, 0.0)) for name in GAZE_JOINTS)
         verdict = self.guard.check(desired, joints, 0.0, self.t_s)
         self.path.append(verdict.command_rad)
@@ -167,8 +161,8 @@ def test_a_rearmed_joint_inside_a_box_is_led_out() -> None:
     world.t_s += DT
     at = (*world.path[-1][:PITCH], radians(-24.0), *world.path[-1][PITCH + 1 :])
     again = tuple(k == PITCH for k in range(9))
-    joints = JointState(at, (0.0,) * 9, (world.t_s,) * 9, (), rearmed=again)
-    verdict = world.guard.check((0.0,) * 9, joints, 0.0, world.t_s)
+    joints = joints_at(at, world.t_s, rearmed=again)
+    verdict = world.guard.check(ZERO, joints, 0.0, world.t_s)
     assert verdict.applied("neck_pitch").reason == "self-collision"
     world.path.append(verdict.command_rad)
     for _ in range(400):
@@ -193,4 +187,4 @@ def test_pairs_come_from_the_rig_file_and_wrong_ones_are_refused() -> None:
 def test_a_pair_that_leaves_no_pose_is_refused() -> None:
     whole = CollisionParams(("neck_pitch", -60.0, 50.0), ("left_upper_lid", -34.5, 34.5))
     with pytest.raises(ValueError, match="neck_pitch -60..50 deg of -60..50 with left_upper_lid"):
-        Guard(GuardParams(collisions=(whole,)), LIMITS, GAZE_JOINTS)
+        guarding(collisions=(whole,))

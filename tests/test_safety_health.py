@@ -6,17 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
-from msgspec.structs import replace
+from guarded_desk import DT, NECK, ZERO, guarding, joints_at
 
-from gazerig.robot.model.guard_params import GuardParams
-from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.types import GuardResult, JointState
-from gazerig.robot.safety.guard import Guard
+from gazerig.robot.model.types import GuardResult
 
-EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000), 70.0, 3.5, 7.0)
-NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500), 70.0, 3.5, 7.0)
-LIMITS = (EYE,) * 6 + (NECK,) * 3
-DT = 0.005
 JOINT = 6
 NAME = GAZE_JOINTS[JOINT]
 
@@ -25,9 +18,7 @@ class World:
     """Joints that follow their commands one tick later, with given feedback of servos."""
 
     def __init__(self) -> None:
-        self.guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
-        self.guard.reset(0.0, (0.0,) * 9)
-        self.guard._gentle = [False] * 9
+        self.guard = guarding()
         self.t_s = 0.0
         self.position = [0.0] * 9
         self.path = [0.0]
@@ -38,13 +29,12 @@ class World:
         at = list(self.position)
         if stray is not None:
             at[JOINT] = stray
-        joints = JointState(tuple(at), (0.0,) * 9, (self.t_s,) * 9, ())
         columns: dict[str, Any] = {
             name: tuple(one if k == JOINT else self._usual(name) for k in range(9))
             for name, one in said.items()
         }
         wishes = tuple(desired if k == JOINT else 0.0 for k in range(9))
-        verdict = self.guard.check(wishes, replace(joints, **columns), 0.0, self.t_s)
+        verdict = self.guard.check(wishes, joints_at(at, self.t_s, **columns), 0.0, self.t_s)
         self.position = list(verdict.command_rad)
         self.path.append(verdict.command_rad[JOINT])
         return verdict
@@ -191,9 +181,9 @@ def test_a_latched_fault_is_limp_with_its_words(world: World, torque: dict[str, 
 
 
 def test_the_gravest_reasons_stand_by_themselves() -> None:
-    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)  # all begin slowly
+    guard = guarding(gentle=True)
     fault = tuple("overload" if k == JOINT else "" for k in range(9))
-    joints = JointState((0.0,) * 9, (0.0,) * 9, (DT,) * 9, (), (), fault)
+    joints = joints_at(ZERO, DT, fault=fault)
     verdict = guard.check((0.5,) * 9, joints, 0.0, DT)
     assert len(verdict.reasons) == 9 and verdict.critical_reasons == (f"{NAME}: overload",)
     assert World().tick(0.0).critical_reasons == ()

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
+from guarded_desk import DT, EYE, NECK, guarding, joints_at
 from numpy.typing import NDArray
 
 from gazerig.robot.model.guard_params import CollisionParams, GuardParams
@@ -18,9 +19,7 @@ Array = NDArray[np.float64]
 Row = tuple[float, ...]
 LENGTH = 25  # ticks of one sequence
 WISHES = 12_500  # of each guard, of which there are 24
-EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000), 70.0, 3.5, 7.0)
 LID = JointLimit(radians(-30), radians(25), radians(1200), radians(60_000), 70.0, 3.5, 7.0)
-NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500), 70.0, 3.5, 7.0)
 SLOW = JointLimit(radians(-5), radians(170), radians(3), radians(10), 80.0, 9.5, 16.0)
 RIGS = ((EYE,) * 4 + (LID,) * 2 + (NECK,) * 3, (SLOW, LID, NECK) * 3)
 BOXES = (
@@ -173,7 +172,6 @@ def test_random_wishes_never_leave_the_limits(seed: int) -> None:
 # Limits changed at random in full flight: every command keeps the present ones, and new ones come
 
 
-DT_S = 0.005
 BOX = CollisionParams(("neck_pitch", -60.0, -30.0), ("left_upper_lid", 40.0, 70.0))
 
 
@@ -194,22 +192,21 @@ class Watched:
 
     def __init__(self, dice: np.random.Generator) -> None:
         self.dice = dice
-        self.guard = Guard(GuardParams(), limits(dice), GAZE_JOINTS)
-        self.guard.reset(0.0, (0.0,) * 9)
+        self.guard = guarding(limits=limits(dice), gentle=True)
         self.p, self.v, self.t_s = np.zeros(9), np.zeros(9), 0.0
         self.desired = np.zeros(9)
 
     def tick(self) -> None:
         before = np.array(self.guard.limits)
-        self.t_s += DT_S
-        joints = JointState(tuple(self.p), (0.0,) * 9, (self.t_s,) * 9, ())
+        self.t_s += DT
+        joints = joints_at(self.p, self.t_s)
         verdict = self.guard.check(tuple(self.desired), joints, 0.0, self.t_s)
         after = np.array(self.guard.limits)
         p = np.array(verdict.command_rad)
-        v = (p - self.p) / DT_S
+        v = (p - self.p) / DT
         speed, accel = (np.maximum(before[:, k], after[:, k]) for k in (2, 3))
         assert (np.abs(v) <= speed + 1e-6).all()
-        assert (np.abs(v - self.v) <= accel * DT_S + 1e-6).all()
+        assert (np.abs(v - self.v) <= accel * DT + 1e-6).all()
         # A joint outside its range moves no farther out than its braking distance.
         out = np.maximum(after[:, 0] - p, p - after[:, 1])
         was = np.maximum(after[:, 0] - self.p, self.p - after[:, 1])

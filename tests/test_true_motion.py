@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from board_rig import on_pca9685
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from mixed_rig import rig_of
@@ -32,8 +31,7 @@ GENTLE = 1.15
 @pytest.fixture(scope="module")
 def rigs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rig]:
     folder = tmp_path_factory.mktemp("rig")
-    on_board = {"pca9685": on_pca9685(folder)}
-    return {name: rig_of(on_board.get(name, name), folder) for name in NAMES}
+    return {name: rig_of(name, folder) for name in NAMES}
 
 
 def gaps(seed: int, share: float, longest: int) -> Iterator[int]:

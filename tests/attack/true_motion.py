@@ -7,20 +7,18 @@ joints went beyond their ranges, how fast they were for their limits, which stop
 import argparse
 import sys
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from board_rig import on_pca9685
 from mixed_rig import rig_of
 from true_shafts import Judge, Late, group_of, looked_at, on_time, run, sometimes_late
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import Rig
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.scene_files import scene_names
@@ -34,15 +32,6 @@ LATES: dict[str, Callable[[], Late]] = {
     "1-400 slots, 1 %": lambda: sometimes_late(3, 0.01, 400),
 }
 STILL_DEG_S = 0.5
-
-out = Console(width=120)
-
-
-def rig_called(name: str, folder: str) -> Rig:
-    """Load a shipped rig, or the one of three kinds of bus."""
-    if name == "pca9685":
-        return load_rig(on_pca9685(folder))
-    return rig_of(name, Path(folder))
 
 
 def all_around(seed: int) -> Callable[[Assembly, float], None]:
@@ -62,27 +51,6 @@ def all_around(seed: int) -> Callable[[Assembly, float], None]:
     return order
 
 
-def table(args: argparse.Namespace) -> None:
-    """Print the table."""
-    heads = ("rig", "scene", "ticks", "joints", "beyond deg", "speed", "accel", "stops")
-    shown = Table(*heads, title=f"{args.seconds:g} s each; speed and accel in parts of the limits")
-    total = 0
-    with TemporaryDirectory() as folder:
-        for name in args.rigs:
-            rig = rig_called(name, folder)
-            for scene in (*args.scenes, "looks all around"):
-                for lateness in args.late:
-                    ticks, judge = one(rig, scene, LATES[lateness](), args.seconds)
-                    total += ticks
-                    for group, (beyond, speed, accel, stops) in judge.by_group().items():
-                        row = [name, f"{scene}, {lateness}", ticks, group]
-                        row += [f"{beyond:.2f}", f"{speed:.2f}", f"{accel:.2f}", stops]
-                        shown.add_row(*map(str, row))
-                        print(*row, sep="\t", flush=True)
-    out.print(shown)
-    print(f"{total} ticks")
-
-
 def one(rig: Rig, scene: str, late: Late, seconds: float) -> tuple[int, Judge]:
     """Run one rig in one scene; returns the ticks and what true joints did."""
     looks = scene not in scene_names()
@@ -97,13 +65,24 @@ def one(rig: Rig, scene: str, late: Late, seconds: float) -> tuple[int, Judge]:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print a row for each group of joints in each run."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=600.0, help="simulated, of each run")
     parser.add_argument("--rigs", nargs="*", default=list(RIGS))
-    parser.add_argument("--scenes", nargs="*", default=list(scene_names()))
-    parser.add_argument("--late", nargs="*", default=list(LATES), choices=list(LATES))
-    table(parser.parse_args())
+    args = parser.parse_args()
+    print("rig", "scene, lateness", "ticks", "joints", "beyond deg", sep="\t", end="\t")
+    print("speed / limit", "accel / limit", "stops", sep="\t")
+    total = 0
+    with TemporaryDirectory() as folder:
+        runs = product(args.rigs, (*scene_names(), "looks all around"), LATES)
+        for name, scene, lateness in runs:
+            rig = rig_of(name, Path(folder))
+            ticks, judge = one(rig, scene, LATES[lateness](), args.seconds)
+            total += ticks
+            for group, (beyond, speed, accel, stops) in judge.by_group().items():
+                figures = (f"{figure:.2f}" for figure in (beyond, speed, accel))
+                print(name, f"{scene}, {lateness}", ticks, group, *figures, stops, sep="\t")
+    print(f"{total} ticks")
 
 
 if __name__ == "__main__":

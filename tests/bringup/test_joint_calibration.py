@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import radians
-from typing import Any, cast
+from typing import Any
 
 import pytest
+from emulated_rig import EmulatedRig
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -40,10 +41,8 @@ from gazerig.features.bringup.calibration.smart_servo_access import (
     SmartServoAccess,
 )
 from gazerig.features.bringup.servo_kinds import servo_kind
-from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.joint import JointParams
-from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -399,11 +398,9 @@ class LinkageBench:
     """
 
     def __init__(self, name: str, *answers: str, pulses: tuple[float, float] = (500, 2500)) -> None:
-        rig = load_rig("maker")
-        self.clock = SimulatedClock()
-        self.board = build(emulated_lines(rig)[""], self.clock.now_s)
-        self.sent: list[bytes] = []
-        self.port = InProcessPort(self.board, self.sent.append, sleep_until=self.clock.sleep_until)
+        made = EmulatedRig(load_rig("maker"))
+        rig, self.clock, self.port = made.rig, made.clock, made.ports[""]
+        self.board: Any = made.devices[""]
         self.why: str | None = None
         self.answers = list(answers)
         self.said: list[str] = []
@@ -421,14 +418,13 @@ class LinkageBench:
 
     def place_us(self) -> float:
         """Return the true position of the shaft."""
-        return cast(Any, self.board).find_servo(self.channel).place_steps / 4
+        place_us: float = self.board.find_servo(self.channel).place_steps / 4
+        return place_us
 
     def pulse(self) -> int:
         """Return the pulse that the board gives now."""
-        report = cast(Any, self.board).faults.reports()[self.channel]
-        position = report["target"]
-        assert isinstance(position, int)
-        return position
+        target: int = self.board.faults.reports()[self.channel]["target"]
+        return target
 
     def measure(self, margin: float = 2.0, more: int = 0):
         try:
