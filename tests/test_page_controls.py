@@ -162,7 +162,6 @@ def heard() -> Heard:
         orders.append,
         tuning,
         point,
-        steer=lambda way: f"went {way}",
         refusals=(ConfigError,),
     )
     return Heard(hear, orders, tuning)
@@ -206,7 +205,6 @@ def test_parameters_are_put_in_force_or_refused(heard: Heard) -> None:
         assert words is not None and re.match(r"refused: .*(500 ms|'mad')", words)
     assert heard.hear({"do": "revert"}) is not None
     assert heard.tuning.get(CLOSE) == {CLOSE: 75.0}
-    assert heard.hear({"steer": "left"}) == "went left"
 
 
 def test_the_feed_tells_all_once_and_then_what_changed(heard: Heard) -> None:

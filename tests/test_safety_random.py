@@ -199,7 +199,7 @@ class Watched:
     def tick(self) -> None:
         before = np.array(self.guard.limits)
         self.t_s += DT
-        joints = joints_at(self.p, self.t_s)
+        joints = joints_at(self.p.tolist(), self.t_s)
         verdict = self.guard.check(tuple(self.desired), joints, 0.0, self.t_s)
         after = np.array(self.guard.limits)
         p = np.array(verdict.command_rad)

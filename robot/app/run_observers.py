@@ -8,7 +8,7 @@ import contextlib
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.vision.model_files import detector_status
@@ -46,20 +46,6 @@ if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
 
 _STATES_PER_FIGURES = 3
-STEER = "steer"
-"""Name of the menu with the page's steps of a calibration (dashboard/panels/controls.py)."""
-
-
-class SteeringButtons(NamedTuple):
-    """Buttons of the page that steer a calibration, instead of all other controls of the robot.
-
-    keys: their labels; press: handles a button in a thread of the page and returns a message about
-        it; shown: returns the progress as text
-    """
-
-    keys: tuple[str, ...]
-    press: Callable[[str], str | None]
-    status_text: Callable[[], str]
 
 
 class RunObservers:
@@ -76,7 +62,7 @@ class RunObservers:
         recorder: records the run.
         browse: opens the page in the user's browser.
         voice: Says sounds and texts; it is closed with the observers.
-        steer: Buttons that steer the head; the page can then only stop and resume besides.
+        led_by: Who leads the head instead of the page, which can then only stop and resume it.
     """
 
     def __init__(
@@ -87,11 +73,11 @@ class RunObservers:
         status: Callable[[str], None] | None = None,
         tuning: ParamStore | None = None,
         recorder: "Recorder | None" = None,
-        steer: SteeringButtons | None = None,
+        led_by: str = "",
         browse: Callable[[str], object] | None = None,
         voice: RunVoice | None = None,
     ) -> None:
-        self._steer, self._lent, self._voice = steer, False, voice
+        self._led_by, self._lent, self._voice = led_by, False, voice
         self._made, self._fast, self._say = assembly, options.fast, say
         self._agent = MockAgent(
             assembly.robot.command,
@@ -101,7 +87,7 @@ class RunObservers:
         self._states = 0
         self._figures: LoopFigures | None = None
         self._timing = LoopTiming(assembly.loop.rate_hz)
-        self._emulated = options.mock and steer is None
+        self._emulated = options.mock and not led_by
         computed = options.no_pictures or (assembly.scene is not None and not options.pixels)
         self._detector = "" if computed else str(detector_status(assembly.live_params.rig.detector))
         self._choice = level_text(options.computer) if options.computer is not None else ""
@@ -124,7 +110,7 @@ class RunObservers:
             if tuning is not None and not options.fast
             else None
         )
-        doors = assembly.live_params.rig.doors if self._live is not None and steer is None else ()
+        doors = assembly.live_params.rig.doors if self._live is not None and not led_by else ()
         self._doors = DoorProcesses(doors, os.getpid(), say)
         self._picking = ClickToLook(
             PixelToWorld(assembly.mount, assembly.poses, assembly.camera_params)
@@ -156,14 +142,13 @@ class RunObservers:
         self.attach(self._observers)
 
     def _make_page(self, address: tuple[str, int], token: str) -> PageProcess:
-        command, steer = self._made.robot.command, self._steer
+        command = self._made.robot.command
         page_requests = PageRequestHandler(
-            command
-            if steer is None
-            else accept_only_stops(command, f"the buttons of {STEER!r} steer the head now"),
+            accept_only_stops(command, f"{self._led_by} leads the head now")
+            if self._led_by
+            else command,
             params=self._tuning,
             point=self._picking.point,
-            steer=steer.press if steer is not None else None,
             refusals=(ConfigError,) if self._tuning is not None else (),
             saved=self._live.saved if self._live is not None else None,
             depth=self._show_depth,
@@ -197,13 +182,9 @@ class RunObservers:
         start_s = scene_start_s(robot.camera)
         if not start_s and self._made.room is not None:
             start_s = self._made.room.start_s()
-        in_force: tuple[str, str, str]
         menus = robot.menus()
-        if self._steer is not None:
-            in_force = self._steer.status_text(), "", ""
-        else:
-            character = self._tuning.character_name if self._tuning is not None else ""
-            in_force = menus["behaviour"][0], menus["conversation"][0], character
+        character = self._tuning.character_name if self._tuning is not None else ""
+        in_force = menus["behaviour"][0], menus["conversation"][0], character
         self._states += 1
         if self._states % _STATES_PER_FIGURES == 1:  # computing them takes half a millisecond
             self._figures = self._timing.figures()
@@ -276,10 +257,9 @@ class RunObservers:
         with self._report_errors("the page"):
             if self._page is not None:
                 self._page.open()
-                steps = None if self._steer is None else {STEER: self._steer.keys}
-                self._page.offer(steps or self._made.robot.menus())
-                infos = [] if steps else self._made.robot.tracks()
-                self._page.offer_tracks(infos)
+                if not self._led_by:
+                    self._page.offer(self._made.robot.menus())
+                    self._page.offer_tracks(self._made.robot.tracks())
         with self._report_errors("the doors"):
             self._doors.open()
 

@@ -5,8 +5,6 @@ from pathlib import Path
 import pytest
 from command_line import Invoked, answers_in, invoked
 from commands_started import OnTerminal
-from page_visitor import Visitor
-from shown_page import free_port
 
 from gazerig.config.schema import load_rig
 from gazerig.features.bringup.cli.calibration_keys import (
@@ -109,39 +107,12 @@ def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
     assert "nothing written" in sitting.said and rig.read_bytes() == before
 
 
-# --- on the page
-
-
-@pytest.mark.slow
-def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
-    address = f"127.0.0.1:{free_port()}"
-    url = f"http://{address}"
-    with sitting_at(rig, "--page", address) as sitting:
-        sitting.reads(f"the page is at {url}/?token=")
-        sitting.reads("\n")
-        visitor = Visitor(f"{url}/?token={sitting.before.strip()}")
-        sitting.reads("1/8 the tip of your nose: 0 mm")
-        visitor.ask({"steer": "left"})
-        sitting.reads("5 mm left, 0 mm up")
-        sitting.types(b"w")
-        sitting.reads("5 mm left, 5 mm up")
-        # No client controls the head meanwhile: it would leave the measured face.
-        visitor.ask({"do": "look_at", "p_world_m": [1.0, 0.5, 0.0]})
-        sitting.enters(lambda: visitor.ask({"steer": "enter"}), "2/8 your left eye")
-        visitor.ask({"steer": "end"})
-        sitting.reads("stopped by you: parked, torque off")
-        assert sitting.ends() == 0, sitting.said
-    found = load_rig(str(rig)).face_parts_mm
-    assert set(found) == {"N"}
-    assert found["N"] == pytest.approx((1e3 * PARTS_FACE_M["N"][0], 5.0, 5.0), abs=0.06)
-
-
-def test_while_buttons_lead_the_page_can_only_stop_and_resume() -> None:
+def test_while_the_terminal_leads_the_page_can_only_stop_and_resume() -> None:
     given: list[Command] = []
-    order = accept_only_stops(given.append, "buttons steer the head now")
+    order = accept_only_stops(given.append, "the terminal leads the head now")
     order(Stop("a test"))
     order(Resume())
     for asked in (LookAt((1.0, 0.0, 0.0)), Jog((("neck_yaw", 0.1),)), Ask("behaviour", "guard")):
-        with pytest.raises(ValueError, match="steer the head now"):
+        with pytest.raises(ValueError, match="leads the head now"):
             order(asked)
     assert given == [Stop("a test"), Resume()]

@@ -1,9 +1,8 @@
-"""Keys of a terminal, words of a script or buttons of the page that control a calibration."""
+"""Keys of a terminal or words of a script that control a calibration."""
 
 from abc import ABC, abstractmethod
 from contextlib import AbstractContextManager
-from queue import Empty, Full, Queue
-from typing import Self, cast, get_args
+from typing import cast
 
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.face_steering import Key
@@ -14,10 +13,6 @@ HELP = (
     "arrow keys or w a s d move the gaze as you see it; + and - the step; Enter: it looks at it; "
     "n: next, leave this part; b: back; q: end"
 )
-
-BUTTONS: tuple[Key, ...] = get_args(Key)
-"""Labels of the page's buttons."""
-_MOST_WAITING = 50
 
 _PLAIN: dict[str, Key] = {
     "w": "up", "a": "left", "s": "down", "d": "right",
@@ -110,42 +105,3 @@ class LineKeys(Keys):
         key, times = key_and_count(line)
         self._ready = [key] * times
         return self._ready.pop(0)
-
-
-class PageKeys(Keys):
-    """Keys pressed as buttons of the page, in addition to those of another source."""
-
-    def __init__(self, others: Keys) -> None:
-        self._others = others
-        self._pressed: Queue[Key] = Queue(_MOST_WAITING)
-
-    def __enter__(self) -> Self:
-        """Enter the other source."""
-        self._others.__enter__()
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        """Exit the other source."""
-        self._others.__exit__(*raised)
-
-    def press(self, word: str) -> str | None:
-        """Handle a button, from any thread; return the reason if it is refused.
-
-        Raises:
-            ValueError: the button does not exist.
-        """
-        found = next((key for key in BUTTONS if key == word), None)
-        if found is None:
-            raise ValueError(f"{word!r} is no key: {', '.join(BUTTONS)}")
-        try:
-            self._pressed.put_nowait(found)
-        except Full:
-            return "refused: too many keys at once; the gaze still has to follow those before"
-        return None
-
-    def next(self, ready: bool) -> Key | None:
-        """Return the next key of either source, those of the page first."""
-        try:
-            return self._pressed.get_nowait()
-        except Empty:
-            return self._others.next(ready)

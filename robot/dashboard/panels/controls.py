@@ -17,8 +17,6 @@ from gazerig.robot.model.commands import Ask, Express, Jog, LookAt
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.types import Snapshot, order_joints
 
-STEER = "steer"
-"""Menu of the steps of a calibration, not of requests to the robot."""
 BEHAVIOUR, CONVERSATION, CHARACTER = "behaviour", "conversation", "character"
 
 _TARGET_SCALE = 0.12
@@ -173,10 +171,7 @@ class GazeTargetPanel:
         menu = self._add(name, choices, order=len(self.menus))
 
         def ask(choice: str, client: str) -> None:
-            if name == STEER:
-                self._outbox.ask({"steer": choice}, client)
-            else:
-                self._outbox.command(Ask(name, choice), client)
+            self._outbox.command(Ask(name, choice), client)
 
         menu.on_press(ask)
 

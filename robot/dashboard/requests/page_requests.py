@@ -41,7 +41,6 @@ class PageRequestHandler:
         command: executes commands.
         params: parameters that can be changed; None: there are none.
         point: returns the point in the world at a position in the image; None: there is no image.
-        steer: handles a steering button; None: there are no buttons.
         depth: switches the depth image on or off; None: there is none.
         talk: plays a minute of conversation and returns a message; None: it cannot.
         refusals: exceptions besides ValueError that ``params`` raises for values that break a rule.
@@ -54,7 +53,6 @@ class PageRequestHandler:
         command: CommandTaker,
         params: ParamAccess | None = None,
         point: Point | None = None,
-        steer: Callable[[str], str | None] | None = None,
         depth: Callable[[bool], None] | None = None,
         talk: Callable[[], str] | None = None,
         refusals: tuple[type[Exception], ...] = (),
@@ -64,7 +62,6 @@ class PageRequestHandler:
         self._handler = CommandHandler(command, params, refusals, saved)
         self._paths = paths
         self._point = point
-        self._steer = steer
         self._depth, self._talk = depth, talk
         self._clock = RealClock()
         self._limited_s = -_SAID_EVERY_S
@@ -90,8 +87,6 @@ class PageRequestHandler:
                     return "refused: there is no camera image to look into yet"
                 who = str(rest.get("who") or PAGE)
                 return self._execute(LookAt(point, who=who))
-            case {"steer": str(way)} if self._steer is not None:
-                return self._steer(way)
             case {"show": {"depth": bool(on)}} if self._depth is not None:
                 self._depth(on)
                 return None

@@ -23,11 +23,9 @@ from gazerig.features.bringup.calibration.face_steering import (
 )
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibration_keys import (
-    BUTTONS,
     HELP,
     Keys,
     LineKeys,
-    PageKeys,
     TerminalKeys,
 )
 from gazerig.features.bringup.cli.ports import MockOption, PortOption
@@ -43,7 +41,7 @@ from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_observers import RunObservers, SteeringButtons
+from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.session import prepare_shutdown
 from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say, status
@@ -142,9 +140,8 @@ def _calibrate(
     made = assemble(exact_gaze(rig), options, Substitutes(chooser=lambda own: steering))
     # Input from a pipe is also a script: no user can end it.
     scripted = scripted or not sys.stdin.isatty()
-    keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
-    steer = SteeringButtons(BUTTONS, keys.press, lambda: status_text(steering))
-    observers = RunObservers(made, options, say, steer=steer)
+    keys = LineKeys(lines) if scripted else TerminalKeys()
+    observers = RunObservers(made, options, say, led_by="the terminal")
     door = StopOnlyServer(
         made.robot.command,
         made.clock,
