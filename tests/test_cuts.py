@@ -8,8 +8,7 @@ from present import present
 from seeing import row_09_identities as row
 from test_perception import Neck, face_at
 
-from gazerig.drivers.camera.process import offset_ids
-from gazerig.drivers.types import Detections
+from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
 from gazerig.drivers.vision.cut_detector import CutDetector
 from gazerig.gaze.types import Percept
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
@@ -47,8 +46,10 @@ def turned(*frames: tuple[float, int, int]) -> list[Percept]:
         yaw = radians(yaw_deg)
         poses.remember(number / 30, (yaw, 0.0, 0.0))
         face = face_at((np.sin(yaw), 0.0, np.cos(yaw)))
-        found = Detections(number / 30, number, 640, 400, (face,), scene=scene)
-        percepts.append(present(perception.see(offset_ids(found, starts), poses)))
+        found = Detections(
+            number / 30, number, 640, 400, (face,), scene=scene + starts * SCENES_OF_A_PROCESS
+        )
+        percepts.append(present(perception.see(found, poses)))
     return percepts
 
 

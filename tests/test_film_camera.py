@@ -25,7 +25,7 @@ class Film(FilePlayer):
     def play_once(self) -> Iterator[StoredFrame]:
         for number in count(1):
             image = np.full((128, 128, 3), number % 256, np.uint8)
-            yield StoredFrame((number - 1) / RATE_HZ, 1.0 / RATE_HZ, partial(Shot, 0.0, 0, image))
+            yield StoredFrame((number - 1) / RATE_HZ, partial(Shot, 0.0, 0, image))
 
 
 class EveryThird:

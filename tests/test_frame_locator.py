@@ -9,7 +9,6 @@ from present import present
 from test_perception import STILL, face_at, picture, standing
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.process import offset_ids
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.types import Percept
@@ -82,12 +81,6 @@ def test_a_frame_comes_with_what_it_shows_located() -> None:
     assert found.located == LOCATOR(found)
     assert [len(of) for of in present(found.located)[1:3]] == [1, 1]
     assert FrameAnalyzer(OneFace()).analyze(shot(3)).located is None
-
-
-def test_things_of_a_restarted_process_get_numbers_of_their_own() -> None:
-    found = offset_ids(located(picture(1, blobs=(BALL,))), 2)
-    assert [blob.id for blob in found.blobs] == [2_000_003]
-    assert [thing.detector_id for thing in present(found.located).things] == [2_000_003]
 
 
 @pytest.mark.parametrize(

@@ -142,8 +142,6 @@ def test_stamps_out_of_step_give_way_to_arrivals(rig, stamp_s):
     source = rig.opened()
     (shot,) = take(rig, source, lambda: 100.1, Message(5.0, stamp_s))
     assert shot.captured_s == pytest.approx(100.08)
-    (reported,) = source.events()
-    assert "not synchronised" in reported and "20 ms" in reported
 
 
 def test_camera_without_frames_counts_as_lost(rig):

@@ -4,10 +4,11 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import count
-from math import isnan
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
 from gazerig.drivers.camera.params import CameraRecovery
@@ -55,21 +56,14 @@ def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
     view. If a face or a landmark is farther outside than the size of the face, the detector is
     wrong, usually because its pixels belong to another frame size.
     """
-    points: list[tuple[float, float]] = face.landmarks_px.tolist()
-    if not points:
+    points = face.landmarks_px
+    if not len(points):
         return False  # a face without points: its consumer reports that
-    x, y = sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
-    if isnan(x) or isnan(y):
-        return False  # not numbers: the consumer reports that too
-    size = max(max(along) - min(along) for along in zip(*points, strict=True))
-    return _distance_outside_px(x, y, width_px, height_px) > 0.0 or any(
-        _distance_outside_px(x, y, width_px, height_px) > size for x, y in points
-    )
-
-
-def _distance_outside_px(x: float, y: float, width_px: int, height_px: int) -> float:
-    """Return the distance of a point outside the frame; negative inside."""
-    return max(-0.5 - x, x - width_px + 0.5, -0.5 - y, y - height_px + 0.5)
+    # The last row is the centre. Points that are not numbers are reported by the consumer, too.
+    points = np.vstack((points, points.mean(axis=0)))
+    low, high = -0.5, np.array([width_px, height_px]) - 0.5
+    *outside_px, centre_px = np.maximum(low - points, points - high).max(axis=1)
+    return bool(centre_px > 0.0 or max(outside_px) > np.ptp(points, axis=0).max())
 
 
 class FrameAnalyzer:
@@ -117,12 +111,12 @@ class FrameAnalyzer:
             ]
         )
         faces_s = perf_counter()
+        image, t_s = shot.image, shot.captured_s
         find_people = getattr(self._detector, "people", None)
-        people = () if find_people is None else find_people(shot.image, shot.captured_s)
+        people = () if find_people is None else find_people(image, t_s)
         find_palms = getattr(self._detector, "palms", None)
-        seen = shot.image, shot.captured_s, faces, people
-        palms = None if find_palms is None else find_palms(*seen)
-        faces, people = self._clothing.add_clothing(shot.image, shot.captured_s, faces, people)
+        palms = None if find_palms is None else find_palms(image, t_s, faces, people)
+        faces, people = self._clothing.add_clothing(image, t_s, faces, people)
         bodies_s = perf_counter()
         blobs = self._motion(shot) if self._motion is not None else ()
         spent_s = {
@@ -130,16 +124,16 @@ class FrameAnalyzer:
             "people and hands": bodies_s - faces_s,
             "motion": perf_counter() - bodies_s,
         }
-        scene = self._cuts.scene(shot.image) + self._turned_count
+        scene = self._cuts.scene(image) + self._turned_count
         self._judge_turn(shot, faces)
         found = Detections(
-            shot.captured_s,
+            t_s,
             shot.number,
             width,
             height,
             faces,
             blobs,
-            shot.image,
+            image,
             shot.depth_m,
             shot.lens,
             scene=scene,

@@ -15,16 +15,17 @@ from gazerig.drivers.errors import CameraError
 _MOST_LATE_S = 1.0
 """Delay after which a film pauses instead of skipping frames: a computer that decodes it too
 slowly, or was suspended, would skip forever."""
+_ALONE_S = 0.1
+"""Time for which the frame of a file with one frame is shown."""
 
 
 class StoredFrame(NamedTuple):
     """A frame of a file, before its pixels are read.
 
-    start_s: time at which it is due; duration_s: time to the next one; read: returns it
+    start_s: time at which it is due; read: returns it
     """
 
     start_s: float
-    duration_s: float
     read: Callable[[], Shot]
 
 
@@ -104,20 +105,18 @@ class FilePlayer(ABC):
         """Free the file; safe to call twice."""
         self._frames = self._next = None
 
-    def report(self, line: str) -> None:
-        """Add an event."""
-        self._events.append(line)
-
     def _repeat(self) -> Iterator[StoredFrame]:
         begin_s = 0.0
         while True:
-            end_s = begin_s
+            last_s, step_s = -1.0, _ALONE_S
             for frame in self.play_once():
-                yield frame._replace(start_s=begin_s + frame.start_s)
-                end_s = begin_s + frame.start_s + frame.duration_s
-            if end_s <= begin_s:
+                if last_s >= 0.0:
+                    step_s = frame.start_s - last_s
+                last_s = frame.start_s
+                yield frame._replace(start_s=begin_s + last_s)
+            if last_s < 0.0:
                 raise CameraError(f"{self.path} contains no readable frame: use another file")
-            begin_s = end_s
+            begin_s += last_s + step_s
 
     def _upcoming(self) -> StoredFrame:
         if self._frames is None:

@@ -1,6 +1,7 @@
 """Films and still images; a film's times, order and rotation are those of its container."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 
 import av
@@ -47,14 +48,14 @@ class Film(FilePlayer):
         return self._film_frames()
 
     def _still(self) -> Shot:
-        try:
-            with quiet_opencv():
-                image = cv2.imread(str(self.path), cv2.IMREAD_COLOR)
-        except cv2.error as error:
-            raise CameraError(f"{self.path} is too large an image: scale it down") from error
-        pixels = None if image is None else to_bgr(image)
+        image = None
+        with quiet_opencv(), suppress(cv2.error):
+            image = cv2.imread(str(self.path), cv2.IMREAD_COLOR)
+        pixels = to_bgr(image)
         if pixels is None:
-            raise CameraError(f"{self.path} is a damaged image: copy or save it again")
+            raise CameraError(
+                f"{self.path} is a damaged or too large image: save it again, or scale it down"
+            )
         return Shot(0.0, 0, pixels)
 
     def _open(self) -> av.container.InputContainer:
@@ -115,7 +116,9 @@ class Film(FilePlayer):
                 except av.FFmpegError:
                     if not self._is_damaged:
                         self._is_damaged = True
-                        self.report(f"{self.path.name} is damaged: the damaged frames are skipped")
+                        self._events.append(
+                            f"{self.path.name} is damaged: the damaged frames are skipped"
+                        )
                     continue
                 for picture in pictures:
                     time_s = picture.time
@@ -125,8 +128,7 @@ class Film(FilePlayer):
                         start_s += usual_s
                     else:
                         start_s = time_s - first_s
-                    duration_s = float(picture.duration * (picture.time_base or 0)) or usual_s
-                    yield StoredFrame(start_s, duration_s, partial(_upright, picture))
+                    yield StoredFrame(start_s, partial(_upright, picture))
                 if packet is None:
                     return
 
@@ -134,7 +136,7 @@ class Film(FilePlayer):
 def _still_frames(shot: Shot) -> Iterator[StoredFrame]:
     number = 0
     while True:
-        yield StoredFrame(number * _STILL_S, _STILL_S, lambda: shot)
+        yield StoredFrame(number * _STILL_S, lambda: shot)
         number += 1
 
 

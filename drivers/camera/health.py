@@ -6,8 +6,8 @@ condition is reported, with its remedy.
 
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from math import atan2, degrees, inf
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -15,10 +15,8 @@ import numpy as np
 from gazerig.drivers.camera.orientation import ROTATIONS, FrameOrientation, Rotation
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import ModelFileError
-from gazerig.drivers.types import DetectedFace, ImageArray
-
-if TYPE_CHECKING:
-    from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 _EVERY_S, _BEGINS, _ENDS = 1.0, 5, 3
 """Time between assessments; number of equal ones after which a condition begins and ends."""
@@ -42,8 +40,8 @@ _REMEDIES = {
 # Largest roll and lowest confidence of an upright face: MTCNN mistakes one of six upside-down faces
 # for upright, with a lower confidence.
 _UPRIGHT_DEG, _SURE = 25.0, 0.9
-_SEARCH_S, _IDLE_S, _SEARCH_PX = 0.33, 1.0, 320
-"""Time between searches with and without a recent result, and width of the searched copy."""
+_SEARCH_S, _SEARCH_PX = 0.5, 320
+"""Time between searches, and width of the searched copy."""
 _SAMPLES, _LEAST_SAMPLES, _HITS = 6, 3, 3
 """Frames in which upright faces are counted; agreeing searches that decide."""
 
@@ -63,24 +61,22 @@ class CameraHealth:
         self._last_s, self._number, self._analysed = -inf, 0, 0
         self._spent_s: Counter[str] = Counter()
 
-    @property
-    def conditions(self) -> tuple[str, ...]:
-        """Return the present conditions, each with its remedy."""
-        return tuple([text for text in self._texts.values() if text])
-
     def assess(self, shot: Shot, spent_s: Mapping[str, float]) -> tuple[str, ...]:
-        """Add an analysed frame and its time by stage; return the present conditions."""
+        """Add an analysed frame and its time by stage.
+
+        Returns:
+            The present conditions, each with its remedy.
+        """
         self._analysed += 1
         self._spent_s.update(spent_s)
         past_s = shot.captured_s - self._last_s
-        if 0.0 <= past_s < _EVERY_S:
-            return self.conditions
-        self._judge("dark", self._dark(shot.image))
-        if _EVERY_S <= past_s < inf:
-            self._judge("slow", self._slow(shot.number - self._number, past_s))
-        self._last_s, self._number, self._analysed = shot.captured_s, shot.number, 0
-        self._spent_s.clear()
-        return self.conditions
+        if not 0.0 <= past_s < _EVERY_S:
+            self._judge("dark", self._dark(shot.image))
+            if _EVERY_S <= past_s < inf:
+                self._judge("slow", self._slow(shot.number - self._number, past_s))
+            self._last_s, self._number, self._analysed = shot.captured_s, shot.number, 0
+            self._spent_s.clear()
+        return tuple([text for text in self._texts.values() if text])
 
     def turned(self, rotation_deg: int) -> None:
         """Record by how much frames must be turned clockwise to show upright faces; 0: they do."""
@@ -141,25 +137,28 @@ class TurnedFaceSearch:
     """
 
     def __init__(self) -> None:
-        self._detector: MtcnnDetector | None = None
+        self._detector: FaceDetector | None = None  # without it no turned faces are found
+        with suppress(ImportError, ModelFileError):
+            from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+
+            self._detector = MtcnnDetector(FaceDetectorParams())
         self._ways: deque[Rotation] = deque((180, 90, 270))
         self._upright: deque[bool] = deque(maxlen=_SAMPLES)
-        self._hits, self._misses = 0, 0
-        self._last_s = self._due_s = -inf
+        self._hits, self._last_s = 0, -inf
 
     def find(self, image: ImageArray, t_s: float, faces: Sequence[DetectedFace]) -> Rotation | None:
         """Add a frame; return the clockwise turn that makes its faces upright, None if unknown.
 
         faces: faces found in it
         """
-        if self._last_s <= t_s < self._due_s:
+        if 0.0 <= t_s - self._last_s < _SEARCH_S:
             return None
-        self._last_s, self._due_s = t_s, t_s + _SEARCH_S
+        self._last_s = t_s
         self._upright.append(_surest_upright(faces) >= _SURE)
         if 2 * sum(self._upright) >= len(self._upright):
-            self._hits = self._misses = 0
+            self._hits = 0
             return 0 if len(self._upright) >= _LEAST_SAMPLES else None
-        if len(self._upright) < _LEAST_SAMPLES or self._create_detector() is None:
+        if len(self._upright) < _LEAST_SAMPLES or self._detector is None:
             return None
         way = self._ways[0]
         height, width = image.shape[:2]
@@ -169,29 +168,16 @@ class TurnedFaceSearch:
         if sure >= _SURE and sure > max(
             self._confidence(small, other) for other in ROTATIONS if other != way
         ):
-            self._hits, self._misses = self._hits + 1, 0
+            self._hits += 1
         else:
-            self._hits, self._misses = max(0, self._hits - 1), self._misses + 1
+            self._hits = max(0, self._hits - 1)
             if self._hits == 0:
                 self._ways.rotate(-1)
-            if self._misses > len(self._ways):
-                self._due_s = t_s + _IDLE_S
         if self._hits < _HITS:
             return None
         self._hits = 0
         self._upright.clear()  # the next frames may have been turned
         return way
-
-    def _create_detector(self) -> "MtcnnDetector | None":
-        if self._detector is None:
-            from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
-            from gazerig.drivers.vision.face.params import FaceDetectorParams
-
-            try:
-                self._detector = MtcnnDetector(FaceDetectorParams())
-            except ModelFileError:
-                self._due_s = inf
-        return self._detector
 
     def _confidence(self, image: ImageArray, rotation: Rotation) -> float:
         assert self._detector is not None

@@ -67,13 +67,8 @@ class FrameOrientation:
 
         if self.mirrored:
             image = cv2.flip(image, 1)
-        codes = {
-            90: cv2.ROTATE_90_CLOCKWISE,
-            180: cv2.ROTATE_180,
-            270: cv2.ROTATE_90_COUNTERCLOCKWISE,
-        }
-        if self.rotation:
-            image = cv2.rotate(image, codes[self.rotation])
+        if self.rotation:  # OpenCV numbers the quarter turns clockwise from 0
+            image = cv2.rotate(image, self.rotation // 90 - 1)
         out = np.asarray(image)
         out.setflags(write=False)
         return out

@@ -16,7 +16,6 @@ from gazerig.drivers.files.file_input import open_mcap
 
 _LARGEST = 1 << 30  # bytes of a record; more is damage
 _CURE = "make one with gazerig run --record-camera; use --video for films"
-_ALONE_S = 0.1  # duration of a recording of one frame
 Messages = dict[str, bytes]
 """Topic -> data of a frame's message."""
 
@@ -32,27 +31,18 @@ class CameraReplay(FilePlayer):
         Raises:
             CameraError: it is absent, is not a recording, or is damaged.
         """
-        first_ns, last_ns, step_s = 0, -1, _ALONE_S
+        first_ns, last_ns = 0, -1
         for index, (stamp_ns, messages) in enumerate(self._stamped_frames()):
-            if stamp_ns <= last_ns:
-                continue
             if last_ns < 0:
                 first_ns = stamp_ns
-            else:
-                step_s = (stamp_ns - last_ns) / 1e9
-            last_ns = stamp_ns
-            read = partial(self._decode, index + 1, messages)
-            yield StoredFrame((stamp_ns - first_ns) / 1e9, step_s, read)
+            if stamp_ns > last_ns:
+                last_ns = stamp_ns
+                read = partial(self._decode, index + 1, messages)
+                yield StoredFrame((stamp_ns - first_ns) / 1e9, read)
 
     def _decode(self, number: int, messages: Messages) -> Shot:
         try:
-            return Shot(
-                0.0,
-                number,
-                fmt.decode_image(messages[fmt.PICTURE]),
-                fmt.decode_depth(messages[fmt.DEPTH]) if fmt.DEPTH in messages else None,
-                fmt.decode_lens(messages[fmt.LENS]) if fmt.LENS in messages else None,
-            )
+            return fmt.decode_shot(messages)
         except ValueError as error:
             raise CameraError(
                 f"frame {number} of {self.path} is damaged ({error}): copy the file again"
@@ -67,15 +57,11 @@ class CameraReplay(FilePlayer):
             reader = StreamReader(file, True, emit_chunks=True, record_size_limit=_LARGEST)
             try:
                 for record in reader.records:
-                    if isinstance(record, Header) and record.profile != fmt.PROFILE:
+                    is_other = isinstance(record, Header) and record.profile != fmt.PROFILE
+                    if is_other or isinstance(record, Chunk):
                         raise CameraError(
-                            f"{self.path} is not a camera recording of gazerig (its profile is "
-                            f"{record.profile!r}): {_CURE}"
-                        )
-                    if isinstance(record, Chunk):
-                        raise CameraError(
-                            f"{self.path} was packed into chunks by another program: "
-                            "play the file as recorded"
+                            f"{self.path} is not a camera recording of gazerig, or was packed into "
+                            f"chunks by another program: {_CURE}"
                         )
                     if isinstance(record, Channel):
                         channels[record.id] = record.topic
@@ -91,6 +77,8 @@ class CameraReplay(FilePlayer):
             except EndOfFile:
                 if not self._is_cut:
                     self._is_cut = True
-                    self.report(f"{self.path.name} was not closed: its complete frames are played")
+                    self._events.append(
+                        f"{self.path.name} was not closed: its complete frames are played"
+                    )
             except (McapError, ValueError, struct.error) as error:
                 raise CameraError(f"{self.path} is damaged: copy the file again") from error

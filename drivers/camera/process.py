@@ -42,8 +42,6 @@ _LONGEST_START_S = 60.0
 _FIRST_FRAME_S = 15.0
 """Longest time to the first frame: exposure settles, networks are loaded."""
 _POLL_S = 0.1
-_BLOB_IDS = 1_000_000
-"""Ids of things reserved for each process; the next process starts above them."""
 # Bytes of messages that wait in the pipe: if the loop is suspended, few frames wait in memory.
 _WAITING_BYTES = 1 << 14
 
@@ -111,12 +109,19 @@ class CaptureProcess:
             self._report(message)
         return None
 
-    def close(self) -> None:
+    def close(self, timeout_s: float = LONGEST_END_S) -> None:
         """End the process, by force if it does not end in time; safe to call twice."""
-        if self._pipe is not None:
-            with suppress(OSError):  # it may have ended already
-                self._pipe.send("stop")
-        self._end(LONGEST_END_S)
+        process, pipe = self._process, self._pipe
+        if process is None or pipe is None:
+            return
+        with suppress(OSError):  # it may have ended already
+            pipe.send("stop")
+        process.join(timeout_s)
+        if process.is_alive():
+            process.kill()
+            process.join()
+        pipe.close()
+        self._process = self._pipe = None
 
     def _start(self) -> None:
         """Start a process and wait until its source is open.
@@ -126,12 +131,8 @@ class CaptureProcess:
         """
         context = multiprocessing.get_context("spawn")
         pipe, theirs = context.Pipe()
-        process = context.Process(
-            target=run,
-            args=(theirs, self._parts, self._now_s, self._recovery),
-            name="camera",
-            daemon=True,
-        )
+        given = theirs, self._parts, self._now_s, self._recovery
+        process = context.Process(target=run, args=given, daemon=True)
         with hide_script():
             process.start()
         theirs.close()
@@ -143,19 +144,10 @@ class CaptureProcess:
             if pipe.poll(_LONGEST_START_S):
                 message = pipe.recv()
         if isinstance(message, SetupError):
-            self._end(0.0)
+            self.close(0.0)
             raise message
         self._is_film, self._is_retrying = bool(message), False
         self._heard_s = self._now_s()
-
-    def _end(self, timeout_s: float) -> None:
-        if self._process is not None and self._pipe is not None:
-            self._process.join(timeout_s)
-            if self._process.is_alive():
-                self._process.kill()
-                self._process.join()
-            self._pipe.close()
-        self._process = self._pipe = None
 
     def _judge_silence(self) -> None:
         """Report a camera without new frames, and restart a process that hangs."""
@@ -176,7 +168,7 @@ class CaptureProcess:
             CameraError: the last one has delivered no frame either.
             SetupError: it cannot be started.
         """
-        self._end(0.0)
+        self.close(0.0)
         if self._number == self._counted:
             raise CameraError(f"{reason}: start it again")
         self._lose(f"{reason}): starting its process again")
@@ -189,46 +181,24 @@ class CaptureProcess:
             self._report(f"{LOST} ({reason}")
 
     def _receive(self, pipe: Connection, message: DetectionMessage) -> Detections:
-        """Return detections with their frame."""
+        """Return detections with their frame.
+
+        The scene is another one than that of earlier processes: what was in front of the camera
+        meanwhile is unknown, as is whether it is the same camera.
+        """
         found, image, depth = message
         self._number = self._counted + found.number
-        found = replace(
-            found,
-            number=self._number,
-            image=_receive_image(pipe, image),
-            depth_m=_receive_image(pipe, depth),
-        )
         self._is_retrying = False
         if self._lost_s is not None:
             self._report(f"{BACK} after {self._now_s() - self._lost_s:.1f} s")
             self._lost_s = None
-        return offset_ids(found, self._starts - 1)
-
-
-def offset_ids(found: Detections, starts: int) -> Detections:
-    """Return detections with ids that differ from those of earlier processes.
-
-    Its things and its scene are new: what was in front of the camera meanwhile is unknown, as is
-    whether it is the same camera.
-
-    Args:
-        found: Detections of the process.
-        starts: Number of earlier processes.
-    """
-    if not starts:
-        return found
-    located, first = found.located, starts * _BLOB_IDS
-    if located is not None:
-        things = [
-            thing
-            if thing.detector_id is None
-            else thing._replace(detector_id=first + thing.detector_id)
-            for thing in located.things
-        ]
-        located = located._replace(things=tuple(things))
-    blobs = tuple([replace(blob, id=first + blob.id) for blob in found.blobs])
-    scene = starts * SCENES_OF_A_PROCESS + found.scene
-    return replace(found, blobs=blobs, located=located, scene=scene)
+        return replace(
+            found,
+            number=self._number,
+            image=_receive_image(pipe, image),
+            depth_m=_receive_image(pipe, depth),
+            scene=(self._starts - 1) * SCENES_OF_A_PROCESS + found.scene,
+        )
 
 
 def run(

@@ -1,14 +1,20 @@
 """Recording of a camera's frames while it is used; threads encode and write them."""
 
-import json
-from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
+from threading import BoundedSemaphore
 
+import msgspec
 from mcap.writer import CompressionType, IndexType, Writer
 
-from gazerig.drivers.camera.recording_format import PROFILE, SCHEMAS, encode_shot, nanoseconds
+from gazerig.drivers.camera.recording_format import (
+    PROFILE,
+    TYPES,
+    encode_shot,
+    nanoseconds,
+    schema_of,
+)
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.files.file_output import refuse_existing
@@ -41,8 +47,8 @@ class RecordingWriter:
         )
         self._writer.start(profile=PROFILE, library="gazerig")
         self._channels: dict[str, int] = {}
-        for topic, (name, schema) in SCHEMAS.items():
-            text = json.dumps(schema).encode("ascii")
+        for topic, (name, kind) in TYPES.items():
+            text = msgspec.json.encode(schema_of(kind))
             number = self._writer.register_schema(name, "jsonschema", text)
             self._channels[topic] = self._writer.register_channel(topic, "json", number)
         self._file.flush()
@@ -95,17 +101,14 @@ class CameraRecorder:
         self._path, self._writer = path, RecordingWriter(path)
         self._encoders = ThreadPoolExecutor(_ENCODERS, "encoder")
         self._disk = ThreadPoolExecutor(1, "recorder")
-        self._waiting: deque[Future[None]] = deque()
+        self._room = BoundedSemaphore(_MOST_WAITING)
         self._events: list[str] = []
         self._failed = self._is_slow = False
 
     def add(self, shot: Shot) -> None:
         """Record a frame; returns at once."""
-        while self._waiting and self._waiting[0].done():
-            self._waiting.popleft()
-        if len(self._waiting) < _MOST_WAITING:
-            encoded = self._encoders.submit(encode_shot, shot)
-            self._waiting.append(self._disk.submit(self._write, shot, encoded))
+        if self._room.acquire(blocking=False):
+            self._disk.submit(self._write, shot, self._encoders.submit(encode_shot, shot))
         elif not self._is_slow:
             self._is_slow = True
             self._events.append(
@@ -126,11 +129,12 @@ class CameraRecorder:
             self._writer.close()
 
     def _write(self, shot: Shot, encoded: "Future[list[tuple[str, bytes]]]") -> None:
-        if self._failed:
-            return
         try:
-            self._writer.add(shot.captured_s, shot.number, encoded.result())
+            if not self._failed:
+                self._writer.add(shot.captured_s, shot.number, encoded.result())
         except Exception as error:  # the camera continues after any error
             self._failed = True
             words = getattr(error, "strerror", None) or " ".join(str(error).split())
             self._events.append(f"{self._path}: recording ended: {words}")
+        finally:
+            self._room.release()

@@ -6,64 +6,70 @@ documentation, message schemas). All messages of one frame have the time of its 
 host's monotonic clock. The image comes last: if it is present, so is the rest. MCAP: mcap.dev/spec.
 """
 
-import base64
-import json
-from typing import Any
+from typing import Annotated, Any
 
 import cv2
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.depth_roi import to_metres, to_millimetres
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot, to_bgr
-from gazerig.drivers.types import Depth, ImageArray
 
 PICTURE, DEPTH, LENS = "/camera/picture", "/camera/depth", "/camera/lens"
 """Topics."""
 PROFILE = "gazerig-camera-1"
 _FRAME = "camera"
-_NUMBER = {"type": "number"}
-_TIME = {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}}
-_IMAGE = {
-    "type": "object",
-    "properties": {
-        "timestamp": _TIME,
-        "frame_id": {"type": "string"},
-        "format": {"type": "string"},
-        "data": {"type": "string", "contentEncoding": "base64"},
-    },
+
+
+class RecordedTime(msgspec.Struct):
+    """Time in the host's monotonic clock: seconds, and nanoseconds below a second."""
+
+    sec: int
+    nsec: int
+
+
+class RecordedImage(msgspec.Struct):
+    """Message of an image or of depth; data: a PNG or JPEG file."""
+
+    timestamp: RecordedTime
+    frame_id: str
+    format: str
+    data: bytes
+
+
+class RecordedLens(msgspec.Struct):
+    """Message of a lens; D: k1 k2 p1 p2 k3; K (3, 3), R (3, 3) and P (3, 4), row by row."""
+
+    timestamp: RecordedTime
+    frame_id: str
+    width: int
+    height: int
+    distortion_model: str
+    D: Annotated[list[float], msgspec.Meta(min_length=5, max_length=5)]
+    K: Annotated[list[float], msgspec.Meta(min_length=9, max_length=9)]
+    R: list[float]
+    P: list[float]
+
+
+TYPES: dict[str, tuple[str, type[msgspec.Struct]]] = {
+    PICTURE: ("foxglove.CompressedImage", RecordedImage),
+    DEPTH: ("foxglove.CompressedImage", RecordedImage),
+    LENS: ("foxglove.CameraCalibration", RecordedLens),
 }
-_MATRIX = {"type": "array", "items": _NUMBER}
-SCHEMAS: dict[str, tuple[str, dict[str, Any]]] = {
-    PICTURE: ("foxglove.CompressedImage", _IMAGE),
-    DEPTH: ("foxglove.CompressedImage", _IMAGE),
-    LENS: (
-        "foxglove.CameraCalibration",
-        {
-            "type": "object",
-            "properties": {
-                "timestamp": _TIME,
-                "frame_id": {"type": "string"},
-                "width": {"type": "integer"},
-                "height": {"type": "integer"},
-                "distortion_model": {"type": "string"},
-                "D": _MATRIX,
-                "K": _MATRIX,
-                "R": _MATRIX,
-                "P": _MATRIX,
-            },
-        },
-    ),
-}
-"""Topic -> name and JSON schema of its messages."""
+"""Topic -> name and type of its messages."""
 # Level 1 of 9 is hardly larger than the best and many times as fast; RLE suits colour best.
 _DEPTH_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
 _COLOUR_PNG = [*_DEPTH_PNG, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
 
 
-class BadMessage(ValueError):
-    """A message lacks contents that its topic requires; the text names the error."""
+def schema_of(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    """Return the JSON schema of messages, without references, which viewers cannot follow."""
+    _, parts = msgspec.json.schema_components([kind, RecordedTime])
+    schema: dict[str, Any] = parts[kind.__name__]
+    schema["properties"]["timestamp"] = parts[RecordedTime.__name__]
+    return schema
 
 
 def nanoseconds(time_s: float) -> int:
@@ -73,107 +79,64 @@ def nanoseconds(time_s: float) -> int:
 
 def encode_shot(shot: Shot) -> list[tuple[str, bytes]]:
     """Encode a frame and its data as messages, the image last."""
-    stamp = nanoseconds(shot.captured_s)
-    found: list[tuple[str, bytes]] = []
+    stamp = RecordedTime(*divmod(nanoseconds(shot.captured_s), 1_000_000_000))
+    found: list[tuple[str, msgspec.Struct]] = []
     if shot.lens is not None:
-        fx, fy, cx, cy = shot.lens.fx_px, shot.lens.fy_px, shot.lens.cx_px, shot.lens.cy_px
-        lens = {
-            "timestamp": _time_stamp(stamp),
-            "frame_id": _FRAME,
-            "width": shot.image.shape[1],
-            "height": shot.image.shape[0],
-            "distortion_model": "plumb_bob",
-            "D": list(shot.lens.distortion),
-            "K": [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
-            "R": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            "P": [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
-        }
-        found.append((LENS, _dump(lens)))
+        height, width = shot.image.shape[:2]
+        K = shot.lens.matrix
+        lens = RecordedLens(
+            stamp,
+            _FRAME,
+            width,
+            height,
+            "plumb_bob",
+            list(shot.lens.distortion),
+            K.ravel().tolist(),
+            np.eye(3).ravel().tolist(),
+            np.column_stack((K, np.zeros(3))).ravel().tolist(),
+        )
+        found.append((LENS, lens))
     if shot.depth_m is not None:
-        file = _encode_file(".png", to_millimetres(shot.depth_m), _DEPTH_PNG)
-        found.append((DEPTH, _dump(_image_message("png", file, stamp))))
-    file = _encode_file(".png", shot.image, _COLOUR_PNG)
-    found.append((PICTURE, _dump(_image_message("png", file, stamp))))
-    return found
+        file = _encode_png(to_millimetres(shot.depth_m), _DEPTH_PNG)
+        found.append((DEPTH, RecordedImage(stamp, _FRAME, "png", file)))
+    file = _encode_png(shot.image, _COLOUR_PNG)
+    found.append((PICTURE, RecordedImage(stamp, _FRAME, "png", file)))
+    return [(topic, msgspec.json.encode(message)) for topic, message in found]
 
 
-def decode_image(data: bytes) -> ImageArray:
-    """Read a frame message.
-
-    Raises:
-        BadMessage: it contains no frame.
-    """
-    pixels = to_bgr(_decode_file(data))
-    if pixels is None:
-        raise BadMessage("no image in it")
-    return pixels
-
-
-def decode_depth(data: bytes) -> Depth:
-    """Read a depth message.
+def decode_shot(messages: dict[str, bytes]) -> Shot:
+    """Read the messages of a frame, by topic; its time and number are 0.
 
     Raises:
-        BadMessage: it contains no 16-bit frame.
+        ValueError: a message lacks contents that its topic requires; the text names the error.
     """
-    mm = _decode_file(data)
-    if mm.dtype != np.uint16 or mm.ndim != 2:
-        raise BadMessage("no 16-bit depth image in it")
-    return to_metres(mm)
+    try:
+        image = to_bgr(_decode_image(messages[PICTURE]))
+        depth = _decode_image(messages[DEPTH]) if DEPTH in messages else None
+        lens = _decode_lens(messages[LENS]) if LENS in messages else None
+    except (msgspec.MsgspecError, cv2.error) as error:
+        raise ValueError(str(error)) from error
+    if image is None:
+        raise ValueError("no image in it")
+    if depth is not None and (depth.dtype != np.uint16 or depth.ndim != 2):
+        raise ValueError("no 16-bit depth image in it")
+    return Shot(0.0, 0, image, None if depth is None else to_metres(depth), lens)
 
 
-def decode_lens(data: bytes) -> Intrinsics:
-    """Read a lens message.
-
-    Raises:
-        BadMessage: it contains no camera matrix.
-    """
-    K = np.asarray(_load(data, "K"), dtype=np.float64)
-    if K.shape != (9,) or not np.isfinite(K).all() or K[0] <= 0.0 or K[4] <= 0.0:
-        raise BadMessage("no camera matrix in it")
-    D = np.asarray(_load(data, "D"), dtype=np.float64)
-    if D.shape != (5,) or not np.isfinite(D).all():
-        raise BadMessage("no five numbers of distortion in it")
-    k1, k2, p1, p2, k3 = D.tolist()
-    return Intrinsics(float(K[0]), float(K[4]), float(K[2]), float(K[5]), (k1, k2, p1, p2, k3))
-
-
-def _image_message(kind: str, file: bytes, stamp: int) -> dict[str, Any]:
-    return {
-        "timestamp": _time_stamp(stamp),
-        "frame_id": _FRAME,
-        "format": kind,
-        "data": base64.b64encode(file).decode("ascii"),
-    }
-
-
-def _time_stamp(nanoseconds_: int) -> dict[str, int]:
-    sec, nsec = divmod(nanoseconds_, 1_000_000_000)
-    return {"sec": sec, "nsec": nsec}
-
-
-def _encode_file(ending: str, pixels: NDArray[Any], how: list[int]) -> bytes:
-    _, file = cv2.imencode(ending, pixels, how)
+def _encode_png(pixels: NDArray[Any], how: list[int]) -> bytes:
+    _, file = cv2.imencode(".png", pixels, how)
     return bytes(file)
 
 
-def _dump(message: dict[str, Any]) -> bytes:
-    return json.dumps(message, separators=(",", ":")).encode("ascii")
-
-
-def _load(data: bytes, key: str) -> Any:
-    try:
-        return json.loads(data)[key]
-    except (ValueError, KeyError, TypeError) as error:
-        raise BadMessage(f"no {key} in it") from error
-
-
-def _decode_file(data: bytes) -> NDArray[Any]:
-    """Decode the file inside an image message."""
-    try:
-        file = base64.b64decode(_load(data, "data"), validate=True)
-        found = cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED)
-    except (ValueError, TypeError, cv2.error) as error:
-        raise BadMessage("no image in it") from error
+def _decode_image(data: bytes) -> NDArray[Any]:
+    file = msgspec.json.decode(data, type=RecordedImage).data
+    found = cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED)
     if found is None:
-        raise BadMessage("no image in it")
-    return found
+        raise ValueError("no image in it")
+    return np.asarray(found)
+
+
+def _decode_lens(data: bytes) -> Intrinsics:
+    lens = msgspec.json.decode(data, type=RecordedLens)
+    k1, k2, p1, p2, k3 = lens.D
+    return Intrinsics(lens.K[0], lens.K[4], lens.K[2], lens.K[5], (k1, k2, p1, p2, k3))

@@ -125,17 +125,9 @@ class PoseBuffer:
         known = entries[np.arange(first, before) % _ENTRIES, :10]
         if not len(known) or t_s < known[0, 0] or t_s > known[-1, 0] + _NEWEST_SERVES_S:
             return None
-        after = int(np.searchsorted(known[:, 0], t_s))
-        if after == len(known):
-            return known[-1, 1:].reshape(3, 3)
-        if after == 0 or known[after, 0] == t_s:
-            return known[after, 1:].reshape(3, 3)
-        (t0, *R0), (t1, *R1) = known[after - 1], known[after]
-        share = (t_s - t0) / (t1 - t0)
+        mean = [np.interp(t_s, known[:, 0], column) for column in known[:, 1:].T]
         # Between two orientations one tick apart: the rotation nearest to the mean of the matrices.
-        U, _, Vt = np.linalg.svd(
-            ((1.0 - share) * np.array(R0) + share * np.array(R1)).reshape(3, 3)
-        )
+        U, _, Vt = np.linalg.svd(np.reshape(mean, (3, 3)))
         return np.asarray(U @ Vt)
 
     def rotation_between(self, now_s: float, before_s: float) -> Floats | None:

@@ -53,6 +53,18 @@ class FrameSource(Protocol):
         """Free the device or file; safe to call twice."""
 
 
+_OLDEST_STAMP_S = 1.0
+
+
+def exposure_s(stamp_s: float, arrived_s: float, latency_s: float = 0.0) -> float:
+    """Return the time of a frame: its stamp, or its arrival minus the latency.
+
+    A stamp that is in the future or too old is not of the host's clock.
+    """
+    is_plausible = 0.0 <= arrived_s - stamp_s <= _OLDEST_STAMP_S
+    return stamp_s if is_plausible else arrived_s - latency_s
+
+
 def to_bgr(pixels: Any) -> ImageArray | None:
     """Return pixels of a camera or file as a read-only BGR frame; None if they are not an image.
 

@@ -10,7 +10,7 @@ import cv2
 
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
-from gazerig.drivers.camera.source import Shot, to_bgr
+from gazerig.drivers.camera.source import Shot, exposure_s, to_bgr
 from gazerig.drivers.errors import CameraError
 
 # Consecutive failed frames after which the camera counts as lost; one fails at times with a long
@@ -19,8 +19,6 @@ _MOST_FAILURES = 5
 # A reader that was away for a smaller part of a frame period has lost no frame, so that period
 # counts, with a share, as the camera's: many take longer in the dark.
 _PROMPT, _SHARE = 0.5, 0.2
-# The kernel's stamp is used if it is at most this old on the same clock.
-_OLDEST_STAMP_S = 1.0
 # Compressed, which USB 2 carries at full size and rate.
 _FOURCC = "MJPG"
 # Time-out for a frame; OpenCV's default is 10 s, and it reads this once.
@@ -61,8 +59,6 @@ class Webcam:
         self._capture: cv2.VideoCapture | None = None
         self._number = 0
         self._period_s, self._captured_s, self._left_s = 0.0, 0.0, 0.0
-        self._events: list[str] = []
-        self._reported = False
 
     def open(self) -> None:
         """Open the camera and fetch one frame as a check.
@@ -96,13 +92,6 @@ class Webcam:
         stated_hz = capture.get(cv2.CAP_PROP_FPS)
         self._period_s = 1.0 / (stated_hz if stated_hz > 0.0 else self._params.rate_hz)
         self._captured_s = inf
-        given = int(capture.get(cv2.CAP_PROP_FOURCC))
-        name = "".join(chr(given >> 8 * k & 0xFF) for k in range(4)).strip("\0 ")
-        if name and name != _FOURCC and not self._reported:
-            self._reported = True
-            self._events.append(
-                f"camera {self._file} uses {name} instead of {_FOURCC}: large frames may arrive slowly"
-            )
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for the next frame; its time is the kernel's stamp or its time of arrival.
@@ -123,7 +112,7 @@ class Webcam:
             pixels = to_bgr(image) if found and image is not None else None
             if pixels is not None:
                 stamp_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-                captured_s = stamp_s if 0.0 <= arrived_s - stamp_s <= _OLDEST_STAMP_S else arrived_s
+                captured_s = exposure_s(stamp_s, arrived_s)
                 self._count(captured_s, came_s - self._left_s)
                 self._left_s = now_s()
                 latency_s = self._params.latency_ms / 1e3
@@ -133,9 +122,8 @@ class Webcam:
         )
 
     def events(self) -> tuple[str, ...]:
-        """Return a line about another format, once."""
-        messages, self._events = tuple(self._events), []
-        return messages
+        """Return no events: a webcam has none."""
+        return ()
 
     def close(self) -> None:
         """Free the camera; safe to call twice."""

@@ -78,33 +78,12 @@ def _is_plugged_in(usb: Path) -> bool:
     return False
 
 
-_CURES = (
-    (("already_in_use", "already in use"), "another program uses it: close that program"),
-    (
-        ("insufficient_permissions", "permission"),
-        "access to it is denied: set up Luxonis' udev rule, and plug it in again",
-    ),
-    (
-        ("after booting", "device_not_found", "no available devices"),
-        "it did not reconnect after its start: use a USB 3 cable directly at the computer, "
-        "not a hub, and connect its power supply",
-    ),
-    (
-        ("resolution", "sensor mode", "sensor config", "unsupported size"),
-        "its sensor does not support that frame rate: set oak.rate_hz to 30",
-    ),
+START_CURE = (
+    "if another program uses it, close that program; if access is denied, set up Luxonis' udev "
+    "rule; unplug it, wait a second, plug it in with a USB 3 cable directly at the computer, not a "
+    "hub, and connect its power supply; if its sensor refuses the rate, set oak.rate_hz to 30"
 )
-"""Parts of messages, in lower case -> cause and remedy."""
-_OTHERWISE = "unplug it, wait a second, plug it in again; if another program uses it, close it"
-
-
-def start_cure(message: str) -> str:
-    """Return the remedy for an error at the start."""
-    lower = message.lower()
-    for parts, cure in _CURES:
-        if any(part in lower for part in parts):
-            return cure
-    return _OTHERWISE
+"""Remedies for an error at the start."""
 
 
 def load_depthai() -> Any:

@@ -87,11 +87,6 @@ def _stereo(dai: Any, pipeline: Any, params: OakParams, colour: Any) -> Any:
 _LEAST_FOCAL_PX = 10.0
 
 
-def message_names(group: Any) -> set[str]:
-    """Return the names of the messages in a group."""
-    return set(group.getMessageNames())
-
-
 def image_of(group: Any) -> ImageArray | None:
     """Return the colour frame of a group, None if it has none."""
     return to_bgr(group[COLOUR].getCvFrame())
@@ -99,7 +94,7 @@ def image_of(group: Any) -> ImageArray | None:
 
 def depth_of(group: Any, width_px: int, height_px: int) -> Depth | None:
     """Return the depth of a group in metres and in the size of its frame."""
-    if DEPTH not in message_names(group):
+    if DEPTH not in group.getMessageNames():
         return None
     mm = np.asarray(group[DEPTH].getFrame())
     if mm.dtype != np.uint16 or mm.ndim != 2 or not mm.size:

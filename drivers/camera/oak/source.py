@@ -2,10 +2,11 @@
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import timedelta
 from typing import Any
 
-from gazerig.drivers.camera.oak.discovery import find_oak, load_depthai, start_cure
+from gazerig.drivers.camera.oak.discovery import START_CURE, find_oak, load_depthai
 from gazerig.drivers.camera.oak.pipeline import (
     COLOUR,
     HEIGHT_PX,
@@ -18,13 +19,10 @@ from gazerig.drivers.camera.oak.pipeline import (
     lens_of,
 )
 from gazerig.drivers.camera.params import OakParams
-from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.source import Shot, exposure_s
 from gazerig.drivers.errors import CameraError
 
 _SLICE = timedelta(milliseconds=100)  # longest delay of a stop request
-# The camera's stamp in host time is used if it is not older than this and not in the future.
-_OLDEST_STAMP_S = 1.0
-
 _USB2_BYTES_S = 30e6
 """Capacity of a USB 2 line for frames."""
 _FRAME_BYTES = WIDTH_PX * HEIGHT_PX * (1.5 + 2.0)
@@ -60,7 +58,6 @@ class OakSource:
         self._device: Any = None
         self._pipeline: Any = None
         self._queue: Any = None
-        self._in_step = True
         self._number = 0
         self._events: list[str] = []
 
@@ -79,7 +76,7 @@ class OakSource:
                 # This program itself reopens a lost camera and reports it.
                 device.setMaxReconnectionAttempts(0)
                 self._device = device
-                self._prepare()
+                self._check_device()
                 self._pipeline = self._dai.Pipeline(self._device)
             else:
                 self._pipeline = self._dai.Pipeline(createImplicitDevice=False)
@@ -88,14 +85,13 @@ class OakSource:
             self._pipeline.start()
         except RuntimeError as error:
             self.close()
-            text = _one_line(error)
             raise CameraError(
-                f"the OAK camera cannot be started ({text}): {start_cure(text)}"
+                f"the OAK camera cannot be started ({_one_line(error)}): {START_CURE}"
             ) from error
         except BaseException:
             self.close()
             raise
-        self._in_step, self._number = True, 0
+        self._number = 0
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for the next frame; its time is the middle of its exposure.
@@ -129,7 +125,7 @@ class OakSource:
         return None
 
     def events(self) -> tuple[str, ...]:
-        """Return new events, one line each: USB 2 instead of 3, a clock out of step."""
+        """Return new events, one line each: USB 2 instead of 3."""
         reported, self._events = tuple(self._events), []
         return reported
 
@@ -138,30 +134,26 @@ class OakSource:
         pipeline, device = self._pipeline, self._device
         self._pipeline = self._device = self._queue = None
         # An unplugged camera raises an error from every call.
-        for end in (_create_end(pipeline), device.close if device is not None else None):
-            if end is not None:
-                try:
-                    end()
-                except RuntimeError as error:
-                    self._events.append(f"closing the OAK camera: {_one_line(error)}")
+        with suppress(RuntimeError):
+            if pipeline is not None:
+                if pipeline.isRunning():
+                    pipeline.stop()
+                # Also if the stream has ended already: the destructor would wait for the threads
+                # with the interpreter lock, which nodes written in Python need to end.
+                pipeline.wait()
+        with suppress(RuntimeError):
+            if device is not None:
+                device.close()
 
     def __del__(self) -> None:
         """Close a camera that was not closed: the SDK's own destructor would wait forever."""
         self.close()
 
-    def _prepare(self) -> None:
-        """Check the device's cameras and USB speed."""
-        self._check_cameras()
-        speed = self._device.getUsbSpeed()
-        slow = (self._dai.UsbSpeed.LOW, self._dai.UsbSpeed.FULL, self._dai.UsbSpeed.HIGH)
-        if speed in slow and _FRAME_BYTES * self._params.rate_hz > _USB2_BYTES_S:
-            self._events.append(_usb2_text(self._params, speed.name))
-
-    def _check_cameras(self) -> None:
-        """Check that the device has a colour camera and a stereo pair.
+    def _check_device(self) -> None:
+        """Check that the device has a colour camera and a stereo pair, and its USB speed.
 
         Raises:
-            CameraError: it has not.
+            CameraError: a camera is missing.
         """
         socket, found = self._dai.CameraBoardSocket, set(self._device.getConnectedCameras())
         wanted = (socket.CAM_A, socket.CAM_B, socket.CAM_C)
@@ -171,6 +163,14 @@ class OakSource:
             raise CameraError(
                 f"{name} has no camera at {missing}: use an OAK-D, with colour and a stereo pair"
             )
+        speed, bytes_s = self._device.getUsbSpeed(), _FRAME_BYTES * self._params.rate_hz
+        usb = self._dai.UsbSpeed
+        if speed in (usb.LOW, usb.FULL, usb.HIGH) and bytes_s > _USB2_BYTES_S:
+            self._events.append(
+                f"the OAK camera runs at USB 2 speed ({speed.name}), which carries about 30 MB a "
+                f"second, and {bytes_s / 1e6:.0f} are requested: use a USB 3 cable (its plug is "
+                f"often blue) and port, or set oak.rate_hz {_USB2_BYTES_S / _FRAME_BYTES:.0f}"
+            )
 
     def _shot(self, group: Any, arrived_s: float) -> Shot | None:
         """Convert a group of messages to a frame."""
@@ -179,51 +179,13 @@ class OakSource:
             return None
         self._number += 1
         height, width = image.shape[:2]
-        captured_s = self._captured_s(group[COLOUR], arrived_s)
+        # depthai measures the offset of the clocks by round trips: no transport delay is in its
+        # stamp in host time.
+        stamp = group[COLOUR].getTimestamp(self._dai.CameraExposureOffset.MIDDLE)
+        captured_s = exposure_s(stamp.total_seconds(), arrived_s, _LATENCY_S)
         return Shot(captured_s, self._number, image, depth_of(group, width, height), lens_of(group))
-
-    def _captured_s(self, frame: Any, arrived_s: float) -> float:
-        """Return the host time of a frame's exposure.
-
-        depthai measures the offset of the clocks by round trips, so its stamp in host time contains
-        no transport delay. If the stamp is implausible, times of arrival are used.
-        """
-        stamped_s = frame.getTimestamp(self._dai.CameraExposureOffset.MIDDLE).total_seconds()
-        if 0.0 <= arrived_s - stamped_s <= _OLDEST_STAMP_S:
-            return float(stamped_s)
-        if self._in_step:
-            self._in_step = False
-            self._events.append(
-                "the OAK camera's clock is not synchronised with the host's: arrival times minus "
-                f"{1e3 * _LATENCY_S:g} ms are used"
-            )
-        return arrived_s - _LATENCY_S
-
-
-def _create_end(pipeline: Any) -> Callable[[], None] | None:
-    """Return a function that stops a pipeline and waits for its threads."""
-    if pipeline is None:
-        return None
-
-    def end() -> None:
-        if pipeline.isRunning():
-            pipeline.stop()
-        # Also if the stream has ended already: the destructor would wait for the threads with the
-        # interpreter lock, which nodes written in Python need to end.
-        pipeline.wait()
-
-    return end
 
 
 def _one_line(error: BaseException) -> str:
     """Return an error's text on one line."""
     return " ".join(str(error).split())
-
-
-def _usb2_text(params: OakParams, speed: str) -> str:
-    """Return a message about the effect of a USB 2 line on the requested frames."""
-    return (
-        f"the OAK camera runs at USB 2 speed ({speed}), which carries about 30 MB a second, and "
-        f"{_FRAME_BYTES * params.rate_hz / 1e6:.0f} are requested: use a USB 3 cable (its plug is "
-        f"often blue) and port, or set oak.rate_hz {_USB2_BYTES_S / _FRAME_BYTES:.0f}"
-    )
