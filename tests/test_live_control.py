@@ -2,76 +2,55 @@
 
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from slow_rigs import at_rate
 
-from gazerig.config.load import ConfigError, ConfigFault
-from gazerig.robot.control.track_choices import TrackInfo
-from gazerig.robot.model.clock import SimulatedClock
-from gazerig.robot.model.commands import Command
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.remote.client import connect_to_all
 from gazerig.robot.remote.live_server import LiveServer
 
-
-class Robot:
-    """A robot that accepts commands and ignores them."""
-
-    def command(self, command: Command) -> None:
-        raise ValueError("it cannot move a head")
-
-    def menus(self) -> dict[str, tuple[str, ...]]:
-        return {}
-
-    def tracks(self) -> tuple[TrackInfo, ...]:
-        return ()
-
-
-class FileOnly:
-    """Tuning whose one value is the text of a file; "wrong" in it is refused."""
-
-    def __init__(self, path: Path) -> None:
-        self.path, self.version, self.text, self.lost = path, 0, "", False
-
-    def files(self) -> Sequence[Path]:
-        if self.lost:
-            raise ConfigError([ConfigFault(str(self.path), None, "", "not now")])
-        return (self.path,)
-
-    def reload(self, path: Path) -> tuple[str, ...]:
-        text = path.read_text(encoding="utf-8")
-        if "wrong" in text:
-            rules = ("a is above 1", "b: unknown key")
-            raise ConfigError(ConfigFault(str(path), 1, "", rule) for rule in rules)
-        before, self.text = self.text, text
-        self.version += text != before
-        return (f"text = {text.strip()}",) if text != before else ()
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+RATE = "loop.rate_hz"
 
 
 class Rig:
     """A live control whose looks at its file are ours."""
 
     def __init__(self, folder: Path) -> None:
-        self.path = folder / "my.yaml"
-        self.path.write_text("first\n", encoding="utf-8")
-        self.tuning = FileOnly(self.path)
+        self.path = Path(at_rate(folder, "desk", 80.0))
+        made = assemble(load_rig(str(self.path)), RunOptions(mock=True, fast=True, scene="visitor"))
+        self.tuning = ParamStore(
+            made.live_params,
+            lambda order: made.live_params(order, 0.0),
+            str(self.path),
+            elsewhere=lambda work, *words: work(*words),
+        )
         self.said: list[str] = []
+        about = {"rig": "desk", "pid": 1}
         self.live = LiveServer(
-            Robot(),  # type: ignore[arg-type]
-            self.tuning,  # type: ignore[arg-type]
-            (ConfigError,),
-            SimulatedClock(),
-            {"rig": "my.yaml", "pid": 1},
-            self.said.append,
+            made.robot, self.tuning, (ConfigError,), made.clock, about, self.said.append
         )
 
-    def written(self, text: str) -> str:
-        """Write the file, check until it is read, and return the last message."""
-        self.path.write_text(text, encoding="utf-8")
-        for _ in range(3):
+    def look(self) -> str:
+        """Look at the file until it counts, and return the last message."""
+        for _ in range(20):
             self.live._watch.look()
         return self.said[-1]
+
+    def written(self, rate_hz: float) -> str:
+        at_rate(self.path.parent, "desk", rate_hz)
+        return self.look()
+
+    @property
+    def rate_hz(self) -> object:
+        return self.tuning.get(RATE)[RATE]
 
 
 @pytest.fixture
@@ -90,35 +69,33 @@ def rig(folder: Path) -> Iterator[Rig]:
     made.live.close()
 
 
-def test_it_listens_and_says_nothing_while_all_is_well(rig: Rig) -> None:
+def test_an_edited_file_is_read_again_and_what_changed_is_said(rig: Rig) -> None:
     (found,) = connect_to_all()
     found.close()
     assert rig.said == []
-
-
-def test_an_edited_file_is_read_again_and_what_changed_is_said(rig: Rig) -> None:
-    assert rig.written("second\n") == (
-        f"{rig.path} was edited: its values are applied\ntext = second"
+    assert rig.written(90.0) == (
+        f"{rig.path} was edited: its values are applied\n{RATE} = 90.0 (at the next start)"
     )
-    assert rig.tuning.text == "second\n"
+    assert rig.rate_hz == 90.0
 
 
 def test_a_wrong_file_is_refused_with_every_fault_and_the_next_good_one_taken(rig: Rig) -> None:
-    rig.written("second\n")
-    said = rig.written("wrong\n").splitlines()
-    assert said[0] == f"{rig.path} changed but has errors; the previous values stay:"
-    assert [line.rpartition(": ")[2] for line in said[1:]] == ["a is above 1", "unknown key"]
-    assert rig.tuning.text == "second\n"
-    assert "values are applied" in rig.written("third\n")
+    rig.written(90.0)
+    with rig.path.open("a") as file:
+        file.write("nonsense: 1\nmore: 2\n")
+    first, *faults = rig.look().splitlines()
+    assert first == f"{rig.path} changed but has errors; the previous values stay:"
+    assert len(faults) == 2 and all("unknown key" in line for line in faults)
+    assert rig.rate_hz == 90.0
+    assert "values are applied" in rig.written(100.0)
 
 
 def test_a_file_that_went_away_is_said_and_the_values_stay(rig: Rig) -> None:
-    rig.written("second\n")
+    rig.written(90.0)
     rig.path.unlink()
-    for _ in range(20):
-        rig.live._watch.look()
-    assert "the previous values stay" in rig.said[-1] and "No such file" in rig.said[-1]
-    assert rig.tuning.text == "second\n" and len(rig.said) == 2
+    rig.look()
+    assert "the previous values stay" in rig.look() and "No such file" in rig.said[-1]
+    assert rig.rate_hz == 90.0 and len(rig.said) == 2
 
 
 def test_without_a_socket_it_says_so_and_watches_the_file(folder: Path) -> None:
@@ -127,6 +104,6 @@ def test_without_a_socket_it_says_so_and_watches_the_file(folder: Path) -> None:
     rig.live.open()
     try:
         assert rig.said[0].startswith("gazerig ctl set and stop cannot find this rig: ")
-        assert "values are applied" in rig.written("second\n")
+        assert "values are applied" in rig.written(90.0)
     finally:
         rig.live.close()
