@@ -5,10 +5,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from desk import GAZE_JOINTS
+from fakes.runs import simulated
 
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import CommandReply
@@ -33,6 +32,7 @@ class Running:
             lambda s: "seconds" if s >= seconds else None,
             self.ticks.append,
         )
+        assert self.count.stopped_by == "seconds"
         return self.ticks[began:]
 
     def do(self, command: Command, seconds: float = 0.006) -> tuple[CommandReply, list[Tick]]:
@@ -51,9 +51,7 @@ class Running:
 @contextmanager
 def running_desk() -> Iterator[Running]:
     """Run a desk rig face to face with a person, for two seconds as yet."""
-    made = assemble(
-        load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, scene="face-to-face")
-    )
+    made = simulated(scene="face-to-face", seed=3)
     made.robot.start(made.clock)
     try:
         running = Running(made)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from gazerig.config.schema import Rig
     from gazerig.robot.app.assemble import Assembly
+    from gazerig.sim_mock.device import Device
+    from gazerig.sim_mock.devices import Emulated
 
 # The same examples every time; HYPOTHESIS_PROFILE=search draws others. A busy machine is no fault.
 settings.register_profile("steady", derandomize=True, deadline=None)
@@ -105,6 +107,22 @@ def small_disk() -> Iterator[None]:
     resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, before[1]))
     yield
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.fixture
+def devices(monkeypatch: pytest.MonkeyPatch) -> "list[Device]":
+    """Return a list that gets the emulated devices behind the runs of this test."""
+    from gazerig.robot.app import run_bus
+
+    made: list[Device] = []
+    build = run_bus.build
+
+    def built(line: "Emulated", now_s: "Callable[[], float]") -> "Device":
+        made.append(build(line, now_s))
+        return made[-1]
+
+    monkeypatch.setattr(run_bus, "build", built)
+    return made
 
 
 def shipped_rig(name: str) -> "Rig":

@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 
+from fakes.runs import simulated
+
 from gazerig.config.rig import Rig
 from gazerig.config.schema import RULES, load_rig
 from gazerig.gaze.track.level import LevelParams
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Assembly
 
 
 def expressive_rig() -> Rig:
@@ -34,6 +35,6 @@ def faults(rig: Rig) -> list[str]:
 
 def started(rig: Rig | None = None) -> Assembly:
     """Return a robot of the rig that has begun, in simulated time; close it."""
-    made = assemble(rig or expressive_rig(), RunOptions(mock=True, fast=True, scene="visitor"))
+    made = simulated(rig or expressive_rig())
     made.robot.start(made.clock)
     return made

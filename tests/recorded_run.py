@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from fakes.runs import simulated
 from msgspec.structs import replace
 
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig, load_walk
 from gazerig.drivers.types import Detections
-from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.recording.recorder import Recorder
@@ -22,9 +22,8 @@ STARTED = datetime(2026, 1, 31, 23, 59, 59, 250_000, UTC)
 
 
 def assembly(recorder: Recorder | None = None) -> Assembly:
-    options = RunOptions(mock=True, fast=True, seed=7, scene="visitor")
     recorded = Substitutes(body=recorder.wrap_body) if recorder is not None else RIGS_OWN
-    return assemble(load_rig("desk"), options, recorded)
+    return simulated(seed=7, substitutes=recorded)
 
 
 def info_for(pictures_hz: float = 4.0) -> RunInfo:

@@ -2,10 +2,8 @@
 
 import pytest
 from desk import GAZE_JOINTS
+from fakes.runs import simulated
 
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.dashboard.panels.controls import TRACKS, refused_moves
 
 LIDLESS = tuple(joint for joint in GAZE_JOINTS if "lid" not in joint)
@@ -14,9 +12,8 @@ ALL = {"track": ("none", *TRACKS)}
 
 @pytest.mark.parametrize("rig", ["desk", "maker", "feetech", "expressive"])
 def test_the_shipped_rigs_can_do_all_five(rig: str) -> None:
-    described = load_rig(rig)
-    made = assemble(described, RunOptions(mock=True, fast=True, seed=0))
-    assert refused_moves(made.robot.menus(), tuple(described.joints)) == {}
+    made = simulated(rig)
+    assert refused_moves(made.robot.menus(), made.robot.body.names) == {}
     made.close()
 
 

@@ -18,12 +18,10 @@ from typing import Any
 
 import pytest
 from branch import Branch
+from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
-from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.command_handler import CommandHandler
 from gazerig.robot.control.loop import Robot, Tick
@@ -55,9 +53,7 @@ class Beat:
     """A simulated robot whose loop runs in a thread, slowly enough to leave the processor."""
 
     def __init__(self) -> None:
-        self.made = made = assemble(
-            load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor")
-        )
+        self.made = made = simulated()
         self.robot: Robot = made.robot
         self.clock = made.clock
         self.pulse = LoopMonitor(self.clock)

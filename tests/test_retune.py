@@ -9,13 +9,13 @@ import msgspec
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
+from fakes.runs import simulated, ticks
 
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.parameters import NEXT_TICK, apply_changes, parameters, value_of
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.live_params import rig_in_effect
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import AnyCommand, Jog, Resume, Stop, Tune, Value
 from gazerig.robot.model.parameter import Parameter
@@ -36,9 +36,7 @@ class Running(NamedTuple):
         return self.made.live_params.rig
 
     def go(self, count: int, dt_s: float = DT_S) -> Tick:
-        for _ in range(count):
-            self.made.clock.sleep_until(self.made.clock.now_s() + dt_s)
-            self.ticks.append(self.made.robot.tick(self.made.clock.now_s(), dt_s))
+        self.ticks.extend(ticks(self.made, count, dt_s))
         return self.ticks[-1]
 
     def tune(self, changes: dict[str, Value]) -> None:
@@ -48,7 +46,7 @@ class Running(NamedTuple):
 
 
 def started(scene: str = "visitor", rig: Rig | None = None) -> Running:
-    made = assemble(rig or load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene=scene))
+    made = simulated(rig or "desk", scene)
     goals: list[list[int]] = []
     write = made.robot.body.bus.write
 

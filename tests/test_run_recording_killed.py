@@ -11,10 +11,9 @@ from pathlib import Path
 import pytest
 from branch import Branch
 from child_processes import command
+from fakes.runs import simulated
 
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Substitutes
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
@@ -30,8 +29,7 @@ def rig(path: Path) -> None:
     recorder.open()
     assert recorder._link is not None and recorder._link._process is not None
     print(recorder._link._process.pid, flush=True)
-    options = RunOptions(mock=True, fast=True, seed=0, scene="visitor")
-    made = assemble(load_rig("desk"), options, Substitutes(body=recorder.wrap_body))
+    made = simulated(substitutes=Substitutes(body=recorder.wrap_body))
     made.robot.start(made.clock)
     wall = RealClock()
     start_s = wall.now_s()

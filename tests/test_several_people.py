@@ -7,15 +7,14 @@ from math import atan2, cos, dist, pi, sin
 import numpy as np
 import pytest
 from attention_scene import NO_STAYS
-from fakes.runs import play
+from fakes.runs import play, simulated
 from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.habituation import Habituation, HabituationParams
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app.assemble import Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Substitutes
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
@@ -58,8 +57,7 @@ def looked_at(scene: StillPeople, seconds: float, seed: int) -> np.ndarray:
 
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=50.0))
-    options = RunOptions(mock=True, fast=True, seed=seed, scene="visitor", bus="ideal")
-    made = assemble(rig, options, Substitutes(camera=before))
+    made = simulated(rig, seed=seed, substitutes=Substitutes(camera=before), bus="ideal")
     ticks: list[Tick] = []
     play(made, seconds, ticks.append)
     places = [person.p_world_face_m for person in scene.people(0.0)]

@@ -6,15 +6,14 @@ from math import radians
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
-from fakes.runs import play
+from fakes.runs import play, simulated
 from msgspec.structs import replace
 from page_feed import STATE
 from six_joints import SIX
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, snapshot
 from gazerig.robot.model.types import SeenBlink, SeenSaccade, Snapshot
@@ -29,7 +28,7 @@ TICKS_BETWEEN = 8
 def visit(name: str = "desk", last_s: float = 8.0) -> tuple[Rig, Assembly, tuple[Tick, ...]]:
     """Some seconds of a rig that talks with a person."""
     rig = load_rig(name)
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="face-to-face"))
+    made = simulated(rig, "face-to-face")
     ticks: list[Tick] = []
     play(made, last_s, ticks.append)
     return rig, made, tuple(ticks)

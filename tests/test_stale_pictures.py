@@ -8,7 +8,7 @@ from math import degrees, radians
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
-from fakes.runs import play
+from fakes.runs import play, simulated
 from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import Rig, load_rig
@@ -18,8 +18,7 @@ from gazerig.gaze.attention.attention import STALE_S
 from gazerig.gaze.attention.idle import SEARCH_S
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app import run_rig
-from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Substitutes
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.safety.guard import FRAME_TIMEOUT_S
 from gazerig.sim_mock.scenes.scene import ScenePerson
@@ -85,10 +84,9 @@ def watched(scene: Passer) -> tuple[Rig, list[Tick]]:
     """Run the rig before a scene, its camera unplugged for a while."""
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
-    options = RunOptions(mock=True, fast=True, seed=3, scene=scene.name)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run_rig, "load_scene", lambda name, seed: scene)
-        made: Assembly = assemble(rig, options, Substitutes(camera=Unplugged))
+        made = simulated(rig, scene.name, 3, Substitutes(camera=Unplugged))
     ticks: list[Tick] = []
     play(made, END_S, ticks.append)
     return rig, ticks

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
 from gazerig.config.parameters import values
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.model.commands import Command, Tune
 
@@ -32,7 +31,7 @@ class Bench:
 
     def __init__(self, name: str, character: str | None = None, **chosen: Any) -> None:
         rig = load_rig(name, character)
-        self.made: Assembly = assemble(rig, RunOptions(True, True, 0, "visitor", **chosen))
+        self.made = simulated(rig, **chosen)
         self.orders: list[Command] = []
         self.tuning = ParamStore(
             self.made.live_params, self.take, name, character, now=lambda: NOW, elsewhere=here

@@ -10,7 +10,6 @@ from attack.ways_out import attack, bench
 from branch import Branch, gazerig
 from features_there import skip_without
 
-import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, SetupError
 from gazerig.robot.app import session
@@ -22,7 +21,6 @@ from gazerig.robot.control.interrupts import SAME_REQUEST_S, Interrupts
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.power_down import PowerDown
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import build
 
 # --- the door alone
 
@@ -191,19 +189,6 @@ def test_handlers_are_put_back_and_nohup_is_heeded() -> None:
 
 
 # --- runs in simulated time, on emulated servos that are read afterwards
-
-
-@pytest.fixture
-def devices(monkeypatch: pytest.MonkeyPatch) -> list[Device]:
-    """Return the devices behind the runs of this test."""
-    made: list[Device] = []
-
-    def built(*words: Any) -> Device:
-        made.append(build(*words))
-        return made[-1]
-
-    monkeypatch.setattr(run_bus, "build", built)
-    return made
 
 
 def on(device: Device) -> int:

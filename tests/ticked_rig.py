@@ -6,6 +6,7 @@ from math import degrees
 import msgspec
 import pytest
 from expressive_rig import started
+from fakes.runs import ticks
 from typer.testing import CliRunner
 
 from gazerig.robot.app.assemble import Assembly
@@ -38,9 +39,7 @@ class TickedRig:
         return ticket
 
     def tick(self, number: int = 1) -> dict[str, float]:
-        for _ in range(number):
-            self.made.clock.sleep_until(self.made.clock.now_s() + 0.005)
-            tick = self.made.robot.tick(self.made.clock.now_s(), 0.005)
+        for tick in ticks(self.made, number):
             self.pulse.update(tick)
         return dict(zip(self.made.robot.body.names, map(degrees, tick.desired_rad), strict=True))
 

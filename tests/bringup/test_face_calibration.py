@@ -5,6 +5,7 @@ from math import degrees, dist, radians
 from typing import Any, get_args
 
 import pytest
+from fakes.runs import simulated
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -31,8 +32,7 @@ from gazerig.gaze.angles import add, angle_between, compose, rotate, rotation, s
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles3, Bodies, Face, Percept, Target, Vec3
-from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Assembly, Substitutes
 from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
@@ -174,8 +174,8 @@ def steered(desk_rig: Rig) -> FaceSteering:
 
 @pytest.fixture
 def made(steered: FaceSteering, desk_rig: Rig) -> Iterator[Assembly]:
-    options = RunOptions(mock=True, fast=True, seed=1, scene="sits-still")
-    found = assemble(exact_gaze(desk_rig), options, Substitutes(chooser=lambda own: steered))
+    own = Substitutes(chooser=lambda own: steered)
+    found = simulated(exact_gaze(desk_rig), "sits-still", 1, own)
     yield found
     found.close()
 

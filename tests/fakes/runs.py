@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from gazerig.config.schema import Rig
-from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_info
 from gazerig.robot.app.session import shut_down
@@ -13,6 +14,18 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording.recorder import Recorder
 
 VISIT = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
+
+
+def simulated(
+    rig: Rig | str = "desk",
+    scene: str = "visitor",
+    seed: int = 0,
+    substitutes: Substitutes = RIGS_OWN,
+    **options: Any,
+) -> Assembly:
+    """Return a robot in simulated time that has not begun; options: others of RunOptions."""
+    found = RunOptions(mock=True, fast=True, seed=seed, scene=scene, **options)
+    return assemble(load_rig(rig) if isinstance(rig, str) else rig, found, substitutes)
 
 
 def ticks(made: Assembly, number: int, dt_s: float = 0.005) -> list[Tick]:

@@ -32,7 +32,7 @@ from gazerig.features.lab.simulated_run import simulate  # noqa: E402
 BEGIN_S = 3.0
 """So long the head straightens up slowly: rows of a measured run begin after it."""
 
-_EYES = ("left_eye_pan", "left_eye_tilt", "right_eye_pan", "right_eye_tilt")
+_EYES = ("left_eye_pan", "left_eye_tilt"), ("right_eye_pan", "right_eye_tilt")
 _NECK = ("neck_yaw", "neck_pitch", "neck_roll")
 _LONGEST_EXTRAPOLATED_S = 0.3
 
@@ -43,8 +43,7 @@ class MeasuredRun:
 
     t_s: (n,) seconds since the run's beginning; the first ``BEGIN_S`` are left out
     gaze_deg: (n, 2) measured gaze in space, the mean of both eyes on the head
-    eyes_deg, eyes_goal_deg: (n, 2, 2) left and right eye in the head, measured; as commanded, after
-        the guard
+    eyes_goal_deg: (n, 2, 2) left and right eye in the head, as commanded, after the guard
     head_deg, head_goal_deg: (n, 3) yaw, pitch, roll of the neck, measured; as commanded
     plan_deg: (n, 2) direction of the planned gaze point from the head
     lids_goal: (n, 2) planned opening of left and right upper lid, 0 shut .. 1 open
@@ -61,7 +60,6 @@ class MeasuredRun:
 
     t_s: np.ndarray
     gaze_deg: np.ndarray
-    eyes_deg: np.ndarray
     head_deg: np.ndarray
     eyes_goal_deg: np.ndarray
     head_goal_deg: np.ndarray
@@ -164,77 +162,60 @@ def _run(
 
 
 class _Columns:
-    """Gathers ticks as columns."""
+    """Gathers ticks as columns, by the names of ``MeasuredRun``; angles in rad as yet."""
 
     def __init__(self) -> None:
         self._rows: defaultdict[str, list[Any]] = defaultdict(list)
         self._angles = GazeAnglesBuilder()
-        self._at: tuple[list[int], list[int]] | None = None
-        self._start_s = nan
+        self._start_s: float | None = None
 
     def update(self, tick: Tick) -> None:
         """Add a tick."""
         self._angles.update(tick)
-        if self._at is None:
+        if self._start_s is None:
             self._start_s = tick.t_s
-            names = tick.guard_result.joints
-            self._at = [names.index(n) for n in _EYES], [names.index(n) for n in _NECK]
         t_s = tick.t_s - self._start_s
         if t_s < BEGIN_S:
             return
-        rows, pose, target, gaze = self._rows, tick.pose, tick.target, tick.gaze
-        eyes, neck = self._at
+        pose, target, gaze = tick.pose, tick.target, tick.gaze
+        at = tick.guard_result.joints.index
         measured, commanded = tick.joints.position_rad, tick.guard_result.command_rad
         since_s = min(max(0.0, tick.t_s - target.at_s), _LONGEST_EXTRAPOLATED_S)
         point = add(target.p_world_m, scale(target.v_world_m_s, since_s))
-        rows["t_s"].append(t_s)
-        rows["clock_s"].append(tick.t_s)
-        rows["eyes"].append([measured[i] for i in eyes])
-        rows["neck"].append([measured[i] for i in neck])
-        rows["eyes_goal"].append([commanded[i] for i in eyes])
-        rows["neck_goal"].append([commanded[i] for i in neck])
-        rows["plan"].append(yaw_pitch(sub(gaze.gaze_point_world_m, pose.p_world_head_m)))
-        rows["lids_goal"].append((gaze.lid_left, gaze.lid_right))
-        rows["phase"].append(gaze.phase)
-        rows["counts"].append((gaze.blink, gaze.saccades, gaze.blinks, target.shift))
-        rows["target_m"].append(point)
-        rows["target"].append(yaw_pitch(sub(point, pose.p_world_head_m)))
-        rows["name"].append(target_text(target))
-        rows["part"].append(target.part or "")
-        rows["head_m"].append(pose.p_world_head_m)
+        row = {
+            "t_s": t_s,
+            "clock_s": tick.t_s,
+            "eyes_goal_deg": [[commanded[at(name)] for name in eye] for eye in _EYES],
+            "head_deg": [measured[at(name)] for name in _NECK],
+            "head_goal_deg": [commanded[at(name)] for name in _NECK],
+            "plan_deg": yaw_pitch(sub(gaze.gaze_point_world_m, pose.p_world_head_m)),
+            "lids_goal": (gaze.lid_left, gaze.lid_right),
+            "phase": gaze.phase,
+            "blink": gaze.blink,
+            "saccades": gaze.saccades,
+            "blinks": gaze.blinks,
+            "shift": target.shift,
+            "target_m": point,
+            "target_deg": yaw_pitch(sub(point, pose.p_world_head_m)),
+            "target_name": target_text(target),
+            "part": target.part or "",
+            "head_m": pose.p_world_head_m,
+        }
+        for name, value in row.items():
+            self._rows[name].append(value)
 
     def gathered(self, scene: Scene, trace: GazeTrace) -> MeasuredRun:
         """Return the columns."""
-        rows, angles = self._rows, self._angles.trace()
-        eyes, eyes_goal = (
-            np.degrees(np.array(rows[name])).reshape(-1, 2, 2) for name in ("eyes", "eyes_goal")
-        )
-        head, head_goal, plan, target = (
-            np.degrees(np.array(rows[name])) for name in ("neck", "neck_goal", "plan", "target")
-        )
-        blink, saccades, blinks, shift = np.array(rows["counts"]).T
+        angles = self._angles.trace()
+        columns: dict[str, Any] = {name: np.array(rows) for name, rows in self._rows.items()}
+        for name in [name for name in columns if name.endswith("_deg")]:
+            columns[name] = np.degrees(columns[name])
         return MeasuredRun(
-            t_s=np.array(rows["t_s"]),
-            gaze_deg=angles.cyclopean_deg[-len(rows["t_s"]) :],
-            eyes_deg=eyes,
-            head_deg=head,
-            eyes_goal_deg=eyes_goal,
-            head_goal_deg=head_goal,
-            plan_deg=plan,
-            lids_goal=np.array(rows["lids_goal"]),
-            phase=np.array(rows["phase"]),
-            blink=blink > 0,
-            saccades=saccades,
-            blinks=blinks,
-            target_m=np.array(rows["target_m"]),
-            target_deg=target,
-            shift=shift,
-            target_name=np.array(rows["name"]),
-            part=np.array(rows["part"]),
-            head_m=np.array(rows["head_m"]),
-            truth=_truth(scene, rows["clock_s"]),
+            gaze_deg=angles.cyclopean_deg[-len(columns["t_s"]) :],
+            truth=_truth(scene, columns.pop("clock_s").tolist()),
             angles=angles,
             trace=trace,
+            **columns,
         )
 
 
