@@ -89,8 +89,8 @@ def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
     plane = (points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px)
     if i.has_distortion and len(points):
         plane = _undistort(plane, i.distortion)
-    found = np.ones((len(points), 3))
-    found[:, :2] = plane
+    found = np.empty((len(points), 3))
+    found[:, :2], found[:, 2] = plane, 1.0
     return found
 
 

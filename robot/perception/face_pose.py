@@ -166,7 +166,6 @@ def _fit_face(seen: Points, noise: float) -> tuple[Mat3, Vec3, float] | None:
     mouth = sqrt(variance / (variance + (_MOUTH_HEIGHT_OF_EYES * eyes) ** 2))
     weights = 1.0, 1.0, 1.0, mouth, mouth
     pitch, yaw, long = variance * _PITCH_INFO, variance * _YAW_INFO, variance * _LENGTH_INFO
-    prior = np.diag([pitch, yaw, 0.0, 0.0, 0.0, 0.0, long])
     # The nose projects from the plane of eyes and mouth: its image position shows the turn.
     aside, below = nose[0] - 0.25 * (ax + bx + cx + ex), nose[1] - 0.25 * (ay + by + cy + ey)
     per_rad = _NOSE_OUT_M / away_m
@@ -183,14 +182,18 @@ def _fit_face(seen: Points, noise: float) -> tuple[Mat3, Vec3, float] | None:
     p, length, wider, before = (nose[0] * z, nose[1] * z, z), 1.0, 0.0, 0.1
     R, frontal = turn_about(unit(turn), norm(turn)), _FRONTAL_M
     for _ in range(_MOST_STEPS):
-        rows = np.array(_rows(seen, weights, frontal, R, p, length))
+        rows = np.array(_rows(seen, weights, frontal, R, p, length)).reshape(-1, 8)
         normal = rows.T @ rows
         # A rotation vector moves with a small turn by that turn and half its product with the
         # vector.
         held = pitch * turn[0], yaw * turn[1], 0.0
         pull = add(held, scale(cross(turn, held), 0.5))
-        wanted = normal[:7, 7] - (*pull, 0.0, 0.0, 0.0, long * (length - 1.0))
-        step = np.linalg.solve(normal[:7, :7] + prior, wanted).tolist()
+        normal[0, 0] += pitch
+        normal[1, 1] += yaw
+        normal[6, 6] += long
+        normal[:3, 7] -= pull
+        normal[6, 7] -= long * (length - 1.0)
+        step = np.linalg.solve(normal[:7, :7], normal[:7, 7]).tolist()
         w = step[0], step[1], step[2]
         turn = add(turn, sub(w, scale(cross(turn, w), 0.5)))
         R, p, length = (
@@ -222,34 +225,30 @@ def _rows(
     R: Mat3,
     p_m: Vec3,
     length: float,
-) -> list[tuple[float, ...]]:
+) -> list[float]:
     """Return the motion of each image coordinate per step, and its error: ten rows of 7 + 1.
 
     A step is a small turn w, which moves a point P by w x P, a shift, and a growth of the length.
     The rows of the heights are multiplied by their weights.
     """
-    rows: list[tuple[float, ...]] = []
+    rows: list[float] = []
     (_, r01, _), (_, r11, _), (_, r21, _) = R
     for (x, y, z), (x_seen, y_seen), weight in zip(frontal, seen, weights, strict=True):
         X, Y, Z = rotate(R, (x, length * y, z))
         q = 1.0 / (Z + p_m[2])
         u, v = (X + p_m[0]) * q, (Y + p_m[1]) * q
-        rows.append(
-            (
-                -u * Y * q,
-                (Z + u * X) * q,
-                -Y * q,
-                q,
-                0.0,
-                -u * q,
-                y * (r01 - u * r21) * q,
-                x_seen - u,
-            )
+        rows += (
+            -u * Y * q,
+            (Z + u * X) * q,
+            -Y * q,
+            q,
+            0.0,
+            -u * q,
+            y * (r01 - u * r21) * q,
+            x_seen - u,
         )
         off, q = weight * (y_seen - v), weight * q
-        rows.append(
-            ((-Z - v * Y) * q, v * X * q, X * q, 0.0, q, -v * q, y * (r11 - v * r21) * q, off)
-        )
+        rows += ((-Z - v * Y) * q, v * X * q, X * q, 0.0, q, -v * q, y * (r11 - v * r21) * q, off)
     return rows
 
 
