@@ -94,11 +94,9 @@ class DynamixelChain(ServoChain):
         parts[-1] += before
         if not faulty:
             parts = [b"".join(parts)]
-        waits_s = [wait_s, *[0.0] * len(parts)]
-        return [
-            Piece(read[0], part, self._end, wait_s)
-            for read, part, wait_s in zip(reads, parts, waits_s, strict=False)
-        ]
+        first = Piece(reads[0][0], parts[0], self._end, wait_s)
+        rest = zip(reads[1:], parts[1:], strict=False)
+        return [first, *[Piece(read[0], part, self._end) for read, part in rest]]
 
 
 build_dynamixel = DynamixelChain.build

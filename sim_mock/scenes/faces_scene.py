@@ -186,9 +186,9 @@ class FacesScene:
             if one.act.do == "look_at" and one.start_s <= phase_s:
                 last_s, last, before = one.start_s, one.act.to, last
         yaw, pitch = self._facing(name, last, phase_s, faces)
-        if before:
+        if before and phase_s < last_s + _TURN_S:
             old_yaw, old_pitch = self._facing(name, before, phase_s, faces)
-            share = min_jerk(min(1.0, (phase_s - last_s) / _TURN_S))
+            share = min_jerk((phase_s - last_s) / _TURN_S)
             yaw = old_yaw + share * wrap(yaw - old_yaw)
             pitch = old_pitch + share * (pitch - old_pitch)
         turn, nod = _position_after_moves((0.0, 0.0), self._glances[name], phase_s)
@@ -213,10 +213,9 @@ class FacesScene:
         person, phase_s = self._script.people[name], t_s % self.round_s
         wave = person.wave
         for one in self._acts[name]:
-            since_s = phase_s - one.start_s
-            inside_s = min(since_s, one.end_s - phase_s)
-            if one.act.do == "wave" and not person.gloves and inside_s >= 0.0:
-                up = min(1.0, inside_s / wave.raise_s)
+            if one.act.do == "wave" and one.start_s <= phase_s <= one.end_s and not person.gloves:
+                since_s = phase_s - one.start_s
+                up = min(1.0, min(since_s, one.end_s - phase_s) / wave.raise_s)
                 up = min_jerk(up) if wave.smooth else up
                 swing = wave.swing_m * sin(2 * pi * _WAVES_HZ * since_s) * up
                 aside = _SIDES[one.act.side] * wave.aside_m + swing
