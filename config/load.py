@@ -21,22 +21,13 @@ from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import SHIPPED, is_path
 from gazerig.config.shipped_files import shipped_names as shipped_names
 from gazerig.config.validation import fault_at, fill, suggestion_text, validate
-from gazerig.drivers.plugins import RIGS, TRACKS, yaml_files
 from gazerig.params import Declaration, declarations
 
 T = TypeVar("T")
-_GROUPS = {"rigs": RIGS, "tracks": TRACKS}
-"""Kinds of files that packages can provide too."""
-
-
-RIGS_FOLDER, TRACKS_FOLDER = SHIPPED / "rigs", SHIPPED / "tracks"
-"""Folders that this package registers in the groups of rigs and tracks."""
-
-
 _FILES = re.compile(r"\.track_files\.\d+|\.meshes\..*\.file")
 """Keys of a rig with file paths, relative to the folder of the file that contains them."""
 _PATH = re.compile(r"[^~]*[./]")
-"""Start of a path to resolve; a name alone selects a track of a package."""
+"""Start of a path to resolve; a name alone selects a shipped track."""
 Check = Callable[[T], Iterable[tuple[str, str]]]
 """Returns (dotted key path, broken rule) for rules between several fields."""
 
@@ -119,22 +110,18 @@ def shipped_path(kind: str, name: str, home: Path | None = None) -> Path:
     """Return the path of a file by name, e.g. ``shipped_path("rigs", "desk")``.
 
     Args:
-        kind: Kind of the file; rigs and tracks of other packages have names too.
+        kind: Kind of the file.
         name: Name of the file, without its extension.
         home: Folder of kinds, e.g. that of a feature; None: ``SHIPPED``.
 
     Raises:
-        ConfigError: no file has this name, or a package cannot be imported; lists the existing
-            names.
+        ConfigError: no file has this name; lists the existing names.
     """
     names = shipped_names(kind, home)
     if name in names:
         return (home or SHIPPED) / kind / f"{name}.yaml"
-    files = yaml_files(_GROUPS[kind]) if kind in _GROUPS else {}
-    if name in files:
-        return files[name][0]
-    known = ", ".join((*names, *files)) or "none"
-    hint = suggestion_text(name, (*names, *files)) or ";"
+    known = ", ".join(names) or "none"
+    hint = suggestion_text(name, names) or ";"
     rule = f"nothing named {name!r} is shipped{hint} available: {known}"
     raise ConfigError([ConfigFault(f"config/{kind}", None, "", rule)])
 

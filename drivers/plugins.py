@@ -12,7 +12,6 @@ from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
 from operator import attrgetter
-from pathlib import Path
 from traceback import walk_tb
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from gazerig.drivers.serial.port import BusPort
 
 BUS, CAMERA, DETECTOR = "gazerig.bus", "gazerig.camera", "gazerig.detector"
-ATTENTION, TRACKS, RIGS = "gazerig.attention", "gazerig.tracks", "gazerig.rigs"
+ATTENTION = "gazerig.attention"
 COMMAND, PAGE_PANEL = "gazerig.command", "gazerig.page_panel"
 SURROUNDINGS, DOOR = "gazerig.surroundings", "gazerig.door"
 GROUPS: Mapping[str, str] = {
@@ -31,8 +30,6 @@ GROUPS: Mapping[str, str] = {
     CAMERA: "camera",
     DETECTOR: "detector",
     ATTENTION: "attention",
-    TRACKS: "tracks",
-    RIGS: "rigs",
     COMMAND: "command",
     SURROUNDINGS: "surroundings",
     PAGE_PANEL: "page panel",
@@ -55,8 +52,6 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "auto": "gazerig.drivers.vision.face.detector:AUTO",
     },
     ATTENTION: {"attention": "gazerig.gaze.attention.attention:Attention"},
-    TRACKS: {"gazerig": "gazerig.config.load:TRACKS_FOLDER"},
-    RIGS: {"gazerig": "gazerig.config.load:RIGS_FOLDER"},
     COMMAND: {
         "report": "gazerig.features.lab.commands:REPORT",
         "sweep": "gazerig.features.lab.commands:SWEEP",
@@ -83,8 +78,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
 }
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 
-Tracks and rigs are folders of YAML files: a module of that folder, or its path. A command is a
-``gazerig.robot.cli.command_list.CommandEntry``, surroundings a subclass of
+A command is a ``gazerig.robot.cli.command_list.CommandEntry``, surroundings a subclass of
 ``gazerig.robot.app.surroundings.Surroundings``, a door a ``gazerig.doors.door.Door``.
 """
 
@@ -247,10 +241,7 @@ def plugin_error(error: BaseException) -> PluginError | None:
 def registrations(group: str) -> tuple[Registration, ...]:
     """Return all parts of a group: ours, then those of packages by package and name."""
     return (
-        *(
-            Registration(group, name, value, OUR_PACKAGE, _version())
-            for name, value in SHIPPED[group].items()
-        ),
+        *(Registration(group, name, value, OUR_PACKAGE) for name, value in SHIPPED[group].items()),
         *_package_parts(group, tuple(sys.path)),
     )
 
@@ -306,34 +297,6 @@ def _load_cached(found: Registration) -> object:
     return found.load()
 
 
-def yaml_files(group: str) -> dict[str, tuple[Path, Registration]]:
-    """Return the YAML files of other packages: name -> file and the part that includes it.
-
-    Of two files with one name the first is used; ``name_conflicts`` does not report the other.
-
-    Raises:
-        PluginError: a package cannot be imported or does not name a folder.
-    """
-    files: dict[str, tuple[Path, Registration]] = {}
-    for one in _package_parts(group, tuple(sys.path)):
-        for file in sorted(folder_of(one).glob("*.yaml")):
-            files.setdefault(file.stem, (file, one))
-    return files
-
-
-def folder_of(found: Registration) -> Path:
-    """Return the folder of YAML files that a part of tracks or rigs names.
-
-    Raises:
-        PluginError: it cannot be imported or is not a folder.
-    """
-    part = found.load()
-    places = list(getattr(part, "__path__", ())) or [part]
-    if isinstance(places[0], str | Path) and (folder := Path(places[0])).is_dir():
-        return folder
-    raise PluginError(f"{found.label} is not a folder: name a folder of YAML files, or its package")
-
-
 def create(group: str, name: str, part: Plugin, params: Any) -> Any:
     """Create a part from its parameters.
 
@@ -349,16 +312,6 @@ def create(group: str, name: str, part: Plugin, params: Any) -> Any:
         raise PluginError(
             f"{find(group, name).label} cannot be created: {describe_error(error)}"
         ) from error
-
-
-@cache
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version(OUR_PACKAGE)
-    except PackageNotFoundError:  # a checkout that is not installed
-        return ""
 
 
 @cache

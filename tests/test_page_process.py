@@ -104,14 +104,14 @@ def test_close_ends_even_a_frozen_page(shared: tuple[PageProcess, str, int]) -> 
 def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None:
     with running_page() as (page, url):
         page.offer({"lids": ("wink", "blink")})
-        first, folder = page_here(), present(page._folder).path
+        first, folder = page_here(), Path(present(page._folder))
         assert first is not None and folder.exists()
         os.kill(first, signal.SIGKILL)
         words = wait_for(page.notice, "the notice")
         assert words.startswith("the page has stopped") and "started again" in words
         page.check()  # has no effect
         assert wait_for(page.url, "the page") == url  # the same port and token
-        assert not folder.exists() and present(page._folder).path.stat().st_mode & 0o077 == 0
+        assert not folder.exists() and Path(present(page._folder)).stat().st_mode & 0o077 == 0
         assert page_here() not in (None, first) and page.started == 2
         assert wait_for(page.notice, "the second notice") == f"the page is there again, at {url}"
         with Visitor(url).open("/rig/panels") as talk:

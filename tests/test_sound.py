@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 from gazerig.drivers.sound.params import SILENT_DEVICE, SoundParams
-from gazerig.drivers.sound.playback import PcmQueue, Playback, SoundEvent
+from gazerig.drivers.sound.playback import PcmQueue, Playback, PlayedSound, SoundEvent
 from gazerig.drivers.sound.player import MAX_AHEAD_S, SoundError, SoundPlayer
-from gazerig.drivers.sound.position import PlayedSound
 from gazerig.drivers.sound.sound_file import check_sound, write_wav
 from gazerig.drivers.sound.speech import MAX_CHARACTERS, speak
 from gazerig.robot.model.clock import RealClock
@@ -31,9 +30,15 @@ class Loudspeaker:
     def __init__(self) -> None:
         self.records: list[PlayedSound] = []
         self.events: list[SoundEvent] = []
-        self.playback = Playback(RATE, 1, LATENCY_S, self.records.append, self.events.append)
+        self.playback = Playback(RATE, 1, LATENCY_S, self.take)
         self.heard: list[np.ndarray] = []
         self.requests = 0
+
+    def take(self, event: PlayedSound | SoundEvent) -> None:
+        if isinstance(event, PlayedSound):
+            self.records.append(event)
+        else:
+            self.events.append(event)
 
     def run(self, seconds: float, late_s: float = 0.0) -> None:
         for _ in range(round(seconds * RATE / PERIOD)):
@@ -268,7 +273,7 @@ from gazerig.drivers.sound.player import SoundPlayer
 player = SoundPlayer("silent")
 player.prepare()
 while not player.is_open:
-    pass
+    player.events()
 print(player.pid, flush=True)
 os.kill(os.getpid(), 9)
 """

@@ -1,7 +1,7 @@
 """Process that synthesises a text with espeak-ng's library, which reports the time of each phoneme.
 
 ``python -m gazerig.drivers.sound.espeak`` reads (text, voice) and writes (rate in Hz, samples,
-phonemes) as MessagePack, an error text, or "" without a library. The library keeps global state, so
+phonemes) as MessagePack, or an error text. The library keeps global state, so
 each text has a process. The calls are those of espeak-ng's ``speak_lib.h``.
 """
 
@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-_LIBRARIES = ("libespeak-ng.so.1", "libespeak-ng.dylib")
+_LIBRARY = "libespeak-ng.so.1"
 _RETRIEVAL = 1
 _PHONEME_EVENTS, _DONT_EXIT = 0x0001, 0x8000
 _UTF8 = 1
@@ -46,7 +46,7 @@ def synthesise(text: str, voice: str) -> tuple[int, bytes, list[tuple[str, float
         OSError: the library cannot be loaded.
         ValueError: it has no such voice.
     """
-    library = _load()
+    library = ctypes.CDLL(_LIBRARY)
     rate_hz = library.espeak_Initialize(_RETRIEVAL, _BUFFER_MS, None, _PHONEME_EVENTS | _DONT_EXIT)
     if rate_hz <= 0:
         raise OSError("it finds no voices")
@@ -74,23 +74,12 @@ def synthesise(text: str, voice: str) -> tuple[int, bytes, list[tuple[str, float
     return rate_hz, bytes(samples), phonemes
 
 
-def _load() -> ctypes.CDLL:
-    for name in _LIBRARIES:
-        try:
-            return ctypes.CDLL(name)
-        except OSError:
-            continue
-    raise OSError("its library is missing")
-
-
 def main() -> None:
     """Answer one request."""
     answer: object
     try:
         answer = synthesise(*msgspec.msgpack.decode(sys.stdin.buffer.read(), type=tuple[str, str]))
-    except OSError:
-        answer = ""
-    except ValueError as error:
+    except (OSError, ValueError) as error:
         answer = str(error)
     sys.stdout.buffer.write(msgspec.msgpack.encode(answer))
 

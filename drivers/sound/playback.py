@@ -7,18 +7,48 @@ is heard after the buffers that precede it, and after the loudspeaker's own late
 
 from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
+import msgspec
 import numpy as np
-
-from gazerig.drivers.sound.position import PlayedSound
 
 WIDTH_BYTES = 2
 """Size of a sample: signed, 16 bits."""
 STALL_S = 0.1
 """Time without samples after which a stream is reported."""
 _REQUESTS = 100
-_MOST_SKIPPED = 1 << 15
+
+
+class PlayedSound(msgspec.Struct, frozen=True, tag=True):
+    """Position of the sound that is being played.
+
+    It stops at the received end, so it stands still if the device or a stream stalls.
+
+    Attributes:
+        number: Number of the sound, 0 before the first.
+        heard_s: Time at which its start is heard, monotonic s.
+        received_s: End of the part that the device has received, s since its start.
+    """
+
+    number: int = 0
+    heard_s: float = 0.0
+    received_s: float = 0.0
+
+    def position_s(self, now_s: float) -> float:
+        """Return the position that is heard at a time, seconds since the sound's start."""
+        return min(now_s - self.heard_s, self.received_s)
+
+
+class SoundEvent(msgspec.Struct, frozen=True, tag=True):
+    """Event of a sound: "started", "ended", "stalled" or "failed", with a reason.
+
+    Of the loudspeaker: "opened" or "closed".
+    """
+
+    kind: str
+    number: int
+    reason: str = ""
 
 
 class SampleSource(Protocol):
@@ -32,14 +62,6 @@ class SampleSource(Protocol):
         """Return whether no more samples will follow."""
 
 
-class SoundEvent(NamedTuple):
-    """Event of a sound: "started", "ended", "stalled" or "failed", with a reason."""
-
-    kind: str
-    number: int
-    reason: str = ""
-
-
 class PcmQueue:
     """Source of a stream: samples in the order of their arrival.
 
@@ -51,14 +73,12 @@ class PcmQueue:
 
     def __init__(self, frame_bytes: int, refill_frames: int = 0) -> None:
         self._frame_bytes, self._refill_bytes = frame_bytes, refill_frames * frame_bytes
-        self._pieces: deque[bytes] = deque()
-        self._bytes = 0
+        self._waiting = bytearray()
         self._finished = self._dry = False
 
     def add(self, pcm: bytes) -> None:
         """Add samples."""
-        self._pieces.append(pcm)
-        self._bytes += len(pcm)
+        self._waiting += pcm
 
     def finish(self) -> None:
         """Mark the end of the stream."""
@@ -67,22 +87,39 @@ class PcmQueue:
     @property
     def is_over(self) -> bool:
         """Return whether no more samples will follow."""
-        return self._finished and not self._pieces
+        return self._finished and not self._waiting
 
     def read(self, frames: int) -> bytes:
         """Return at most this number of frames, b"" if none has arrived."""
-        if self._dry and not self._finished and self._bytes < self._refill_bytes:
+        if self._dry and not self._finished and len(self._waiting) < self._refill_bytes:
             return b""
-        wanted, parts = frames * self._frame_bytes, []
-        self._dry = self._bytes < wanted
-        self._bytes -= min(wanted, self._bytes)
-        while wanted > 0 and self._pieces:
-            piece = self._pieces.popleft()
-            parts.append(piece[:wanted])
-            if len(piece) > wanted:
-                self._pieces.appendleft(piece[wanted:])
-            wanted -= len(parts[-1])
-        return b"".join(parts)
+        size = frames * self._frame_bytes
+        self._dry = len(self._waiting) < size
+        part = bytes(self._waiting[:size])
+        del self._waiting[:size]  # samples may have been added meanwhile
+        return part
+
+
+@dataclass
+class _Sound:
+    """A sound and its state.
+
+    from_s: position of its first sample; heard_s: time at which the position 0 is heard
+    skips: whether what should have been heard already is skipped; otherwise it is late
+    first: frame of the device at which the position 0 is, None before the start
+    received: frames that the device has received; missing: silent ones since the last of them
+    """
+
+    number: int
+    source: SampleSource
+    from_s: float
+    heard_s: float
+    volume: float
+    skips: bool
+    first: int | None = None
+    received: int = 0
+    missing: int = 0
+    is_stopping: bool = False
 
 
 class Playback:
@@ -92,8 +129,7 @@ class Playback:
         rate_hz: Rate of the device.
         channels: Its channels; samples are signed, 16 bits.
         latency_s: Time from a request until the requested part is heard.
-        write: Receives the record of the position.
-        report: Receives events.
+        report: Receives the position after each buffer, and events.
     """
 
     def __init__(
@@ -101,21 +137,14 @@ class Playback:
         rate_hz: int,
         channels: int,
         latency_s: float,
-        write: Callable[[PlayedSound], None],
-        report: Callable[[SoundEvent], None],
+        report: Callable[[PlayedSound | SoundEvent], None],
     ) -> None:
         self.rate_hz, self.channels = rate_hz, channels
-        self._latency_s, self._write, self._report = latency_s, write, report
+        self._latency_s, self._report = latency_s, report
         self._frame_bytes = WIDTH_BYTES * channels
         self._requested = 0
         self._zeros_s: deque[float] = deque(maxlen=_REQUESTS)
-        self._source: SampleSource | None = None
-        self._stop()
-
-    def _stop(self) -> None:
-        self._source, self._number, self._stopping = None, 0, False
-        self._begun = self._over = False
-        self._missing = 0
+        self._sound: _Sound | None = None
 
     def play(
         self,
@@ -136,20 +165,20 @@ class Playback:
             volume: Factor.
             skips: Whether what should have been heard already is skipped; otherwise it is late.
         """
-        self._stop()
-        self._number, self._volume, self._skips = number, volume, skips
-        self._from_s, self._heard_s = from_s, heard_s
-        self._received = 0
-        self._source = source
+        self._sound = _Sound(number, source, from_s, heard_s, volume, skips)
 
     @property
     def is_playing(self) -> bool:
         """Return whether a sound is played or waits for its time."""
-        return self._source is not None
+        return self._sound is not None
 
     def stop(self) -> None:
         """Stop the sound within one buffer, which fades out."""
-        self._stopping = True
+        sound = self._sound
+        if sound is not None and sound.first is None:
+            self._sound = None
+        elif sound is not None:
+            sound.is_stopping = True
 
     def fill(self, frames: int, now_s: float) -> bytes:
         """Return the samples of one buffer.
@@ -161,54 +190,42 @@ class Playback:
         self._zeros_s.append(now_s - self._requested / self.rate_hz)
         zero_s = min(self._zeros_s) + self._latency_s
         begin, self._requested = self._requested, self._requested + frames
-        if self._source is None or (self._stopping and not self._begun):
-            self._stop()
+        sound, silence = self._sound, 0
+        if sound is not None and sound.first is None:
+            early = round((sound.heard_s + sound.from_s - zero_s) * self.rate_hz) - begin
+            silence = min(frames, max(0, early))
+            if silence < frames:
+                if sound.skips and early < 0:
+                    sound.received = len(sound.source.read(-early)) // self._frame_bytes
+                sound.first = begin + silence - sound.received - round(sound.from_s * self.rate_hz)
+                self._report(SoundEvent("started", sound.number))
+        if sound is None or sound.first is None:
             return bytes(frames * self._frame_bytes)
-        silence = 0
-        if not self._begun:
-            early_s = self._heard_s + self._from_s - (zero_s + begin / self.rate_hz)
-            silence = min(frames, max(0, round(early_s * self.rate_hz)))
-            if silence == frames:
-                return bytes(frames * self._frame_bytes)
-            if self._skips:
-                self._skip(self._source, round(-early_s * self.rate_hz))
-            self._first = begin + silence - self._received - round(self._from_s * self.rate_hz)
-            self._begun = True
-            self._report(SoundEvent("started", self._number))
-        return self._mix(self._source, frames, silence, zero_s, now_s)
+        data = self._read(sound, frames - silence)
+        received_s = sound.from_s + sound.received / self.rate_hz
+        played = PlayedSound(sound.number, zero_s + sound.first / self.rate_hz, received_s)
+        self._report(played)
+        samples = np.frombuffer(data, np.int16).reshape(-1, self.channels) * sound.volume
+        if sound.is_stopping:
+            samples *= np.linspace(1.0, 0.0, len(samples))[:, None]
+            self._sound = None
+        elif sound.source.is_over and played.position_s(now_s) >= received_s:
+            self._report(SoundEvent("ended", sound.number))
+            self._sound = None
+        sounding = bytes(silence * self._frame_bytes) + samples.astype(np.int16).tobytes()
+        return sounding.ljust(frames * self._frame_bytes, b"\0")
 
-    def _skip(self, source: SampleSource, frames: int) -> None:
-        """Skip frames that should have been heard already."""
-        while frames > 0 and (part := source.read(min(frames, _MOST_SKIPPED))):
-            self._received += len(part) // self._frame_bytes
-            frames -= len(part) // self._frame_bytes
-
-    def _mix(
-        self, source: SampleSource, frames: int, silence: int, zero_s: float, now_s: float
-    ) -> bytes:
-        data = source.read(frames - silence)
+    def _read(self, sound: _Sound, frames: int) -> bytes:
+        """Return the next samples; the position waits for those of a stream that are missing."""
+        assert sound.first is not None
+        data = sound.source.read(frames)
         found = len(data) // self._frame_bytes
         if found:
-            self._first += self._missing
-            self._missing = 0
-        self._received += found
-        if found < frames - silence and source.is_over:
-            self._over = True
-        elif found < frames - silence:  # the position waits for the stream
-            self._missing += frames - silence - found
-            if self._missing >= STALL_S * self.rate_hz > self._missing - frames:
-                self._report(SoundEvent("stalled", self._number))
-        received_s = self._from_s + self._received / self.rate_hz
-        played = PlayedSound(self._number, zero_s + self._first / self.rate_hz, received_s)
-        self._write(played)
-        if self._stopping:
-            self._stop()
-        elif self._over and played.position_s(now_s) >= received_s:
-            self._report(SoundEvent("ended", self._number))
-            self._stop()
-        samples = np.frombuffer(data, np.int16).reshape(-1, self.channels).astype(np.float32)
-        samples *= self._volume
-        if self._source is None:
-            samples *= np.linspace(1.0, 0.0, len(samples), dtype=np.float32)[:, None]
-        rest = (frames - silence - found) * self._frame_bytes
-        return bytes(silence * self._frame_bytes) + samples.astype(np.int16).tobytes() + bytes(rest)
+            sound.first += sound.missing
+            sound.missing = 0
+        sound.received += found
+        if found < frames and not sound.source.is_over:
+            sound.missing += frames - found
+            if sound.missing >= STALL_S * self.rate_hz > sound.missing - frames:
+                self._report(SoundEvent("stalled", sound.number))
+        return data

@@ -1,11 +1,10 @@
 """Player of sounds in a process of its own; one sound at a time.
 
 A sound is started with the time at which its beginning is heard, so it coincides with motion from
-its first sample. The position that is really heard is read from shared memory.
+its first sample. The process reports the position that is really heard after each buffer.
 """
 
 import contextlib
-import os
 import signal
 import subprocess
 from importlib.util import find_spec
@@ -16,8 +15,7 @@ import msgspec
 from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.drivers.process import child_process
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink, create_links
-from gazerig.drivers.sound.playback import WIDTH_BYTES, SoundEvent
-from gazerig.drivers.sound.position import PlayedSound, PositionMemory, shared_file
+from gazerig.drivers.sound.playback import WIDTH_BYTES, PlayedSound, SoundEvent
 
 MAX_AHEAD_S = 2.0
 """Longest part of a stream that is stored before it is heard."""
@@ -47,21 +45,22 @@ class SoundPlayer:
 
     Args:
         device: Name of the loudspeaker, a part of it, "" for the default, or "silent".
+
+    Attributes:
+        is_open: Whether the loudspeaker is open, so that a sound begins without delay; ``events``
+            updates it.
     """
 
     def __init__(self, device: str) -> None:
         self._device = device
-        self._fd = shared_file()
-        self._memory = PositionMemory(self._fd)
+        self.is_open = False
+        self._played = PlayedSound()
         self._process: subprocess.Popen[bytes] | None = None
         self._link: MessageLink | None = None
         self._number = 0
         self._heard: tuple[int, float] = (0, -inf)
         self._rate_hz, self._frame_bytes = _RATES_HZ[0], WIDTH_BYTES
         self._fed_s = 0.0
-
-    def __del__(self) -> None:
-        os.close(self._fd)
 
     @property
     def pid(self) -> int | None:
@@ -75,11 +74,6 @@ class SoundPlayer:
             SoundError: miniaudio is missing, or the process cannot be started.
         """
         self._send("prepare")
-
-    @property
-    def is_open(self) -> bool:
-        """Return whether the loudspeaker is open, so that a sound begins without delay."""
-        return self._link is not None and self._memory.is_open
 
     def play(self, path: str, from_s: float, heard_s: float, volume: float = 1.0) -> int:
         """Play a file instead of the present sound; return its number.
@@ -165,7 +159,7 @@ class SoundPlayer:
         Returns:
             Seconds since the sound's start; it never decreases.
         """
-        played = self._memory.read() or PlayedSound()
+        played = self._played
         if played.number != self._number or not played.number:
             return None
         number, before_s = self._heard
@@ -176,7 +170,7 @@ class SoundPlayer:
         return position_s
 
     def events(self) -> tuple[SoundEvent, ...]:
-        """Return the events of the present sound since the last call."""
+        """Return the events of the present sound since the last call, and update its position."""
         found: list[SoundEvent] = []
         while self._link is not None:
             try:
@@ -189,7 +183,13 @@ class SoundPlayer:
                 found.append(SoundEvent("failed", self._number, self._end_text()))
                 self.close()
                 break
-            found.append(msgspec.msgpack.decode(message, type=SoundEvent))
+            event = msgspec.msgpack.decode(message, type=SoundEvent | PlayedSound)
+            if isinstance(event, PlayedSound):
+                self._played = event
+            elif event.kind in ("opened", "closed"):
+                self.is_open = event.kind == "opened"
+            else:
+                found.append(event)
         return tuple(one for one in found if one.number == self._number)
 
     def close(self) -> None:
@@ -203,6 +203,7 @@ class SoundPlayer:
                 self._process.kill()
                 self._process.wait()
         self._link = self._process = None
+        self.is_open = False
 
     def _send(self, *message: object) -> None:
         """Send a message; start the process if it does not run.
@@ -226,8 +227,8 @@ class SoundPlayer:
             offer = create_links(1)
             (self._link,) = offer.parent_ends
             self._process = child_process.start(
-                _MODULE, *offer.arguments, str(self._fd), self._device,
-                stderr=subprocess.DEVNULL, pass_fds=(*offer.fds, self._fd),
+                _MODULE, *offer.arguments, self._device, stderr=subprocess.DEVNULL,
+                pass_fds=offer.fds,
             )  # fmt: skip
         except OSError as error:
             self._link = None

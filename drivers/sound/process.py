@@ -1,8 +1,7 @@
-"""Process that plays sounds: ``python -m gazerig.drivers.sound.process LINK MEMORY DEVICE``.
+"""Process that plays sounds: ``python -m gazerig.drivers.sound.process LINK DEVICE``.
 
-It receives messages (MessagePack) on a link, writes its position to shared memory and sends events
-back. The device is open while a sound is played and for a moment after. The process ends with its
-program.
+It receives messages (MessagePack) on a link, and sends its position and events back. The device is
+open while a sound is played and for a moment after. The process ends with its program.
 """
 
 import os
@@ -10,6 +9,7 @@ import select
 import sys
 import time
 from collections.abc import Generator
+from contextlib import suppress
 from typing import Any
 
 import miniaudio
@@ -17,11 +17,14 @@ import msgspec
 
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink, open_link
 from gazerig.drivers.sound.params import SILENT_DEVICE
-from gazerig.drivers.sound.playback import PcmQueue, Playback, SampleSource, SoundEvent
-from gazerig.drivers.sound.position import PositionMemory
+from gazerig.drivers.sound.playback import (
+    WIDTH_BYTES,
+    PcmQueue,
+    Playback,
+    PlayedSound,
+    SoundEvent,
+)
 
-PLAY, STREAM, FEED, FINISH, STOP, PREPARE = "play", "stream", "feed", "finish", "stop", "prepare"
-"""Kinds of messages; see ``gazerig.drivers.sound.player``."""
 LONGEST_MESSAGE = 1 << 17
 FILE_FORMAT = 48000, 2
 """Rate in Hz and channels to which files are converted."""
@@ -60,101 +63,86 @@ class _FileSource:
         return b"".join(parts)
 
 
-class _Device:
-    """An open loudspeaker, and the playback that fills its buffers."""
-
-    def __init__(self, name: str, rate_hz: int, channels: int, playback: Playback) -> None:
-        self.format = rate_hz, channels
-        self.playback = playback
-        self.filled_s = time.monotonic()
-        null = name == SILENT_DEVICE
-        self._device = miniaudio.PlaybackDevice(
-            nchannels=channels,
-            sample_rate=rate_hz,
-            buffersize_msec=_PERIOD_MS,
-            callback_periods=_PERIODS,
-            device_id=None if null else _find_device(name),
-            backends=[miniaudio.Backend.NULL] if null else _real_backends(),
-            app_name="gazerig",
-        )
-        buffers = self._fill()
-        next(buffers)
-        self._device.start(buffers)
-
-    def _fill(self) -> Generator[bytes, int, None]:
-        frames = yield b""
-        while True:
-            self.filled_s = time.monotonic()
-            frames = yield self.playback.fill(frames, self.filled_s)
-
-    def close(self) -> None:
-        self._device.close()
-
-
 class _Player:
-    """The player of the process."""
+    """The player of the process, and its open loudspeaker."""
 
-    def __init__(self, link: MessageLink, memory: PositionMemory, device: str) -> None:
-        self._link, self._memory, self._name = link, memory, device
-        self._device: _Device | None = None
+    def __init__(self, link: MessageLink, device: str) -> None:
+        self._link, self._name = link, device
+        self._device: miniaudio.PlaybackDevice | None = None
+        self._playback = Playback(*FILE_FORMAT, _LATENCY_S, self._report)
         self._queue = PcmQueue(1)
         self._number = 0
-        self._used_s = time.monotonic()
+        self._used_s = self._filled_s = time.monotonic()
 
     def handle(self, message: bytes) -> None:
         """Execute a message; errors become events."""
-        kind, *values = msgspec.msgpack.decode(message)
         self._used_s = time.monotonic()
         try:
-            self._execute(kind, values)
+            self._execute(msgspec.msgpack.decode(message))
         except (miniaudio.MiniaudioError, OSError, ValueError) as error:
-            self._report(SoundEvent("failed", self._number, _error_text(error, self._name)))
+            self._fail(_error_text(error, self._name))
 
-    def _execute(self, kind: str, values: list[Any]) -> None:
-        if kind == PLAY:
-            self._number, path, from_s, heard_s, volume = values
-            self._play(_FileSource(path, from_s), *FILE_FORMAT, from_s, heard_s, volume)
-        elif kind == STREAM:
-            self._number, rate_hz, channels, heard_s, volume = values
-            self._queue = PcmQueue(2 * channels, round(_REFILL_S * rate_hz))
-            self._play(self._queue, rate_hz, channels, 0.0, heard_s, volume)
-        elif kind == FEED:
-            self._queue.add(values[0])
-        elif kind == FINISH:
-            self._queue.finish()
-        elif kind == PREPARE:
-            self._open(*FILE_FORMAT)
-        elif self._device is not None:
-            self._device.playback.stop()
+    def _execute(self, message: list[Any]) -> None:
+        match message:
+            case ["play", number, path, from_s, heard_s, volume]:
+                self._number = number
+                source = _FileSource(path, from_s)
+                self._open(*FILE_FORMAT).play(number, source, from_s, heard_s, volume)
+            case ["stream", number, rate_hz, channels, heard_s, volume]:
+                self._number = number
+                self._queue = PcmQueue(WIDTH_BYTES * channels, round(_REFILL_S * rate_hz))
+                playback = self._open(rate_hz, channels)
+                playback.play(number, self._queue, 0.0, heard_s, volume, skips=False)
+            case ["feed", pcm]:
+                self._queue.add(pcm)
+            case ["finish"]:
+                self._queue.finish()
+            case ["prepare"]:
+                self._open(*FILE_FORMAT)
+            case ["stop"]:
+                self._playback.stop()
 
-    def _play(
-        self, source: SampleSource, rate_hz: int, channels: int, from_s: float, heard_s: float,
-        volume: float,
-    ) -> None:  # fmt: skip
-        device = self._open(rate_hz, channels)
-        skips = isinstance(source, _FileSource)
-        device.playback.play(self._number, source, from_s, heard_s, volume, skips)
-
-    def _open(self, rate_hz: int, channels: int) -> _Device:
-        """Return the open device with this format."""
-        if self._device is None or self._device.format != (rate_hz, channels):
+    def _open(self, rate_hz: int, channels: int) -> Playback:
+        """Return the playback of a loudspeaker with this format, which is open."""
+        playback = self._playback
+        if self._device is None or (playback.rate_hz, playback.channels) != (rate_hz, channels):
             self._close()
-            playback = Playback(rate_hz, channels, _LATENCY_S, self._memory.write, self._report)
-            self._device = _Device(self._name, rate_hz, channels, playback)
-            self._memory.is_open = True
-        return self._device
+            self._playback = Playback(rate_hz, channels, _LATENCY_S, self._report)
+            null = self._name == SILENT_DEVICE
+            self._device = miniaudio.PlaybackDevice(
+                nchannels=channels,
+                sample_rate=rate_hz,
+                buffersize_msec=_PERIOD_MS,
+                callback_periods=_PERIODS,
+                device_id=None if null else _find_device(self._name),
+                backends=[miniaudio.Backend.NULL] if null else _real_backends(),
+                app_name="gazerig",
+            )
+            self._filled_s = time.monotonic()
+            buffers = self._fill(self._playback)
+            next(buffers)
+            self._device.start(buffers)
+        self._report(SoundEvent("opened", self._number))
+        return self._playback
+
+    def _fill(self, playback: Playback) -> Generator[bytes, int, None]:
+        frames = yield b""
+        while True:
+            self._filled_s = time.monotonic()
+            frames = yield playback.fill(frames, self._filled_s)
 
     def check(self) -> None:
         """Close an idle device, and report one that requests no more buffers."""
-        device, now_s = self._device, time.monotonic()
-        if device is None:
+        now_s = time.monotonic()
+        if self._device is None:
             return
-        if device.playback.is_playing:
+        if self._playback.is_playing:
             self._used_s = now_s
-        if now_s - device.filled_s > _LOST_S:
+        if now_s - self._filled_s > _LOST_S:
             self._close()
-            text = f"the loudspeaker {self._name or 'of the system'} has disappeared: connect it"
-            self._report(SoundEvent("failed", self._number, text))
+            self._fail(
+                f"the loudspeaker {self._name or 'of the system'} has disappeared: connect it"
+            )
         elif now_s - self._used_s > _IDLE_S:
             self._close()
 
@@ -166,14 +154,15 @@ class _Player:
     def _close(self) -> None:
         if self._device is not None:
             self._device.close()
-        self._device = None
-        self._memory.is_open = False
+            self._device = None
+            self._report(SoundEvent("closed", self._number))
 
-    def _report(self, event: SoundEvent) -> None:
-        try:
+    def _fail(self, reason: str) -> None:
+        self._report(SoundEvent("failed", self._number, reason))
+
+    def _report(self, event: SoundEvent | PlayedSound) -> None:
+        with suppress(OSError):  # the program is gone, and this process ends
             self._link.send(msgspec.msgpack.encode(event), DONT_WAIT)
-        except OSError:  # the program is gone, and this process ends
-            return
 
 
 def _real_backends() -> list[miniaudio.Backend]:
@@ -216,11 +205,11 @@ def _error_text(error: Exception, device: str) -> str:
     return str(error)
 
 
-def main(word: str, memory_fd: int, device: str) -> None:
+def main(word: str, device: str) -> None:
     """Play until the program is gone."""
     parent = os.getppid()
     link = open_link(word)
-    player = _Player(link, PositionMemory(memory_fd), device)
+    player = _Player(link, device)
     waiting = select.poll()
     waiting.register(link.fileno(), select.POLLIN)
     while os.getppid() == parent:
@@ -238,4 +227,4 @@ def main(word: str, memory_fd: int, device: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), sys.argv[3])
+    main(*sys.argv[1:])

@@ -12,7 +12,6 @@ from gazerig.drivers.sound.player import SoundError, require_miniaudio
 
 MOUTH_RATE_HZ = 16000
 """Rate at which the mouth reads a sound."""
-_PLAYED_HZ = 48000
 _MISSING_S = 0.1
 
 
@@ -22,12 +21,10 @@ class SoundInfo(NamedTuple):
     Attributes:
         path: The file.
         duration_s: Its duration, s.
-        note: Conversion for the loudspeaker, "" if there is none.
     """
 
     path: str
     duration_s: float
-    note: str = ""
 
 
 def check_sound(path: Path, longest_s: float) -> SoundInfo:
@@ -65,10 +62,7 @@ def check_sound(path: Path, longest_s: float) -> SoundInfo:
         raise SoundError(
             f"{path}: lasts {info.duration:.0f} s, more than {longest_s:.0f} s; divide it"
         )
-    note = ""
-    if info.sample_rate != _PLAYED_HZ:
-        note = f"converted from {info.sample_rate} to {_PLAYED_HZ} Hz"
-    return SoundInfo(str(path), info.duration, note)
+    return SoundInfo(str(path), info.duration)
 
 
 def _is_cut(path: Path) -> bool:

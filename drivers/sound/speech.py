@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+import tempfile
 import wave
 from pathlib import Path
 from typing import NamedTuple
@@ -9,7 +10,6 @@ from typing import NamedTuple
 import msgspec
 
 from gazerig.drivers.process import child_process
-from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.drivers.sound.params import SoundParams
 from gazerig.drivers.sound.player import SoundError
 
@@ -52,56 +52,45 @@ def speak(text: str, params: SoundParams) -> SpokenText:
             f"{program} is not installed, so texts are not spoken: {_INSTALL[program]}"
         )
     try:
-        return (
-            _espeak(found, text, params) if program == "espeak-ng" else _piper(found, text, params)
-        )
+        return _espeak(text, params) if program == "espeak-ng" else _piper(found, text, params)
     except subprocess.TimeoutExpired:
         raise SoundError(f"{program} has not finished within {_TIMEOUT_S:g} s") from None
     except (OSError, wave.Error, EOFError) as error:
         raise SoundError(f"{program} cannot speak: {error}") from None
 
 
-def _espeak(program: str, text: str, params: SoundParams) -> SpokenText:
-    """Speak with the library, which reports phonemes, otherwise with the program."""
+def _espeak(text: str, params: SoundParams) -> SpokenText:
+    """Speak with the program's library, which reports phonemes."""
     request = msgspec.msgpack.encode((text, params.voice))
     done = child_process.run(_MODULE, request, _TIMEOUT_S)
-    answer = msgspec.msgpack.decode(done.stdout) if done.returncode == 0 else ""
-    if isinstance(answer, list):
-        rate_hz, pcm, phonemes = answer
-        return SpokenText(pcm, rate_hz, tuple((name, begin_s) for name, begin_s in phonemes))
-    if answer:
-        raise SoundError(str(answer))
-    return _run([program, "--stdin", "-v", params.voice, "-w"], text)
+    answer = msgspec.msgpack.decode(done.stdout) if done.stdout else "its process has ended"
+    if not isinstance(answer, list):
+        raise SoundError(f"espeak-ng cannot speak: {answer}")
+    rate_hz, pcm, phonemes = answer
+    return SpokenText(pcm, rate_hz, tuple((name, begin_s) for name, begin_s in phonemes))
 
 
 def _piper(program: str, text: str, params: SoundParams) -> SpokenText:
-    if not params.voice.endswith(_MODEL):
-        raise SoundError("piper needs a voice: set sound.voice to the path of its .onnx file")
-    return _run([program, "--model", params.voice, "--output_file"], text.replace("\n", " "))
-
-
-def _run(words: list[str], text: str) -> SpokenText:
-    """Run a program that reads a text and writes the WAV file named by its last argument.
+    """Run piper, which reads a text and writes a WAV file.
 
     Raises:
         SoundError: it fails.
         OSError, wave.Error, EOFError: it cannot be started, or its file cannot be read.
         subprocess.TimeoutExpired: it takes too long.
     """
-    with OwnFolder("speech") as folder:
+    if not params.voice.endswith(_MODEL):
+        raise SoundError("piper needs a voice: set sound.voice to the path of its .onnx file")
+    with tempfile.TemporaryDirectory(prefix="gazerig-speech-") as folder:
         file = Path(folder, "speech.wav")
         done = subprocess.run(
-            [*words, str(file)], input=text.encode(), capture_output=True, timeout=_TIMEOUT_S,
+            [program, "--model", params.voice, "--output_file", str(file)],
+            input=text.replace("\n", " ").encode(), capture_output=True, timeout=_TIMEOUT_S,
             check=False, start_new_session=True,
         )  # fmt: skip
         if done.returncode != 0 or not file.is_file():
-            said = done.stderr.decode("utf-8", "replace").strip().splitlines()
-            raise SoundError(
-                f"{Path(words[0]).name} cannot speak: {said[-1] if said else 'no sound'}"
-            )
+            lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
+            raise SoundError(f"piper cannot speak: {lines[-1] if lines else 'no sound'}")
         with wave.open(str(file)) as spoken:
             if (spoken.getsampwidth(), spoken.getnchannels()) != (2, 1):
-                raise SoundError(
-                    f"{Path(words[0]).name} wrote another format than 16 bits, 1 channel"
-                )
+                raise SoundError("piper wrote another format than 16 bits, 1 channel")
             return SpokenText(spoken.readframes(spoken.getnframes()), spoken.getframerate(), None)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Literal, NamedTuple
 
 from msgspec import structs
@@ -18,7 +19,6 @@ from gazerig.config.rig import Rig
 from gazerig.config.save_text import params_text, track_files
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError, SetupError
-from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_summary import Summary
@@ -84,7 +84,7 @@ def rerun(
         raise SetupError(f"joints {joints}: unknown; choose recorded or emulated")
     changed = rig is not None or character is not None
     fed: Joints = "emulated" if joints == "emulated" or (joints is None and changed) else "recorded"
-    with OwnFolder("rerun") as folder:
+    with TemporaryDirectory(prefix="gazerig-rerun-") as folder:
         with_rig = _resimulation_rig(recording, rig, character, Path(folder))
         # The scene is not needed: its percepts are in the recording.
         info = recording.info

@@ -8,6 +8,8 @@ nothing is played.
 """
 
 import contextlib
+import shutil
+import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -19,7 +21,6 @@ from msgspec import structs
 
 from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import file_in_folders
-from gazerig.drivers.process.own_folder import OwnFolder, sweep
 from gazerig.drivers.sound.params import KINDS, SILENT_DEVICE
 from gazerig.drivers.sound.playback import SoundEvent
 from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
@@ -118,10 +119,8 @@ class RunVoice:
         self._over = False
         self._stream: _Stream | None = None
         self._texts = deque[Path]()
-        self._scratch: OwnFolder | None = None
+        self._scratch: Path | None = None
         self._lines = deque[str](maxlen=20)
-        if not fast:
-            sweep()  # what a killed run has said
 
     # --- speech
 
@@ -143,8 +142,6 @@ class RunVoice:
             samples = read_samples(sound).astype(np.float64)
             keys = self._mouth(samples, len(samples) / sound.duration_s)
             speech = self._speak(sound.path, sound.duration_s, keys)
-            if sound.note:
-                self._lines.append(f"{sound.path}: {sound.note}")
         else:
             said = speak(what, params)
             silent_s = _LEAD_IN_S + params.latency_ms / 1e3
@@ -220,9 +217,9 @@ class RunVoice:
         """Write samples to a file that exists until the run ends, or some texts later."""
         with self._lock:
             if self._scratch is None:
-                self._scratch = OwnFolder("voice")
+                self._scratch = Path(tempfile.mkdtemp(prefix="gazerig-voice-"))
             number = int(self._texts[-1].stem) + 1 if self._texts else 1
-            path = Path(self._scratch.path, f"{number}.wav")
+            path = Path(self._scratch, f"{number}.wav")
             self._texts.append(path)
             while len(self._texts) > _KEPT_FILES:
                 self._texts.popleft().unlink(missing_ok=True)
@@ -373,7 +370,7 @@ class RunVoice:
             if self._player is not None:
                 self._player.close()
             if self._scratch is not None:
-                self._scratch.remove()
+                shutil.rmtree(self._scratch, ignore_errors=True)
         if self._thread is not None:
             self._thread.join(1.0)
 

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from math import degrees
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
@@ -11,7 +12,6 @@ from typer.core import TyperGroup
 
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.errors import DriverError, SetupError
-from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.robot.cli import animation as cli_animation
 from gazerig.robot.cli import fault as cli_fault
 from gazerig.robot.cli import look_and_stop
@@ -257,7 +257,7 @@ def read_value(key: str, text: str) -> Any:
     Raises:
         SetupError: it is not a YAML value.
     """
-    with OwnFolder("value") as folder:
+    with TemporaryDirectory(prefix="gazerig-value-") as folder:
         file = Path(folder) / "value.yaml"
         file.write_text(f"value: {text}\n", encoding="utf-8")
         try:

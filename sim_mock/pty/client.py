@@ -2,7 +2,9 @@
 
 import json
 import pickle
+import shutil
 import subprocess
+import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -10,7 +12,6 @@ from typing import Any, Self
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
-from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.pty.server import MakeSurroundings, ServerSettings
@@ -23,7 +24,7 @@ class PtyBuses:
 
     def __init__(self) -> None:
         self._server: subprocess.Popen[bytes] | None = None
-        self._folder: OwnFolder | None = None
+        self._folder: Path | None = None
         self._asking = threading.Lock()
         self.joints: dict[str, int] = {}
         """Index of each joint in the state of the surroundings; {} without these."""
@@ -43,8 +44,7 @@ class PtyBuses:
             SetupError: the surroundings cannot be used; the message gives the reason.
             RuntimeError: the server did not start; its message is on standard error.
         """
-        self._folder = OwnFolder("servos")
-        folder = self._folder.path
+        self._folder = folder = Path(tempfile.mkdtemp(prefix="gazerig-servos-"))
         around = None if surroundings is None else surroundings(folder)
         buses = tuple(
             BusSettings(device, name, link=str(folder / f"tty{k}"))
@@ -72,7 +72,7 @@ class PtyBuses:
         """Return the folder of the terminals and of the surroundings."""
         if self._folder is None:
             raise RuntimeError("the emulated bus is not running: start it first")
-        return self._folder.path
+        return self._folder
 
     @property
     def pid(self) -> int:
@@ -112,7 +112,7 @@ class PtyBuses:
                 server.kill()
                 server.wait()
         if self._folder is not None:
-            self._folder.remove()
+            shutil.rmtree(self._folder, ignore_errors=True)
             self._folder = None
 
     def __enter__(self) -> Self:

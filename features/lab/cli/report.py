@@ -3,13 +3,13 @@
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.robot.cli.progress_bar import Steps, progress_bar
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, record_signals, say
@@ -216,7 +216,7 @@ def _load_config(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
     from gazerig.config.schema import RULES, load_walk
     from gazerig.gaze.scanpath.scanpath import Walk
 
-    with OwnFolder("report") as folder:
+    with TemporaryDirectory(prefix="gazerig-report-") as folder:
         rig_file, walk_file = Path(folder) / "recorded.yaml", Path(folder) / "walk.yaml"
         rig_file.write_text(config_yaml, encoding="utf-8")
         rig = load(rig_file, Rig, checks=RULES)

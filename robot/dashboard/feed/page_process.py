@@ -9,7 +9,9 @@ this side of the socket closes, so it never outlives the program, however the pr
 import json
 import os
 import secrets
+import shutil
 import subprocess
+import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +23,6 @@ import msgspec
 
 from gazerig.drivers.process import child_process, message_link
 from gazerig.drivers.process.message_link import MessageLink
-from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.drivers.process.passed_image import send
 from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.dashboard.requests.inbox import (
@@ -120,7 +121,7 @@ class PageProcess:
         self.started = 0
         self.gone = False
         self._errors: BinaryIO | None = None
-        self._folder: OwnFolder | None = None
+        self._folder: str | None = None
         self._url: str | None = None
         self._notices: deque[str] = deque()
         self._pending_replies: deque[bytes] = deque(maxlen=_MAX_PENDING)
@@ -138,7 +139,7 @@ class PageProcess:
         # A file: the page's messages matter only if it dies, and a pipe without a reader would fill
         # up.
         self._errors = _errors_file()
-        self._folder = OwnFolder("page")
+        self._folder = tempfile.mkdtemp(prefix="gazerig-page-")
         try:
             self._process = child_process.start(
                 "gazerig.robot.dashboard.page_main",
@@ -149,7 +150,7 @@ class PageProcess:
                 variables={
                     TOKEN_VARIABLE: self._token,
                     ONCE_VARIABLE: self._once if self.started == 0 else "",
-                    FOLDER_VARIABLE: str(self._folder.path),
+                    FOLDER_VARIABLE: self._folder,
                     COMMANDS_VARIABLE: str(self._commands() or ""),
                 },
             )
@@ -354,7 +355,7 @@ class PageProcess:
             self._errors.close()
             self._errors = None
         if self._folder is not None:
-            self._folder.remove()  # close() may have killed the process
+            shutil.rmtree(self._folder, ignore_errors=True)  # close() may have killed the process
 
 
 def _errors_file() -> BinaryIO:
