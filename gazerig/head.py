@@ -342,7 +342,7 @@ class Head(ABC):
     ) -> Order:  # fmt: skip
         """Say a sound file, a text, or a stream, with the mouth of a rig that has one.
 
-        A text needs espeak-ng or piper. A stream is heard 0.15 s after its pieces arrive; this
+        A text needs espeak-ng. A stream is heard 0.15 s after its pieces arrive; this
         method returns when its last piece has been accepted.
 
         Args:

@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from gazerig.config.faults import ConfigError
-from gazerig.drivers.sound.player import SoundError
+from gazerig.drivers.errors import SetupError
 from gazerig.errors import Error, HeadEnded, Refused
 from gazerig.head import Head, Order
 from gazerig.program_signals import SIGNALS, interrupt, is_left_waiting_for
@@ -382,5 +382,5 @@ def _raising_refused() -> Any:
     """Raise ``Refused`` when the head refuses a request."""
     try:
         yield
-    except (ConfigError, SoundError, ValueError, OSError) as error:
+    except (ConfigError, SetupError, ValueError, OSError) as error:
         raise Refused(str(error)) from None

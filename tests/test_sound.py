@@ -3,7 +3,6 @@
 import os
 import shutil
 import signal
-import stat
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gazerig.drivers.sound.params import SILENT_DEVICE, SoundParams
+from gazerig.drivers.sound import espeak
+from gazerig.drivers.sound.params import SILENT_DEVICE
 from gazerig.drivers.sound.playback import PcmQueue, Playback, PlayedSound, SoundEvent
 from gazerig.drivers.sound.player import MAX_AHEAD_S, SoundError, SoundPlayer
 from gazerig.drivers.sound.sound_file import check_sound, write_wav
@@ -163,42 +163,22 @@ needs_espeak = pytest.mark.skipif(
 
 @needs_espeak
 def test_espeak_reports_the_time_of_each_phoneme() -> None:
-    spoken = speak("a mama", SoundParams())
-    assert spoken.phonemes is not None
+    spoken = speak("a mama", "en-us")
     names = [name for name, _ in spoken.phonemes]
     times = [begin_s for _, begin_s in spoken.phonemes]
     assert names.count("m") == 2 and times == sorted(times)
     assert times[-1] <= len(spoken.pcm) / 2 / spoken.rate_hz
     with pytest.raises(SoundError, match="no voice 'xx-yy'; list them with: espeak-ng --voices"):
-        speak("a mama", SoundParams(voice="xx-yy"))
+        speak("a mama", "xx-yy")
 
 
-def test_a_missing_speech_program_and_bad_texts_are_one_message(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(SoundError, match="espeak-ng is not installed.*: apt install espeak-ng"):
-        speak("hello", SoundParams())
-    with pytest.raises(SoundError, match="piper is not installed.*: pip install piper-tts"):
-        speak("hello", SoundParams(voice="en.onnx"))
+def test_a_missing_library_and_bad_texts_are_one_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(espeak, "_LIBRARY", "none such")
+    missing = espeak.synthesise("hello", "en-us")
+    assert isinstance(missing, str) and missing.startswith("espeak-ng is not installed")
+    assert missing.endswith(": apt install espeak-ng")
     with pytest.raises(SoundError, match="at most 5000 characters, not 5001"):
-        speak("a" * (MAX_CHARACTERS + 1), SoundParams())
-
-
-def test_piper_is_run_with_its_voice_and_its_errors_are_one_line(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, folder: Path
-) -> None:
-    program = tmp_path / "piper"
-    program.write_text(
-        f'#!/bin/sh\ntest "$2" = en.onnx || {{ echo no model >&2; exit 1; }}\ncp {folder}/good.wav "$4"\n'
-    )
-    program.chmod(program.stat().st_mode | stat.S_IXUSR)
-    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
-    assert speak("hello", SoundParams(voice="en.onnx"))[1:] == (16000, None)
-    with pytest.raises(SoundError, match="piper cannot speak: no model"):
-        speak("hello", SoundParams(voice="de.onnx"))
-    with pytest.raises(SoundError, match="set sound.voice"):
-        speak("hello", SoundParams(speech="piper"))
+        speak("a" * (MAX_CHARACTERS + 1), "en-us")
 
 
 # --- the process

@@ -6,13 +6,13 @@ waits forever, and a full device accepts nothing.
 """
 
 import contextlib
-import io
 import os
 import secrets
 import shutil
+from codecs import StreamWriter, getwriter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO, TextIO
+from typing import BinaryIO
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import kind_of
@@ -73,37 +73,23 @@ def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
                 file.flush()
                 os.fsync(file.fileno())
                 if target.exists():
+                    if not force:  # created meanwhile
+                        raise SetupError(_exists_message(path))
                     shutil.copymode(target, fresh)
-                if force:
-                    os.replace(fresh, target)
-                else:
-                    try:  # unlike a rename, it never replaces a file created meanwhile
-                        os.link(fresh, target)
-                    except FileExistsError:
-                        raise SetupError(_exists_message(path)) from None
-                    except OSError:  # a file system without links
-                        if target.exists():
-                            raise SetupError(_exists_message(path)) from None
-                        os.replace(fresh, target)
+                os.replace(fresh, target)
             finally:
                 fresh.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
-def output_text(path: Path, force: bool = False) -> Iterator[TextIO]:
+def output_text(path: Path, force: bool = False) -> Iterator[StreamWriter]:
     """Yield a text file to write to, in UTF-8 and with unchanged line ends.
 
     Raises:
         SetupError: see ``output_file``.
     """
     with output_file(path, force) as raw:
-        text = io.TextIOWrapper(raw, encoding="utf-8", newline="")
-        try:
-            yield text
-            text.flush()
-        finally:
-            with contextlib.suppress(OSError, ValueError):
-                text.detach()  # ``output_file`` closes the underlying file
+        yield getwriter("utf-8")(raw)
 
 
 def write_file(path: Path, content: str | bytes, force: bool = False) -> None:

@@ -32,17 +32,19 @@ class VisibleStream:
 
     Args:
         stream: Standard output or standard error.
+        for_rich: Whether the control characters of Rich are executed.
 
     rich_proxied_file: stream for Rich, which looks for this name and colours its text itself
     """
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self.rich_proxied_file = _RichStream(stream)
+    def __init__(self, stream: TextIO, for_rich: bool = False) -> None:
+        self._stream, self._for_rich = stream, for_rich
+        self.rich_proxied_file = self if for_rich else VisibleStream(stream, True)
 
     def write(self, text: str) -> int:
         """Write a text; return its length."""
-        self._stream.write(visible(text))
+        parts = _OF_RICH.split(text) if self._for_rich else [text]
+        self._stream.write("".join([p if k % 2 else visible(p) for k, p in enumerate(parts)]))
         return len(text)
 
     def writelines(self, lines: Any) -> None:
@@ -52,19 +54,4 @@ class VisibleStream:
 
     def __getattr__(self, name: str) -> Any:
         """Return everything else of the stream."""
-        return getattr(self._stream, name)
-
-
-class _RichStream:
-    """A text stream that shows control characters other than those of Rich."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-
-    def write(self, text: str) -> int:
-        parts = _OF_RICH.split(text)
-        self._stream.write("".join([p if k % 2 else visible(p) for k, p in enumerate(parts)]))
-        return len(text)
-
-    def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)

@@ -1,8 +1,8 @@
 """Process that synthesises a text with espeak-ng's library, which reports the time of each phoneme.
 
-``python -m gazerig.drivers.sound.espeak`` reads (text, voice) and writes (rate in Hz, samples,
-phonemes) as MessagePack, or an error text. The library keeps global state, so
-each text has a process. The calls are those of espeak-ng's ``speak_lib.h``.
+``python -m gazerig.drivers.sound.espeak`` reads (text, voice) and writes a ``SpokenText`` or an
+error text as MessagePack. The library keeps global state, so each text has a process. The calls are
+those of espeak-ng's ``speak_lib.h``.
 """
 
 import ctypes
@@ -39,20 +39,32 @@ _CALLBACK = ctypes.CFUNCTYPE(
 )
 
 
-def synthesise(text: str, voice: str) -> tuple[int, bytes, list[tuple[str, float]]]:
-    """Return the rate in Hz, samples (signed, 16 bits) and phonemes with their begins in s.
+class SpokenText(msgspec.Struct):
+    """A spoken text.
 
-    Raises:
-        OSError: the library cannot be loaded.
-        ValueError: it has no such voice.
+    Attributes:
+        pcm: Samples of one channel, signed, 16 bits.
+        rate_hz: Their rate.
+        phonemes: (name, begin in s).
     """
-    library = ctypes.CDLL(_LIBRARY)
+
+    pcm: bytes
+    rate_hz: int
+    phonemes: list[tuple[str, float]]
+
+
+def synthesise(text: str, voice: str) -> SpokenText | str:
+    """Return a text as speech, or an error text."""
+    try:
+        library = ctypes.CDLL(_LIBRARY)
+    except OSError:
+        return "espeak-ng is not installed, so texts are not spoken: apt install espeak-ng"
     rate_hz = library.espeak_Initialize(_RETRIEVAL, _BUFFER_MS, None, _PHONEME_EVENTS | _DONT_EXIT)
     if rate_hz <= 0:
-        raise OSError("it finds no voices")
+        return "espeak-ng finds no voices"
     if library.espeak_SetVoiceByName(voice.encode()) != 0:
-        raise ValueError(f"no voice {voice!r}; list them with: espeak-ng --voices")
-    samples, phonemes = bytearray(), []
+        return f"no voice {voice!r}; list them with: espeak-ng --voices"
+    samples, phonemes = bytearray(), list[tuple[str, float]]()
 
     def collect(wave: Any, count: int, events: Any) -> int:
         if wave and count:
@@ -71,17 +83,13 @@ def synthesise(text: str, voice: str) -> tuple[int, bytes, list[tuple[str, float
     data = text.encode()
     library.espeak_Synth(data, len(data) + 1, 0, 1, 0, _UTF8, None, None)
     library.espeak_Synchronize()
-    return rate_hz, bytes(samples), phonemes
+    return SpokenText(bytes(samples), rate_hz, phonemes)
 
 
 def main() -> None:
     """Answer one request."""
-    answer: object
-    try:
-        answer = synthesise(*msgspec.msgpack.decode(sys.stdin.buffer.read(), type=tuple[str, str]))
-    except (OSError, ValueError) as error:
-        answer = str(error)
-    sys.stdout.buffer.write(msgspec.msgpack.encode(answer))
+    request = msgspec.msgpack.decode(sys.stdin.buffer.read(), type=tuple[str, str])
+    sys.stdout.buffer.write(msgspec.msgpack.encode(synthesise(*request)))
 
 
 if __name__ == "__main__":

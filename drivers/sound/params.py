@@ -1,7 +1,7 @@
 """Parameters of the sound."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 from gazerig.params import Bounds
 
@@ -23,7 +23,5 @@ class SoundParams:
         "delay of the loudspeaker itself, e.g. by Bluetooth; motion waits for it"] = 0.0
     folders: Annotated[tuple[str, ...],
         "folders whose sounds may be played, relative to this file; empty: this file's folder"] = ()
-    speech: Annotated[Literal["auto", "espeak-ng", "piper"],
-        "program that speaks texts; auto: piper if a voice is given as a file, otherwise espeak-ng"] = "auto"
-    voice: Annotated[str, "voice of that program: a name of espeak-ng such as en-us or de, or piper's .onnx file"] = "en-us"
+    voice: Annotated[str, "voice of espeak-ng, such as en-us or de; espeak-ng --voices lists them"] = "en-us"
     # fmt: on

@@ -7,12 +7,11 @@ its first sample. The process reports the position that is really heard after ea
 import contextlib
 import signal
 import subprocess
-from importlib.util import find_spec
 from math import inf
 
 import msgspec
 
-from gazerig.drivers.errors import SetupError, extra_hint
+from gazerig.drivers.errors import SetupError, require_package
 from gazerig.drivers.process import child_process
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink, create_links
 from gazerig.drivers.sound.playback import WIDTH_BYTES, PlayedSound, SoundEvent
@@ -27,17 +26,6 @@ _RATES_HZ = 8000, 192_000
 
 class SoundError(SetupError):
     """A sound, a loudspeaker or a speech program is missing or not usable."""
-
-
-def require_miniaudio() -> None:
-    """Check that sounds can be read and played.
-
-    Raises:
-        SoundError: miniaudio is not installed; the message contains the command.
-    """
-    if find_spec("miniaudio") is None:
-        missing = ModuleNotFoundError(name="miniaudio")
-        raise SoundError(extra_hint("miniaudio", "sound", missing))
 
 
 class SoundPlayer:
@@ -71,7 +59,7 @@ class SoundPlayer:
         """Start the process and open the loudspeaker; ``is_open`` reports when it is.
 
         Raises:
-            SoundError: miniaudio is missing, or the process cannot be started.
+            SetupError: miniaudio is missing, or the process cannot be started.
         """
         self._send("prepare")
 
@@ -86,7 +74,7 @@ class SoundPlayer:
             volume: Factor 0..1.
 
         Raises:
-            SoundError: miniaudio is missing, or the process cannot be started.
+            SetupError: miniaudio is missing, or the process cannot be started.
         """
         self._number += 1
         self._send("play", self._number, path, from_s, heard_s, volume)
@@ -102,8 +90,8 @@ class SoundPlayer:
             volume: Factor 0..1.
 
         Raises:
-            SoundError: the format is not possible, miniaudio is missing, or the process cannot be
-                started.
+            SoundError: the format is not possible.
+            SetupError: miniaudio is missing, or the process cannot be started.
         """
         check_format(rate_hz, channels)
         self._number += 1
@@ -222,7 +210,7 @@ class SoundPlayer:
             raise SoundError(self._end_text()) from None
 
     def _start(self) -> None:
-        require_miniaudio()
+        require_package("miniaudio", "sound")
         try:
             offer = create_links(1)
             (self._link,) = offer.parent_ends

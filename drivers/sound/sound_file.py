@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.errors import require_package
 from gazerig.drivers.sound.params import KINDS
-from gazerig.drivers.sound.player import SoundError, require_miniaudio
+from gazerig.drivers.sound.player import SoundError
 
 MOUTH_RATE_HZ = 16000
 """Rate at which the mouth reads a sound."""
@@ -35,9 +36,10 @@ def check_sound(path: Path, longest_s: float) -> SoundInfo:
         longest_s: Longest duration.
 
     Raises:
-        SoundError: it cannot; the message names the file and the remedy.
+        SetupError: miniaudio is missing.
+        SoundError: the file cannot be played; the message names it and the remedy.
     """
-    require_miniaudio()
+    require_package("miniaudio", "sound")
     import miniaudio
 
     if not path.is_file():

@@ -11,7 +11,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
 from gazerig.config.shipped_files import shipped_names
 from gazerig.config.tracks import tracks_of
-from gazerig.drivers.sound.player import SoundError
+from gazerig.drivers.errors import SetupError
 from gazerig.drivers.sound.sound_file import check_sound
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.attention import Attention
@@ -299,7 +299,7 @@ def _sound_s(path: str) -> float:
     """
     try:
         return check_sound(Path(path), MAX_DURATION_S).duration_s
-    except SoundError as error:
+    except SetupError as error:
         raise TrackRefused(str(error)) from None
 
 

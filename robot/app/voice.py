@@ -21,6 +21,7 @@ from msgspec import structs
 
 from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import file_in_folders
+from gazerig.drivers.errors import SetupError
 from gazerig.drivers.sound.params import KINDS, SILENT_DEVICE
 from gazerig.drivers.sound.playback import SoundEvent
 from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
@@ -133,7 +134,7 @@ class RunVoice:
 
         Raises:
             ValueError: the command is invalid.
-            SoundError: the file, the text or a program is not usable.
+            SetupError: the file, the text or a program is not usable.
         """
         command = check_command(command)
         what, params = command.what, self._rig().sound
@@ -143,10 +144,10 @@ class RunVoice:
             keys = self._mouth(samples, len(samples) / sound.duration_s)
             speech = self._speak(sound.path, sound.duration_s, keys)
         else:
-            said = speak(what, params)
+            said = speak(what, params.voice)
             silent_s = _LEAD_IN_S + params.latency_ms / 1e3
             silence = bytes(2 * round(silent_s * said.rate_hz))
-            phonemes = [(name, t_s + silent_s) for name, t_s in said.phonemes or ()]
+            phonemes = [(name, t_s + silent_s) for name, t_s in said.phonemes]
             speech = self._from_pcm(silence + said.pcm, said.rate_hz, 1, phonemes)
         self._open_loudspeaker()
         if not command.sway:
@@ -393,7 +394,7 @@ class RunVoice:
                     if self._stream is not None:
                         self._follow_stream(self._stream, player, tick, now_s)
                     self._follow_tracks(player, tick, now_s)
-                except (SoundError, OSError) as error:
+                except (SetupError, OSError) as error:
                     self._fail(str(error), tick)
 
     def _handle_event(self, event: SoundEvent, tick: Tick | None) -> None:
