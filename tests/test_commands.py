@@ -1,21 +1,32 @@
 """Commands to a running robot: checked, executed at the next tick, and safe."""
 
 from math import degrees, inf, nan, pi, radians
+from typing import Any
 
 import msgspec
 import pytest
 from commanded_robot import YAW, Running
 
 from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
 from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_text import head_activity, tick_control_source
+from gazerig.robot.dashboard.feed.snapshot import snapshot
+from gazerig.robot.dashboard.panels.attention_panel import salience_bars, target_text
+from gazerig.robot.dashboard.panels.servo_health import health_table
+from gazerig.robot.model.client_control import ARRIVED_RAD
 from gazerig.robot.model.commands import (
     AnyCommand,
     Ask,
     Command,
     Jog,
     LookAt,
+    LookAtDirection,
+    LookAtInHead,
+    LookAtPerson,
+    LookAtPixel,
     Renew,
     Resume,
     Say,
@@ -25,7 +36,9 @@ from gazerig.robot.model.commands import (
     Tune,
     check_command,
 )
+from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlSource, control_sentence
 from gazerig.robot.model.requests import read_request
+from gazerig.robot.model.types import Snapshot
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 GENTLE_RAD_S = radians(load_rig("desk").guard.soft_start_speed_deg_s)
@@ -330,3 +343,184 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
     for _ in range(1000):
         robot.command(Stop("again"))
     assert len(robot._commands) <= 128
+
+
+# ---- Gaze targets of clients: points of two frames, directions, people, pixels; the end
+
+
+def test_a_point_of_the_head_is_where_the_head_had_it(running: Running) -> None:
+    before = running.go(0.006)[-1].pose
+    reply, ticks = running.do(LookAtInHead((1.2, 0.3, 0.1), stay=True), 1.5)
+    assert reply.asked_m is not None
+    seen = rotate_back(before.R_world_head, sub(reply.asked_m, before.p_world_head_m))
+    assert seen == pytest.approx((1.2, 0.3, 0.1), abs=1e-9)
+    # The point stays in the world while the head turns to it.
+    assert {tick.target.p_world_m for tick in ticks} == {reply.asked_m}
+    assert ticks[-1].client_control.arrived and ticks[-1].client_control.error_rad <= ARRIVED_RAD
+
+
+@pytest.mark.parametrize("frame", ["world", "head"])
+def test_a_direction_is_looked_in(running: Running, frame: Any) -> None:
+    running.do(Jog((("neck_yaw", radians(15.0)),), stay=True), 2.0)
+    before = running.go(0.006)[-1].pose
+    asked = (radians(10.0), radians(-5.0))
+    ticks = running.do(LookAtDirection(asked, frame, stay=True), 2.0)[1]
+    pose, point = ticks[-1].pose, ticks[-1].gaze.gaze_point_world_m
+    seen = yaw_pitch(sub(point, pose.p_world_head_m))
+    if frame == "head":
+        seen = yaw_pitch(rotate_back(before.R_world_head, sub(point, pose.p_world_head_m)))
+    assert tuple(map(degrees, seen)) == pytest.approx((10.0, -5.0), abs=0.2)
+    assert ticks[-1].client_control.arrived
+
+
+def test_a_person_is_followed_with_the_scanpath_on_the_face(running: Running) -> None:
+    percept = running.go(0.006)[-1].percept
+    assert percept is not None
+    person = percept.faces[0].id
+    reply, ticks = running.do(LookAtPerson(person, stay=True), 3.0)
+    assert not reply.refused and reply.control_number == 1
+    assert {(tick.target.kind, tick.target.id) for tick in ticks} == {("face", person)}
+    assert len({tick.target.part for tick in ticks}) > 1
+    assert (
+        ticks[-1].client_control.arrived
+        and ticks[-1].controlled_by == f"a client: look at person {person}"
+    )
+
+
+def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(running: Running) -> None:
+    assert running.do(LookAtPerson(99))[0].refused.startswith("person 99 is not visible; visible: ")
+    percept = running.go(0.006)[-1].percept
+    assert percept is not None
+    running.do(LookAtPerson(percept.faces[0].id, stay=True))
+    blind: Any = lambda found, poses: None  # noqa: E731
+    running.made.robot.perception.see = blind  # type: ignore[method-assign]
+    ticks = running.go(2.5)
+    assert ticks[100].controlled_by and not ticks[-1].controlled_by
+    assert ticks[-1].client_control.end_reason == f"person {percept.faces[0].id} is gone"
+
+
+def test_a_pixel_is_where_it_was_when_the_frame_was_taken(running: Running) -> None:
+    tick = running.go(0.006)[-1]
+    found = tick.detections
+    assert found is not None and tick.percept is not None
+    x, y, width, height = found.faces[0].box_px
+    pixel = (x + width / 2, y + height / 2)
+    reply, ticks = running.do(LookAtPixel(pixel, captured_s=found.captured_s, stay=True), 1.5)
+    face = tick.percept.faces[0].p_world_m
+    head = tick.pose.p_world_head_m
+    assert reply.asked_m is not None
+    assert degrees(angle_between(sub(reply.asked_m, head), sub(face, head))) < 2.0
+    assert norm(sub(reply.asked_m, head)) == pytest.approx(norm(sub(face, head)), abs=0.1)
+    (command,) = ticks[0].commands
+    assert isinstance(command, LookAtPixel) and command.p_world_m == reply.asked_m
+    assert ticks[-1].client_control.arrived
+    near = running.do(LookAtPixel(pixel, 0.5))[0]
+    assert near.asked_m is not None
+    assert norm(sub(near.asked_m, head)) == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_pixel_without_a_frame_is_refused(running: Running) -> None:
+    nothing: Any = lambda now_s: None  # noqa: E731
+    running.made.robot.camera.latest = nothing  # type: ignore[method-assign]
+    running.go(0.006)
+    assert "no camera frame" in running.do(LookAtPixel((1.0, 1.0)))[0].refused
+
+
+def test_leads_are_counted_and_their_ends_have_reasons(running: Running) -> None:
+    assert running.go(0.006)[-1].client_control == NO_CLIENT_CONTROL
+    assert running.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].control_number == 1
+    reply, ticks = running.do(LookAt((1.0, 0.4, 0.3), stay=True), 1.5)
+    assert (
+        reply.control_number == 2
+        and ticks[0].client_control.number == 2
+        and not ticks[0].client_control.arrived
+    )
+    assert ticks[-1].client_control.arrived
+    free = running.do(LookAt(None, who="a show"))
+    assert (
+        free[0].control_number == 0
+        and free[1][-1].client_control.end_reason == "a show looks elsewhere"
+    )
+    reply, ticks = running.do(Jog((("neck_yaw", radians(20.0)),), stay=True), 0.1)
+    assert reply.control_number == 3 and degrees(ticks[0].client_control.error_rad) > 3.0
+    assert running.go(2.0)[-1].client_control.arrived
+    assert running.do(Stop("a hand"))[1][-1].client_control.end_reason == "stopped: a hand"
+
+
+# ---- The source of control of the head is one value with the same words everywhere.
+
+
+def shown(tick: Tick) -> Snapshot:
+    return snapshot(tick)
+
+
+def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:
+    tick = running.go(0.1)[-1]
+    assert (
+        tick_control_source(tick) == ControlSource()
+        and not tick_control_source(tick).overrides_gaze
+    )
+    shot = shown(tick)
+    assert shot.headline.startswith("looks at person 1") and shot.target_kind == "face"
+
+
+def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running: Running) -> None:
+    running.order(Jog((("neck_yaw", 0.3),), who="ann"))
+    first = running.go(0.2)[0]
+    running.order(Jog((("neck_yaw", 0.1), ("neck_pitch", 0.1)), who="ann"))
+    for _ in range(6):
+        running.order(Jog((("neck_yaw", 0.3),), who="ann"))
+        tick = running.go(0.5)[-1]
+    leads = tick_control_source(tick)
+    assert (leads.kind, leads.who, leads.since_s) == ("joint", "ann", first.t_s)
+    assert leads.joints == ("neck_yaw", "neck_pitch")
+    shot = shown(tick)
+    assert shot.headline == "ann holds neck_yaw at 17.2 deg, neck_pitch at 5.7 deg, for 3 s"
+    assert (shot.target_name, shot.phase) == ("neck_yaw and neck_pitch held", "held")
+    assert shot.why == shot.headline
+    assert (shot.target_part, shot.saliences) == (None, ())
+    for said in (health_table(shot), target_text(shot), salience_bars(shot)):
+        assert "face 1" not in said and "person 1" not in said
+
+
+@pytest.mark.parametrize(
+    ("pointer", "kind", "said"),
+    [
+        (False, "person", "ann makes it look at 1 0.2 0.3, for 2 s"),
+        (True, "pointer", "it looks at the pointer of ann, for 2 s"),
+    ],
+)
+def test_a_point_and_a_pointer_are_led_by_who_chose_them(
+    running: Running, pointer: bool, kind: str, said: str
+) -> None:
+    for _ in range(10):
+        running.order(LookAt((1.0, 0.2, 0.3), who="ann", pointer=pointer))
+        tick = running.go(0.2)[-1]
+    assert tick_control_source(tick).kind == kind
+    assert head_activity(tick).headline == said
+
+
+def test_stopped_says_that_and_nothing_else(running: Running) -> None:
+    running.order(Jog((("neck_yaw", 0.3),), who="ann"))
+    running.go(0.2)
+    running.order(Stop("STOP was pressed", who="ann"))
+    shot = shown(running.go(0.5)[-1])
+    assert shot.control_source.kind == shot.target_name == shot.phase == "stopped"
+    assert shot.headline == shot.why == "stopped: STOP was pressed; the torque is off"
+    running.go(2.0)
+    running.order(Resume(who="ann"))
+    assert tick_control_source(running.go(0.1)[-1]) == ControlSource()
+
+
+def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) -> None:
+    running.order(Jog((("neck_yaw", 0.3),), who="ann", stay=True))
+    running.go(1.0)
+    made = running.made
+    ticks: list[Tick] = []
+    assert made.robot.park(made.park_rad, made.clock, made.loop, watch=ticks.append)
+    assert {tick_control_source(tick).kind for tick in ticks} == {"parking"} and len(ticks) > 5
+    assert head_activity(ticks[-1]).headline == control_sentence(ControlSource("parking"), 0.0)
+    yaw = [
+        tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
+    ]
+    assert abs(yaw[-1]) < abs(yaw[0])

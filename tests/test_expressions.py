@@ -1,6 +1,6 @@
 """Facial expressions and levels: tables, blending, commands, and what is refused."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import degrees, radians
 from random import Random
@@ -8,13 +8,19 @@ from random import Random
 import pytest
 from expressive_rig import expressive_rig, faults, started
 from fakes.runs import ticks
+from ticked_rig import TickedRig, connected, gazerig
 
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
 from gazerig.gaze.minimum_jerk import PEAK_SPEED, MinimumJerkBlend
 from gazerig.gaze.track.level import HOLD_S, LevelParams
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.rig_limits import pose_offset
+from gazerig.robot.cli import animation
 from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Express, SetLevel
+from gazerig.robot.model.types import further_joints, order_joints
 
 DT = 0.005
 
@@ -142,3 +148,67 @@ def test_the_range_of_a_neck_at_full_strength_counts() -> None:
     rig = replace(expressive_rig(), expressions={"shy": {"neck_pitch": -36.0}})
     assert any("outside the joint's range -35.0..35.0" in fault for fault in faults(rig))
     assert pose_offset(rig, {"neck_pitch": -20.0}).head_rad == (0.0, radians(-20.0), 0.0)
+
+
+# ---- Joints of any name: a jaw, brows, ears.
+
+
+def with_joint(name: str) -> Rig:
+    """Return the desk rig with one more joint, on a servo of its own."""
+    rig = load_rig("desk")
+    jaw = replace(rig.joints["left_upper_lid"], id=42, min_deg=-2.0, max_deg=25.0)
+    return replace(rig, joints={name: jaw, **rig.joints})
+
+
+def test_joints_of_gaze_come_first_and_others_follow_by_name() -> None:
+    rig = with_joint("jaw")
+    names = order_joints({*rig.joints, "brow"})
+    assert names[-2:] == ("brow", "jaw") and set(names[:-2]) == set(load_rig("desk").joints)
+    assert further_joints(names) == ("brow", "jaw")
+    assert order_joints(reversed(names)) == names
+
+
+def test_a_jaw_is_a_joint_and_a_misspelt_neck_is_not() -> None:
+    assert faults(with_joint("jaw")) == []
+    rig = with_joint("nek_yaw")
+    without = replace(rig, joints={k: v for k, v in rig.joints.items() if k != "neck_yaw"})
+    assert any("joints.nek_yaw: did you mean neck_yaw" in fault for fault in faults(without))
+    assert any(
+        "joints.Jaw!: not a valid joint name" in fault for fault in faults(with_joint("Jaw!"))
+    )
+
+
+def test_a_jaw_is_read_held_at_rest_and_written(started: Callable[[Rig], Assembly]) -> None:
+    made = started(with_joint("jaw"))
+    tick = made.robot.tick(0.005, 0.005)
+    assert made.robot.body.names[-1] == "jaw"
+    assert tick.desired_rad[-1] == 0.0
+    assert len(tick.guard_result.command_rad) == len(tick.desired_rad) == 10
+
+
+# ---- Expressions and levels from the command line, from Python and on the page.
+
+
+@pytest.fixture
+def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
+    yield from connected(monkeypatch)
+
+
+def test_an_expression_from_the_command_line(rig: TickedRig) -> None:
+    assert "neutral, happy, sad, surprised" in gazerig("ctl", "express")
+    assert "happy is active, strength 0.5" in gazerig(
+        "ctl", "express", "happy", "--strength", "0.5"
+    )
+    assert rig.tick(200)["jaw"] == pytest.approx(3.0)
+    assert "expression: happy (in force), neutral, sad" in gazerig("ctl", "ask", "expression")
+    assert "available: neutral, happy, sad, surprised" in gazerig("ctl", "express", "glad")
+
+
+def test_a_level_from_the_command_line_is_kept_up_and_let_go(
+    rig: TickedRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(animation, "RealClock", SimulatedClock)
+    assert gazerig("ctl", "level", "mouth", "0.7", "--seconds", "0.25") == ""
+    assert rig.commands == [SetLevel("mouth", 0.7)] * 4 + [SetLevel("mouth", 0.0)]
+    assert "'loud' is not a level: give a number 0..1" in gazerig("ctl", "level", "mouth", "loud")
+    assert "no level 'ear'; available: mouth" in gazerig("ctl", "level", "ear", "1")

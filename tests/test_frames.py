@@ -1,15 +1,28 @@
 """Pose history, camera mounts and the joints' conversion to servo steps."""
 
-from math import radians
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from math import cos, degrees, pi, radians, sin
 from pathlib import Path
 
+import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
+from expressive_rig import faults
+from fakes.runs import ticks
+from gaze_targets import joints_at
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
-from gazerig.gaze.angles import rotate
+from gazerig.gaze.angles import angle_between, angles_of, norm, rotate, rotate_back, rotation, sub
+from gazerig.gaze.field_of_view import head_in_space, line_of_sight
+from gazerig.gaze.types import GazeCommand
+from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.commands import Express, Jog, LookAt
 from gazerig.robot.model.frames import (
     CameraMount,
     CameraParams,
@@ -142,3 +155,220 @@ def test_joint_limits_that_contradict_each_other_are_refused(
     good = {"min_deg": -30.0, "max_deg": 25.0, "max_speed_deg_s": 600.0, "max_accel_deg_s2": 1e4}
     with pytest.raises(ValueError, match=message):
         JointParams(4, "xl330-m077", **{**good, **change})  # type: ignore[arg-type]
+
+
+# ---- Kinematics: forward and inverse against each other over the whole range.
+
+
+GEOMETRY = GeometryParams(62.0, 38.0, 51.0)
+WIDE = Kinematics(
+    GEOMETRY,
+    GAZE_JOINTS,
+    {
+        "left_upper_lid": (radians(-25), radians(20)),
+        "right_upper_lid": (radians(25), radians(-20)),
+    },
+)
+degree = st.floats(-1.0, 1.0)
+
+
+@given(
+    head=st.tuples(degree, degree, degree),
+    point=st.tuples(st.floats(0.3, 5.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.5)),
+)
+def test_eyes_on_a_point_and_the_lines_of_sight_meet_in_it(
+    head: tuple[float, float, float], point: tuple[float, float, float]
+) -> None:
+    angles = (head[0] * 1.2, head[1] * 0.6, head[2] * 0.5)
+    R, p = WIDE.head_pose(angles)
+    left, right = WIDE.eye_angles_to(point, R, p)
+    state = WIDE.forward(joints_at(*left, *right, 0.0, 0.0, *angles))
+    for is_left in (True, False):
+        eye = state.p_world_eye_left_m if is_left else state.p_world_eye_right_m
+        assert angle_between(line_of_sight(state, is_left), sub(point, eye)) < 1e-9
+
+
+@given(
+    q=st.tuples(*[st.floats(-0.6, 0.6)] * 4),
+    lids=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)),
+    head=st.tuples(st.floats(-1.5, 1.5), st.floats(-0.7, 0.7), st.floats(-0.5, 0.5)),
+)
+def test_forward_of_inverse_is_the_identity(
+    q: tuple[float, ...], lids: tuple[float, float], head: tuple[float, float, float]
+) -> None:
+    command = GazeCommand(
+        head, (q[0], q[1]), (q[2], q[3]), *lids, "fixate", False, (1.0, 0.0, 0.0), 0, 0, 0
+    )
+    state = WIDE.forward(joints_at(*WIDE.inverse(command)))
+    assert state.head_rad == head
+    assert (*state.eye_left_rad, *state.eye_right_rad) == q
+    assert (state.lid_left, state.lid_right) == pytest.approx(lids, abs=1e-9)
+
+
+@given(st.tuples(st.floats(-3.0, 3.0), st.floats(-1.5, 1.5), st.floats(-3.0, 3.0)))
+def test_rotations_turn_back(angles: tuple[float, float, float]) -> None:
+    R = rotation(angles)
+    assert angles_of(R) == pytest.approx(angles, abs=1e-9)
+    v = (0.3, -1.2, 0.7)
+    assert rotate_back(R, rotate(R, v)) == pytest.approx(v, abs=1e-12)
+    assert np.linalg.det(np.array(R)) == pytest.approx(1.0)
+
+
+def test_signs_are_left_up_and_right_ear_down() -> None:
+    R, _ = WIDE.head_pose((radians(10), 0.0, 0.0))
+    assert rotate(R, (1.0, 0.0, 0.0))[1] > 0.0
+    R, _ = WIDE.head_pose((0.0, radians(10), 0.0))
+    assert rotate(R, (1.0, 0.0, 0.0))[2] > 0.0
+    R, _ = WIDE.head_pose((0.0, 0.0, radians(10)))
+    assert rotate(R, (0.0, -1.0, 0.0))[2] < 0.0
+
+
+def test_eyes_are_where_the_geometry_says() -> None:
+    state = WIDE.forward(joints_at(*[0.0] * 9))
+    assert state.p_world_head_m == pytest.approx((0.038, 0.0, 0.113))
+    gap = sub(state.p_world_eye_left_m, state.p_world_eye_right_m)
+    assert norm(gap) == pytest.approx(0.0619)
+    assert gap[1] > 0.0
+
+
+ONE_PAN = Kinematics(GEOMETRY, ("eyes_pan", "eyes_tilt"), {})
+
+
+@given(angle=st.floats(-3.14, 3.14), far=st.floats(0.3, 5.0))
+def test_eyes_on_one_linkage_point_between_what_each_would_need(angle: float, far: float) -> None:
+    R, p = ONE_PAN.head_pose((0.0, 0.0, 0.0))
+    point = (p[0] + far * cos(angle), far * sin(angle), p[2])
+    left, right = ONE_PAN.eye_angles_to(point, R, p)
+    assert left == right
+    off = abs(left[0] - angle)
+    # Next to the head one eye is nearer, so the mean is not quite that of the middle.
+    assert min(off, 2.0 * pi - off) < 0.01 / far
+
+
+def test_eyes_on_one_linkage_turn_to_the_end_for_a_point_straight_behind() -> None:
+    R, p = ONE_PAN.head_pose((0.0, 0.0, 0.0))
+    for aside in (-0.05, -0.001, 0.0, 0.001, 0.05):
+        (pan, _), _ = ONE_PAN.eye_angles_to((p[0] - 1.0, aside, p[2]), R, p)
+        assert abs(pan) > 3.0
+        assert pan * aside >= 0.0
+
+
+# ---- A second pair of neck joints below the neck: gaze allows for the head's displacement.
+
+
+LOWER = ("lower_neck_pitch", "lower_neck_yaw")
+BENT_GEOMETRY = GeometryParams(170.0, 38.0, 55.0, lower_pitch_axis_height_mm=50.0)
+TARGET = (1.0, 0.2, 0.25)
+
+
+def rig_with_lower_neck() -> Rig:
+    rig = load_rig("desk")
+    lower = replace(rig.joints["neck_pitch"], id=30, min_deg=-30.0, max_deg=30.0)
+    return replace(
+        rig,
+        geometry=BENT_GEOMETRY,
+        joints={
+            **rig.joints, "lower_neck_pitch": lower, "lower_neck_yaw": replace(lower, id=31),
+        },
+        expressions={"bow": {"lower_neck_pitch": -20.0, "lower_neck_yaw": 15.0}},
+        expression_blend_s=1.0,
+    )  # fmt: skip
+
+
+@cache
+def kinematics() -> Kinematics:
+    return Kinematics(BENT_GEOMETRY, rig_with_lower_neck().joints, LIDS)
+
+
+def test_the_lower_neck_carries_the_head() -> None:
+    made, pitch = kinematics(), radians(-30.0)
+    angles = (pitch if name == LOWER[0] else 0.0 for name in made.names)
+    pose = made.forward(joints_at(*angles))
+    # From the lower axis: 38 mm ahead and 120 + 55 mm up, pitched down by 30 deg.
+    ahead, up = 0.038, 0.175
+    assert pose.p_world_head_m == pytest.approx(
+        (ahead * cos(pitch) - up * sin(pitch), 0.0, 0.05 + ahead * sin(pitch) + up * cos(pitch))
+    )
+    assert pose.head_rad == (0.0, 0.0, 0.0)
+    assert head_in_space(pose) == pytest.approx((0.0, pitch, 0.0))
+    assert pose.base_rad == (0.0, pitch)
+
+
+@given(
+    point=st.tuples(st.floats(0.3, 5.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.5)),
+    base=st.just((0.0, 0.0)) | st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
+)
+def test_a_neck_that_faces_a_point_leads_the_head_through_it(
+    point: tuple[float, float, float], base: tuple[float, float]
+) -> None:
+    for made in (WIDE, kinematics()):
+        yaw, pitch = made.neck_angles_to(point, base)
+        R, p = made.head_pose((yaw, pitch, 0.0), base)
+        assert angle_between(rotate(R, (1.0, 0.0, 0.0)), sub(point, p)) < 1e-9
+
+
+def test_poses_between_ticks_have_the_lower_neck_between() -> None:
+    made = kinematics()
+    poses = PoseHistory(made)
+    poses.remember(0.0, (0.1, 0.0, 0.0), (0.0, 0.0))
+    poses.remember(1.0, (0.1, 0.0, 0.0), (0.2, -0.4))
+    R, p = poses.head_pose(0.25)
+    wanted, at = made.head_pose((0.1, 0.0, 0.0), (0.05, -0.1))
+    assert np.allclose(R, wanted) and p == pytest.approx(at)
+
+
+def error_deg(tick: Tick) -> float:
+    pose = tick.pose
+    lines = (line_of_sight(pose, left=side) for side in (True, False))
+    eyes = (pose.p_world_eye_left_m, pose.p_world_eye_right_m)
+    return max(
+        degrees(angle_between(line, sub(TARGET, eye)))
+        for line, eye in zip(lines, eyes, strict=True)
+    )
+
+
+def test_the_eyes_stay_on_their_point_while_the_head_bows(
+    started: Callable[[Rig], Assembly],
+) -> None:
+    rig = rig_with_lower_neck()
+    assert faults(rig) == []
+    made = started(rig)
+    made.robot.command(LookAt(TARGET, stay=True))
+    still = error_deg(ticks(made, 600)[-1])
+    made.robot.command(Express("bow"))
+    moving = ticks(made, 300)
+    bowed = dict(zip(rig.names, map(degrees, moving[-1].joints.position_rad), strict=True))
+    assert bowed["lower_neck_pitch"] == pytest.approx(-20.0, abs=0.5)
+    assert bowed["lower_neck_yaw"] == pytest.approx(15.0, abs=0.5)
+    worst = max(map(error_deg, moving))
+    assert still < 0.2 and worst < 0.8, (still, worst)
+
+
+def test_what_a_look_will_come_to_counts_the_bent_lower_neck(
+    started: Callable[[Rig], Assembly],
+) -> None:
+    rig = rig_with_lower_neck()
+    made = started(rig)
+    made.robot.command(Express("bow"))
+    ticks(made, 400)
+    ticket = made.robot.command(LookAt(TARGET, stay=True))
+    ticks(made, 1)
+    reply = ticket.wait(0.0)
+    assert reply is not None and reply.error_deg < 0.5, reply
+
+
+def test_people_stay_where_they_are_when_the_lower_neck_turns_the_camera(
+    started: Callable[[Rig], Assembly],
+) -> None:
+    """The emulated camera is carried by the servos, and frames are placed by what they measure."""
+    rig = rig_with_lower_neck()
+    made = started(rig)
+    made.robot.command(Jog((("lower_neck_yaw", radians(15.0)),), stay=True))
+    errors = []
+    for tick in ticks(made, 700):
+        if tick.percept is None or not tick.percept.faces or made.scene is None:
+            continue
+        seen = tick.percept.faces[0].p_world_m
+        people = [one[0] for one in made.scene.people(tick.percept.captured_s)]
+        errors.append(min(norm(sub(seen, at)) for at in people))
+    assert len(errors) > 200 and max(errors) < 0.04, max(errors)

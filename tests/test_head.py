@@ -1,16 +1,19 @@
 """Head goal, timing and trajectory. Numbered checks are listed in docs/checks.md."""
 
 from collections.abc import Callable
-from math import degrees, radians
+from math import degrees, pi, radians
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from gaze_targets import DT, target, turn
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from gazerig.gaze.angles import direction
+from gazerig.gaze.angles import angle_between, direction
 from gazerig.gaze.minimum_jerk import Quintic
-from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
-from gazerig.gaze.types import Floats
+from gazerig.gaze.oculomotor.head import HeadModel, HeadParams, HeadShare
+from gazerig.gaze.types import Angles2, Floats, Target
 
 NECK = ((-2.0, 2.0), (-1.0, 1.0))
 EQ_7 = HeadParams(goal_model="attention")
@@ -169,3 +172,314 @@ def test_plans_made_in_full_flight_stay_in_the_neck_range() -> None:
     seen = target(salience=2.0, top_down=True)
     yaws = turn(model, 60.0, lambda t: (seen, places[round(t / DT) // 40]))
     assert np.abs(yaws).max() <= np.degrees(0.9)
+
+
+# ---- Travel of the head from any start to any target: never past it.
+
+
+human_norms = pytest.importorskip("gazerig.features.lab.analysis.human_norms")
+
+TALL_NECK = ((-2.0, 2.0), (-1.2, 1.2))
+ROLL = (radians(-25.0), radians(25.0))
+Model = Literal["attention", "align", "stahl"]
+
+MODELS = st.sampled_from(("attention", "align", "stahl"))
+PLACES = st.tuples(st.floats(-75.0, 75.0), st.floats(-40.0, 40.0))
+INTERESTS = st.floats(0.0, 1.6)
+EYES = st.floats(10.0, 60.0)
+
+
+def ends(
+    model: Model, eyes_deg: float, start: Angles2, place: Angles2, salience: float
+) -> tuple[float, float, float]:
+    """Let a head at rest turn to a place; angles in degrees.
+
+    Returns:
+        The target's arc from the start, how far the head went, and what is left to the target.
+    """
+    params = HeadParams(goal_model=model)
+    head = HeadModel(params, radians(eyes_deg), TALL_NECK, ROLL)
+    at = (radians(start[0]), radians(start[1]))
+    facing = (radians(place[0]), radians(place[1]))
+    head.reset(0.0, (*at, 0.0))
+    seen = target(salience=salience)
+    arc = angle_between(direction(at), direction(facing))
+    for t in (0.0, 0.4, 2.9):
+        yaw, pitch, _ = head.step(seen, facing, facing, arc, 1.0, t)
+    way = direction((yaw, pitch))
+    went, left = angle_between(direction(at), way), angle_between(way, direction(facing))
+    return degrees(arc), degrees(went), degrees(left)
+
+
+@settings(max_examples=300, deadline=None)
+@given(MODELS, EYES, PLACES, PLACES, INTERESTS)
+def test_e65_the_head_never_goes_past_the_target_as_seen_from_where_it_comes(
+    model: Model, eyes_deg: float, start: Angles2, place: Angles2, salience: float
+) -> None:
+    arc, went, left = ends(model, eyes_deg, start, place, salience)
+    assert went <= arc + 1e-6
+    assert went + left == pytest.approx(arc, abs=1e-4), "along the great circle"
+
+
+@settings(max_examples=300, deadline=None)
+@given(MODELS, EYES, PLACES, PLACES, INTERESTS, INTERESTS)
+def test_e65_less_interest_never_turns_the_head_further(
+    model: Model, eyes_deg: float, start: Angles2, place: Angles2, one: float, other: float
+) -> None:
+    less, more = sorted((one, other))
+    moved = [ends(model, eyes_deg, start, place, salience)[1] for salience in (less, more)]
+    assert moved[0] <= moved[1] + 1e-6
+
+
+@pytest.mark.parametrize("range_deg", [0.0, 35.8, 60.0])
+def test_e75_stahls_law_holds_for_any_range_of_the_eyes(range_deg: float) -> None:
+    share = HeadShare(HeadParams(eye_only_range_deg=range_deg), radians(170.0))
+    for arc_deg in (0.0, 20.0, 70.0):
+        went = radians(arc_deg) - share.undershoot_rad(0.5, radians(arc_deg))
+        law = 0.77 * max(0.0, arc_deg - range_deg / 2.0)
+        assert degrees(went) == pytest.approx(law, abs=1e-9)
+
+
+@pytest.mark.parametrize("start", [-60.0, -20.0, 0.0, 35.0, 60.0])
+@pytest.mark.parametrize("place", [-60.0, -31.0, 0.0, 16.0, 25.0, 60.0])
+def test_e75_the_model_goes_as_far_as_the_report_expects_of_people(
+    start: float, place: float
+) -> None:
+    arc, went, _ = ends("stahl", 75.0, (start, 0.0), (place, 0.0), 0.5)
+    assert went == pytest.approx(
+        human_norms.STAHL_SLOPE * max(0.0, arc - human_norms.STAHL_FREE_DEG), abs=1.0
+    )
+
+
+def model() -> HeadModel:
+    return HeadModel(HeadParams(), radians(35.0), TALL_NECK, ROLL)
+
+
+def test_e65_a_head_in_flight_stops_where_it_can_and_not_behind_a_nearer_target() -> None:
+    yaws = turn(
+        model(), 2.0, lambda t: (target(), 65.0) if t < 0.25 else (target(id=2, shift=2), 30.0)
+    )
+    assert 3.0 < yaws[50] < 20.0
+    assert yaws.max() <= 30.0
+    assert np.diff(yaws[50:]).min() > -0.02, "it does not swing back"
+
+
+def test_e65_eyes_that_are_being_brought_back_do_not_take_the_head_to_the_next_target() -> None:
+    yaws = turn(model(), 4.9, lambda t: (target(), 50.0) if t < 3.9999 else (target(id=0), 38.0))
+    assert yaws[801] > yaws[600] + 2.0, "it is being brought back"
+    assert yaws[-1] == pytest.approx(yaws[801], abs=2.0), "the eyes go alone"
+
+
+def test_parts_of_a_face_do_not_pull_the_head_further_each_time() -> None:
+    """The same person all the while: the law counts from where the head was at first."""
+    rng = np.random.default_rng(0)
+
+    def part(t: float) -> tuple[Target, float]:
+        return target(shift=round(t / DT) // 60), 45.0 + 2.0 * float(rng.standard_normal())
+
+    yaws = turn(HeadModel(HeadParams(), radians(50.0), TALL_NECK, ROLL), 2.9, part, facing_deg=45.0)
+    assert yaws[-1] == pytest.approx(0.77 * (45.0 - 17.9), abs=0.5)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(-80.0, 80.0), INTERESTS, INTERESTS)
+def test_e75_the_roll_goes_to_the_side_of_the_target_and_grows_with_interest(
+    yaw_deg: float, one: float, other: float
+) -> None:
+    share = HeadShare(HeadParams(), radians(35.0))
+    less, more = (abs(share.roll_rad(s, radians(yaw_deg))) for s in sorted((one, other)))
+    assert less <= more + 1e-12 and degrees(more) <= 4.0
+    assert share.roll_rad(one, radians(yaw_deg)) * yaw_deg <= 0.0
+    if abs(yaw_deg) >= 20.0:
+        assert degrees(less) >= 1.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_e75_a_roll_does_not_swing_when_the_head_is_called_elsewhere(seed: int) -> None:
+    rng, angles = np.random.default_rng(seed), (0.0, 0.0, 0.0)
+    facing, name = (0.0, 0.0), 0
+    head, rolls = model(), []
+    for k in range(6000):
+        if k % 60 == 0 and rng.random() < 0.4:
+            facing, name = (radians(float(rng.uniform(-70.0, 70.0))), 0.0), k
+        seen = target(id=name, salience=1.0, shift=name)
+        angles = head.step(seen, facing, facing, abs(facing[0] - angles[0]), 1.0, k * DT)
+        rolls.append(degrees(angles[2]))
+    assert 3.0 < max(map(abs, rolls)) < 5.5
+
+
+def test_e75_a_neck_without_a_roll_joint_does_not_roll() -> None:
+    facing, seen, rolls = (radians(60.0), 0.0), target(salience=1.0), []
+    for limits in ((0.0, 0.0), ROLL):
+        head = HeadModel(HeadParams(), radians(35.0), TALL_NECK, limits)
+        for t in (0.0, 0.5, 2.9):
+            roll = head.step(seen, facing, facing, radians(60.0), 1.0, t)[2]
+        rolls.append(degrees(roll))
+    assert rolls[0] == 0.0 and rolls[1] == pytest.approx(-4.0, abs=0.1)
+
+
+# ---- The head between shifts and from shift to shift: pursuit, recentring, scatter, search.
+
+
+SMALL_NECK = ((-1.3, 1.3), (-0.6, 0.6))
+SMALL_ROLL = (-0.4, 0.4)
+
+
+def small_head(seed: int | None = 0, **params: Any) -> HeadModel:
+    rng = None if seed is None else np.random.default_rng(seed)
+    return HeadModel(HeadParams(**params), radians(35.0), SMALL_NECK, SMALL_ROLL, rng)
+
+
+def seen(id: int = 1, kind: str = "face") -> Target:
+    return target(kind=kind, id=id, top_down=True, shift=id)
+
+
+def follow(head: HeadModel, place: Floats, kind: str = "face") -> Floats:
+    """Return the yaws of a head with a target at these yaws, one a tick; degrees."""
+    yaws = [0.0]
+    for k, yaw in enumerate(place.tolist()):
+        ahead = min(len(place) - 1, k + round(head.foresees_s / DT))
+        now, soon = (radians(yaw), 0.0), (radians(place[ahead]), 0.0)
+        aside = abs(radians(yaw - yaws[-1]))
+        moves = None if soon == now else soon
+        turned = head.step(seen(kind=kind), now, now, aside, 1.0, k * DT, moves)
+        yaws.append(degrees(turned[0]))
+    return np.array(yaws[1:])
+
+
+def test_the_head_pursues_a_walker_with_a_lag_of_people() -> None:
+    t = np.arange(0.0, 40.0, DT)
+    walk = 25.0 * np.sin(2.0 * pi * 0.08 * t)
+    yaws = follow(small_head(), walk)
+    late = t > 15.0
+    lags = [np.abs(yaws[late] - np.interp(t[late] - lag, t, walk)).mean() for lag in LAGS_S]
+    assert 0.1 <= LAGS_S[int(np.argmin(lags))] <= 0.25
+    assert np.abs(walk - yaws)[late].max() < 6.0
+    assert np.abs(np.diff(yaws, 2)).max() / DT**2 < 1000.0, "no jerk of the neck"
+
+
+LAGS_S = np.arange(0.0, 0.6, 0.02)
+
+
+def test_slow_and_short_motion_is_left_to_the_eyes() -> None:
+    t = np.arange(0.0, 10.0, DT)
+    assert np.abs(follow(small_head(), 1.0 * t, "thing")).max() == 0.0, (
+        "1 deg/s, within the range of the eyes"
+    )
+    jump = np.clip((t - 2.0) * 180.0, 0.0, 9.0)
+    assert np.abs(follow(small_head(), jump, "thing")).max() == 0.0
+    walk = 12.0 * np.sin(2.0 * pi * 0.08 * t)
+    assert np.abs(follow(small_head(goal_model="attention"), walk, "thing")).max() == 0.0
+
+
+def test_after_pursuit_the_head_comes_to_rest() -> None:
+    t = np.arange(0.0, 12.0, DT)
+    walk = np.minimum(10.0 * t, 40.0)
+    yaws = follow(small_head(), walk)
+    assert yaws[-1] == pytest.approx(40.0, abs=3.0) and yaws.max() < 44.0
+    assert np.ptp(yaws[t > 8.0]) < 0.1
+
+
+def test_the_head_goes_on_with_a_walker_during_a_look_away() -> None:
+    head, yaws, place = small_head(), list[float](), 0.0
+    for k in range(round(3.0 / DT)):
+        t, place = k * DT, 12.0 * k * DT
+        away = t >= 2.2
+        now = (radians(place), 0.0)
+        past = (radians(38.0), 0.0) if away else now
+        soon = None if away else (radians(place + 12.0 * head.foresees_s), 0.0)
+        aside = abs(past[0] - radians(yaws[-1] if yaws else 0.0))
+        on = seen(kind="away" if away else "face")
+        yaws.append(degrees(head.step(on, now, past, aside, 1.0, t, soon)[0]))
+    late = round(2.4 / DT)
+    assert (yaws[-1] - yaws[late]) / (3.0 - 2.4) == pytest.approx(12.0, abs=1.5)
+    assert 0.0 < place - yaws[-1] < 4.0
+
+
+def test_recentring_is_late_random_and_slow() -> None:
+    place = np.full(round(30.0 / DT), 32.0)
+    starts, peaks, ends = [], [], []
+    for seed in range(30):
+        yaws = follow(small_head(seed), place, "thing")
+        held = yaws[round(2.0 / DT)]
+        assert held == pytest.approx(0.77 * (32.0 - 17.9), abs=3.5)
+        after = yaws[round(2.0 / DT) :]
+        moved = np.flatnonzero(after > held + 0.1)
+        if len(moved):
+            starts.append(2.0 + moved[0] * DT)
+            peaks.append(np.diff(after).max() / DT)
+            ends.append(32.0 - after[-1])
+    assert len(starts) > 20 and min(starts) >= 3.0
+    assert 5.0 < np.mean(starts) < 11.0 and np.std(starts) > 1.5
+    assert max(peaks) <= 12.1
+    assert min(ends) >= 0.25 * 10.0 - 0.1 and max(ends) <= 10.0
+
+
+@pytest.mark.parametrize(("elsewhere", "id"), [("away", 1), ("hand", 1_000_001), ("face", 1)])
+def test_the_head_comes_to_face_a_person_in_spite_of_short_looks_elsewhere(
+    elsewhere: str, id: int
+) -> None:
+    def place(t: float) -> tuple[Target, float]:
+        return seen(id, elsewhere) if t % 2.0 > 1.4 else seen(), 10.0
+
+    yaws = np.array([turn(small_head(seed), 20.0, place) for seed in range(24)])
+    assert np.abs(yaws[:, : round(3.0 / DT)]).max() == 0.0
+    turned = yaws[:, -1] > 5.0
+    assert 0.7 < turned.mean() < 1.0 and yaws.max() <= 8.01
+    half = [np.argmax(row > 3.0) * DT for row in yaws[turned]]
+    assert 6.0 < np.mean(half) < 11.0 and np.std(half) > 2.0
+    assert np.diff(yaws).max() / DT <= 12.1
+
+
+@pytest.mark.parametrize(
+    ("salience", "top_down", "turns"), [(0.9, True, True), (0.5, True, False), (0.9, False, False)]
+)
+def test_the_head_recentres_soon_before_what_it_is_most_interested_in(
+    salience: float, top_down: bool, turns: bool
+) -> None:
+    urgent = target(kind="attack_target", salience=salience, top_down=top_down)
+    assert (turn(small_head(), 2.0, lambda t: (urgent, 15.0))[-1] > 5.0) == turns
+
+
+def shifts(seed: int | None) -> Floats:
+    """Return how far the head turned for 40 deg, 40 times; degrees."""
+    head, turned = small_head(seed), []
+    for n in range(40):
+        head.reset(n * 2.0, (0.0, 0.0, 0.0))
+        place = (radians(40.0), 0.0)
+        yaw = 0.0
+        for k in range(240):
+            t = n * 2.0 + k * DT
+            yaw = head.step(seen(n), place, place, abs(place[0] - yaw), 1.0, t)[0]
+        turned.append(degrees(yaw))
+    return np.array(turned)
+
+
+def test_equal_shifts_scatter_within_bounds() -> None:
+    slopes = shifts(3) / (40.0 - 17.9)
+    assert slopes.mean() == pytest.approx(0.77, abs=0.05)
+    assert 0.06 < slopes.std() < 0.14 and np.abs(slopes - 0.77).max() <= 0.201
+    assert np.ptp(shifts(None)) < 1e-9, "without a generator all are equal"
+
+
+def test_the_head_is_first_in_half_of_its_own_looks_and_never_in_a_reaction() -> None:
+    head = small_head(5)
+    own = [head.draw_lead_s(seen(-2 - n, "glance"), 0.7) for n in range(600)]
+    assert 0.5 < np.mean(np.array(own) > 0.0) < 0.75
+    assert 0.35 < np.mean(np.array(own) > 0.008) < 0.6 and max(own) <= 0.071
+    assert max(head.draw_lead_s(seen(n), 0.7) for n in range(200)) == 0.0
+    assert max(head.draw_lead_s(seen(-2, "glance"), 0.1) for n in range(50)) == 0.0
+
+
+def test_a_search_is_completed_by_the_head() -> None:
+    place = np.full(round(3.0 / DT), 15.0)
+    assert follow(small_head(), place, "search")[-1] == pytest.approx(9.0, abs=1.1)
+    assert follow(small_head(), place, "glance")[-1] == 0.0
+
+
+@pytest.mark.parametrize("law", ["attention", "align"])
+def test_the_papers_heads_are_not_random(law: str) -> None:
+    place = np.full(200, 50.0)
+    one, other = (follow(small_head(seed, goal_model=law), place) for seed in (1, None))
+    assert (one == other).all()
+    assert small_head(1, goal_model=law).draw_lead_s(seen(), 1.0) == 0.0

@@ -1,19 +1,25 @@
 """Blinks, winks and lids that follow the gaze; numbered checks: docs/checks.md."""
 
+from dataclasses import replace
 from math import cos, radians, sin
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
 from gaze_targets import DT, joints_at, target
 from gaze_trace_rig import EXACT
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
 
-from gazerig.gaze.lids.blink import LAWS, LidParams, blink_depth, blink_pause_s
-from gazerig.gaze.lids.lids import Lids, Side
+from gazerig.gaze.lids.blink import LAWS, LidParams, blink_depth, blink_pause_s, closure
+from gazerig.gaze.lids.lids import LidOpenings, Lids, Side
 from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.oculomotor.pursuit import Pursuit, PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
+from gazerig.gaze.types import GazeCommand
+from gazerig.params import declarations
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 
 AWAKE = 0.75
@@ -306,3 +312,208 @@ def test_the_eyes_turn_down_and_towards_the_nose_in_a_blink_and_back_before_the_
     )
     assert (right_pitch == left_pitch).all()
     assert not np.any((left_pitch < -1e-9) & ~np.array(shut))
+
+
+# ---- Lower lids: they go with the gaze and meet the upper ones in a blink.
+
+
+LOWER_AWAKE = 0.8
+SHUT_S = 0.085  # after the onset: between close_ms and close_ms + hold_ms
+
+
+def still_lids(**params: float | str) -> Lids:
+    """Return lids that do not blink by themselves."""
+    chosen = LidParams(**{"blinks_per_min": 0.0, **params})  # type: ignore[arg-type]
+    return Lids(chosen, np.random.default_rng(0))
+
+
+def winked(model: Lids, t_s: float, pitch_deg: float = 0.0) -> LidOpenings:
+    """Shut both eyes by winks at a time and give the openings while they are shut."""
+    model.step(t_s, radians(pitch_deg), None)
+    model.wink("left", t_s)
+    model.wink("right", t_s)
+    return model.step(t_s + SHUT_S, radians(pitch_deg), None)
+
+
+def test_lower_lids_follow_by_less_than_the_upper_ones_and_evenly() -> None:
+    model = still_lids()
+    level, up, down = (model.step(0.0, radians(a), None) for a in (0.0, 10.0, -10.0))
+    assert level.lower_left == level.lower_right == LOWER_AWAKE
+    assert up.lower_left == pytest.approx(LOWER_AWAKE - 0.08)
+    assert down.lower_left == pytest.approx(LOWER_AWAKE + 0.08)
+    # On lids that travel 45 and 30 deg: a quarter of the upper lid's travel.
+    way = 30.0 * (down.lower_left - level.lower_left) / (45.0 * (level.left - down.left))
+    assert way == pytest.approx(2.2 / 9.1, abs=0.01)
+    # Looking down narrows the fissure, looking up a little does not.
+    assert 45.0 * down.left + 30.0 * down.lower_left < 45.0 * level.left + 30.0 * level.lower_left
+    assert 45.0 * up.left + 30.0 * up.lower_left > 45.0 * level.left + 30.0 * level.lower_left
+    assert model.step(0.0, radians(-80.0), None).lower_left == 1.0
+    still = still_lids(law="nakamoto").step(0.0, radians(-30.0), None)
+    assert (still.left, still.lower_left) == (0.75, LOWER_AWAKE)
+
+
+@pytest.mark.parametrize("pitch_deg", [-60.0, -10.0, 0.0, 30.0])
+def test_upper_and_lower_lids_meet_wherever_the_eye_looks(pitch_deg: float) -> None:
+    shut = winked(still_lids(), 1.0, pitch_deg)
+    assert (shut.left, shut.right, shut.lower_left, shut.lower_right) == (0.0,) * 4
+
+
+def test_an_incomplete_blink_stops_both_lids_at_the_same_share() -> None:
+    model = still_lids(blinks_per_min=40.0)
+    rows = np.array([model.step(k * DT, 0.0, None) for k in range(round(60.0 / DT))])
+    assert rows[:, 3] / LOWER_AWAKE == pytest.approx(rows[:, 0] / 0.75)
+    assert rows[:, 4] / LOWER_AWAKE == pytest.approx(rows[:, 1] / 0.75)
+
+
+def test_lids_that_meet_have_their_joints_at_the_calibrated_ends() -> None:
+    ends = {
+        "left_upper_lid": (radians(-20.0), radians(25.0)),
+        "right_upper_lid": (radians(-22.0), radians(24.0)),
+        "left_lower_lid": (radians(-8.0), radians(22.0)),
+        "right_lower_lid": (radians(-9.0), radians(21.0)),
+    }
+    kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), ends, ends)
+    shut, level = winked(still_lids(), 1.0, -25.0), still_lids().step(0.0, 0.0, None)
+
+    def joints(openings: LidOpenings) -> dict[str, float]:
+        left, right, blink, lower_left, lower_right = openings
+        command = GazeCommand(
+            (0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0), left, right, "fixate", blink,
+            (1.0, 0.0, 0.0), 0, 0, 0, lower_left, lower_right,
+        )  # fmt: skip
+        return dict(zip(kinematics.names, kinematics.inverse(command), strict=True))
+
+    assert joints(shut) == pytest.approx({name: shut for name, (shut, _) in ends.items()})
+    assert joints(level)["right_upper_lid"] == pytest.approx(radians(-22.0 + 0.75 * 46.0))
+    assert joints(level)["right_lower_lid"] == pytest.approx(radians(-9.0 + 0.8 * 30.0))
+
+
+def test_lids_glide_to_what_they_are_retuned_to() -> None:
+    model = still_lids()
+    before = model.step(1.0, radians(-20.0), None)
+    model.retune(LidParams(blinks_per_min=0.0, rest_opening=0.3, law="nakamoto"))
+    assert model.step(1.0, radians(-20.0), None) == before
+    trace = [before, *(model.step(1.0 + k * DT, radians(-20.0), None) for k in range(70))]
+    assert np.abs(np.diff(np.array(trace), axis=0)).max() <= 1.875 * 0.5 * DT / 0.3 + 1e-9
+    assert trace[-1][0] == pytest.approx(0.3) and trace[-1][3] == pytest.approx(LOWER_AWAKE)
+
+
+def test_a_wink_that_is_over_does_not_come_back_when_blinks_are_made_longer() -> None:
+    model = still_lids()
+    winked(model, 1.0)
+    model.step(1.6, 0.0, None)
+    model.retune(LidParams(blinks_per_min=0.0, close_ms=500.0, hold_ms=1000.0, open_ms=1500.0))
+    for k in range(1, 400):
+        assert model.step(1.6 + k * DT, 0.0, None) == (0.75, 0.75, False, LOWER_AWAKE, LOWER_AWAKE)
+
+
+def test_a_higher_rate_begins_no_blink_within_a_blink() -> None:
+    slow = LidParams(0.0, 500.0, 1000.0, 1500.0, law="nakamoto")
+    model = Lids(slow, np.random.default_rng(0))
+    assert not model.step(0.0, 0.0, radians(90.0)).blink and model.blinks == 1
+    assert model.step(0.6, 0.0, None).lower_left == 0.0
+    model.retune(replace(slow, blinks_per_min=60.0))
+    trace = [model.step(0.6 + k * DT, 0.0, None)[3] for k in range(round(2.39 / DT))]
+    assert np.abs(np.diff(trace)).max() <= 2.2 / 1.5 * DT and model.blinks == 1
+    assert model.step(3.02, 0.0, None) and model.blinks == 2
+
+
+# ---- Whatever the parameters and whatever happens, lids stay between shut and open and never jump.
+
+
+STEEPEST = 1.875  # slope of minimum jerk at its middle
+GLIDE_S = 0.3
+# To simplify sixty numbers takes minutes; the found example is sufficient.
+WITHOUT_SHRINKING = (Phase.explicit, Phase.generate)
+
+
+def steepest_opening() -> float:
+    """Return the steepest slope of an opening that takes 1 s."""
+    shut = [closure(1.0 + s, 0.0, 1.0, 1.0) for s in np.linspace(0.0, 1.0, 20_001)]
+    return float(-np.diff(shut).min() * 20_000)
+
+
+OPENING = steepest_opening()
+
+
+def admissible() -> st.SearchStrategy[LidParams]:
+    """Draw any parameters that a file may hold."""
+    ranges: dict[str, st.SearchStrategy[float | str | bool]] = {}
+    for name, item in declarations(LidParams).items():
+        if item.choices:
+            ranges[name] = st.sampled_from(item.choices)
+        elif item.low is None or item.high is None:
+            ranges[name] = st.booleans()
+        else:
+            ranges[name] = st.floats(item.low, item.high)
+    return st.builds(LidParams, **ranges)
+
+
+class Event(NamedTuple):
+    """Something that happens, and the gaze in the ticks after it."""
+
+    what: str
+    level: float
+    pitch_deg: float
+    shift_deg: float | None
+    ticks: int
+
+
+EVENTS = st.builds(
+    Event,
+    st.sampled_from(["", "", "left", "right", "rest", "conversation", "retune"]),
+    st.floats(0.0, 1.0),
+    st.floats(-60.0, 60.0),
+    st.none() | st.floats(-90.0, 90.0),
+    st.integers(1, 60),
+)
+
+
+def happen(model: Lids, event: Event, other: LidParams, t_s: float) -> None:
+    if event.what in ("left", "right"):
+        model.wink(event.what, t_s + event.level - 0.5)  # type: ignore[arg-type]
+    elif event.what in ("rest", "conversation"):
+        model.set_conversation(event.what == "conversation")
+    elif event.what == "retune":
+        model.retune(other)
+
+
+def fastest_per_s(params: LidParams) -> float:
+    """Return the steepest slope that blink and glide may have together."""
+    blink = max(STEEPEST / (params.close_ms / 1e3), OPENING / (params.open_ms / 1e3))
+    return blink + 4.0 * STEEPEST / GLIDE_S  # following changes as well, by up to 60 deg
+
+
+@settings(max_examples=60, deadline=None, phases=WITHOUT_SHRINKING)
+@given(admissible(), admissible(), st.lists(EVENTS, min_size=1, max_size=10), st.integers(0, 99))
+def test_lids_stay_within_bounds_and_never_jump(
+    first: LidParams, other: LidParams, events: list[Event], seed: int
+) -> None:
+    model = Lids(first, np.random.default_rng(seed))
+    most = max(fastest_per_s(first), fastest_per_s(other)) * DT
+    t_s, pitch_deg, before = 0.0, 0.0, None
+    for event in events:
+        happen(model, event, other, t_s)
+        for tick in range(event.ticks):
+            t_s += DT
+            shift = None if tick or event.shift_deg is None else radians(event.shift_deg)
+            # The eye turns at up to 600 deg/s.
+            turn_deg = min(3.0, max(-3.0, event.pitch_deg - pitch_deg))
+            pitch_deg += turn_deg
+            left, right, _, *lower = model.step(t_s, radians(pitch_deg), shift)
+            now = np.array([left, right, *lower])
+            assert (now >= 0.0).all() and (now <= 1.0).all()
+            if before is not None:
+                step = np.abs(now - before).max()
+                assert step <= most + 0.0222 * abs(turn_deg) + 1e-9
+            before = now
+
+
+def test_rounding_errors_lead_no_lid_beyond_shut_or_open() -> None:
+    # Minimum jerk comes out beyond its end by up to 2e-15 just before it.
+    near = 1.0 - np.logspace(-2.0, -8.0, 4001)
+    assert min(closure(1.0 + float(s), 0.0, 1.0, 1.0) for s in near) == 0.0
+    winking = Lids(LidParams(blinks_per_min=0.0, close_ms=500.0), np.random.default_rng(0))
+    winking.wink("left", 0.0)
+    winks = [winking.step(0.5 * float(t_s), 0.0, None) for t_s in near]
+    assert min(o.left for o in winks) == min(o.lower_left for o in winks) == 0.0

@@ -13,11 +13,15 @@ import cv2
 import numpy as np
 import pytest
 from command_line import typed
+from described_rigs import shipped
+from desk import GAZE_JOINTS
 from fakes.runs import play
 from msgspec import structs
+from recorded_rigs import Run, recorded
+from six_joints import SIX
 from typer.testing import CliRunner
 
-from gazerig.config.schema import Rig, load_walk
+from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.features.lab.analysis import human_norms as bands
 from gazerig.features.lab.analysis import human_norms as human
 from gazerig.features.lab.analysis.blink_finder import BlinkEvent, BlinkFinder
@@ -38,11 +42,13 @@ from gazerig.features.lab.report.gaze_trace import (
     ReactionFinder,
     TraceRow,
 )
+from gazerig.features.lab.report.joint_basis import JointBasis
 from gazerig.features.lab.report.measures import judge_run
 from gazerig.features.lab.report.page import (
     RunHeader,
     band_text,
 )
+from gazerig.features.lab.report.servo_saccades import eye_joint, eye_servo_text, saccade_times
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
     MeasureResult,
@@ -467,3 +473,87 @@ def test_density_keeps_the_time_and_lies_where_it_was_looked() -> None:
     assert places_z_m[row] == pytest.approx(z_m, abs=0.005)
     assert places_y_m[column] == pytest.approx(y_m, abs=0.005)
     assert density == pytest.approx(2.0 * face.gaze_density(np.array([[y_m, z_m, 1.0]])))
+
+
+# ---- Reports of a rig of six hobby servos without a neck mark estimated results.
+
+
+@pytest.fixture(scope="module")
+def maker(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return recorded(tmp_path_factory.mktemp("six") / "maker.mcap", load_rig("maker"), 4.2)
+
+
+def quiet(words: str, share: float) -> None:
+    """Ignore progress."""
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unlaid_figures")
+def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
+    from gazerig.features.lab.report.report import make_report, read_run
+
+    out = tmp_path / "six.html"
+    about = RunHeader("six")
+    made = make_report(read_run(maker.ticks, about, quiet), about, out, quiet)
+    rows = {row["key"]: row for row in json.loads(made.data.read_text())}
+    assert {row["basis"] for row in rows.values()} == {"estimated"}
+    page = unescape(out.read_text(encoding="utf-8"))
+    assert "Nothing here is measured: the servos of this rig have no feedback" in page
+    assert "not measured" in page.partition("Saccades <span")[2][:120]
+    assert "measured from the servos" not in page
+    for key in ("head_slope", "head_share", "head_after", "head_peak", "vor", "vergence",
+                "vergence_ok", "unasked"):  # fmt: skip
+        assert key not in rows, key
+    drawn = {path.stem for path in (tmp_path / "six_figures").iterdir()}
+    assert "blink_shape" in drawn and drawn.isdisjoint(("head_part", "vor", "vergence"))
+    assert "This rig has no neck" in page and "they stay parallel" in page
+
+
+@pytest.mark.parametrize(
+    ("names", "key", "words"),
+    [
+        (SIX, "vor", "no neck"),
+        (("left_eye_pan", "neck_yaw"), "vor", ""),
+        (("left_eye_pan", "neck_pitch"), "head_part", "turns the head sideways"),
+    ],
+)
+def test_what_cannot_be_told_says_why(names: tuple[str, ...], key: str, words: str) -> None:
+    why = JointBasis(names).left_out(key)
+    assert (words in why) if words else why == ""
+
+
+def test_a_rig_of_both_kinds_of_servos_is_measured_in_parts() -> None:
+    eyes = JointBasis(GAZE_JOINTS, tuple(name for name in GAZE_JOINTS if "eye" in name))
+    assert eyes.basis("Saccades") == "partly estimated" and eyes.basis("Lids") == "measured"
+    assert eyes.whole_basis == "partly estimated" and eyes.left_out("unasked")
+    lids = JointBasis(GAZE_JOINTS, ("left_upper_lid", "right_upper_lid"))
+    assert lids.basis("Lids") == "estimated" and lids.basis("On the face") == "measured"
+    assert not lids.left_out("unasked")
+
+
+# ---- Saccades that the eye servo of a rig can make.
+
+
+def test_an_xl330_makes_saccades_of_human_speed_and_a_slow_servo_none() -> None:
+    rig = shipped("desk")
+    assert eye_joint(rig) == "left_eye_pan"
+    for times in saccade_times(rig, "left_eye_pan"):
+        assert times.servo_ms is not None
+        assert times.model_ms < times.servo_ms < times.model_ms + 20
+    slow = replace(rig.joints["left_eye_pan"], model="xm430-w350", gains=None)
+    slow_rig = replace(rig, joints={**rig.joints, "left_eye_pan": slow})
+    *_, large = saccade_times(slow_rig, "left_eye_pan")
+    assert large.servo_ms is not None and large.servo_ms > 3 * large.model_ms
+
+
+@pytest.mark.parametrize("name", ["desk", "maker", "minimal"])
+def test_the_text_names_the_servo_and_both_times(name: str) -> None:
+    rig = shipped(name)
+    joint = eye_joint(rig)
+    assert joint is not None
+    text = eye_servo_text(rig) or ""
+    assert text.startswith(
+        f"{rig.joints[joint].model}, emulated: within 1 deg of 5, 10, 20 deg after"
+    )
+    assert "; the model after " in text
+    assert eye_servo_text(replace(rig, joints={"neck_yaw": rig.joints[joint]})) is None
