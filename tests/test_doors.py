@@ -5,6 +5,7 @@ import base64
 import os
 import socket
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -215,16 +216,30 @@ def test_played_speech_ends_by_its_length() -> None:
 
 
 Scenario = Callable[[DoorLink, TalkingHead], Awaitable[object]]
+Handler = Callable[[web.Request], Awaitable[web.WebSocketResponse]]
+
+
+@asynccontextmanager
+async def realtime_server(port: int, handle: Handler) -> AsyncIterator[None]:
+    """Serve what a realtime API does at a port of this computer."""
+    app = web.Application()
+    app.router.add_get("/v1/realtime", handle)
+    runner = web.AppRunner(app, shutdown_timeout=0.1, handler_cancellation=True)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", port).start()
+    yield
+    await runner.cleanup()
 
 
 def run(door: Door, scenario: Scenario, address: str = "", bind: str = "") -> TalkingHead:
-    """Run a door with a recording head until a scenario has ended."""
+    """Run a door with a recording head until a scenario, begun at its first words, has ended."""
     head = TalkingHead()
     link = DoorLink(head.connect, head.said.append, address, bind)
 
     async def both() -> None:
         tasks = [asyncio.ensure_future(door.serve(link)), asyncio.ensure_future(link.run())]
         try:
+            await until(lambda: head.said)
             await scenario(link, head)
             assert not any(task.done() for task in tasks)
         finally:
@@ -241,7 +256,6 @@ def test_a_voice_assistant_is_followed_and_found_again() -> None:
     assistant = Assistant()
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        await until(lambda: head.said)
         assert "waiting for a Linux Voice Assistant at ws" in head.said[0]
         async with assistant:
             await until(lambda: assistant.sockets)
@@ -284,7 +298,6 @@ def test_web_pages_are_refused_and_programs_are_not(door: Door) -> None:
     programs += [{"Host": "[::1]:22"}]  # through a tunnel
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        await until(lambda: head.said)
         async with ClientSession() as session:
             for headers in refused:
                 with pytest.raises(WSServerHandshakeError, match="403"):
@@ -328,7 +341,6 @@ def test_another_user_of_this_computer_cannot_speak(
     )
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        await until(lambda: head.said)
         stranger = open_as_a_stranger(port, monkeypatch)
         reader, writer = await asyncio.open_connection(sock=stranger)
         if door is pipecat.DOOR:
@@ -356,36 +368,31 @@ def test_realtime_sessions_are_relayed_with_their_key() -> None:
         return socket
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        await until(lambda: head.said)
         url, key = f"ws://{bind}/v1/realtime?model=m", {"Authorization": "Bearer hush"}
         async with ClientSession() as session:
             with pytest.raises(WSServerHandshakeError, match="502"):
                 await session.ws_connect(url, headers=key)
-            app = web.Application()
-            app.router.add_get("/v1/realtime", server)
-            runner = web.AppRunner(app, shutdown_timeout=0.1, handler_cancellation=True)
-            await runner.setup()
-            await web.TCPSite(runner, "127.0.0.1", port).start()
-            program = await session.ws_connect(url, headers=key, protocols=("realtime",))
-            assert program.protocol == "realtime"
-            await program.send_str("hello")
-            await until(lambda: "hello" in seen)
-            for one in (event("input_audio_buffer.speech_started"), audio(0.1)):
-                await sockets[0].send_json(one)
-            await sockets[0].send_str("no JSON")
-            assert [(await program.receive_json())["type"] for _ in range(2)][1] == audio(0)["type"]
-            assert (await program.receive()).data == "no JSON"
-            await until(lambda: head.last == "speaking")
-            await sockets[0].send_json(event("response.output_audio.done"))
-            await sockets[0].send_json(event("response.done"))
-            await until(lambda: head.last == "listening")
-            assert head.mouths == [(24_000, 1, bytes(4800))] and not head.sounds
-            await sockets[0].close(code=4000)
-            while not program.closed:
-                await program.receive()
-            assert program.close_code == 4000
-            await until(lambda: head.last == "idle")
-            await runner.cleanup()
+            async with realtime_server(port, server):
+                program = await session.ws_connect(url, headers=key, protocols=("realtime",))
+                assert program.protocol == "realtime"
+                await program.send_str("hello")
+                await until(lambda: "hello" in seen)
+                for one in (event("input_audio_buffer.speech_started"), audio(0.1)):
+                    await sockets[0].send_json(one)
+                await sockets[0].send_str("no JSON")
+                kinds = [(await program.receive_json())["type"] for _ in range(2)]
+                assert kinds[1] == audio(0)["type"]
+                assert (await program.receive()).data == "no JSON"
+                await until(lambda: head.last == "speaking")
+                await sockets[0].send_json(event("response.output_audio.done"))
+                await sockets[0].send_json(event("response.done"))
+                await until(lambda: head.last == "listening")
+                assert head.mouths == [(24_000, 1, bytes(4800))] and not head.sounds
+                await sockets[0].close(code=4000)
+                while not program.closed:
+                    await program.receive()
+                assert program.close_code == 4000
+                await until(lambda: head.last == "idle")
 
     head = run(openai_realtime.DOOR, scenario, f"ws://127.0.0.1:{port}", bind)
     assert seen == [("/v1/realtime?model=m", "Bearer hush"), "hello"]
@@ -408,7 +415,6 @@ def test_a_satellite_s_sound_is_said_and_reported_as_played() -> None:
     shape = {"rate": 16000, "width": 2, "channels": 1}
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        await until(lambda: head.said)
         async with (
             AsyncTcpClient("127.0.0.1", port) as sounds, AsyncTcpClient("127.0.0.1", port) as events
         ):  # fmt: skip
@@ -454,7 +460,6 @@ def test_a_stranger_at_the_satellite_s_port_is_disconnected(sent: bytes) -> None
     port = free_port()
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        await until(lambda: head.said)
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
         writer.write(sent)
         assert await reader.read() == b""
@@ -630,7 +635,6 @@ def test_the_newest_neighbour_takes_the_place_of_an_idle_one(
     bind = f"127.0.0.1:{free_port()}"
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        await until(lambda: head.said)
         async with ClientSession() as session:
             sockets = [await session.ws_connect(f"ws://{bind}/x?y=1") for _ in range(8)]
             for one in sockets[1:]:

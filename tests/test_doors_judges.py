@@ -11,7 +11,7 @@ import pytest
 from aiohttp import web
 from fakes.talking_head import TalkingHead, until
 from fakes.voice_assistant import free_port
-from test_doors import CONVERSATIONS, audio, event, run
+from test_doors import CONVERSATIONS, audio, event, realtime_server, run
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
@@ -69,21 +69,17 @@ def test_openai_s_client_talks_through_the_relay() -> None:
         return socket
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        await until(lambda: head.said)
-        app = web.Application()
-        app.router.add_get("/v1/realtime", server)
-        runner = web.AppRunner(app, shutdown_timeout=0.1, handler_cancellation=True)
-        await runner.setup()
-        await web.TCPSite(runner, "127.0.0.1", port).start()
         client = openai.AsyncOpenAI(api_key="hush", websocket_base_url=f"ws://{bind}/v1")
-        async with client.realtime.connect(model="m") as program:
+        async with (
+            realtime_server(port, server),
+            client.realtime.connect(model="m") as program,
+        ):
             await program.response.create()
             kinds = [(await program.recv()).type for _ in answer]
             assert kinds == [one["type"] for one in answer]
             await until(lambda: head.last == "listening")
             assert "speaking" in head.states
         await until(lambda: head.last == "idle")
-        await runner.cleanup()
 
     run(openai_realtime.DOOR, scenario, f"ws://127.0.0.1:{port}", bind)
     assert seen == [("/v1/realtime?model=m", "Bearer hush"), "response.create"]

@@ -1,6 +1,6 @@
 """Facial expressions and levels: tables, blending, commands, and what is refused."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from math import degrees, radians
 from random import Random
@@ -176,14 +176,6 @@ def test_a_jaw_is_a_joint_and_a_misspelt_neck_is_not() -> None:
     assert any(
         "joints.Jaw!: not a valid joint name" in fault for fault in faults(with_joint("Jaw!"))
     )
-
-
-def test_a_jaw_is_read_held_at_rest_and_written(started: Callable[[Rig], Assembly]) -> None:
-    made = started(with_joint("jaw"))
-    tick = made.robot.tick(0.005, 0.005)
-    assert made.robot.body.names[-1] == "jaw"
-    assert tick.desired_rad[-1] == 0.0
-    assert len(tick.guard_result.command_rad) == len(tick.desired_rad) == 10
 
 
 # ---- Expressions and levels from the command line, from Python and on the page.
