@@ -278,11 +278,8 @@ def test_e79_among_three_people_all_are_looked_at_and_keep_their_identities() ->
 
 
 def test_e80_what_spins_draws_the_gaze_by_its_spin() -> None:
-    rig = load_rig("desk")
-    rig = replace(rig, loop=replace(rig.loop, rate_hz=50.0))
     scene, (start_s, end_s) = load_scene("two-people"), SPIN_S
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="two-people"))
-    lived = Lived(made, scene, end_s)
+    lived = Lived(made_for("two-people", 0, 50.0), scene, end_s)
     on = [tick for tick in lived.within(start_s, end_s) if tick.target.kind == "pinwheel"]
     assert len(on) / 50.0 > 0.5
     first = on[0].target

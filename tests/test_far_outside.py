@@ -6,20 +6,15 @@ from math import degrees, nan, radians
 
 import pytest
 from command_line import typed
-from true_shafts import Shafts
+from true_shafts import Bench
 
 import gazerig
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoMissing, SetupError
 from gazerig.robot.app import run_bus
-from gazerig.robot.app.bus_wiring import rig_bus
-from gazerig.robot.app.rig_limits import limits, park_rad
-from gazerig.robot.app.run_bus import emulated_lines, servo_index
-from gazerig.robot.control.body import Body
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.safety.guard import Guard
 from gazerig.robot.safety.start_range import far_outside, find_far_outside
 
 EYE = "left_eye_pan"
@@ -48,43 +43,22 @@ def slipped(monkeypatch: pytest.MonkeyPatch) -> None:
     place(monkeypatch, {EYE: FAR})
 
 
-class Bench:
-    """A rig's body on emulated servos, and a guard whose desired angles are 0."""
+class FarBench(Bench):
+    """A bench whose desired angles are 0, and what it said of its recovery."""
 
     def __init__(self, rig: Rig, recover: bool = False) -> None:
-        self.rig, self.shafts, self.said = rig, Shafts(rig), list[str]()
-        self.period_s = 1.0 / rig.loop.rate_hz
-        ports = self.shafts.build(dict(emulated_lines(rig)))
-        self.body = Body(
-            rig_bus(rig, ports),
-            rig.joints,
-            park_rad(rig),
-            rig.couplings.values(),
-            recover=self.said.append if recover else None,
-        )
-        self.names = self.body.names
-        self.guard = Guard(
-            rig.guard, limits(rig.joints), self.names, self.body.configured_limits, self.period_s
-        )
+        self.said = list[str]()
+        super().__init__(rig, recover=self.said.append if recover else None)
 
-    def start(self) -> None:
-        self.guard.reset(self.shafts.now_s(), self.body.start(self.shafts))
-
-    def angle_deg(self, name: str = EYE) -> float:
-        """Return where a joint truly is."""
-        device = self.shafts.devices[self.rig.joints[name].bus]
-        steps = device.positions_steps()[servo_index(self.rig, name)]
-        return degrees(self.rig.joints[name].angle_rad(steps))
+    def angle_deg(self) -> float:
+        """Return where the eye truly is."""
+        return degrees(self.shafts.truth()[self.names.index(EYE)])
 
     def run(self, seconds: float) -> list[float]:
         """Run; return the true angle of the eye in every tick."""
         angles = []
         for _ in range(round(seconds / self.period_s)):
-            self.shafts.sleep_until(self.shafts.now_s() + self.period_s)
-            t_s = self.shafts.now_s()
-            self.joints = self.body.read(t_s)
-            result = self.guard.check((0.0,) * len(self.names), self.joints, 0.0, t_s)
-            self.body.write(result.command_rad)
+            self.tick((0.0,) * len(self.names))
             angles.append(self.angle_deg())
         return angles
 
@@ -95,7 +69,7 @@ class Bench:
 @pytest.mark.parametrize("rig", ["desk", "feetech", "two buses"])
 @pytest.mark.usefixtures("slipped")
 def test_no_servo_of_the_rig_gets_torque(rig: str) -> None:
-    bench = Bench(rig_of(rig))
+    bench = FarBench(rig_of(rig))
     with pytest.raises(SetupError, match=SAID) as refused:
         bench.start()
     assert "gazerig doctor" in str(refused.value) and "\n" not in str(refused.value)
@@ -110,7 +84,7 @@ def test_no_servo_of_the_rig_gets_torque(rig: str) -> None:
 @pytest.mark.parametrize("rig", ["desk", "feetech", "two buses"])
 @pytest.mark.usefixtures("slipped")
 def test_on_request_it_moves_inside_slowly_and_the_run_goes_on(rig: str) -> None:
-    bench = Bench(rig_of(rig), recover=True)
+    bench = FarBench(rig_of(rig), recover=True)
     bench.start()
     angles = bench.run(7.0)
     assert bench.said == [
@@ -128,7 +102,7 @@ def test_a_joint_a_little_outside_moves_inside_without_request(
     rig: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place(monkeypatch, {EYE: 44.0})
-    bench = Bench(load_rig(rig))
+    bench = FarBench(load_rig(rig))
     bench.start()
     assert abs(bench.run(3.0)[-1]) < 1.0
 
@@ -138,7 +112,7 @@ def test_a_servo_that_restarts_far_outside_stays_limp_until_it_is_turned_back(
     rig: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place(monkeypatch, {})
-    bench = Bench(load_rig(rig))
+    bench = FarBench(load_rig(rig))
     bench.start()
     bench.run(1.5)
     joint = bench.rig.joints[EYE]
@@ -159,7 +133,7 @@ def test_a_stop_holds_when_a_hand_has_turned_a_joint_far_outside(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     place(monkeypatch, {})
-    bench = Bench(load_rig("desk"))
+    bench = FarBench(load_rig("desk"))
     bench.start()
     bench.run(0.5)
     bench.body.disable_torque()
@@ -176,7 +150,7 @@ def test_a_stop_holds_when_a_hand_has_turned_a_joint_far_outside(
 
 @pytest.mark.usefixtures("slipped")
 def test_a_servo_without_a_position_is_not_taken_for_one_inside() -> None:
-    bench = Bench(load_rig("desk"))
+    bench = FarBench(load_rig("desk"))
     opened = bench.body.bus.open
 
     def open_and_lose() -> None:

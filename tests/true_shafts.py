@@ -234,14 +234,20 @@ def run(
 class Bench:
     """A rig's guard and bus without gaze: wishes in, true shafts out."""
 
-    def __init__(self, rig: Rig, where_rad: dict[str, float] | None = None) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        where_rad: dict[str, float] | None = None,
+        recover: Callable[[str], None] | None = None,
+    ) -> None:
         self.rig = rig
         self.shafts = Shafts(rig)
         ports = self.shafts.build(dict(emulated_lines(rig)))
         self.names = rig.names
         for name, angle in (where_rad or {}).items():
             self.turn(name, angle)
-        self.body = Body(rig_bus(rig, ports), rig.joints, park_rad(rig), sag=sag_compensation(rig))
+        sag = sag_compensation(rig)
+        self.body = Body(rig_bus(rig, ports), rig.joints, park_rad(rig), sag=sag, recover=recover)
         self.guard = Guard(
             rig.guard,
             limits(rig.joints),
@@ -273,8 +279,8 @@ class Bench:
         self.slot += 1 + missed_slots
         self.shafts.sleep_until(self._began_s + self.slot * self.period_s)
         t_s = self.shafts.now_s()
-        joints = self.body.read(t_s)
-        self.verdict = self.guard.check(desired_rad, joints, 0.0, t_s)
+        self.joints = self.body.read(t_s)
+        self.verdict = self.guard.check(desired_rad, self.joints, 0.0, t_s)
         self.body.write(self.verdict.command_rad)
         return self.verdict.command_rad
 
