@@ -5,10 +5,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from desk import GAZE_JOINTS
-from fakes.runs import simulated
+from fakes.runs import go, simulated
 
 from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import CommandReply
 
@@ -25,14 +25,7 @@ class Running:
     def go(self, seconds: float) -> list[Tick]:
         """Run on; give the new ticks."""
         began = len(self.ticks)
-        self.count = run(
-            self.made.robot,
-            self.made.clock,
-            self.made.loop,
-            lambda s: "seconds" if s >= seconds else None,
-            self.ticks.append,
-        )
-        assert self.count.stopped_by == "seconds"
+        self.count = go(self.made, seconds, self.ticks.append)
         return self.ticks[began:]
 
     def do(self, command: Command, seconds: float = 0.006) -> tuple[CommandReply, list[Tick]]:

@@ -6,11 +6,11 @@ from typing import Any
 import msgspec
 import pytest
 from commanded_robot import YAW, Running
+from fakes.runs import go
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
 from gazerig.robot.app.session import shut_down
-from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import head_activity, tick_control_source
 from gazerig.robot.dashboard.feed.snapshot import snapshot
@@ -136,7 +136,7 @@ def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(
     later = [tick.joints.position_rad for tick in ticks[20:]]
     assert max(abs(a - b) for p in later for a, b in zip(p, later[0], strict=True)) < 0.02
     # The program goes on: people can see, and resume.
-    assert running.count.stopped_by == "seconds"
+    assert running.count.stopped_by == "over"
 
 
 def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running) -> None:
@@ -159,7 +159,7 @@ def test_a_run_that_ends_stopped_does_not_park(running: Running) -> None:
     running.go(0.2)
     said: list[str] = []
     shut_down(running.made, running.count, said.append)
-    assert said == ["stopped by seconds: not parked, as it was stopped, torque off"]
+    assert said == ["stopped by over: not parked, as it was stopped, torque off"]
 
 
 def test_a_stop_while_parking_is_obeyed_at_once(running: Running) -> None:
@@ -266,7 +266,7 @@ def test_a_flood_of_resumes_beats_no_stop(running: Running, confirmed: bool) -> 
 
 
 def test_a_command_is_replied_to_when_its_tick_can_be_seen(running: Running) -> None:
-    robot, made = running.made.robot, running.made
+    robot = running.made.robot
     orders: tuple[list[Command], ...] = (
         [Stop("a hand")],
         [LookAt((1.0, 0.2, 0.3)), Stop("again")],
@@ -278,7 +278,7 @@ def test_a_command_is_replied_to_when_its_tick_can_be_seen(running: Running) -> 
         def watch(tick: Tick) -> None:
             seen.append([ticket.wait(0.0) for ticket in tickets])  # noqa: B023
 
-        run(robot, made.clock, made.loop, lambda s: "s" if s >= 0.006 else None, watch)
+        go(running.made, 0.006, watch)
         assert seen[0] == [None] * len(tickets)
         assert None not in [ticket.wait(0.0) for ticket in tickets]
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
+from fakes.runs import go
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
@@ -19,7 +20,7 @@ from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotatio
 from gazerig.gaze.types import PARTS
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import PARK_S, Tick, run
+from gazerig.robot.control.loop import PARK_S, Tick
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
@@ -40,12 +41,8 @@ def made(seed: int = 0, rig: Rig | None = None) -> Assembly:
 def ticks(assembly: Assembly, seconds: float) -> list[Tick]:
     seen: list[Tick] = []
     assembly.robot.start(assembly.clock)
-    run(assembly.robot, assembly.clock, assembly.loop, until(seconds), seen.append)
+    go(assembly, seconds, seen.append)
     return seen
-
-
-def until(seconds: float) -> Callable[[float], str | None]:
-    return lambda s: "seconds" if s >= seconds else None
 
 
 def test_it_starts_slowly_from_where_the_joints_are() -> None:
@@ -88,8 +85,7 @@ def test_a_servo_fault_ends_the_loop_with_its_cause() -> None:
         if len(seen) == 100:
             chain[7].overload()
 
-    count = run(assembly.robot, assembly.clock, assembly.loop, until(5.0), watch)
-    assert count.stopped_by.startswith("fault: ")
+    count = go(assembly, 5.0, watch)
     assert count.stopped_by == "fault: neck_yaw: overload"
     assert count.ticks <= 105
 
@@ -123,7 +119,8 @@ class SlowRobot:
 def test_slots_are_absolute_and_overruns_are_skipped_not_caught_up() -> None:
     clock = SimulatedClock()
     robot = SlowRobot(clock, lambda n: 0.0231 if n == 10 else 0.001)
-    count = run(robot, clock, LoopParams(), until(1.0), lambda tick: None)  # type: ignore[arg-type]
+    stand_in: Any = SimpleNamespace(robot=robot, clock=clock, loop=LoopParams())
+    count = go(stand_in, 1.0)
     slots = np.array([t for t, _ in robot.times]) / 0.005
     assert np.abs(slots - np.round(slots)).max() < 1e-6
     assert count.overruns == 4
@@ -250,7 +247,7 @@ def test_it_parks_in_time_on_a_host_that_is_late(name: str, host: str) -> None:
     robot, period_s = made.robot, 1.0 / made.loop.rate_hz
     limits = robot._guard.limits
     robot.start(made.clock)
-    run(robot, made.clock, made.loop, lambda s: "over" if s >= 0.5 else None, lambda _: None)
+    go(made, 0.5)
     sent: list[tuple[float, tuple[float, ...]]] = []
     write = robot.body.write
 

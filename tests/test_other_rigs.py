@@ -5,26 +5,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fakes.runs import go
 from mixed_rig import rig_of
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.tick import Tick
 
 
-def ran(rig: Rig, seconds: float, seed: int = 0) -> tuple[Assembly, list[Tick], tuple[str, ...]]:
+def ran(rig: Rig, seconds: float) -> tuple[Assembly, list[Tick], tuple[str, ...]]:
     """Run a rig before a visitor; return the run, every tick, and the messages at the start."""
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=seed, scene="visitor"))
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
     ticks: list[Tick] = []
     made.robot.start(made.clock)
     said = made.robot.body.bus.events()
-
-    def over(s: float) -> str | None:
-        return "over" if s >= seconds else None
-
-    count = run(made.robot, made.clock, made.loop, over, ticks.append)
-    assert count.stopped_by == "over"
+    assert go(made, seconds, ticks.append).stopped_by == "over"
     return made, ticks, said
 
 

@@ -37,19 +37,23 @@ def ticks(made: Assembly, number: int, dt_s: float = 0.005) -> list[Tick]:
     return done
 
 
-def play(
-    made: Assembly, seconds: float, watch: Callable[[Tick], None] = lambda tick: None
-) -> LoopCount:
+Watch = Callable[[Tick], object]
+
+
+def go(made: Assembly, seconds: float, watch: Watch = lambda tick: None) -> LoopCount:
+    """Run the loop of a robot that has started for a time."""
+
+    def end(s: float) -> str | None:
+        return "over" if s >= seconds - 1e-9 else None
+
+    return run(made.robot, made.clock, made.loop, end, watch)
+
+
+def play(made: Assembly, seconds: float, watch: Watch = lambda tick: None) -> LoopCount:
     """Start a robot, run its loop for a time, stop it and close it."""
     made.robot.start(made.clock)
     try:
-        return run(
-            made.robot,
-            made.clock,
-            made.loop,
-            lambda s: "over" if s >= seconds - 1e-9 else None,
-            watch,
-        )
+        return go(made, seconds, watch)
     finally:
         made.robot.stop()
         made.close()
