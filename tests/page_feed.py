@@ -1,18 +1,18 @@
 """A running rig's ticks for a page, sent as the control loop sends them."""
 
-from collections.abc import Mapping
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
-from fakes.runs import play
+from fakes.runs import play, simulated
 from msgspec import structs
 from present import present
 
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.feed.live_feed import LiveRig
@@ -30,8 +30,7 @@ GREY = np.full((400, 640, 3), (140, 120, 100), np.uint8)
 @cache
 def visit(name: str) -> tuple[Assembly, Tick]:
     """Return a rig, and its tick after 1.2 s: it looks at the mouth of a person."""
-    options = RunOptions(rig=name, mock=True, fast=True, seed=0, scene="face-to-face", bus="ideal")
-    made, ticks = assemble(load_rig(name), options), list[Tick]()
+    made, ticks = simulated(name, "face-to-face", bus="ideal"), list[Tick]()
     play(made, 1.2, ticks.append)
     return made, ticks[-1]
 
@@ -73,6 +72,24 @@ class PageFeed:
         tick = structs.replace(self.tick, detections=found, **changes)
         self._stream.update(tick)
         return tick
+
+
+@contextmanager
+def going_on(show: Callable[[], object]) -> Iterator[None]:
+    """Show something every 20 ms from a thread, as a running rig does."""
+    done = threading.Event()
+
+    def work() -> None:
+        while not done.wait(0.02):
+            show()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
 
 
 def _fail(line: str) -> None:

@@ -13,11 +13,10 @@ from typing import Any
 
 from browser import Browser
 from desk import GAZE_JOINTS
+from fakes.runs import simulated
 from present import present
 from shown_page import free_port, wait_for
 
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
@@ -35,7 +34,7 @@ class Rig:
     """A simulated rig with a page, ticked by a thread."""
 
     def __init__(self, host: str = "127.0.0.1") -> None:
-        made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+        made = simulated()
         self.made, self.robot = made, made.robot
         self.tuning = ParamStore(made.live_params, self.robot.command, "desk")
         self.said: list[str] = []

@@ -77,8 +77,10 @@ def free_port() -> int:
 
 
 @contextmanager
-def running_page(port: int | None = None) -> Iterator[tuple[PageProcess, str]]:
-    page = PageProcess("127.0.0.1", free_port() if port is None else port)
+def running_page(
+    port: int | None = None, hear: Callable[[dict[str, object]], str | None] | None = None
+) -> Iterator[tuple[PageProcess, str]]:
+    page = PageProcess("127.0.0.1", free_port() if port is None else port, hear)
     page.open()
     try:
         yield page, wait_for(page.url, "the page's address")

@@ -1,14 +1,9 @@
 """The page shows a head that looks."""
 
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
-
 import cv2
 import numpy as np
 from browser import Browser, browsing
-from page_feed import GREY, PageFeed
+from page_feed import GREY, PageFeed, going_on
 from page_person import Person
 from present import present
 from shown_page import running_page, wait_for
@@ -16,24 +11,6 @@ from shown_page import running_page, wait_for
 WINDOW_SMALL_PX = (900, 500)  # a processor that does a graphics card's work has less to do
 PANEL_PX = 370
 CLOSE_TO_THE_RIG = "initialCameraPosition=0.45,-0.3,0.2&initialCameraLookAt=0,0,0.12"
-
-
-@contextmanager
-def feeding(feed: PageFeed, **changes: Any) -> Iterator[None]:
-    """Feed the page from a thread, as a running rig does."""
-    done = threading.Event()
-
-    def work() -> None:
-        while not done.wait(0.02):
-            feed.show(GREY, **changes)
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    try:
-        yield
-    finally:
-        done.set()
-        thread.join()
 
 
 def irises(browser: Browser) -> np.ndarray:
@@ -76,13 +53,14 @@ def test_page_shows_a_head_that_turns() -> None:
         assert camera.get("value") == GREY.shape[1]
         before = wait_for(eyes, "the rig's eyes").mean(axis=0)
         feed.tick = feed.turned({"neck_yaw": 0.4})
-        with feeding(feed):
+        with going_on(lambda: feed.show(GREY)):
             wait_for(eyes_elsewhere, "the turn of the head")
             wait_for(lambda: reads("face 1: mouth", "behaviour wait adds", "fixate"), "the words")
             Person(browser).open("Health")
             wait_for(lambda: reads("no answer 3 times", "guard: ok"), "the health")
         # Six servos without feedback: a person is informed before torque is switched on again.
-        with feeding(PageFeed(page, "maker"), stopped="a test"):
+        maker = PageFeed(page, "maker")
+        with going_on(lambda: maker.show(GREY, stopped="a test")):
             wait_for(lambda: reads("6 of 6 joints without feedback", "Resume"), "the other rig")
             browser.run("document.querySelector('#rig-words button').click()")
             wait_for(lambda: reads("6 joints without feedback jump to their places"), "the warning")

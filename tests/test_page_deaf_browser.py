@@ -5,22 +5,18 @@ other browsers and the stop button do not notice.
 """
 
 import itertools
-import socket
 import threading
-from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, closing, suppress
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from page_feed import PageFeed
+from page_feed import PageFeed, going_on
 from page_visitor import LOOKING, Visitor
 from present import present
-from shown_page import wait_for
+from shown_page import running_page, wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
-
-from gazerig.robot.dashboard.feed.page_process import PageProcess
 
 OWED_BYTES = 6_000_000
 """More than Linux keeps for one connection."""
@@ -64,56 +60,6 @@ class Listener:
         self._thread.join()
 
 
-class Rig:
-    """A page that is fed as by a running rig, and what was heard from it."""
-
-    def __init__(self) -> None:
-        with socket.socket() as trial:
-            trial.bind(("127.0.0.1", 0))
-            self.port = trial.getsockname()[1]
-        self.heard: list[dict[str, object]] = []
-        self.page = PageProcess("127.0.0.1", self.port, self.heard.append)
-        self.changes: dict[str, object] = {}
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._feed)
-
-    def open(self) -> str:
-        self.page.open()
-        wait_for(self.page.url, "the page's address")
-        self._thread.start()
-        return str(self.page.url())
-
-    def _feed(self) -> None:
-        # Noise does not compress: what the deaf browser is owed soon fills all buffers.
-        noise = np.random.default_rng(0).integers(0, 255, (8, 400, 640, 3)).astype(np.uint8)
-        feed = PageFeed(self.page)
-        percept = present(feed.tick.percept)
-        (face,) = percept.faces
-        for number in itertools.count():
-            if self._over.wait(0.02):
-                return
-            # New people again and again, with all their shapes.
-            newer = replace(percept, faces=(replace(face, id=number // 3),))
-            feed.show(noise[number % len(noise)], percept=newer, **self.changes)
-
-    def feed_no_more(self) -> None:
-        self._over.set()
-        self._thread.join()
-
-    def close(self) -> None:
-        self.feed_no_more()
-        self.page.close()
-
-
-@pytest.fixture
-def rig() -> Iterator[Rig]:
-    rig = Rig()
-    try:
-        yield rig
-    finally:
-        rig.close()
-
-
 def drained(there: ClientConnection) -> int:
     """Return the bytes kept for the deaf browser when it finally reads."""
     taken = 0
@@ -124,24 +70,36 @@ def drained(there: ClientConnection) -> int:
 
 
 @pytest.mark.parametrize("path", [PANELS, VIEW])
-def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(rig: Rig, path: str) -> None:
-    visitor = Visitor(rig.open())
-    deaf = browser(visitor, path, deaf=True)
-    reads_all, listener = Listener(visitor, path), Listener(visitor)
-    try:
-        wait_for(lambda: reads_all.bytes > OWED_BYTES, "what one who reads gets")
-        # Now as ever: others see the newest, a stop is heard, the button knows of it.
-        rig.changes = {"stopped": "a test"}
-        wait_for(lambda: listener.reads("stopped: a test"), "the newest words")
-        seen = reads_all.bytes
-        wait_for(lambda: reads_all.bytes > seen, "more for who reads")
-        assert visitor.ask({"do": "stop", "why": "a test"}) == 204
-        wait_for(lambda: [asked["do"] for asked in rig.heard] == ["stop"], "the stop")
-        wait_for(lambda: visitor.state()["stopped"] == "a test", "the button's news")
-        # It was deaf indeed: what it was owed was not all kept for it.
-        rig.feed_no_more()
-        assert 0 < drained(deaf) < reads_all.bytes - 1_000_000
-    finally:
-        for one in (reads_all, listener):
-            one.close()
-        deaf.close()
+def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(path: str) -> None:
+    heard: list[dict[str, object]] = []
+    changes: dict[str, object] = {}
+    # Noise does not compress: what the deaf browser is owed soon fills all buffers.
+    noise = np.random.default_rng(0).integers(0, 255, (8, 400, 640, 3)).astype(np.uint8)
+    numbers = itertools.count()
+    with running_page(hear=heard.append) as (page, url):
+        feed, visitor = PageFeed(page), Visitor(url)
+        percept = present(feed.tick.percept)
+        (face,) = percept.faces
+
+        def show() -> None:
+            """New people again and again, with all their shapes."""
+            number = next(numbers)
+            newer = replace(percept, faces=(replace(face, id=number // 3),))
+            feed.show(noise[number % len(noise)], percept=newer, **changes)
+
+        with ExitStack() as stack:
+            with going_on(show):
+                deaf = stack.enter_context(browser(visitor, path, deaf=True))
+                reads_all = stack.enter_context(closing(Listener(visitor, path)))
+                listener = stack.enter_context(closing(Listener(visitor)))
+                wait_for(lambda: reads_all.bytes > OWED_BYTES, "what one who reads gets")
+                # Now as ever: others see the newest, a stop is heard, the button knows of it.
+                changes["stopped"] = "a test"
+                wait_for(lambda: listener.reads("stopped: a test"), "the newest words")
+                seen = reads_all.bytes
+                wait_for(lambda: reads_all.bytes > seen, "more for who reads")
+                assert visitor.ask({"do": "stop", "why": "a test"}) == 204
+                wait_for(lambda: [asked["do"] for asked in heard] == ["stop"], "the stop")
+                wait_for(lambda: visitor.state()["stopped"] == "a test", "the button's news")
+            # It was deaf indeed: what it was owed was not all kept for it.
+            assert 0 < drained(deaf) < reads_all.bytes - 1_000_000

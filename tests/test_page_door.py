@@ -58,13 +58,6 @@ def test_the_view_is_viser_in_a_frame_of_this_page_alone(near: Rig) -> None:
     assert near.get("/elsewhere")[0] == near.get("/rig/page_files.py")[0] == 404
 
 
-def test_a_browser_gets_what_the_server_sends(near: Rig) -> None:
-    near.server.gui.add_html("words for the test")
-    with near.knock() as socket_:
-        assert isinstance(socket_.recv(timeout=PATIENCE_S), bytes)
-        assert socket_.subprotocol == VISER
-
-
 @pytest.mark.parametrize("host", ["elsewhere.example", "127.0.0.1.elsewhere.example", "10.0.0.1"])
 def test_a_foreign_name_for_this_machine_is_refused(near: Rig, host: str) -> None:
     status, _, text = near.get(Host=host)
@@ -355,19 +348,24 @@ def test_the_token_becomes_a_cookie_and_leaves_the_address(either: Rig) -> None:
     assert "HttpOnly" in cookie and "SameSite=Strict" in cookie
     assert either.get()[0] == 200
     with either.knock() as socket_:
-        assert socket_.recv(timeout=PATIENCE_S)
+        assert isinstance(socket_.recv(timeout=PATIENCE_S), bytes)
+        assert socket_.subprotocol == VISER
+
+
+def raw_answer(rig: Rig, path: str, headers: str = "") -> bytes:
+    """Return the whole answer to a request whose path no client has tidied."""
+    host, port = rig.address.split(":")
+    with socket.create_connection((host, int(port)), PATIENCE_S) as there:
+        head = f"GET {path} HTTP/1.1\r\nHost: {rig.address}\r\n{headers}Connection: close"
+        there.sendall(f"{head}\r\n\r\n".encode())
+        return b"".join(iter(lambda: there.recv(1 << 16), b""))
 
 
 @pytest.mark.parametrize(
     "path", ["//evil/", "/%5Cevil/", "/\\evil/", "///evil", "//evil/%2e%2e//x"]
 )
 def test_the_token_leads_to_this_page_and_nowhere_else(near: Rig, path: str) -> None:
-    with socket.create_connection(tuple(near.address.split(":"))) as there:  # type: ignore[arg-type]
-        there.sendall(
-            f"GET {path}?token={TOKEN} HTTP/1.1\r\nHost: {near.address}\r\n"
-            "Connection: close\r\n\r\n".encode()
-        )
-        answer = there.recv(4096).decode()
+    answer = raw_answer(near, f"{path}?token={TOKEN}").decode()
     place = next(line for line in answer.splitlines() if line.startswith("Location: "))
     assert place.startswith("Location: /") and place[11:12] not in ("/", "\\")
 
@@ -378,13 +376,7 @@ def test_the_token_leads_to_this_page_and_nowhere_else(near: Rig, path: str) -> 
      "//etc/passwd", "/assets/../../../../../../etc/passwd", "/\\..\\etc\\passwd"],
 )  # fmt: skip
 def test_no_path_leads_out_of_the_pages_own_files(near: Rig, path: str) -> None:
-    with socket.create_connection(tuple(near.address.split(":"))) as there:  # type: ignore[arg-type]
-        there.settimeout(PATIENCE_S)
-        there.sendall(
-            f"GET {path} HTTP/1.1\r\nHost: {near.address}\r\nCookie: {near.cookie}\r\n"
-            "Connection: close\r\n\r\n".encode()
-        )
-        answer = b"".join(iter(lambda: there.recv(1 << 16), b""))
+    answer = raw_answer(near, path, f"Cookie: {near.cookie}\r\n")
     assert b"root:" not in answer and b" 500 " not in answer.splitlines()[0]
 
 

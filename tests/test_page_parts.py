@@ -1,31 +1,33 @@
 """Elements of the page: shapes, words, traces, and the picture with its detections."""
 
+import json
 import math
 import re
 from dataclasses import replace
 from html import escape
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
+from msgspec import structs
+from outside_package import install, on_path
 from shown_page import AHEAD, SNAPSHOT
 from six_joints import SIX, of_six
+from ticked_rig import Outbox
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import BusHealth, DetectedFace, Detections, MovingBlob
 from gazerig.gaze.types import PARTS, Face, Salience
 from gazerig.robot.control.tick_text import health_text
-from gazerig.robot.dashboard.feed.camera_overlay import (
-    IMAGE_WIDTH_PX,
-    draw_detections,
-)
+from gazerig.robot.control.track_choices import TrackInfo
+from gazerig.robot.dashboard.feed.camera_overlay import IMAGE_WIDTH_PX, draw_detections
 from gazerig.robot.dashboard.panels.attention_panel import reason_text, salience_bars, target_text
-from gazerig.robot.dashboard.panels.event_timeline import Timeline
-from gazerig.robot.dashboard.panels.joint_charts import (
-    MOST_POINTS,
-    JointSeries,
-)
+from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
+from gazerig.robot.dashboard.panels.joint_charts import MOST_POINTS, JointSeries
+from gazerig.robot.dashboard.panels.package_panels import PagePanels, core_panels
+from gazerig.robot.dashboard.panels.play_panel import PlayPanel, SoundWaves, timeline_html
 from gazerig.robot.dashboard.panels.servo_health import (
     alarms,
     health_table,
@@ -35,7 +37,9 @@ from gazerig.robot.dashboard.panels.servo_health import (
     strain_of_load,
     strain_of_voltage,
 )
-from gazerig.robot.model.control_source import ControlSource
+from gazerig.robot.dashboard.widgets.widgets import Client, Widgets
+from gazerig.robot.model.commands import EndTrack, Play
+from gazerig.robot.model.control_source import FINISHED, ControlSource, TrackState
 from gazerig.robot.model.types import (
     CommandedPose,
     LoopFigures,
@@ -280,3 +284,293 @@ def test_bus_faults_are_told_in_plain_words() -> None:
     said = health_text(BusHealth(0, 0, errors))
     assert said == "bus: pulse 2 times, torque switched on again 1 time, no answer 74 times"
     assert health_text(BusHealth(0, 0, {})) == "bus ok"
+
+
+# --- The page's panels: what browsers are sent, what they may send, and who is sent what
+
+
+class Tab:
+    """A browser's tab without the drawing."""
+
+    def __init__(self, widgets: Widgets, browser: str = "browser 1") -> None:
+        self._widgets = widgets
+        self.woken = 0
+        self.client: Client = widgets.join(browser, self._wake)
+        self.images: dict[int, bytes] = {}
+        self.seen: dict[int, dict[str, Any]] = {}
+        self.notices: list[tuple[str, bool]] = []
+
+    def _wake(self) -> None:
+        self.woken += 1
+
+    def read(self) -> list[int]:
+        """Take what waits; the numbers of what was put."""
+        out = self._widgets.outgoing(self.client)
+        if out is None:
+            return []
+        for one in out.images:
+            self.images[int.from_bytes(one[:4], "big")] = one[4:]
+        said = json.loads(out.text) if out.text else {}
+        for number, props in said.get("put", []):
+            self.seen.setdefault(number, {}).update(props)
+        for number in said.get("gone", []):
+            self.seen.pop(number, None)
+        self.notices += [(one["text"], one["refused"]) for one in said.get("say", [])]
+        return [number for number, _ in said.get("put", [])]
+
+    def send(self, *message: object) -> None:
+        self._widgets.handle_message(self.client, json.dumps(message[0]))
+
+
+@pytest.fixture
+def widgets() -> Widgets:
+    return Widgets()
+
+
+def test_who_comes_late_gets_all_and_then_what_changed(widgets: Widgets) -> None:
+    words = widgets.panel("watch").html("first")
+    section = widgets.panel("steer").section("joints")
+    slider = section.slider("neck", (-10.0, 10.0), 0.1, 0.0)
+    tab = Tab(widgets)
+    assert tab.read() == [1, 2, 3]
+    assert tab.seen[3]["in"] == 2 and tab.seen[3]["kind"] == "slider"
+    assert tab.read() == []
+    words.content = "second"
+    slider.value = 4.0
+    words.content = "third"
+    assert tab.read() == [1, 3]
+    assert (tab.seen[1]["content"], tab.seen[3]["value"]) == ("third", 4.0)
+    words.content = "third"
+    assert tab.read() == []
+
+
+def test_a_slow_browser_gets_only_the_newest_of_each(widgets: Widgets) -> None:
+    words, image = widgets.panel("watch").html(), widgets.panel("camera").image("camera")
+    tab = Tab(widgets)
+    tab.read()
+    for k in range(1000):
+        words.content = f"words {k}"
+        image.show(b"image %d" % k)
+    assert len(tab.client.changes) == 1 and len(tab.client.images) == 1
+    assert tab.woken == 2  # once for all that waits
+    tab.read()
+    assert tab.seen[1]["content"] == "words 999" and tab.images == {2: b"image 999"}
+
+
+def test_a_drawer_that_is_shut_is_not_sent_until_it_is_opened(widgets: Widgets) -> None:
+    camera = widgets.panel("camera").image("camera")
+    words = widgets.panel("health").html("guard: ok")
+    tab = Tab(widgets)
+    tab.send({"seen": ["camera"]})
+    assert widgets.is_visible("camera") and not widgets.is_visible("health")
+    assert tab.read() == [1]
+    words.content = "guard: hold"
+    camera.show(b"jpeg")
+    assert tab.read() == [] and tab.images == {1: b"jpeg"}
+    tab.send({"seen": ["camera", "health"]})
+    assert tab.read() == [2] and tab.seen[2]["content"] == "guard: hold"
+
+
+def test_what_one_does_the_others_see_and_handlers_hear_once(widgets: Widgets) -> None:
+    heard: list[tuple[float, str]] = []
+    slider = widgets.panel("steer").slider("neck", (-10.0, 10.0), 0.1, 0.0)
+    slider.on_change(lambda value, client: heard.append((value, client)))
+    one, other = Tab(widgets), Tab(widgets)
+    one.read(), other.read()
+    one.send({"set": [1, 2.5]})
+    assert heard == [(2.5, one.client.name)] and slider.value == 2.5
+    assert one.read() == [] and other.read() == [1]
+    slider.value = 3.0  # set by the program: no handler is called
+    assert len(heard) == 1 and one.read() == [1]
+    slider.value = 4.0  # older than what the browser sends before it reads
+    one.send({"set": [1, 5.0]})
+    one.read(), other.read()
+    assert (one.seen[1]["value"], other.seen[1]["value"]) == (3.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "wrong"),
+    [
+        ("slider", [99.0, "1", None, True, [1], 1e400]),
+        ("checkbox", [1, "yes", None]),
+        ("text", [1, None, "x" * 5000]),
+        ("choice", ["c", 1, None]),
+    ],
+)
+def test_what_a_field_cannot_hold_is_refused_in_words(
+    widgets: Widgets, kind: str, wrong: list[object]
+) -> None:
+    place = widgets.panel("steer")
+    heard: list[object] = []
+    made: dict[str, Any] = {
+        "slider": lambda: place.slider("neck", (-10.0, 10.0), 0.1, 1.0),
+        "checkbox": lambda: place.checkbox("drag", value=False),
+        "text": lambda: place.text("find", "neck"),
+        "choice": lambda: place.choice("group", ("a", "b")),
+    }
+    field = made[kind]()
+    for name in ("on_change", "on_press"):
+        if hasattr(field, name):
+            getattr(field, name)(lambda *given: heard.append(given))
+    before = field.props.get("value")
+    tab = Tab(widgets)
+    tab.read()
+    for value in wrong:
+        tab.send({"set": [1, value]})
+    tab.read()
+    assert heard == [] and field.props.get("value") == before
+    assert len(tab.notices) == len(wrong) and all(refused for _, refused in tab.notices)
+    assert tab.seen[1].get("value") == before  # the browser gets the present value
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["no JSON", "[]", "{}", '{"set": 3}', '{"set": [true, 1]}', '{"set": ["1", 1]}', "NaN",
+     '{"set": [1, NaN]}', '{"seen": ["nowhere"]}', '{"seen": "watch"}', "[" * 9000],
+)  # fmt: skip
+def test_nonsense_is_refused_and_changes_nothing(widgets: Widgets, text: str) -> None:
+    slider = widgets.panel("steer").slider("neck", (-10.0, 10.0), 0.1, 0.0)
+    tab = Tab(widgets)
+    tab.read()
+    widgets.handle_message(tab.client, text)
+    assert slider.value == 0.0 and tab.client.seen >= {"steer", "watch"}
+    tab.read()
+    assert len(tab.notices) == 1 and tab.notices[0][1]
+
+
+# --- Drawer Play: buttons, the timeline of the tracks that play, and what it sends
+
+
+SHOW = TrackState(
+    4, "show", 12.0, 60.0, owns=("neck_yaw", "jaw"), who="stage", sound="/a/hello.wav",
+    limited="neck_yaw: slower by 1.2", clock="sound",
+)  # fmt: skip
+INFO = TrackInfo(
+    "show", "a <b>song</b>", 60.0, 1.2,
+    sound="/a/hello.wav", cues=(("verse", 30.0),), layers=("head", "jaw"),
+)  # fmt: skip
+
+
+class NoWaves(SoundWaves):
+    def get(self, path: str) -> None:
+        return None
+
+
+class Drawer:
+    """The drawer of a rig with three tracks."""
+
+    def __init__(self) -> None:
+        self.outbox = Outbox()
+        self.panel = PlayPanel(Widgets().panel("play"), self.outbox)  # type: ignore[arg-type]
+        self.panel._waves = NoWaves()
+        self.panel.offer(["tilt", "none", "show"])
+        self.panel.add_infos([structs.asdict(INFO)])
+
+    def show(self, t_s: float, *tracks: TrackState) -> None:
+        self.panel.show(replace(SNAPSHOT, t_s=t_s, tracks=tracks))
+
+
+def test_buttons_speed_and_loop() -> None:
+    drawer = Drawer()
+    panel = drawer.panel
+    assert panel.tracks is not None and panel.tracks.options == ("none", "show", "tilt")
+    panel.speed.receive_input(1.5, "5")  # nothing plays yet
+    panel.tracks.receive_input("show", "5")
+    panel.loops.receive_input(True, "5")
+    panel.tracks.receive_input("none", "5")
+    assert drawer.outbox.asked == [
+        (Play("show", 1.5), "5"), (Play("", 1.5, loop=True), "5"),
+    ]  # fmt: skip
+
+
+def test_a_playing_track_is_ended() -> None:
+    drawer = Drawer()
+    drawer.show(1.0, SHOW, replace_state(SHOW, number=5, name="tilt", position_s=0.5))
+    panel = drawer.panel
+    assert panel.tracks is not None and panel.tracks.current == "tilt"
+    assert panel.which.options == ("all", "show", "tilt")
+    panel.which.receive_input("show", "5")
+    drawer.show(1.1, SHOW)  # too soon to be drawn
+    assert panel.tracks.current == "tilt"
+    drawer.show(1.3, SHOW)
+    assert panel.tracks.current == "show"
+    panel.end.receive_input("end", "5")
+    panel.which.receive_input("all", "5")
+    panel.end.receive_input("end", "5")
+    assert [asked for asked, _ in drawer.outbox.asked] == [EndTrack("show"), EndTrack()]
+    drawer.show(9.0)
+    assert panel.tracks.current == "none" and "no track plays" in panel.timeline.content
+
+
+def replace_state(state: TrackState, **changes: object) -> TrackState:
+    return structs.replace(state, **changes)
+
+
+def test_the_timeline_shows_position_owners_cues_and_limits() -> None:
+    html = timeline_html((SHOW,), {"show": INFO}, NoWaves())
+    for words in (
+        "12.0 of 60.0 s, sound clock", "verse", "head, jaw; owns neck_yaw, jaw", "started by stage",
+        "show: neck_yaw: slower by 1.2", "show at 12.0 s",
+    ):  # fmt: skip
+        assert words in html, words
+    ended = replace_state(SHOW, end_reason="stage has ended it")
+    assert "show has ended: stage has ended it" in timeline_html((ended,), {}, NoWaves())
+    done = replace_state(SHOW, end_reason=FINISHED, limited="")
+    assert "note" not in timeline_html((done,), {}, NoWaves())
+
+
+def test_the_list_describes_all_tracks_and_escapes_texts() -> None:
+    listed = Drawer().panel.list.content
+    assert "a &lt;b&gt;song&lt;/b&gt;" in listed and "1.20 times slower" in listed
+    assert "hello.wav" in listed
+
+
+# --- Panels of one file, ours and those of packages; a failed one shows why, the page continues
+
+
+CODE = """
+from gazerig.robot.dashboard.panels.package_panels import PagePanel
+class Count(PagePanel):
+    title = "snapshots"
+    def __init__(self): self.n = 0
+    def update(self, snapshot): self.n += 1
+    def drawing(self): return f"<p>{self.n}</p>"
+class Broken(Count):
+    title = "broken"
+    def update(self, snapshot): raise RuntimeError("no bulb")
+class NoPanel: pass
+"""
+NAMES = {"count": "counter:Count", "broken": "counter:Broken", "none": "counter:NoPanel"}
+
+
+def contents(widgets: Widgets) -> list[str]:
+    return [widget.content for widget in widgets._widgets.values() if hasattr(widget, "content")]
+
+
+def test_panels_of_packages_are_drawn_and_failures_named(tmp_path: Path) -> None:
+    install(tmp_path, "counter", {"gazerig.page_panel": NAMES}, {"counter": CODE})
+    with on_path(tmp_path):
+        widgets = Widgets()
+        panels = PagePanels(widgets.panel("watch"))
+        panels.begin()
+        for _ in range(3):
+            panels.update(looking(0.0))
+        panels.draw(0)
+        shown = " ".join(contents(widgets))
+        assert "<p>3</p>" in shown and "RuntimeError: no bulb" in shown
+        assert "is no subclass of PagePanel" in shown
+        panels.begin()
+        panels.draw(0)
+        assert "<p>0</p>" in " ".join(contents(widgets))
+
+
+def test_panels_of_this_folder_are_found_and_drawn_when_they_are_due() -> None:
+    assert list(core_panels()) == [Timeline]
+    widgets = Widgets()
+    panels = PagePanels(widgets.panel("watch"))
+    panels.begin()
+    panels.update(looking(0.0))
+    panels.draw(Timeline.period - 1)
+    assert not any(contents(widgets))
+    panels.draw(Timeline.period)
+    assert f"the last {STRIP_S:.0f} seconds: looked at" in "".join(contents(widgets))

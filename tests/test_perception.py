@@ -75,14 +75,6 @@ def test_a_face_is_as_far_as_the_camera_measures_and_says_so() -> None:
     assert left_eye[1] == pytest.approx(-0.8 * PARTS_FACE_M["LE"][1], abs=0.002)
 
 
-def test_without_depth_its_size_tells_and_the_doubt_is_shown() -> None:
-    perception = Perception(STILL, 69.0, Tracker())
-    (face,) = seen(perception, 1, faces=(face_at((0.0, 0.0, 1.0)),)).faces
-    assert face.distance_from == "face size"
-    assert face.p_world_m[0] == pytest.approx(1.0, abs=0.02)
-    assert face.along_sd_m > 0.05 > 0.01 > face.across_sd_m
-
-
 @pytest.mark.parametrize(
     ("size", "depth_m", "believed"),
     [
@@ -93,12 +85,14 @@ def test_without_depth_its_size_tells_and_the_doubt_is_shown() -> None:
         (0.65, depth_of(0.65), True),
         (1.3, depth_of(1.3), True),
         (1.0, np.random.default_rng(1).normal(1.0, 0.3, (HEIGHT, WIDTH)), False),
+        (1.0, None, False),
     ],
     ids=["background behind a narrow face", "a hand before the face", "far behind",
-         "background beside the face", "a child", "a large face", "no surface"],
+         "background beside the face", "a child", "a large face", "no surface",
+         "no depth"],
 )  # fmt: skip
 def test_depth_that_is_not_the_faces_is_not_taken(
-    size: float, depth_m: NDArray[Any], believed: bool
+    size: float, depth_m: NDArray[Any] | None, believed: bool
 ) -> None:
     """All have the picture of an adult's face at 1 m."""
     perception = Perception(STILL, 69.0, Tracker())
@@ -106,6 +100,7 @@ def test_depth_that_is_not_the_faces_is_not_taken(
     (found,) = seen(perception, 1, faces=(face,), depth_m=depth_m).faces
     assert found.distance_from == ("camera" if believed else "face size")
     assert found.p_world_m[0] == pytest.approx(size, abs=0.02)
+    assert believed or found.along_sd_m > 0.05 > 0.01 > found.across_sd_m
 
 
 def blob_at(p: Vec3, v: Vec3, known: bool = True, **more: Any) -> MovingBlob:

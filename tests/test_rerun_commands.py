@@ -1,5 +1,6 @@
 """The commands rerun and export on one recorded run."""
 
+import csv
 import json
 import re
 from dataclasses import replace
@@ -10,15 +11,21 @@ import numpy as np
 import pytest
 from fakes.runs import VISIT, play, record
 from mcap.reader import make_reader
+from msgspec import structs
+from recorded_rigs import Run, recorded
+from recorded_run import exact
+from six_joints import SIX
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import compose
 from gazerig.robot.app.session import run as run_composed
 from gazerig.robot.cli import recordings
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.recording.gaze_angles import collect_gaze_angles
+from gazerig.robot.recording.export_csv import columns, write_csv
+from gazerig.robot.recording.gaze_angles import collect_gaze_angles, find_intervals, label_samples
 from gazerig.robot.recording.read import RunRecording
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -31,7 +38,7 @@ TALK = replace(VISIT, seed=0, scene="face-to-face")
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording of two seconds."""
     path = tmp_path_factory.mktemp("recorded") / "run.mcap"
     record(path, load_rig("desk"), 2.005, TALK)
@@ -43,8 +50,8 @@ def said(*arguments: object) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
-def test_a_recording_exports_what_the_run_itself_would(recorded: Path) -> None:
-    from_file = collect_gaze_angles(RunRecording(recorded).ticks())
+def test_a_recording_exports_what_the_run_itself_would(run_file: Path) -> None:
+    from_file = collect_gaze_angles(RunRecording(run_file).ticks())
     ticks: list[Tick] = []
     play(assemble(load_rig("desk"), TALK), 2.005, ticks.append)
     itself = collect_gaze_angles(ticks)
@@ -53,15 +60,15 @@ def test_a_recording_exports_what_the_run_itself_would(recorded: Path) -> None:
     assert np.array_equal(from_file.movement, itself.movement) and from_file.names == itself.names
 
 
-def test_a_rerun_says_that_all_is_the_same(recorded: Path) -> None:
-    code, words = said("rerun", recorded)
+def test_a_rerun_says_that_all_is_the_same(run_file: Path) -> None:
+    code, words = said("rerun", run_file)
     assert code == 0 and "joints recorded: " in words and "run again" in words
     reported = re.search(r"(\d+) of (\d+) ticks are bit-identical", words)
     assert reported is not None and reported[1] == reported[2] and int(reported[1]) > 350
 
 
-def test_a_rerun_with_another_character_shows_both(recorded: Path) -> None:
-    code, words = said("rerun", recorded, "--character", "shy")
+def test_a_rerun_with_another_character_shows_both(run_file: Path) -> None:
+    code, words = said("rerun", run_file, "--character", "shy")
     assert code == 0 and "joints emulated: " in words and "saccades" in words
 
 
@@ -90,8 +97,8 @@ def test_figures_of_two_runs_stand_side_by_side() -> None:
     ]  # fmt: skip
 
 
-def test_export_writes_tables(recorded: Path, tmp_path: Path) -> None:
-    code, words = said("export", recorded, "--out", tmp_path / "seen")
+def test_export_writes_tables(run_file: Path, tmp_path: Path) -> None:
+    code, words = said("export", run_file, "--out", tmp_path / "seen")
     assert code == 0 and "saccades" in words
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "seen_events.csv", "seen_fixations.csv", "seen_samples.csv", "seen_samples.json",
@@ -109,3 +116,78 @@ def test_what_cannot_be_done_is_one_line(arguments: tuple[str, ...], words: str)
     code, output = said(*arguments)
     assert code == 2 and words in output and "Traceback" not in output
     assert len(output.strip().splitlines()) == 1
+
+
+# --- Runs of a rig of six hobby servos without a neck: recorded, done again, reported, exported
+
+
+@pytest.fixture(scope="module")
+def maker(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return recorded(tmp_path_factory.mktemp("six") / "maker.mcap", load_rig("maker"), 4.2)
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return recorded(tmp_path_factory.mktemp("nine") / "desk.mcap", load_rig("desk"), 2.0)
+
+
+# --- recordings
+
+
+def test_six_joints_come_back_with_their_names(maker: Run) -> None:
+    for tick in maker.recording.ticks():
+        assert tick.guard_result.joints == SIX and tick.joints.measured == (False,) * 6
+    shut = min(tick.pose.lower_left for tick in maker.ticks)
+    assert shut < 0.9  # lower lids move, and are kept
+
+
+def test_a_run_of_six_joints_is_done_again_to_the_bit(maker: Run) -> None:
+    seen: list[Tick] = []
+    found = rerun(maker.recording, on_tick=seen.append)
+    assert found.is_same and found.sent_bytes_same and found.notes == ()
+    assert list(map(exact, seen)) == list(map(exact, maker.ticks))
+    assert rerun(maker.recording, joints="emulated").is_same
+
+
+# --- exports
+
+
+def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
+    maker: Run, desk: Run, tmp_path: Path
+) -> None:
+    for name, ticks, lids in (
+        ("six", maker.ticks, ["left_lid", "right_lid", "left_lower_lid", "right_lower_lid"]),
+        ("nine", desk.ticks, ["left_lid", "right_lid"]),
+    ):
+        trace = collect_gaze_angles(ticks)
+        labels = label_samples(trace)
+        samples, *_, beside = write_csv(
+            trace, labels, find_intervals(trace, labels), tmp_path / name
+        )
+        with samples.open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert tuple(rows[0]) == columns(ticks[0].guard_result.joints)
+        assert [column for column in rows[0] if column.endswith("lid")] == lids
+        assert ("head_yaw_deg" in rows[0]) == (name == "nine")
+        assert float(rows[300][lids[-1]]) == pytest.approx(
+            (ticks[300].pose.lower_right if name == "six" else ticks[300].pose.lid_right), abs=6e-4
+        )
+        assert "" not in {row["x_deg"] for row in rows}
+        said = json.loads(beside.read_text())
+        assert set(said["basis"].values()) == {"estimated" if name == "six" else "measured"}
+        expected = list(SIX) if name == "six" else []
+        assert said["estimated_joints"] == expected
+
+
+def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:
+    silent = [
+        structs.replace(tick, joints=structs.replace(tick.joints, missing=missing))
+        for tick, missing in zip(
+            maker.ticks[100:103], [("eyes_tilt",), ("right_lower_lid",), ()], strict=True
+        )
+    ]
+    trace = collect_gaze_angles(silent)
+    for eye in (trace.left_deg, trace.right_deg, trace.cyclopean_deg):
+        assert np.isnan(eye[:, 0]).tolist() == [True, False, False]
+    assert np.isnan(trace.lower_lids).tolist() == [[False] * 2, [False, True], [False] * 2]
+    assert np.isnan(trace.head_deg).all()  # there is no neck

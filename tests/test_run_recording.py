@@ -1,42 +1,57 @@
 """Recordings of runs: every tick is read back bit for bit, and reading errors have a reason."""
 
 import base64
+import errno
 import json
+import os
+import signal
+import socket
+import subprocess
+import time
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from datetime import UTC, datetime
+from functools import partial
+from itertools import islice
 from math import inf, nan
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import cv2
 import jsonschema
 import numpy as np
 import pytest
+from branch import Branch
+from child_processes import command
 from desk import GAZE_JOINTS
+from fakes.runs import simulated, ticks
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from msgspec.structs import replace
-from recorded_run import (
-    STARTED,
-    Recorded,
-    exact,
-    info_for,
-)
+from recorded_run import STARTED, Recorded, assembly, exact, info_for
 
 from gazerig.config.load import load
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import Rig, load_rig, load_walk
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.files.file_input import MAGIC
 from gazerig.drivers.types import Detections
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
+from gazerig.robot.app.assemble import Assembly, Substitutes
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick import MeasuredJoints, TorqueEnabled
+from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.model.control_source import ControlState, TrackState
 from gazerig.robot.recording import run_format as fmt
-from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.recording import writer_process as writer
+from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import FramePicker, Recorder
-from gazerig.robot.recording.run_info import RunInfo, as_text, read_text
+from gazerig.robot.recording.run_info import PROFILE, RunEnd, RunInfo, as_text, read_text
+from gazerig.robot.recording.run_writer import RunWriter
 
 
 def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
@@ -222,3 +237,345 @@ def test_a_late_frame_does_not_delay_those_that_follow() -> None:
     camera = (k / 100.0 for k in range(200) if not 40 <= k < 45 and not 100 <= k < 170)
     wanted = [0.0, 0.2, 0.45, 0.6, 0.8, 1.7, 1.9]  # after a long gap the count starts again
     assert picked_s(5.0, camera) == pytest.approx(wanted)
+
+
+# --- Recordings of runs that cannot be read, and what goes wrong while one is written
+
+
+# --- what cannot be read
+
+
+def test_a_recording_cut_anywhere_opens_and_keeps_what_is_whole(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    data = recorded.path.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    counts = []
+    for share in (0.9, 0.6, 0.4):
+        cut.write_bytes(data[: int(share * len(data))])
+        recording = RunRecording(cut)
+        assert not recording.whole and "was not closed" in recording.note
+        assert recording.info == recorded.info
+        back = list(recording.ticks())
+        for was, now in zip(recorded.ticks, back, strict=False):
+            assert exact(now) == exact(was)
+        counts.append(len(back))
+    assert counts == sorted(counts, reverse=True) and counts[-1] < 299
+
+
+def test_time_that_runs_back_or_leaps_is_no_run(recorded: Recorded, tmp_path: Path) -> None:
+    with recorded.path.open("rb") as file:
+        found = [json.loads(m.data) for *_, m in make_reader(file).iter_messages([fmt.TICK])][:3]
+    for number, (moved_s, right) in enumerate(((0.0, True), (-0.006, False), (4000.0, False))):
+        path = tmp_path / f"{number}.mcap"
+        writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), recorded.info)
+        for nth, tick in enumerate(found):
+            t_s = tick["tick"]["t_s"] + moved_s * (nth == 2)
+            writer.add(fmt.TICK, 0.0, {**tick, "tick": {**tick["tick"], "t_s": t_s}})
+        writer.close(RunEnd("seconds"))
+        if right:
+            assert len(list(RunRecording(path).ticks())) == 3
+            continue
+        with pytest.raises(BadRecording, match="damaged .a tick at"):
+            list(RunRecording(path).ticks())
+
+
+def written(path: Path, profile: str) -> Path:
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile, "test")
+        writer.finish()
+    return path
+
+
+def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "text").write_text("not at all a recording")
+    (tmp_path / "empty").touch()
+    wrong = {
+        tmp_path / "nothing": "no recording at .*nothing: check the path",
+        tmp_path: "is not a file",
+        tmp_path / "text": "is not a recording: make one with gazerig run --record",
+        tmp_path / "empty": "is not a recording",
+        written(tmp_path / "camera", "gazerig-camera-1"): "a recording of a camera, not of a run",
+        written(tmp_path / "newer", "gazerig-run-9"): "of format 9, .* reads 2: use the version",
+        written(
+            tmp_path / "other", "ros2"
+        ): r"not a recording of gazerig \(its profile is 'ros2'\)",
+        written(tmp_path / "bare", PROFILE): "it contains nothing of a run",
+    }
+    for path, words in wrong.items():
+        with pytest.raises(SetupError, match=words) as found:
+            RunRecording(path)
+        assert "\n" not in str(found.value)
+
+
+def test_a_file_is_not_written_over_unasked(tmp_path: Path) -> None:
+    there = tmp_path / "there.mcap"
+    there.write_text("precious")
+    with pytest.raises(SetupError, match="already exists: name another file, or use --force"):
+        refused = Recorder(there, info_for())
+        refused.open()
+    refused.close()
+    assert there.read_text() == "precious"
+    with pytest.raises(SetupError, match="cannot write .*: choose a folder"):
+        Recorder(tmp_path / "no" / "r", info_for()).open()
+
+
+# --- what goes wrong while it runs
+
+
+def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_path: Path) -> None:
+    path = tmp_path / "full.mcap"
+    recorder = Recorder(path, info_for(), patient=True)
+    recorder.open()
+    made = assembly(recorder)
+    made.robot.start(made.clock)
+    said: list[str] = []
+    goes_on = 0
+    for number in range(1, 2001):
+        made.clock.sleep_until(0.005 * number)
+        recorder.record(made.robot.tick(0.005 * number, 0.005))
+        said += recorder.events()
+        goes_on += bool(said)
+        if goes_on == 100:
+            break
+    last = recorder.close("seconds")
+    said += recorder.events()
+    assert goes_on == 100
+    assert said == ["recording stopped (File too large); the run continues without it"]
+    assert last == f"recording in {path} is incomplete: File too large"
+    recording = RunRecording(path)
+    assert not recording.whole
+    assert path.stat().st_size <= 60_000
+    list(recording.ticks())  # what is there is not damaged
+
+
+def writing(path: Path) -> tuple[Recorder, Assembly, Any]:
+    """Begin to record a robot; give the process of the writer too."""
+    recorder = Recorder(path, info_for())
+    recorder.open()
+    made = assembly(recorder)
+    made.robot.start(made.clock)
+    assert recorder._link is not None and recorder._link._process is not None
+    return recorder, made, recorder._link._process
+
+
+def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "late.mcap"
+    recorder, made, process = writing(path)
+    process.send_signal(19)  # SIGSTOP
+    seen = ticks(made, 400)
+    for tick in seen:
+        recorder.record(tick)  # would never return if it waited
+    process.send_signal(18)  # SIGCONT
+    assert recorder.close("seconds").startswith("400 ticks")
+    assert recorder.lost == 0
+    back = list(RunRecording(path).ticks())
+    assert list(map(exact, back)) == list(map(exact, seen))
+
+
+def test_what_the_queue_cannot_hold_is_lost_and_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gazerig.robot.recording.writer_client.QUEUE_BYTES", 150_000)
+    path = tmp_path / "lost.mcap"
+    recorder, made, process = writing(path)
+    process.send_signal(19)
+    for tick in ticks(made, 400):
+        recorder.record(tick)
+    process.send_signal(18)
+    said = recorder.close("seconds")
+    assert recorder.lost > 0
+    assert f"; {recorder.lost} ticks were not recorded" in said
+    recording = RunRecording(path)
+    assert recording.end.lost == recorder.lost
+    assert f"lacks {recorder.lost} ticks" in recording.note
+    assert len(list(recording.ticks())) == 400 - recorder.lost
+
+
+def test_a_writer_that_dies_is_told_once_and_the_run_goes_on(tmp_path: Path) -> None:
+    recorder, made, process = writing(tmp_path / "dead.mcap")
+    process.kill()
+    process.wait()
+    said: list[str] = []
+    for tick in ticks(made, 199):
+        recorder.record(tick)
+        said += recorder.events()
+    assert said == ["recording stopped (its writer has died); the run continues without it"]
+    assert "incomplete: its writer has died" in recorder.close("seconds")
+
+
+# --- A rig that is killed while it records: the file closes, or opens up to the last second
+
+
+TICK_S = 0.05
+
+
+def rig(path: Path) -> None:
+    """Record a rig until it is killed, and print the time of each tick's transfer."""
+    info = RunInfo("desk", "robot", "a: 1", 0, 1.0 / TICK_S, datetime(2026, 1, 31, tzinfo=UTC))
+    recorder = Recorder(path, info)
+    recorder.open()
+    assert recorder._link is not None and recorder._link._process is not None
+    print(recorder._link._process.pid, flush=True)
+    made = simulated(substitutes=Substitutes(body=recorder.wrap_body))
+    made.robot.start(made.clock)
+    wall = RealClock()
+    start_s = wall.now_s()
+    for number in range(1, 100000):
+        t_s = TICK_S * number
+        wall.sleep_until(start_s + t_s)
+        made.clock.sleep_until(t_s)
+        recorder.record(made.robot.tick(t_s, TICK_S))
+        print(wall.now_s(), t_s, flush=True)
+
+
+class Killed:
+    """A rig that has been killed, alone or with its writer.
+
+    handed: (wall clock, rig's time) of every tick that it had handed over; killed_s: when
+    """
+
+    def __init__(self, path: Path, both: bool) -> None:
+        process = Branch(partial(rig, path), stdout=subprocess.PIPE, text=True)
+        assert process.stdout is not None
+        writer = int(process.stdout.readline())
+        lines = []
+        for line in process.stdout:
+            lines.append(line)
+            if float(line.split()[1]) >= 2.5:
+                break
+        if both:
+            os.kill(writer, signal.SIGKILL)
+        process.kill()
+        self.killed_s = time.monotonic()
+        lines += process.stdout.readlines()
+        process.wait()
+        self.handed = [tuple(map(float, line.split())) for line in lines if line.endswith("\n")]
+        deadline_s = time.monotonic() + 30.0
+        while command(writer):
+            assert time.monotonic() < deadline_s, "the writer outlives its rig"
+            time.sleep(0.02)
+
+
+@pytest.mark.parametrize("both", [False, True], ids=["rig", "rig and writer"])
+def test_a_killed_rig_leaves_a_recording(tmp_path: Path, both: bool) -> None:
+    path = tmp_path / "killed.mcap"
+    killed = Killed(path, both)
+    recording = RunRecording(path)
+    assert recording.whole is not both
+    words = "was not closed" if both else "ends at the time at which the program was killed"
+    assert words in recording.note
+    times = [tick.t_s for tick in recording.ticks()]
+    assert times == [t_s for _, t_s in killed.handed][: len(times)]  # nothing lacks in between
+    kept_s = dict((t_s, wall_s) for wall_s, t_s in killed.handed)[times[-1]]
+    assert killed.killed_s - kept_s <= 1.0
+    assert recording.info.rig == "desk" and recording.end.stopped_by == ""
+
+
+# --- The process that writes a recording, piece by piece: a full disk, the disk itself, its socket
+
+
+MESSAGES, A_CHUNK = 40, 10
+
+
+class Written:
+    """A file of noise, a chunk every ten messages.
+
+    kept: how long it was at its beginning and after each chunk; failed: the writer's error
+    """
+
+    def __init__(self, path: Path) -> None:
+        noise = Random(1)
+        fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        made = RunWriter(fd, info_for())
+        self.kept = [path.stat().st_size]
+        for n in range(1, MESSAGES + 1):
+            made.add(fmt.DESCRIPTION, 0.1 * n, {"data": noise.randbytes(300).hex()})
+            if n % A_CHUNK == 0:
+                made.flush()
+                self.kept.append(path.stat().st_size)
+        made.close(RunEnd("seconds"))
+        self.failed, self.data = made.failed, path.read_bytes()
+
+
+def limited(monkeypatch: pytest.MonkeyPatch, at_once: int, in_all: int) -> None:
+    """Let the system take no more bytes at once, and in all; then the disk is full."""
+    write, left = os.write, [in_all]
+
+    def some(fd: int, data: bytes) -> int:
+        if not left[0]:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        done = write(fd, bytes(data[: min(at_once, left[0])]))
+        left[0] -= done
+        return done
+
+    monkeypatch.setattr(os, "write", some)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Written:
+    return Written(tmp_path_factory.mktemp("whole") / "run.mcap")
+
+
+def test_what_the_system_takes_in_parts_is_written_whole(
+    whole: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        limited(patch, 100, 10**9)
+        parts = Written(tmp_path / "run.mcap")
+    assert parts.failed == "" and parts.data == whole.data
+
+
+@pytest.mark.parametrize("chunks", [0, 1, 3])
+def test_a_full_disk_leaves_whole_chunks_alone(
+    whole: Written, chunks: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half a chunk more fits on it."""
+    end = whole.kept[chunks]
+    with monkeypatch.context() as patch:
+        limited(patch, 1000, (end + whole.kept[chunks + 1]) // 2)
+        cut = Written(tmp_path / "run.mcap")
+    assert cut.failed == "No space left on device"
+    assert cut.data == whole.data[:end]
+    at = len(MAGIC)
+    while at < end:  # kind, length and content
+        at += 9 + int.from_bytes(cut.data[at + 1 : at + 9], "little")
+    assert at == end
+
+
+def test_what_is_written_is_put_on_the_disk_every_second(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock, at_s = SimulatedClock(), list[float]()
+    monkeypatch.setattr(os, "fdatasync", lambda fd: at_s.append(clock.now_s()))
+
+    def nothing_for(seconds: float) -> Iterator[None]:
+        while clock.now_s() < seconds:
+            clock.sleep_until(clock.now_s() + 0.1)
+            yield None
+
+    made = RunWriter(os.open(tmp_path / "r", os.O_WRONLY | os.O_CREAT), info_for())
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        writer._write(nothing_for(5.05), made, theirs, clock)
+    made.close(RunEnd())
+    assert np.diff([0.0, *at_s]).max() < 1.2 and at_s[-1] > 5.0  # the last one at the end
+
+
+@pytest.fixture
+def line() -> Iterator[tuple[socket.socket, socket.socket]]:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setblocking(False)
+    with ours, theirs:
+        yield ours, theirs
+
+
+def test_a_writer_whose_program_has_died_ends_although_a_fork_holds_its_socket(
+    line: tuple[socket.socket, socket.socket],
+) -> None:
+    ours, theirs = line
+    ours.send(writer.LAST + writer.END + b"first")
+    found = list(islice(writer._messages(theirs, os.getpid()), 3))  # our parent is another one
+    assert [(one.kind, one.body) for one in found if one] == [(writer.END, b"first")]
+    assert len(found) == 1

@@ -1,7 +1,10 @@
 """Tracks as data: curves of least jerk, what a rig can do of them, and bad input."""
 
-from math import degrees, radians
+from collections.abc import Sequence
+from functools import cache
+from math import degrees, pi, radians
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -11,16 +14,22 @@ from hypothesis import strategies as st
 from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track, shipped_tracks, tracks_of
+from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.pose_offset import PoseOffset
 from gazerig.gaze.track.track import POSE_CHANNELS, KeyFrame, Track, channel_keys
+from gazerig.gaze.track.track_player import OffsetState, TrackPlayer
 from gazerig.gaze.types import Floats
-from gazerig.robot.app.rig_limits import lid_spans, limits
-from gazerig.robot.model.track_fit import (
-    FittedTrack,
-    TrackFit,
-    TrackRefused,
-    track_motions,
-)
+from gazerig.robot.app.gaze_models import rig_kinematics
+from gazerig.robot.app.rig_limits import lid_ends, lid_spans, limits
+from gazerig.robot.app.track_file import TOLERANCE_DEG
+from gazerig.robot.control.track_choices import TrackChoices
+from gazerig.robot.model.commands import EndTrack, Play, SyncTrack
+from gazerig.robot.model.joint import JointLimit
+from gazerig.robot.model.kinematics import LIDS, NECK
+from gazerig.robot.model.motion_keys import fit_keys, smooth
+from gazerig.robot.model.track_fit import FittedTrack, TrackFit, TrackRefused, track_motions
+from gazerig.robot.model.types import further_joints
 
 RIGS = [name for name in shipped_names("rigs") if name != "minimal"]
 """The shipped rigs but the one without neck and lids, which has nothing to laugh or tilt with."""
@@ -223,3 +232,279 @@ def test_a_rig_with_tracks_of_its_own_is_checked_with_them(tmp_path: Path) -> No
     assert "wave_back" in tracks_of([str(good)])
     with pytest.raises(ConfigError, match="twitch.yaml:3: frames.0: .*names no motion"):
         tracks_of([str(good), str(bad)])
+
+
+# --- Files of tracks, and fits of keys to samples
+
+
+def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> None:
+    random = np.random.default_rng(3)
+    times = np.cumsum(random.uniform(0.015, 0.025, 200))
+    truth = 12.0 * np.sin(2 * pi * 0.6 * times) * np.minimum(1.0, times)
+    even, values_deg = smooth(times, truth + random.normal(0.0, 0.15, 200))
+    found, values = fit_keys(even, values_deg, TOLERANCE_DEG)
+    assert 4 <= len(found) <= 30
+    curve = MinimumJerkCurve(float(values_deg[0]), found.tolist(), values.tolist())
+    assert np.abs(curve.sample_at(even)[0] - values_deg).max() <= TOLERANCE_DEG
+    assert np.abs(curve.sample_at(times - times[0])[0] - truth).max() < TOLERANCE_DEG + 0.6
+    held = np.concatenate((values_deg, np.full(50, values_deg[-1]), values_deg[::-1]))
+    long = np.tile(np.concatenate((held, np.full(50, values_deg[0]))), 20)
+    times = np.arange(len(long)) * (even[1] - even[0])
+    many, values = fit_keys(times, long, TOLERANCE_DEG)
+    curve = MinimumJerkCurve(float(long[0]), many.tolist(), values.tolist())
+    assert np.abs(curve.sample_at(times)[0] - long).max() <= TOLERANCE_DEG
+    assert len(many) <= 20 * (2 * len(found) + 4)
+    still = fit_keys(even, np.full(len(even), 3.0), TOLERANCE_DEG)
+    assert len(still[0]) == 0
+
+
+# --- Tracks begin, end and are interrupted at random moments: no joint jumps or breaks a limit
+
+
+DT_S = 0.01
+TARGET = (1.0, 0.0, 0.25)
+
+
+class Moments(NamedTuple):
+    """What a chain of interrupted tracks asked of the joints.
+
+    step_deg, speed_share, accel_share: (joints,) largest step in a tick, and largest speed and
+        acceleration over the joint's limit
+    began: tracks that were begun
+    """
+
+    step_deg: Floats
+    speed_share: Floats
+    accel_share: Floats
+    began: int
+
+
+def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
+    """Return (n, joints) angles of a head that looks at a point straight ahead all the while."""
+    rig = load_rig(rig_name)
+    kinematics, ends = rig_kinematics(rig), lid_ends(rig)
+    eyes = [
+        kinematics.eye_angles_to(TARGET, *kinematics.head_pose(one.head_rad)) for one in offsets
+    ]
+    left, right = np.array(eyes)[:, 0, :2].T, np.array(eyes)[:, 1, :2].T
+    yaw, pitch = np.array([one.eyes_rad for one in offsets]).T
+    lids = [LidOpenings(0.9, 0.9, False, 0.9, 0.9).scale(one.lids) for one in offsets]
+    openings = np.array([(one.left, one.right, one.lower_left, one.lower_right) for one in lids]).T
+    head, joints = (
+        np.array([one.head_rad for one in offsets]).T,
+        np.array([one.joints_rad for one in offsets]).T,
+    )
+    angles = {
+        "left_eye_pan": left[0] + yaw, "left_eye_tilt": left[1] + pitch,
+        "right_eye_pan": right[0] + yaw, "right_eye_tilt": right[1] + pitch,
+        "eyes_pan": 0.5 * (left[0] + right[0]) + yaw, "eyes_tilt": left[1] + pitch,
+        **dict(zip(NECK, head, strict=True)),
+        **dict(zip(further_joints(rig.joints), joints, strict=True)),
+        **{lid: ends[lid][0] + opening * (ends[lid][1] - ends[lid][0])
+           for lid, opening in zip(LIDS, openings, strict=True) if lid in ends},
+    }  # fmt: skip
+    return np.stack([angles[name] for name in rig.names], axis=1)
+
+
+def interrupted(track: str, rig_name: str, moments: int, seed: int) -> Moments:
+    """Play a track and, at random moments, another one, the same again, or nothing."""
+    rig, random = load_rig(rig_name), np.random.default_rng(seed)
+    player = TrackPlayer(len(further_joints(rig.joints)))
+    choices = TrackChoices(shipped_tracks(), player, rig.names, lid_spans(rig))
+    bounds, others = limits(rig.joints), (*choices.names, track, track, "")
+    at_rest = tuple([0.0] * len(rig.names))
+    offsets, t, began = [player.step(0.0)] * 3, 0.0, 0
+    for _ in range(moments):
+        name = track if not player.playing else others[int(random.integers(len(others)))]
+        speed = float(random.uniform(0.5, 2.0))
+        reply = choices.play(Play(name, speed), t, at_rest, bounds)
+        began += bool(name) and not reply.refused
+        for _ in range(int(random.integers(1, round(0.25 / DT_S)))):
+            t += DT_S
+            offsets.append(player.step(t))
+    angles = joint_angles(rig_name, offsets)
+    step = np.abs(np.diff(angles, axis=0)).max(axis=0)
+    accel = np.abs(np.diff(angles, 2, axis=0)).max(axis=0) / DT_S**2
+    return Moments(
+        np.degrees(step),
+        step / DT_S / [one.speed_rad_s for one in bounds],
+        accel / [one.accel_rad_s2 for one in bounds],
+        began,
+    )
+
+
+TRACKS = shipped_names("tracks")
+RIG_OF = dict(
+    zip(TRACKS, ("expressive", "desk", "maker", "expressive", "feetech") * 9, strict=False)
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("track", TRACKS)
+def test_no_joint_jumps_or_breaks_a_limit_at_400_random_moments(track: str) -> None:
+    found = interrupted(track, RIG_OF[track], 400, seed=len(track))
+    assert found.began > 280
+    assert found.step_deg.max() > 0.1  # something has moved
+    assert found.speed_share.max() < 1.0
+    assert found.accel_share.max() < 1.0
+
+
+# --- Tracks in a show: another clock at random, several at once, joints of their own
+
+
+@cache
+def rig() -> Rig:
+    return load_rig("expressive")
+
+
+class Show(NamedTuple):
+    """A player, and what starts and controls its tracks."""
+
+    player: TrackPlayer
+    choices: TrackChoices
+    bounds: Sequence[JointLimit]
+
+    def play(self, name: str, t_s: float, **how: object) -> int:
+        rest = (0.0,) * len(rig().names)
+        reply = self.choices.play(Play(name, **how), t_s, rest, self.bounds)  # type: ignore[arg-type]
+        assert reply.track is not None, reply
+        return reply.track.number
+
+    def end(self, t_s: float, track: str = "") -> str:
+        return self.choices.end(EndTrack(track), t_s, self.bounds).refused
+
+
+def show(**tracks: Track) -> Show:
+    player = TrackPlayer(len(further_joints(rig().joints)))
+    choices = TrackChoices(tracks, player, rig().names, lid_spans(rig()))
+    return Show(player, choices, limits(rig().joints))
+
+
+def long_track(seconds: float, seed: int) -> Track:
+    """Return a track with a key of neck and jaw in each second or so."""
+    random, times = np.random.default_rng(seed), np.arange(0.8, seconds, 0.9)
+    frames = tuple(
+        KeyFrame(
+            round(float(t), 3),
+            head_yaw_deg=float(random.uniform(-15, 15)),
+            head_pitch_deg=float(random.uniform(-6, 6)),
+            joints_deg={"jaw": float(random.uniform(0, 6))},
+        )
+        for t in times
+    )
+    return Track("a show", frames, fit="slow", cues={"middle": seconds / 2})
+
+
+def test_a_show_of_an_hour_with_200_corrections_keeps_all_limits() -> None:
+    it, random = show(hour=long_track(3600.0, 1)), np.random.default_rng(2)
+    t = 0.0
+    it.play("hour", t, loop=True)
+    (voice,) = it.player.voices
+    worst = 0.0
+    for _ in range(200):
+        before = it.player.state(t)
+        off_s = float(random.choice([0.01, 0.1, -0.2, 2.0]))
+        it.choices.sync(SyncTrack(1, max(0.0, voice.position_s(t) + off_s)), t)
+        after = it.player.state(t)
+        for was, now in zip(before[:2], after[:2], strict=True):
+            assert np.abs(was - now).max() < 1e-9
+        for _ in range(18):
+            t += 0.2
+            it.player.step(t)
+            _, speed, acceleration = it.player.state(t)
+            worst = max(worst, voice.played.stretch(speed[None], acceleration[None]))
+    assert 0.4 < worst <= 1.06, worst
+
+
+@pytest.mark.parametrize("at_s", [3.1, 40.0, 59.0])
+def test_a_track_that_begins_in_its_middle_grows_from_rest_within_limits(at_s: float) -> None:
+    it = show(minute=long_track(60.0, 3))
+    it.play("minute", 0.0, from_s=at_s)
+    (voice,) = it.player.voices
+    assert not it.player.state(0.0).value.any() and voice.position_s(0.0) == at_s
+    times = np.arange(0.0, 2.0, 0.005)
+    states = [it.player.state(t) for t in times.tolist()]
+    value, speed, acceleration = (np.array([one[i] for one in states]) for i in range(3))
+    assert voice.played.stretch(speed, acceleration) <= 1.0 + 1e-3
+    assert speed[1:] == pytest.approx(np.diff(value, axis=0) / 0.005, abs=0.02)
+    offsets = np.array([it.player.step(t).to_flat() for t in times.tolist()])
+    assert offsets - offsets[0] == pytest.approx(value, abs=1e-9)
+
+
+def test_other_channels_run_together_and_the_same_replace() -> None:
+    pitch = Track("p", (KeyFrame(2.0, head_pitch_deg=5.0),), fit="slow")
+    jaw = Track("j", (KeyFrame(2.0, joints_deg={"jaw": 5.0}),), fit="slow", owns=("jaw",))
+    talk = Track("t", (KeyFrame(2.0, joints_deg={"jaw": 3.0}),), fit="slow")
+    it = show(pitch=pitch, jaw=jaw, talk=talk)
+    it.play("pitch", 0.0)
+    it.play("jaw", 0.1)
+    it.player.step(0.5)
+    states = it.choices.states(0.5)
+    assert [one.name for one in states if one.is_playing] == ["pitch", "jaw"]
+    assert states[1].owns == ("jaw",)
+    it.play("talk", 0.6)
+    it.player.step(0.6)
+    states = it.choices.states(0.6)
+    assert [one.name for one in states if one.is_playing] == ["pitch", "talk"]
+    assert states[1].end_reason == "another track: talk"
+    assert not it.choices.ends_show(Play("talk")) and not it.choices.ends_show(Play("pitch"))
+    assert it.end(0.7) == ""
+    it.player.step(0.7)
+    assert not [one for one in it.choices.states(0.7) if one.is_playing]
+    assert it.end(0.8, "talk") == "talk is not playing; playing: none"
+
+
+def test_a_jaw_that_is_interrupted_in_a_syllable_comes_to_rest_at_once() -> None:
+    state = OffsetState(*np.zeros((3, 12)))
+    state.value[9], state.speed[9], state.acceleration[9] = 0.152, -3.22, -140.0
+    assert TrackFit(rig().names, lid_spans(rig())).fade_s(state, limits(rig().joints), 0.25) < 1.0
+
+
+def test_an_owned_jaw_goes_from_the_present_angle_to_the_track_and_back() -> None:
+    jaw = Track(
+        "j", tuple(KeyFrame(float(s), joints_deg={"jaw": 2.0 + s % 2}) for s in range(1, 9)),
+        fit="slow", owns=("jaw",), blend_in_s=0.5, blend_out_s=0.8,
+    )  # fmt: skip
+    it = show(jaw=jaw)
+    it.play("jaw", 0.0)
+    angles, index = [], 9
+    for k in range(2200):
+        t = k * 0.005
+        it.player.step(t)
+        (index,) = it.player.owned.layers or (index,)
+        angles.append(it.player.owned.mix(index, radians(5.0)))
+    at = np.degrees(angles)
+    assert at[0] == pytest.approx(5.0) and at[-1] == pytest.approx(5.0)
+    assert at[400] == pytest.approx(2.0, abs=0.01)  # of the track alone
+    bound = it.bounds[rig().names.index("jaw")]
+    assert np.abs(np.diff(at, 2)).max() / 0.005**2 <= np.degrees(bound.accel_rad_s2)
+    assert np.abs(np.diff(at)).max() / 0.005 <= np.degrees(bound.speed_rad_s)
+
+
+def test_cues_loops_and_a_clock_of_a_sound() -> None:
+    frames = (KeyFrame(1.0, head_pitch_deg=3.0), KeyFrame(2.0, head_pitch_deg=0.0))
+    it = show(hello=Track("h", frames, fit="slow", cues={"top": 1.0, "end": 1.9}, loop=True))
+    number = it.play("hello", 0.0)
+    t, cues = 0.0, list[tuple[int, str]]()
+    for _ in range(1004):
+        t += 0.005
+        it.player.step(t)
+        (state,) = it.choices.states(t)
+        if not cues or state.cues != cues[-1][0]:
+            cues.append((state.cues, state.cue))
+    assert cues == [(0, ""), (1, "top"), (2, "end"), (3, "top"), (4, "end"), (5, "top")]
+    assert state.loop and state.position_s == pytest.approx(1.02)
+    it.choices.sync(SyncTrack(number, 1.12, "sound"), t)  # 0.1 s late: faster for 3.75 s
+    for _ in range(800):
+        t += 0.005
+        it.player.step(t)
+    (state,) = it.choices.states(t)
+    assert state.position_s == pytest.approx((1.12 + 4.0) % 2.0, abs=0.012)
+    assert state.clock == "sound"
+    with pytest.raises(ValueError, match="has no cue 'no'; available: top, end"):
+        it.choices.require(Play("hello", from_s="no"))
+    it.play("hello", t, from_s="top")
+    (playing,) = [one for one in it.choices.states(t) if one.is_playing]
+    assert playing.position_s <= 1.0
+    it.player.step(t + 0.5)
+    (playing,) = [one for one in it.choices.states(t + 0.5) if one.is_playing]
+    assert 1.0 <= playing.position_s <= 1.5 and playing.cue == "top"

@@ -1,20 +1,38 @@
 """Whole runs in a world: servo bytes, torques, motion, what is seen, and back to servo bytes."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from fakes.runs import ticks
+from fakes.runs import record, ticks
+from present import present
 from rendering import why_not
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.worker import CameraWorker
+from gazerig.drivers.errors import SetupError
 from gazerig.features.world.gl_context import NoRenderer
-from gazerig.robot.app.assemble import assemble
+from gazerig.features.world.opponent_motion import HOLD_S, MAX_M_S, MAX_M_S2, TAKE_S, OpponentMotion
+from gazerig.features.world.run.poses import RigInState, WorldPoses
+from gazerig.features.world.run.run_world import RunWorld, world_of, world_scene
+from gazerig.features.world.run.sight import WorldCamera
+from gazerig.features.world.world_scene import WorldScene
+from gazerig.gaze.types import Vec3
+from gazerig.robot.app.assemble import Assembly, assemble, with_options
+from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.app.session import compose, run
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.commands import MoveOpponent
+from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.recording.read import RunRecording
 from gazerig.sim_mock.cameras.detections import SceneCamera
+from gazerig.sim_mock.cameras.frame_times import FrameParams
+from gazerig.sim_mock.pty.line import BusSettings
 
 simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
 
@@ -77,3 +95,178 @@ def test_pictures_of_the_same_seed_give_the_same_bytes_on_one_machine() -> None:
         pytest.skip(reason)
     seen = replace(FAST, no_pictures=False, seconds=0.2)
     assert digest(seen) == digest(seen)
+
+
+# --- The world of the emulator's process, and the camera that looks into it from another one
+
+
+class Host:
+    """A clock that is set, and a world on it."""
+
+    def __init__(self, folder: Path) -> None:
+        from gazerig.features.world.served_world import ServedWorld
+
+        self.rig = load_rig("minimal")
+        world = world_of(self.rig, RunOptions(mock=True, world="living-room"))
+        assert world is not None
+        self.world: RunWorld = world
+        self.t_s = 100.0
+        self.served = ServedWorld(world.spec, folder / "state", lambda: self.t_s)
+        for name, line in emulated_lines(self.rig).items():
+            self.served.device(BusSettings(line, name))
+        joints = RigInState(rig_kinematics(self.rig), self.served.joints())
+        self.poses = WorldPoses(folder / "state", joints)
+
+    def serve(self, seconds: float, heard: bool) -> None:
+        end_s = self.t_s + seconds
+        while self.t_s < end_s - 1e-9:
+            self.t_s += 0.001
+            self.served.serve(heard)
+
+
+@pytest.fixture
+def host(tmp_path: Path) -> Host:
+    return Host(tmp_path)
+
+
+def test_people_wait_until_a_client_has_spoken(host: Host) -> None:
+    from gazerig.features.world.served_world import PUBLISH_MS
+
+    host.serve(0.05, heard=False)
+    assert host.poses.newest() is None and host.poses.begin_s is None
+    host.serve(0.05, heard=True)
+    begin_s, newest = host.poses.begin_s, host.poses.newest()
+    assert begin_s is not None and newest is not None
+    assert begin_s == pytest.approx(100.051, abs=0.002)
+    assert 0.0 <= host.t_s - newest.t_s <= PUBLISH_MS / 1e3 + 1e-9
+    state = host.poses.state
+    assert state is not None and state.t_s == pytest.approx(newest.t_s - begin_s, abs=0.002)
+
+
+def test_the_state_is_that_of_physics(host: Host) -> None:
+    host.serve(0.02, heard=True)
+    assert host.poses.newest() is not None and host.poses.state is not None
+    truly = host.served.world.joints_rad()
+    for name, at in host.served.joints().items():
+        assert host.poses.state.qpos[at] == pytest.approx(truly[name], abs=1e-3)
+
+
+class Broken(CameraWorker):
+    """A camera's process in which nothing can render."""
+
+    def __init__(self, error: SetupError) -> None:
+        self.error = error
+
+    def open(self) -> None:
+        raise self.error
+
+    def close(self) -> None:
+        pass
+
+    def events(self) -> tuple[str, ...]:
+        return ()
+
+
+def camera(host: Host, error: SetupError | None) -> WorldCamera:
+    def ideal(begin_s: float) -> SceneCamera:
+        return SceneCamera(
+            FrameParams(), host.world.scene, CameraMount(host.rig.camera),
+            host.poses.head, np.random.default_rng(1), begins_s=begin_s,
+        )  # fmt: skip
+
+    return WorldCamera(None if error is None else Broken(error), ideal, host.poses)
+
+
+@pytest.mark.parametrize("error", [None, NoRenderer("egl: it is missing")])
+def test_without_pictures_detections_are_those_of_the_same_people(
+    host: Host, error: SetupError | None
+) -> None:
+    seen = camera(host, error)
+    seen.open()
+    assert (("egl: it is missing" in " ".join(seen.events())) is True) == (error is not None)
+    assert seen.latest(host.t_s) is None  # the script has not begun
+    host.serve(0.02, heard=True)
+    found = seen.latest(host.t_s + 0.2)
+    assert seen.start_s == host.poses.begin_s
+    assert found is None or found.image is None
+    seen.close()
+
+
+# --- A boxer whose fist a person moves: limits, take-over and return, score, and a repeated run
+
+
+BOXING = RunOptions(
+    mock=True, fast=True, seed=1, rig="desk", world="boxing", no_pictures=True, bus="ideal"
+)
+READY, HIT, LOW = (0.7, 0.0, 0.05), (0.36, 0.0, 0.12), (0.7, 0.0, -0.3)
+
+
+def path(t_s: float) -> Vec3 | None:
+    """Return the orders: a punch at 2 s, an open guard from 3 to 4 s, none after 5 s."""
+    if not 1.0 <= t_s < 5.0:
+        return None
+    return HIT if 2.0 <= t_s < 2.5 else LOW if 3.0 <= t_s < 4.0 else READY
+
+
+@pytest.fixture
+def scene() -> WorldScene:
+    return world_scene("boxing", 0)
+
+
+def hands(scene: WorldScene, orders: Callable[[float], Vec3 | None] = path) -> np.ndarray:
+    """Return places of both hands and the face, (n, 3, 3), every 10 ms of 7 s."""
+    opponent, found = scene.opponent, []
+    assert opponent is not None
+    for k in range(700):
+        t_s = 0.01 * k
+        if k % 5 == 0 and (p_m := orders(t_s)) is not None:
+            opponent.move(p_m, t_s)
+        opponent.update(t_s)
+        left, right = (scene.hand("rival", side, t_s) for side in ("left", "right"))
+        found.append((left, right, scene.face("rival", t_s)))
+    return np.array(found)
+
+
+def test_the_fist_follows_within_its_limits(scene: WorldScene) -> None:
+    at = hands(scene)
+    m_s = np.linalg.norm(np.diff(at, axis=0), axis=2) / 0.01
+    assert m_s.max(axis=0) == pytest.approx([2.65, 2.5, 0.25], abs=0.2) and m_s.max() < MAX_M_S
+    # The front fist is at its ordered place; a low one takes the other hand along.
+    assert at[245, 0] == pytest.approx(HIT, abs=0.05)
+    assert at[390, 0] == pytest.approx(LOW, abs=0.06)
+    assert at[390, 1, 2] < -0.25 < at[240, 1, 2]
+
+
+def test_the_fist_keeps_its_acceleration_where_its_order_jumps() -> None:
+    motion = OpponentMotion(READY)
+    motion.set_target(HIT, 0.0)
+    fist = np.array([motion.step(k).fist_m for k in range(90)])
+    m_s2 = np.linalg.norm(np.diff(fist, n=2, axis=0), axis=1) / 0.01**2
+    assert 0.9 * MAX_M_S2 < m_s2.max() <= MAX_M_S2 + 1e-6
+
+
+def test_the_script_takes_over_again_after_a_second(scene: WorldScene) -> None:
+    alone = hands(world_scene("boxing", 0), lambda t_s: None)
+    at = hands(scene)
+    assert (at[:100] == alone[:100]).all()
+    ends_s = 4.95 + HOLD_S + TAKE_S
+    (span,) = present(scene.figures.opponent).spans_s
+    assert span == pytest.approx((1.02, ends_s), abs=0.05)
+    assert (at[int(100 * ends_s) + 5 :] == alone[int(100 * ends_s) + 5 :]).all()
+    # The punch of the script at 1.9 s was not thrown, that of the person at 2 s was.
+    assert alone[210:230, 0, 0].min() < 0.36 and at[190:200, 0, 0].min() > 0.6
+
+
+def test_the_recording_of_a_moved_opponent_repeats_to_the_bit(tmp_path: Path) -> None:
+    def order(number: int, made: Assembly) -> None:
+        if number % 10 == 0 and (p_m := path(0.005 * number)) is not None:
+            made.robot.command(MoveOpponent(p_m))
+
+    options = replace(BOXING, character="strong_boxer")
+    rig = with_options(load_rig("desk", "strong_boxer"), options)
+    ticks: list[Tick] = record(tmp_path / "run.mcap", rig, 3.0, options, order)
+    assert any(tick.target.plan.startswith("guard") for tick in ticks)
+    ordered = [one for tick in ticks for one in tick.commands]
+    assert len(ordered) == 40 and all(isinstance(one, MoveOpponent) for one in ordered)
+    found = rerun(RunRecording(tmp_path / "run.mcap"))
+    assert found.is_same and found.agreeing_ticks == found.ticks == 599

@@ -1,10 +1,22 @@
 """Emulated servos whose mechanics are a world's: motion and registers as before, and gravity."""
 
+from dataclasses import replace
+from math import degrees, radians
 from pathlib import Path
 from typing import Any
 
 import pytest
-from world_rigs import WorldBench, arm, write
+from mixed_rig import mixed_rig
+from test_coupling import COUPLING
+from world_rigs import WorldBench, arm, read, write
+
+from gazerig.config.schema import load_rig
+from gazerig.features.world.run.run_world import rig_in_world
+from gazerig.features.world.serve import SentWorld
+from gazerig.features.world.world_spec import WorldSpec
+from gazerig.robot.app.run_bus import JOINT_PLAY_DEG, emulated_lines
+from gazerig.sim_mock.pty.line import BusSettings
+from gazerig.sim_mock.pty.server import Server, ServerSettings
 
 pytestmark = pytest.mark.usefixtures("mujoco")
 STEP = 200
@@ -137,3 +149,172 @@ def test_a_head_at_rest_does_not_tremble() -> None:
         for name, servo in bench.servos.items():
             assert servo.shaft.v == 0.0, name
             assert servo.position_steps == pytest.approx(before[name], abs=0.05)
+
+
+# --- Hobby servos and ideal ones whose mechanics are a world's
+
+
+MOVE = 800
+"""Quarter microseconds that a servo is sent away, 18 deg."""
+
+
+@pytest.mark.parametrize("name", ["maker", "six_hobby"])
+def test_hobby_servos_follow_their_pulses_as_those_with_mechanics_of_their_own(name: str) -> None:
+    """They need as long, and stop within their dead band."""
+    bench = WorldBench(name)
+    joint = bench.rig.names[0]
+    for board in (*bench.devices.values(), *bench.own_devices.values()):
+        board.channels[bench.rig.joints[joint].id].set_target(6000)
+    bench.pass_ms(600)
+    for board in (*bench.devices.values(), *bench.own_devices.values()):
+        board.channels[bench.rig.joints[joint].id].set_target(6000 + MOVE)
+    halfway_ms = [0, 0]
+    for servo in bench.both(joint):
+        assert abs(servo.place_steps - 6000) <= 2 * servo.spec.dead_steps
+    for ms in range(10, 510, 10):
+        bench.pass_ms(10)
+        for nth, servo in enumerate(bench.both(joint)):
+            if servo.place_steps > 6000 + MOVE / 2 and not halfway_ms[nth]:
+                halfway_ms[nth] = ms
+    assert halfway_ms[0] and abs(halfway_ms[0] - halfway_ms[1]) <= 20
+    for servo in bench.both(joint):
+        assert abs(servo.place_steps - 6000 - MOVE) <= 1.5 * servo.spec.dead_steps
+
+
+def test_a_hobby_servo_without_pulses_is_limp() -> None:
+    """A hand turns it and it stays; with pulses it goes back."""
+    bench = WorldBench("maker")
+    joint = bench.rig.names[0]
+    servo = bench.servos[joint]
+    assert servo.width_steps == 0
+    before = servo.place_steps
+    servo.turn(300.0)
+    bench.pass_ms(200)
+    assert servo.place_steps == pytest.approx(before + 300.0, abs=3.0)
+    bench.devices[""].channels[bench.rig.joints[joint].id].set_target(round(before))
+    bench.pass_ms(400)
+    assert abs(servo.place_steps - before) <= 30.0
+
+
+# --- Several buses and coupled servos in one world
+
+
+def test_buses_of_three_kinds_share_one_world(tmp_path: Path) -> None:
+    """A Maestro's eyes, a Dynamixel and a Feetech servo in the neck: each moves its own joint."""
+    bench = WorldBench(mixed_rig(tmp_path))
+    eyes, yaw, pitch = "eyes_pan", bench.servos["neck_yaw"], bench.servos["neck_pitch"]
+    arm(yaw)
+    arm(pitch)
+    write(yaw, "goal_position", read(yaw, "present_position") + 200)
+    write(pitch, "goal_position", round(pitch.position_steps) + 100)
+    joint = bench.rig.joints[eyes]
+    bench.devices[""].channels[joint.id].set_target(round(joint.steps(radians(12.0))))
+    before = bench.world.joints_rad()
+    bench.pass_ms(900)
+    angles = bench.world.joints_rad()
+    assert degrees(angles[eyes]) == pytest.approx(12.0, abs=1.2)
+    for name, servo in (("neck_yaw", yaw), ("neck_pitch", pitch)):
+        assert abs(angles[name] - before[name]) > radians(7.0)
+        told = bench.rig.joints[name].angle_rad(servo.position_steps)
+        assert told == pytest.approx(angles[name], abs=radians(0.5 * JOINT_PLAY_DEG) + 1e-6)
+
+
+def test_two_servos_move_two_joints_together() -> None:
+    """Both give what their gears make of the joints' angles, and hold them there."""
+    rig = replace(load_rig("desk"), couplings={"neck": COUPLING})
+    bench = WorldBench(rig)
+    pair = [bench.servos[name] for name in ("neck_pitch", "neck_roll")]
+    joints = [rig.joints[name] for name in ("neck_pitch", "neck_roll")]
+    for servo in pair:
+        arm(servo)
+    bench.pass_ms(150)
+    for servo, joint, angle in zip(pair, joints, COUPLING.servo_rad((0.2, -0.15)), strict=True):
+        write(servo, "goal_position", round(joint.steps(angle)))
+    for ms in (20, 20, 40, 900):
+        bench.pass_ms(ms)
+        angles = bench.world.joints_rad()
+        truly = COUPLING.servo_rad((angles["neck_pitch"], angles["neck_roll"]))
+        for servo, joint, angle in zip(pair, joints, truly, strict=True):
+            ahead = servo.shaft.x - servo.shaft.joint
+            assert servo.position_steps - ahead == pytest.approx(joint.steps(angle), abs=0.05)
+            assert abs(ahead) < 4.0  # play of both joints
+    assert angles["neck_pitch"] == pytest.approx(0.2, abs=radians(1.0))
+    assert angles["neck_roll"] == pytest.approx(-0.15, abs=radians(1.0))
+
+
+# --- A pushed head yields within its torque limits and returns; registers show it
+
+
+NECK = ("neck_yaw", "neck_pitch", "neck_roll")
+
+
+def _held() -> WorldBench:
+    """Return a desk rig whose neck holds its angles."""
+    bench = WorldBench("desk")
+    for name in NECK:
+        arm(bench.servos[name])
+    bench.pass_ms(200)
+    return bench
+
+
+def test_a_push_shows_in_the_registers_and_the_head_comes_back() -> None:
+    """Present Current against the push, Present Position away from the goal, then as before."""
+    bench = _held()
+    yaw = bench.servos["neck_yaw"]
+    goal, upright = (
+        read(yaw, "present_position"),
+        read(bench.servos["neck_roll"], "present_position"),
+    )
+    bench.world.push("head", (0.0, 10.0, 0.0), 0.4)
+    bench.pass_ms(300)
+    assert read(yaw, "present_position") - goal > 15  # to the left
+    # More than 0.1 of the stall current of 1.8 A, in the opposite direction, in units of 1 mA.
+    assert read(yaw, "present_current") < -180
+    assert read(bench.servos["neck_roll"], "present_position") < upright - 15
+    bench.pass_ms(1500)
+    assert abs(read(yaw, "present_position") - goal) <= 6
+    assert abs(read(yaw, "present_current")) < 80 and not yaw.errors
+
+
+def test_servos_yield_within_their_torque_limits() -> None:
+    """Of a push that is too strong for them they keep all their torque and no more."""
+    bench = _held()
+    roll = bench.servos["neck_roll"]
+    bench.world.push("head", (0.0, 40.0, 0.0), 0.3)
+    bench.pass_ms(280)
+    assert abs(bench.world.joints_rad()["neck_roll"]) > 0.3
+    assert 0.8 < abs(roll.shaft.effort) <= 1.01
+
+
+# --- as a command
+
+
+def test_a_push_that_cannot_be_is_refused_with_what_would_be_right() -> None:
+    """The usage follows."""
+    from gazerig.features.world.served_world import COMMANDS
+
+    world = WorldBench("desk").world
+    for text, message in (
+        ("push tail 5 left", "no body 'tail': there is base_link, "),
+        ("push head 500 left", "'500' is not NEWTONS from 0 to 100"),
+        ("push head 5 sideways", "'sideways' is not forward.back"),
+        ("kick head", "'kick' is not a command; commands: push, help"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            COMMANDS.obey(world, text)
+
+
+def test_a_server_passes_a_push_on_to_its_world_and_everything_else_to_its_servos(
+    tmp_path: Path,
+) -> None:
+    """``gazerig ctl fault`` orders both."""
+    spec = WorldSpec(None, (rig_in_world(load_rig("desk"), looks=False),))
+    (line,) = emulated_lines(load_rig("desk")).values()
+    around = SentWorld(spec, tmp_path)
+    server = Server(ServerSettings((BusSettings(line),), True, around), lambda text: None)
+    try:
+        assert "pushed left with 5 N" in server._obey("push head 5 left 0.1")
+        assert "NEWTONS is missing; usage: push BODY NEWTONS" in server._obey("push head")
+        assert "servo 7 is stuck" in server._obey("stick 7")
+    finally:
+        server.close()
