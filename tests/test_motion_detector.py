@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.detector import MotionDetector, relative_rotation
-from gazerig.drivers.vision.motion.flow import scale_down
 from gazerig.drivers.vision.motion.params import MotionParams
 
 DT_S = 1 / 30
@@ -126,12 +125,6 @@ def test_times_that_do_not_follow_are_not_compared(times: tuple[float, float]) -
     assert detector.before_s == times[0]
     assert look(detector, scene(1), times[1]) == ()
     assert detector.no_result_reason == "no frame shortly before"
-
-
-def test_what_is_no_picture_is_refused_in_words() -> None:
-    picture: Any = np.zeros((240, 320))
-    with pytest.raises(ValueError, match="an image is"):
-        scale_down(picture, 320, lens(320, 240), 0.0)
 
 
 def test_forgotten_is_forgotten_and_numbers_are_not_used_again() -> None:

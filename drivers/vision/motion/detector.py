@@ -1,8 +1,7 @@
 """Detection of moving things between two images, independent of the camera's own motion.
 
-The newer image is compared with the older one, which is turned as the joints measured. If most of
-the room keeps its position, flow is computed only where the images differ; otherwise everywhere,
-and the camera's own motion is estimated from it (ego_motion). Other motion (segmentation) is
+The newer image is compared with the older one, which is turned as the joints measured. The camera's
+own motion is estimated from the flow between them (ego_motion). Other motion (segmentation) is
 clustered to patches (clustering). Their slide, growth and spin (patch_motion) give position and
 velocity, and persistent ids (tracking). No clock is used: times come with images.
 
@@ -32,8 +31,6 @@ from gazerig.drivers.vision.motion.clustering import (
 from gazerig.drivers.vision.motion.ego_motion import (
     EgoMotion,
     estimate_ego_motion,
-    predicted_ego_motion,
-    turn_rad,
 )
 from gazerig.drivers.vision.motion.flow import (
     Floats,
@@ -42,18 +39,16 @@ from gazerig.drivers.vision.motion.flow import (
     Plane,
     SmallImage,
     align_images,
-    changed_window,
     is_searchable,
     scale_down,
     to_original_px,
     turn_homography,
 )
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.drivers.vision.motion.patch_motion import PatchMotion, blur_images, patch_motion
+from gazerig.drivers.vision.motion.patch_motion import PatchMotion, blur, patch_motion
 from gazerig.drivers.vision.motion.segmentation import (
     LEAST_FLOW_PX,
-    ImageDifference,
-    image_difference,
+    is_unchanged,
     segment_motion,
 )
 from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
@@ -62,8 +57,6 @@ _KIND = "thing"
 # Unpredicted motion of the image above which flow is computed again, as a shift blurs flow and
 # loses it at the edges.
 _SEARCH_AGAIN_PX = 1.5
-# Time for which a camera counts as moving after a shake, as it is at rest where a shake reverses.
-_SHAKES_ON_S = 0.5
 # Smallest common share of both images, below which motions cannot be separated.
 _LEAST_KNOWN = 0.4
 # No motion is reported while the camera turns faster, or if a smaller share of the image's texture
@@ -154,7 +147,6 @@ class MotionDetector:
 
             self._gloves = GloveDetector()
         self._before: SmallImage | None = None
-        self._moved_s = -np.inf  # time of the last camera motion known only from the image
         self.no_result_reason = ""
 
     @property
@@ -172,15 +164,12 @@ class MotionDetector:
     ) -> tuple[MovingBlob, ...]:
         """Find moving things between the last image and this one.
 
-        image: (h, w), or with 1, 3 or 4 channels, uint8
+        image: (h, w, 3) BGR or (h, w) grey, uint8
         lens: focal lengths and centre in pixels of this image
         R_now_before: (3, 3) turns directions from the camera's axes at ``before_s`` into those at
             ``captured_s``; identity for a camera at rest, None if unknown
         depth_m: (any, any) distance along the optical axis, aligned with the image; 0, NaN or
             infinite if unknown
-
-        Raises:
-            ValueError: the image has another shape or type.
         """
         now = scale_down(image, self._params.work_px, lens, captured_s)
         before, self._before = self._before, now
@@ -191,7 +180,7 @@ class MotionDetector:
 
     def forget(self) -> None:
         """Discard the last image: the next one is the first of another scene."""
-        self._before, self._moved_s = None, -np.inf
+        self._before = None
         self._tracks.forget()
         if self._gloves is not None:
             self._gloves.forget()
@@ -213,22 +202,33 @@ class MotionDetector:
         if not 0.0 < dt_s <= _LONGEST_GAP_S:
             return (), "no frame shortly before"
         depth = shrink_depth(depth_m, now.grey.shape)
-        pair, ego, still = self._measure_flow(now, before, R_now_before)
-        turn = float(np.degrees(turn_rad(ego, now.grey, now.K))) / dt_s
+        H = turn_homography(R_now_before, now, before)
+        pair = align_images(now, before, H)
+        if is_unchanged(pair):
+            self._tracks.step([], [], [], H, now.captured_s, dt_s)
+            return (), ""
+        pair = self._search.search(pair)
+        ego = estimate_ego_motion(pair, now.K, R_now_before is not None)
+        if (
+            ego.background_share >= _LEAST_BACKGROUND_SHARE
+            and ego.unforeseen_px >= _SEARCH_AGAIN_PX
+        ):
+            # A large unpredicted motion is removed first.
+            pair = self._search.search(align_images(now, before, ego.total))
+            ego = estimate_ego_motion(pair, now.K, True)
+        turn = float(np.degrees(np.arctan(ego.shift_px / now.K[0, 0]))) / dt_s
         why = self._separation_fault(pair, ego, turn)
         if why:
             self._tracks.predict(ego.total, now.captured_s, dt_s)
             return (), why
-        shrink = now.fine_grey.shape[0] // now.grey.shape[0]
-        things = segment_motion(pair, ego, shrink, R_now_before is None, still)
-        groups = cluster_motion(things, shrink)
-        images = blur_images(pair) if groups else ()
+        groups = cluster_motion(segment_motion(pair, ego, R_now_before is None))
+        soft = (blur(pair.fine_now), blur(pair.fine_before)) if groups else ()
         moving: list[tuple[PixelGroup, Floats, PatchMotion]] = []
         for group in groups:
             places = np.column_stack((group.columns, group.rows)).astype(np.float64)
             centre = places.mean(axis=0)
-            motion = patch_motion(places, group.flow, centre, images, ego.B)
-            if _motion_px(group, motion, now.grey.shape) > LEAST_FLOW_PX / shrink:
+            motion = patch_motion(places, group.flow, centre, *soft, ego.B)
+            if _motion_px(group, motion, now.grey.shape) > LEAST_FLOW_PX:
                 moving.append((group, centre, motion))
         follows = self._tracks.step(
             [centre for _, centre, _ in moving],
@@ -244,30 +244,6 @@ class MotionDetector:
             if self._tracks.is_confirmed(follow)
         )
         return blobs, ""
-
-    def _measure_flow(
-        self, now: SmallImage, before: SmallImage, R_now_before: Floats | None
-    ) -> tuple[ImagePair, EgoMotion, ImageDifference | None]:
-        """Compute the flow and the camera's own motion; a large unpredicted one is removed first.
-
-        If the camera moved as predicted, flow is computed only where the images differ, and their
-        difference is returned too.
-        """
-        pair = align_images(now, before, turn_homography(R_now_before, now, before))
-        moved_before = now.captured_s - self._moved_s < _SHAKES_ON_S
-        if not moved_before:
-            still = image_difference(pair)
-            ego = predicted_ego_motion(pair, still.changed_mask)
-            if ego is not None:
-                return self._search.search(pair, changed_window(still.changed_mask)), ego, still
-        pair = self._search.search(pair)
-        ego = estimate_ego_motion(pair, now.K, R_now_before is not None, moved_before)
-        if ego.unforeseen_px > 0.0:
-            self._moved_s = now.captured_s
-        if ego.background_share < _LEAST_BACKGROUND_SHARE or ego.unforeseen_px < _SEARCH_AGAIN_PX:
-            return pair, ego, None
-        again = self._search.search(align_images(now, before, ego.total))
-        return again, estimate_ego_motion(again, now.K, True), None
 
     def _separation_fault(self, pair: ImagePair, ego: EgoMotion, turn_deg_s: float) -> str:
         """Return why ego-motion cannot be separated from the motion of objects, "" if it can."""
@@ -290,8 +266,7 @@ class MotionDetector:
     ) -> MovingBlob:
         """Combine the measurements of one thing."""
         far = distance(group, depth)
-        point = thing_pixel(group, now.grey, follow.centre, follow.offset)
-        follow.offset = point - follow.centre
+        point = thing_pixel(group, follow.centre)
         p = back_project(point, far.z_m, now.K)
         flow_px_s = motion.slide_px[0] / dt_s, motion.slide_px[1] / dt_s
         # A thing that the edge of the image cuts does not grow when more of it becomes visible.

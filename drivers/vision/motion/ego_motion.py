@@ -19,12 +19,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.vision.motion.flow import (
     Floats,
-    Grey,
     ImagePair,
-    Mask,
-    corners,
-    gradients,
-    remove_illumination,
     upper_median,
     warp_points,
 )
@@ -41,11 +36,6 @@ _LEAST_POINTS = 30
 _CELLS, _LEAST_CELLS = (8, 6), 12
 # Share of the textured points that must agree with the prediction.
 _LEAST_SHARE = 0.35
-# Share of the outlines that keep their position although the whole image seems to have moved: .11
-# to .32 in rendered rooms with a moving camera, .49 to .77 behind people with one at rest.
-# Brightness change that they should exceed, grey levels, and share of it below which they are
-# unchanged.
-_KEPT_OUTLINES, _CLEAR_CHANGE, _UNCHANGED = 0.4, 4.0, 0.3
 _STEPS = 8
 # The iteration ends at a step that moves the image by less.
 _SMALL_PX = 0.01
@@ -60,32 +50,11 @@ _MIXED_PX = 0.25
 _SPREADS = np.array([0.1, 0.1, 0.2, 0.1, 0.1, 0.2, 0.05, 0.05])
 _PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 _POINT_NOISE = 1e-3
-# Test of a camera at rest: pixel step, texture and number of the tested points, share that must
-# keep their brightness, and largest common slide.
-_REST_STEP, _REST_GRADIENT, _REST_POINTS = 3, 2.0, 60
-_REST_SHARE, _REST_PX = 0.6, 0.05
-
-
-class _MotionThresholds(NamedTuple):
-    """Requirements for accepting that the whole image moved.
-
-    moved_share: share of the textured points that moved together; moved_cells: number of image
-        cells with them
-    kept_edge_share: largest share of the points at the edge that may have kept their position
-    """
-
-    moved_share: float
-    moved_cells: int
-    kept_edge_share: float
-
-
-# A person close to the lens fills most of the image; a strip of wall that keeps its position shows
-# that. A moving camera sometimes follows a person, who then keeps their position.
-_AGAINST_JOINTS, _STOOD, _MOVES = (
-    _MotionThresholds(0.45, 24, 0.1),
-    _MotionThresholds(0.35, 24, 0.15),
-    _MotionThresholds(0.35, 12, 0.4),
-)
+# Requirements for accepting that the whole image moved, against or without the joints: share of the
+# textured points that moved together, number of the image's cells with them, and largest share of
+# the points at the edge that may have kept their position. A person close to the lens fills most of
+# the image; a strip of wall that keeps its position shows that.
+_MOVED_SHARE, _MOVED_CELLS, _KEPT_EDGE_SHARE = 0.45, 24, 0.1
 
 
 class HomographyFit(NamedTuple):
@@ -120,15 +89,12 @@ class EgoMotion(NamedTuple):
     unforeseen_px: float
 
 
-def estimate_ego_motion(
-    pair: ImagePair, K: Floats, predicted: bool, moved_before: bool = False
-) -> EgoMotion:
+def estimate_ego_motion(pair: ImagePair, K: Floats, predicted: bool) -> EgoMotion:
     """Find the camera's own motion.
 
     K: (3, 3) camera matrix
     predicted: whether ``pair`` was turned as the joints measured; otherwise the camera's motion is
         unknown, and the motion of most points is used instead
-    moved_before: whether the image alone showed a motion of the camera shortly before
     """
     # Points (n, 2) of a grid with reliable flow.
     strength = cv2.cornerMinEigenVal(pair.now, _CORNER_BLOCK)
@@ -142,8 +108,7 @@ def estimate_ego_motion(
         at = points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)
         there = points + pair.flow[at]
         reach = _STANDING_REACH_PX + (_median_shift(_inverse(pair.H), points) if predicted else 0.0)
-        need = _AGAINST_JOINTS if predicted else _MOVES if moved_before else _STOOD
-        found = _fit_room(points, there, K, pair, reach, need)
+        found = _fit_room(points, there, K, pair.now.shape, reach, predicted)
         if found is not None:
             B, share, noise, free = found
             share = share if noise <= _MOST_NOISE_PX else 0.0
@@ -154,90 +119,36 @@ def estimate_ego_motion(
     return EgoMotion(B, total / total[2, 2], share, noise, way, unforeseen)
 
 
-def predicted_ego_motion(pair: ImagePair, changed: Mask) -> EgoMotion | None:
-    """Return the predicted motion of the camera if most of the texture confirms it.
-
-    pair: images whose flow need not have been computed
-    changed: (h, w) mask of differences above the noise
-
-    The result is None if the flow is needed to decide.
-    """
-    window = np.s_[::_REST_STEP, ::_REST_STEP]
-    gx, gy = (g[window].ravel() for g in gradients(pair.now))
-    off = (pair.now[window].astype(np.float32) - pair.before[window]).ravel()
-    good = (gx * gx + gy * gy > _REST_GRADIENT**2) & pair.valid_mask[window].ravel()
-    if np.count_nonzero(good) < _REST_POINTS:
-        return None
-    same = good & ~changed[window].ravel()
-    share = np.count_nonzero(same) / np.count_nonzero(good)
-    if share < _REST_SHARE:
-        return None
-    g: Floats = np.column_stack((gx[same], gy[same], np.ones(np.count_nonzero(same)))).astype(float)
-    slid = np.linalg.solve(g.T @ g + np.eye(3), -(g.T @ off[same]))
-    if np.hypot(*slid[:2]) > _REST_PX:
-        return None
-    way = _median_shift(_inverse(pair.H), corners(pair.now.shape))
-    return EgoMotion(np.eye(3), pair.H / pair.H[2, 2], float(share), _LEAST_NOISE_PX, way, 0.0)
-
-
 def _fit_room(
     points: Floats,
     there: Floats,
     K: Floats,
-    pair: ImagePair,
+    shape: tuple[int, ...],
     reach_px: float,
-    need: _MotionThresholds,
+    predicted: bool,
 ) -> HomographyFit | None:
     """Fit the motion of the room: as predicted or at rest; otherwise that of the whole image."""
-    shape = pair.now.shape
     off = np.hypot(*(there - points).T)
     near = off < reach_px
     stands = bool(near.mean() >= _LEAST_SHARE) and _count_cells(points[near], shape) >= _LEAST_CELLS
-    asked = stands or need is _AGAINST_JOINTS
-    found = _fit_homography(points, there, K, shape, reach_px) if asked else None
+    fits = stands or predicted
+    found = _fit_homography(points, there, K, shape, reach_px) if fits else None
     if found is not None and found.agreeing_share >= _LEAST_SHARE:
         return found
-    free = _fit_homography(points, there, K, shape, np.inf, need.moved_cells)
+    free = _fit_homography(points, there, K, shape, np.inf, _MOVED_CELLS)
     if free is not None and free.noise_px > _MIXED_PX:
-        free = _fit_two_motions(points, there, K, shape, need.moved_cells) or free
-    if free is None or free.agreeing_share < need.moved_share:
+        free = _fit_two_motions(points, there, K, shape) or free
+    if free is None or free.agreeing_share < _MOVED_SHARE:
         return found
     # Points that kept their position although the whole image seems to have moved.
     parted = np.hypot(*(warp_points(free.B, points) - points).T) > 2 * _STANDING_REACH_PX
     edge = _edge_mask(points, shape)
     kept = float(((off < _STANDING_REACH_PX) & parted)[edge].mean()) if edge.any() else 0.0
-    return (
-        free
-        if kept < need.kept_edge_share and _kept_outline_share(pair, free.B) < _KEPT_OUTLINES
-        else found
-    )
-
-
-def _kept_outline_share(pair: ImagePair, B: Floats) -> float:
-    """Return the share of the outlines at the edge that did not move although they should have.
-
-    Boards and door frames on a plain wall have no corners, so people who walk in front of it have
-    all of the texture.
-    """
-    height, width = pair.now.shape
-    y, x = np.mgrid[:height, :width]
-    points = np.column_stack((x.ravel(), y.ravel())).astype(np.float64)
-    gx, gy = (g.ravel() for g in gradients(pair.now))
-    moves = warp_points(B, points) - points
-    # Beyond one pixel brightness no longer changes as the gradient predicts.
-    change = np.abs(gx * moves[:, 0] + gy * moves[:, 1]) / np.maximum(1.0, np.hypot(*moves.T))
-    should = (
-        (change > _CLEAR_CHANGE) & pair.valid_mask.ravel() & _edge_mask(points, (height, width))
-    )
-    if not should.any():
-        return 0.0
-    off = remove_illumination(pair.now.astype(np.float32) - pair.before)
-    changed = np.abs(cv2.blur(off, (3, 3))).ravel()
-    return float((changed[should] < _UNCHANGED * change[should]).mean())
+    return free if kept < _KEPT_EDGE_SHARE else found
 
 
 def _fit_two_motions(
-    points: Floats, there: Floats, K: Floats, shape: tuple[int, ...], least_cells: int
+    points: Floats, there: Floats, K: Floats, shape: tuple[int, ...]
 ) -> HomographyFit | None:
     """Fit the room in an image with two motions: more of the edge moves with it.
 
@@ -257,7 +168,7 @@ def _fit_two_motions(
         if start is None:
             continue
         left = warp_points(_inverse(start.B), there)
-        rest = _fit_homography(points, left, K, shape, _STANDING_REACH_PX, least_cells)
+        rest = _fit_homography(points, left, K, shape, _STANDING_REACH_PX, _MOVED_CELLS)
         if rest is None or rest.noise_px > _MIXED_PX:
             continue
         B = start.B @ rest.B
@@ -304,7 +215,7 @@ def _fit_homography(
         belief = np.diag(_SPREADS**-2.0)
         right = weighted.T @ b.T.ravel() + belief @ _PLAIN
         last, h = h, np.asarray(np.linalg.solve(rows.T @ weighted + belief, right))
-        errors = focal * np.hypot(*(_apply_homography(h, a) - b).T)
+        errors = focal * np.hypot(*(warp_points(np.append(h, 1.0).reshape(3, 3), a) - b).T)
         done = np.abs(h - last).max() * focal < _SMALL_PX and scale < 2 * noise
         noise = _noise_px(errors, weights > 0.0)
         scale = min(scale, max(0.5 * scale, noise))
@@ -318,15 +229,6 @@ def _fit_homography(
     return HomographyFit(
         B / B[2, 2], float(near.mean()), _noise_px(errors, near), reach_px == np.inf
     )
-
-
-def _apply_homography(h: Floats, a: Floats) -> Floats:
-    """Return points after the homography."""
-    x, y = a.T
-    depth = np.maximum(h[6] * x + h[7] * y + 1.0, 1e-3)
-    there = h[0] * x + h[1] * y + h[2], h[3] * x + h[4] * y + h[5]
-    out: Floats = np.column_stack(there) / depth[:, None]
-    return out
 
 
 def _noise_px(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
@@ -354,12 +256,3 @@ def _inverse(H: Floats) -> Floats:
 def _median_shift(H: Floats, points: Floats) -> float:
     """Return the median motion of points by a homography."""
     return float(np.median(np.hypot(*(warp_points(H, points) - points).T)))
-
-
-def turn_rad(ego: EgoMotion, grey: Grey, K: Floats) -> float:
-    """Return the turn of the image's centre, as an angle in radians."""
-    height, width = grey.shape
-    middle = np.array([[0.5 * (width - 1), 0.5 * (height - 1)]])
-    rays = (np.concatenate((middle, warp_points(ego.total, middle))) - K[:2, 2]) / K[[0, 1], [0, 1]]
-    a, b = np.column_stack((rays, np.ones(2))) / np.sqrt((rays**2).sum(axis=1) + 1.0)[:, None]
-    return float(2.0 * np.arcsin(min(1.0, 0.5 * float(np.linalg.norm(a - b)))))

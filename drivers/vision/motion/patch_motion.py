@@ -3,7 +3,7 @@
 Flow is computed on squares that extend over a thing's edge, where its motion mixes with that of the
 background; for a small thing that is most of it. So one affine map is fitted to all its pixels
 (inverse compositional alignment, Baker and Matthews 2004), with Tukey's weights, which exclude
-pixels of the background, first on blurred and then on sharp images. OpenCV's alignment
+pixels of the background. OpenCV's alignment
 (findTransformECC) has no such weights: on drawn boxers its errors of velocity are twice as large.
 """
 
@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.vision.motion.flow import (
+    TO_FINE,
+    TO_SEARCHED,
     Floats,
     Grey,
-    ImagePair,
     Plane,
     upper_median,
     warp_points,
@@ -25,11 +26,11 @@ from gazerig.drivers.vision.motion.flow import (
 
 # Most points for a fit, and least for the refinement.
 _SAMPLE, _LEAST_POINTS = 400, 24
-# Flow at neighbouring pixels comes from the same squares: this area counts as one measurement (8 px
-# at half size); smallest noise of flow.
-_SQUARE_PX2, _LEAST_FLOW_NOISE_PX = 64.0, 0.03
-# (blur in pixels, most steps) at the level of each image; larger errors are not corrected.
-_LEVELS = ((1.25, 8), (1.0, 6))
+# Flow at neighbouring pixels comes from the same squares: this area counts as one measurement (16
+# px in the fine image); smallest noise of flow.
+_SQUARE_PX2, _LEAST_FLOW_NOISE_PX = 256.0, 0.06
+# Blur in pixels, and most steps; larger errors are not corrected.
+_BLUR_PX, _STEPS = 1.25, 8
 _TUKEY = 4.685
 # Smallest noise of pixels, grey levels.
 _LEAST_NOISE = 1.0
@@ -45,7 +46,6 @@ _BELIEF = np.diag([_SLOPE_SD_PX**-2.0] * 4 + [_SLIDE_SD_PX**-2.0] * 2 + [1e-9])
 _STEP_PX = 8.0
 _AROUND = np.array([(0.0, 0.0), (_STEP_PX, 0.0), (0.0, _STEP_PX)])
 _ONE_MAP: Plane = np.empty(0, dtype=np.float32)
-_EDGE = cv2.BORDER_REPLICATE
 
 
 class PatchMotion(NamedTuple):
@@ -75,27 +75,14 @@ class _Affine(NamedTuple):
     slope_sd: float
 
 
-class BlurredImages(NamedTuple):
-    """Two blurred images, and their scale relative to the images searched for flow."""
-
-    now: Plane
-    before: Plane
-    scale: float
-    steps: int
-
-
-def blur_images(pair: ImagePair) -> tuple[BlurredImages, ...]:
-    """Blur the images once for all patches: at the searched size, then at the fine size."""
-    fine = pair.fine_images[0].shape[0] / pair.now.shape[0]
-    both = ((pair.now, pair.before), 1.0), (pair.fine_images, fine)
-    return tuple(
-        BlurredImages(_blur(now, px), _blur(before, px), scale, steps)
-        for ((now, before), scale), (px, steps) in zip(both, _LEVELS, strict=True)
-    )
+def blur(grey: Grey) -> Plane:
+    """Return an image without the finest detail, in which a fit would go astray."""
+    soft = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), _BLUR_PX)
+    return np.asarray(soft, dtype=np.float32)
 
 
 def patch_motion(
-    places: Floats, flow: Floats, centre: Floats, images: tuple[BlurredImages, ...], B: Floats
+    places: Floats, flow: Floats, centre: Floats, now: Plane, before: Plane, B: Floats
 ) -> PatchMotion:
     """Return the motion of a patch, without the camera's.
 
@@ -107,25 +94,23 @@ def patch_motion(
         places: Its pixels (n, 2) in the newer image.
         flow: Their motion (n, 2) from the older image, without the camera's.
         centre: The point (2,) whose motion is the slide.
-        images: The images.
+        now: The newer of the fine images, blurred.
+        before: The older one, blurred.
         B: Homography of still things from the newer image to the older one.
     """
-    area_px2, step = len(places), max(1, len(places) // _SAMPLE)
-    places, flow = np.ascontiguousarray(places[::step]), flow[::step]
+    area_px2, step = 4 * len(places), max(1, len(places) // _SAMPLE)
+    # Everything is computed in pixels of the fine images.
+    places, flow, centre = 2.0 * places[::step], 2.0 * flow[::step], 2.0 * centre + 0.5
     arms = places - centre
     size = max(1.0, float(np.sqrt((arms**2).sum(axis=1).mean())))
     back = _fit_to_flow(arms, flow, size, area_px2)
     if len(places) >= _LEAST_POINTS:
-        at = warp_points(B, centre + _AROUND)
+        at = warp_points(TO_FINE @ B @ TO_SEARCHED, centre + _AROUND)
         slope = ((at[1:] - at[0]) / _STEP_PX).T
-        for level in images:
-            finer = _refine(back, arms, centre, size, level, slope, at[0])
-            if finer is None:
-                break
-            back = finer
+        back = _refine(back, places, centre, size, now, before, slope, at[0])
     (a, b), (c, d) = back.matrix.tolist()
     shrink = sqrt(max(abs(a * d - b * c), 1e-6))
-    slide = float(-back.shift[0]), float(-back.shift[1])
+    slide = float(-back.shift[0]) / 2.0, float(-back.shift[1]) / 2.0
     # Growth and spin are each half the sum of two numbers.
     return PatchMotion(slide, -log(shrink), -atan2(c - b, a + d), back.slope_sd / sqrt(2.0))
 
@@ -145,65 +130,53 @@ def _fit_to_flow(arms: Floats, flow: Floats, size: float, area_px2: float) -> _A
 
 def _refine(
     start: _Affine,
-    arms: Floats,
+    places: Floats,
     centre: Floats,
     size: float,
-    level: BlurredImages,
+    now: Plane,
+    before: Plane,
     slope: Floats,
     there: Floats,
-) -> _Affine | None:
-    """Refine a map on the pixels of one level; None if it diverges or does not improve.
+) -> _Affine:
+    """Refine a map on the pixels of the images; unchanged if it diverges or does not improve.
 
     slope, there: map of still things to the older image, around the centre
     """
-    scale = level.scale
-    at = _level_positions(arms + centre, scale).astype(np.intp)
-    # Exact positions of the whole pixels.
-    arms = (at + 0.5) / scale - 0.5 - centre
-    wanted, slopes = _template(level.now, at, arms / size)
+    arms = places - centre
+    wanted, slopes = _template(now, places.astype(np.intp), arms / size)
     matrix, shift = start.matrix, start.shift
 
     def errors() -> Floats:
-        seen = arms @ (slope @ matrix).T + (there + slope @ shift)
-        at = _level_positions(seen, scale).astype(np.float32)[:, None]
-        found = cv2.remap(level.before, at, _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
-        out: Floats = wanted - found.ravel()
-        return out
+        at = arms @ (slope @ matrix).T + (there + slope @ shift)
+        linear, edge = cv2.INTER_LINEAR, cv2.BORDER_REPLICATE
+        found = cv2.remap(before, at.astype(np.float32)[:, None], _ONE_MAP, linear, None, edge)
+        return np.asarray(wanted - found.ravel(), np.float64)
 
     off = errors()
     first, weights = _tukey_weights(off)
     noise, normal = first, np.eye(7)
-    for _ in range(level.steps):
+    for _ in range(_STEPS):
         weighted = slopes * weights[:, None]
         normal = slopes.T @ weighted + noise**2 * _BELIEF
         step = np.linalg.solve(normal, weighted.T @ off)
-        matrix = matrix @ (np.eye(2) + step[:4].reshape(2, 2) / (size * scale))
-        shift = shift + matrix @ step[4:6] / scale
+        matrix = matrix @ (np.eye(2) + step[:4].reshape(2, 2) / size)
+        shift = shift + matrix @ step[4:6]
         off = errors()
         noise, weights = _tukey_weights(off)
         if np.abs(step[:6]).max() < _SMALL_PX:
             break
-    led_away = np.abs(matrix - start.matrix).max() * size * scale > 3 * _SLOPE_SD_PX
-    led_away |= bool(np.abs(shift - start.shift).max() * scale > 3 * _SLIDE_SD_PX)
+    led_away = np.abs(matrix - start.matrix).max() * size > 3 * _SLOPE_SD_PX
+    led_away |= bool(np.abs(shift - start.shift).max() > 3 * _SLIDE_SD_PX)
     if led_away or noise > first or not np.isfinite(matrix).all():
-        return None
-    spread = noise * np.sqrt(_ALIKE * np.linalg.inv(normal).diagonal()[:4].mean()) / (size * scale)
+        return start
+    spread = noise * np.sqrt(_ALIKE * np.linalg.inv(normal).diagonal()[:4].mean()) / size
     return _Affine(matrix, shift, float(spread))
-
-
-def _level_positions(places: Floats, scale: float) -> Floats:
-    """Return positions of the searched image in a level's pixels."""
-    return places if scale == 1.0 else (places + 0.5) * scale - 0.5
 
 
 def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, Floats]:
     """Return brightness (n,), and its derivatives (n, 7) by the map's numbers and by light."""
-    height, width = now.shape
     x, y = at.T
-    right, left = np.minimum(x + 1, width - 1), np.maximum(x - 1, 0)
-    below, above = np.minimum(y + 1, height - 1), np.maximum(y - 1, 0)
-    gx = 0.5 * (now[y, right] - now[y, left]).astype(np.float64)
-    gy = 0.5 * (now[below, x] - now[above, x]).astype(np.float64)
+    gx, gy = (cv2.Sobel(now, cv2.CV_64F, dx, 1 - dx, ksize=1, scale=0.5)[y, x] for dx in (1, 0))
     u, v = arms.T
     slopes = np.column_stack((gx * u, gx * v, gy * u, gy * v, gx, gy, np.ones(len(x))))
     return now[y, x].astype(np.float64), slopes
@@ -214,7 +187,3 @@ def _tukey_weights(errors: Floats) -> tuple[float, Floats]:
     apart = np.abs(errors - upper_median(errors))
     noise = max(_LEAST_NOISE, 1.4826 * upper_median(apart))
     return noise, np.maximum(1.0 - (apart / (_TUKEY * noise)) ** 2, 0.0) ** 2
-
-
-def _blur(grey: Grey, sigma: float) -> Plane:
-    return np.asarray(cv2.GaussianBlur(grey.astype(np.float32), (0, 0), sigma), dtype=np.float32)

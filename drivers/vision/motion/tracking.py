@@ -27,7 +27,6 @@ class PatchTrack:
     """Track of one patch, in pixels of the small image.
 
     centre: (2,); velocity_px_s: (2,)
-    offset: (2,) from the centre to its last reported point
     size_px: root of the box's area
     consecutive_images: number of consecutive images
     """
@@ -38,7 +37,6 @@ class PatchTrack:
     size_px: float
     seen_s: float
     consecutive_images: int
-    offset: Floats
 
 
 class MotionTracks:
@@ -81,7 +79,7 @@ class MotionTracks:
             found[j] = follow
         for j, centre in enumerate(centres):
             if j not in found:
-                begun = PatchTrack(self._next_id, centre, np.zeros(2), 1.0, t_s, 0, np.zeros(2))
+                begun = PatchTrack(self._next_id, centre, np.zeros(2), 1.0, t_s, 0)
                 self._next_id += 1
                 self._patch_tracks.append(begun)
                 found[j] = begun
