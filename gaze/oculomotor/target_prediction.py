@@ -168,10 +168,11 @@ class TargetPrediction:
             return _STILL, self._v
         age_s = max(0.0, t_s - self._at_s)
         if age_s <= _HORIZON_S:
-            return self._displacement_at(age_s), self._speed(age_s)
-        left, speed = exp(-(age_s - _HORIZON_S) / _FADE_S), self._speed(_HORIZON_S)
+            return self._motion_at(age_s)
+        moved, speed = self._motion_at(_HORIZON_S)
+        left = exp(-(age_s - _HORIZON_S) / _FADE_S)
         beyond = scale(speed, _FADE_S * (1.0 - left))
-        return add(self._displacement_at(_HORIZON_S), beyond), scale(speed, left)
+        return add(moved, beyond), scale(speed, left)
 
     @property
     def to_middle(self) -> Vec3 | None:
@@ -183,29 +184,23 @@ class TargetPrediction:
         """Return the amplitude of the recognised swing, 0 without one."""
         return 0.0 if self.sine is None else self.sine.size_m
 
-    def _displacement_at(self, age_s: float) -> Vec3:
-        """Return the displacement an age after the frame."""
-        sine = self.sine
-        if sine is not None:
-            at_s = self._at_s
-            there = scale(sine.offset(at_s + age_s + self._lag_s), self._share)
-            return sub(there, sine.offset(at_s))
+    def _motion_at(self, age_s: float) -> tuple[Vec3, Vec3]:
+        """Return displacement and velocity an age after the frame."""
+        if (sine := self.sine) is not None:
+            ahead_s = self._at_s + age_s + self._lag_s
+            there = scale(sine.offset(ahead_s), self._share)
+            moved = sub(there, sine.offset(self._at_s))
+            return moved, scale(sine.velocity(ahead_s), self._share)
         bent = min(age_s, _BENDS_S)
         more = bent * (age_s - 0.5 * bent)
         (x, y, z), (a, b, c) = self._v, self._bend
         moved = x * age_s + a * more, y * age_s + b * more, z * age_s + c * more
-        return _limit_length(moved, self._fastest_m_s * age_s)
-
-    def _speed(self, age_s: float) -> Vec3:
-        """Return the velocity an age after the frame."""
-        if self.sine is not None:
-            ahead_s = self._at_s + age_s + self._lag_s
-            return scale(self.sine.velocity(ahead_s), self._share)
-        bent = min(age_s, _BENDS_S)
-        (x, y, z), (a, b, c) = self._v, self._bend
         speed = x + a * bent, y + b * bent, z + c * bent
         # No extrapolated change makes the target faster than it has been.
-        return _limit_length(speed, self._most_m_s)
+        return (
+            _limit_length(moved, self._fastest_m_s * age_s),
+            _limit_length(speed, self._most_m_s),
+        )
 
     def _past_slope(self) -> Vec3:
         """Return the rate at which the velocity has changed over the last frames."""
