@@ -140,6 +140,8 @@ class Guard:
 
     def take_reports(self) -> list[str]:
         """Return a line for each joint that has become warm since the last call."""
+        if not self._health.warmed:
+            return []
         found, self._health.warmed = self._health.warmed, []
         return [
             f"{self._names[i]} is warm, {celsius:.0f} deg C: slower until it cools; stops at {hot:.0f}"

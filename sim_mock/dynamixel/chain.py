@@ -6,6 +6,7 @@ Sources: ROBOTIS e-Manual, Protocol 2.0 and X series.
 import struct
 from collections.abc import Sequence
 from functools import lru_cache
+from operator import itemgetter
 
 from fastcrc.crc16 import umts
 
@@ -20,6 +21,7 @@ FAST_SYNC_READ, FAST_BULK_READ = 0x8A, 0x9A
 """Group reads with one answer of all servos."""
 
 _ROW = struct.Struct("<BHH")
+_SIZE = itemgetter(2)
 _MARKS = [bytes((0, servo_id)) for servo_id in range(256)]
 """Error and id of a fast answer without an error."""
 
@@ -58,7 +60,7 @@ class DynamixelChain(ServoChain):
         A missing or cut block ends it; a refused read has zeros. The CRC of a block counts for the
         next piece, as its sender continues from it.
         """
-        length = 1 + sum([4 + read[2] for read in reads])
+        length = 1 + 4 * len(reads) + sum(map(_SIZE, reads))
         before, crc, pack = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0, CRC.pack
         parts: list[bytes] = []
         wait_s, now_ms, fed_ms = 0.0, self._now_ms, self._fed_ms
