@@ -5,6 +5,7 @@ form and are found by the same code, but without a search of the installed packa
 some milliseconds. Nothing is imported before its name is used.
 """
 
+import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -226,16 +227,12 @@ def plugin_error(error: BaseException) -> PluginError | None:
     if isinstance(error, DriverError):
         return None
     frames = [frame for frame, _ in walk_tb(error.__traceback__)]
-    modules = {str(frame.f_globals.get("__name__")) for frame in frames}
-    packages = {name.partition(".")[0] for name in modules}
-    parts = [
-        (part, part.value.partition(":")[0].strip())
-        for group in GROUPS
-        for part in _package_parts(group, tuple(sys.path))
-    ]
-    found = [part for part, module in parts if module in modules]
-    found += [part for part, module in parts if module.partition(".")[0] in packages]
-    return PluginError(f"{found[0].label} failed ({describe_error(error)})") if found else None
+    raising = {str(frame.f_globals.get("__name__")).partition(".")[0] for frame in frames}
+    for group in GROUPS:
+        for part in _package_parts(group, tuple(sys.path)):
+            if re.split(r"[.:\s]", part.value)[0] in raising:
+                return PluginError(f"{part.label} failed ({describe_error(error)})")
+    return None
 
 
 def registrations(group: str) -> tuple[Registration, ...]:

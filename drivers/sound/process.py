@@ -35,7 +35,7 @@ _LATENCY_S = _PERIOD_MS / 1e3 * (_PERIODS - 1)
 _REFILL_S = 0.12
 _IDLE_S = 10.0
 _LOST_S = 1.0
-_POLL_MS = 100
+_POLL_S = 0.1
 
 
 class _FileSource:
@@ -146,11 +146,6 @@ class _Player:
         elif now_s - self._used_s > _IDLE_S:
             self._close()
 
-    @property
-    def is_open(self) -> bool:
-        """Return whether a device is open."""
-        return self._device is not None
-
     def _close(self) -> None:
         if self._device is not None:
             self._device.close()
@@ -161,8 +156,10 @@ class _Player:
         self._report(SoundEvent("failed", self._number, reason))
 
     def _report(self, event: SoundEvent | PlayedSound) -> None:
+        # A suspended program reads nothing: positions are dropped then, and events wait.
+        flags = DONT_WAIT if isinstance(event, PlayedSound) else 0
         with suppress(OSError):  # the program is gone, and this process ends
-            self._link.send(msgspec.msgpack.encode(event), DONT_WAIT)
+            self._link.send(msgspec.msgpack.encode(event), flags)
 
 
 def _real_backends() -> list[miniaudio.Backend]:
@@ -210,10 +207,8 @@ def main(word: str, device: str) -> None:
     parent = os.getppid()
     link = open_link(word)
     player = _Player(link, device)
-    waiting = select.poll()
-    waiting.register(link.fileno(), select.POLLIN)
     while os.getppid() == parent:
-        if waiting.poll(_POLL_MS if player.is_open else 1000):
+        if select.select([link], [], [], _POLL_S)[0]:
             try:
                 message = link.recv(LONGEST_MESSAGE)
             except OSError:
