@@ -44,7 +44,6 @@ class Device:
         self.speed = speed
         sockets = real().CameraBoardSocket
         self.sockets = [sockets.CAM_A, sockets.CAM_B, sockets.CAM_C]
-        self.platform = real().Platform.RVC2
         self.closed = 0
         self.reconnections: int | None = None
 
@@ -57,9 +56,6 @@ class Device:
     def getDeviceName(self):  # noqa: N802
         return "OAK-D"
 
-    def getPlatform(self):  # noqa: N802
-        return self.platform
-
     def setMaxReconnectionAttempts(self, count):  # noqa: N802
         self.reconnections = count
 
@@ -70,8 +66,8 @@ class Device:
 class Message:
     """A colour frame with its stamps."""
 
-    def __init__(self, device_s, host_s, lens=None, size=(6, 4)) -> None:
-        self.device_s, self.host_s = device_s, host_s
+    def __init__(self, host_s, lens=None, size=(6, 4)) -> None:
+        self.host_s = host_s
         self.lens = np.eye(3) if lens is None else lens
         self.width, self.height = size
 
@@ -81,11 +77,8 @@ class Message:
     def getTransformation(self):  # noqa: N802
         return SimpleNamespace(getIntrinsicMatrix=lambda: self.lens)
 
-    def getTimestampDevice(self, offset):  # noqa: N802
-        assert offset == real().CameraExposureOffset.MIDDLE
-        return timedelta(seconds=self.device_s)
-
     def getTimestamp(self, offset):  # noqa: N802
+        assert offset == real().CameraExposureOffset.MIDDLE
         return timedelta(seconds=self.host_s)
 
 

@@ -78,17 +78,8 @@ def answering(dai, pipeline, make, source) -> Any:
     return node.out
 
 
-def host_nodes(film, loop=True, lens=None, device_clock=None):
-    """Make a substitute for device_nodes: a replayed film and nodes that answer each picture."""
-
-    def looked_through(frame):
-        if lens is not None:
-            transformation = frame.getTransformation()
-            transformation.setIntrinsicMatrix(lens)
-            frame.setTransformation(transformation)
-        if device_clock is not None:
-            frame.setTimestampDevice(device_clock(frame.getTimestampDevice()))
-        return frame
+def host_nodes(film, loop=True):
+    """Make a substitute for device_nodes: a replayed film and a node that answers each picture."""
 
     def nodes(dai, pipeline, params) -> PipelineOutputs:
         replay = pipeline.create(dai.node.ReplayVideo)
@@ -96,29 +87,22 @@ def host_nodes(film, loop=True, lens=None, device_clock=None):
         replay.setOutFrameType(dai.ImgFrame.Type.NV12)
         replay.setFps(params.rate_hz)
         replay.setLoop(loop)
-        colour = answering(dai, pipeline, looked_through, replay.out)
-        return PipelineOutputs(
-            colour,
-            answering(dai, pipeline, partial(depth_mm, dai), colour),
-        )
+        depth = answering(dai, pipeline, partial(depth_mm, dai), replay.out)
+        return PipelineOutputs(replay.out, depth)
 
     return nodes
 
 
-def opened(nodes, params=PARAMS) -> OakSource:
-    source = OakSource(params, nodes, on_device=False)
+def opened(nodes) -> OakSource:
+    source = OakSource(PARAMS, nodes, on_device=False)
     source.open()
     return source
 
 
-def take(source, count):
-    shots = [source.take(time.monotonic, GO_ON) for _ in range(count)]
-    source.close()
-    return shots
-
-
 def test_colour_depth_and_times_of_one_instant(film):
-    shots = take(opened(host_nodes(film)), 12)
+    source = opened(host_nodes(film))
+    shots: Any = [source.take(time.monotonic, GO_ON) for _ in range(12)]
+    source.close()
     assert [shot.number for shot in shots] == list(range(1, 13))
     for shot in shots:
         assert shot.image.shape == (240, 320, 3)

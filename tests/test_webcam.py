@@ -70,8 +70,8 @@ def device(tmp_path):
     return file
 
 
-def opened(device, capture: Capture) -> Webcam:
-    camera = Webcam(device, WebcamParams(800, 600, 25.0), lambda name: capture)
+def opened(device, capture: Capture, latency_ms: float = 0.0) -> Webcam:
+    camera = Webcam(device, WebcamParams(800, 600, 25.0, latency_ms), lambda name: capture)
     camera.open()
     return camera
 
@@ -110,23 +110,30 @@ def capture():
     return Capture()
 
 
-def test_wishes_reach_the_camera(capture, device):
+def test_wishes_reach_the_camera_the_compressed_format_first(capture, device):
     opened(device, capture)
-    assert capture.wishes[cv2.CAP_PROP_FRAME_WIDTH] == 800
-    assert capture.wishes[cv2.CAP_PROP_FRAME_HEIGHT] == 600
-    assert capture.wishes[cv2.CAP_PROP_FPS] == 25.0
-    assert capture.wishes[cv2.CAP_PROP_BUFFERSIZE] == 1
+    assert list(capture.wishes.items()) == [  # sizes depend on the format
+        (cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"MJPG")),
+        (cv2.CAP_PROP_FRAME_WIDTH, 800),
+        (cv2.CAP_PROP_FRAME_HEIGHT, 600),
+        (cv2.CAP_PROP_FPS, 25.0),
+        (cv2.CAP_PROP_BUFFERSIZE, 1),
+    ]
 
 
-def test_picture_has_the_kernels_time_where_it_is_on_our_clock(device):
-    camera = opened(device, Capture(stamp_ms=49_970.0))
-    assert present(camera.take(lambda: 50.0, GO_ON)).captured_s == pytest.approx(49.97)
-
-
-@pytest.mark.parametrize("stamp_ms", [0.0, 51_000.0, 48_000.0, 1.7e12])
-def test_picture_has_the_time_of_its_arrival_otherwise(device, stamp_ms):
-    camera = opened(device, Capture(stamp_ms=stamp_ms))
-    assert present(camera.take(lambda: 50.0, GO_ON)).captured_s == 50.0
+@pytest.mark.parametrize(
+    ("stamp_ms", "latency_ms", "captured_s"),
+    [
+        (49_970.0, 0.0, 49.97),
+        (49_970.0, 35.0, 49.935),
+        *((stamp_ms, 0.0, 50.0) for stamp_ms in (0.0, 51_000.0, 48_000.0, 1.7e12)),
+    ],
+)
+def test_picture_has_the_kernels_time_on_our_clock_otherwise_that_of_its_arrival(
+    device, stamp_ms, latency_ms, captured_s
+):
+    camera = opened(device, Capture(stamp_ms), latency_ms)
+    assert present(camera.take(lambda: 50.0, GO_ON)).captured_s == pytest.approx(captured_s)
 
 
 def test_pictures_are_counted_and_fresh(device):
@@ -150,14 +157,6 @@ def test_lasting_failure_means_the_camera_is_gone(capture, device):
         camera.take(lambda: 1.0, GO_ON)
 
 
-def test_latency_of_the_camera_is_taken_off(device):
-    params = WebcamParams(latency_ms=35.0)
-    camera = Webcam(device, params)
-    camera._open_capture = lambda name: Capture(stamp_ms=49_970.0)
-    camera.open()
-    assert present(camera.take(lambda: 50.0, GO_ON)).captured_s == pytest.approx(49.935)
-
-
 @pytest.mark.parametrize(
     "picture", [np.full((4, 6, 4), 7, np.uint8), np.full((4, 6), 7 << 8, np.uint16)]
 )
@@ -165,12 +164,6 @@ def test_grey_alpha_and_deep_pictures_become_colour(capture, device, picture):
     capture.picture = picture
     image = present(opened(device, capture).take(lambda: 1.0, GO_ON)).image
     assert image.shape == (4, 6, 3) and image.dtype == np.uint8 and (image == 7).all()
-
-
-def test_the_compressed_format_is_requested_first(capture, device):
-    opened(device, capture)
-    assert list(capture.wishes)[0] == cv2.CAP_PROP_FOURCC  # sizes depend on it
-    assert capture.wishes[cv2.CAP_PROP_FOURCC] == cv2.VideoWriter.fourcc(*"MJPG")
 
 
 def test_frames_that_came_while_the_reader_was_away_are_counted(device):
