@@ -68,13 +68,17 @@ def small(tmp_path):
     return file
 
 
+def put(path: Path, changes: dict[str, Any], load_again=check):
+    return save(path, changes, NOW, load_again)
+
+
 def lines_that_differ(old: str, new: str) -> list[tuple[str, str]]:
     pairs = zip(old.splitlines(), new.splitlines(), strict=True)
     return [pair for pair in pairs if pair[0] != pair[1]]
 
 
 def test_a_value_changes_and_every_other_line_stays(small):
-    saved = save(small, {"joints.tilt.zero_step": 2051}, NOW, check)
+    saved = put(small, {"joints.tilt.zero_step": 2051})
     assert lines_that_differ(SMALL, small.read_text()) == [
         (
             "        zero_step: 2048      # by hand, 3 May",
@@ -88,7 +92,7 @@ def test_a_value_changes_and_every_other_line_stays(small):
 
 
 def test_flow_mappings_and_block_lists_keep_their_style(small):
-    save(small, {"joints.pan.id": 7, "joints.tilt.gains": (800, 1, 10)}, NOW, check)
+    put(small, {"joints.pan.id": 7, "joints.tilt.gains": (800, 1, 10)})
     text = small.read_text()
     assert "    pan: {id: 7, zero_step: 2000}    # flow\n" in text
     assert "        - 800   # P\n        - 1\n        - 10    # D\n" in text
@@ -96,19 +100,17 @@ def test_flow_mappings_and_block_lists_keep_their_style(small):
 
 def test_a_list_is_replaced_unless_comments_would_be_lost(small):
     with pytest.raises(ConfigError, match="joints.tilt.gains: .*comments"):
-        save(small, {"joints.tilt.gains": None}, NOW, check)
+        put(small, {"joints.tilt.gains": None})
     assert small.read_text() == SMALL
     small.write_text(SMALL.replace("   # P", "").replace("    # D\n# the end", ""))
-    save(small, {"joints.tilt.gains": None}, NOW, check)
+    put(small, {"joints.tilt.gains": None})
     assert check(small).joints["tilt"].gains is None
 
 
 def test_missing_keys_are_added_apart_from_the_comments_of_what_follows(small):
-    saved = save(
+    saved = put(
         small,
         {"joints.pan.min_deg": -20.0, "spare.id": 9, "spare.note": "x", "joints.tilt.note": "y"},
-        NOW,
-        check,
     )
     text = small.read_text()
     assert "    pan: {id: 1, zero_step: 2000, min_deg: -20.0} # flow\n" in text
@@ -120,8 +122,7 @@ def test_missing_keys_are_added_apart_from_the_comments_of_what_follows(small):
 
 
 def test_nothing_differs_nothing_is_written(small):
-    saved = save(small, {"joints.tilt.zero_step": 2048, "joints.tilt.gains": [400, 0, 10]}, NOW,
-                 check)  # fmt: skip
+    saved = put(small, {"joints.tilt.zero_step": 2048, "joints.tilt.gains": [400, 0, 10]})
     assert (saved.backup, saved.changes) == (None, ())
     assert [p.name for p in small.parent.iterdir()] == ["head.yaml"]
 
@@ -141,7 +142,7 @@ def test_nothing_differs_nothing_is_written(small):
 )
 def test_a_refused_value_leaves_everything_as_it_was(small, changes, says):
     with pytest.raises(ConfigError, match=says):
-        save(small, changes, NOW, check)
+        put(small, changes)
     assert small.read_text() == SMALL
     assert [p.name for p in small.parent.iterdir()] == ["head.yaml"]
 
@@ -153,7 +154,7 @@ def test_a_later_layer_that_has_the_last_word_is_named(small):
     with pytest.raises(
         ConfigError, match="name: stays other with any value in this file: a later layer sets it"
     ):
-        save(small, {"name": "mine"}, NOW, overridden)
+        put(small, {"name": "mine"}, overridden)
     assert small.read_text() == SMALL
 
 
@@ -161,15 +162,15 @@ def test_files_that_cannot_be_written(small, tmp_path):
     small.chmod(0o444)
     if os.geteuid():  # root may write any file
         with pytest.raises(ConfigError, match="read-only; allow writing with chmod u"):
-            save(small, {"name": "b"}, NOW, check)
+            put(small, {"name": "b"})
     with pytest.raises(ConfigError, match="No such file"):
-        save(tmp_path / "none.yaml", {"name": "b"}, NOW, check)
+        put(tmp_path / "none.yaml", {"name": "b"})
     with pytest.raises(ConfigError, match="is a directory"):
-        save(tmp_path, {"name": "b"}, NOW, check)
+        put(tmp_path, {"name": "b"})
     small.chmod(0o644)
     small.write_text("name: a\nname: b\n")
     with pytest.raises(ConfigError, match="duplicate key"):
-        save(small, {"name": "c"}, NOW, check)
+        put(small, {"name": "c"})
     assert small.read_text() == "name: a\nname: b\n"
 
 
@@ -240,5 +241,5 @@ def test_somebody_elses_change_meanwhile_is_not_lost(small):
         return check(path)
 
     with pytest.raises(ConfigError, match="changed by another program"):
-        save(small, {"name": "mine"}, NOW, slow)
+        put(small, {"name": "mine"}, slow)
     assert "id: 77" in small.read_text()

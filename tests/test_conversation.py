@@ -24,36 +24,35 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.head_state import HeadState, head_state
 from gazerig.robot.dashboard.door.programs import ProgramSocket
-from gazerig.robot.model.commands import LookAt, Renew, Talk
+from gazerig.robot.model.commands import LookAt, Renew, Talk, TalkOrder
+from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.reply import CommandReply
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
 def test_states_follow_each_other_and_are_in_tick_and_state(running: Running) -> None:
-    person = running.do(Talk("listening", 1, who="a", stay=True))[1][-1].conversation
+    def talk(state: TalkOrder, partner: int | None = None, **more: Any) -> ConversationState:
+        return running.do(Talk(state, partner, who="a", stay=True, **more))[1][-1].conversation
+
+    person = talk("listening", 1)
     assert (person.number, person.state, person.partner, person.who) == (1, "listening", 1, "a")
-    assert running.do(Talk("thinking", who="a", stay=True))[1][-1].conversation.partner == 1
-    spoken = running.do(Talk("speaking", seconds=2.0, who="a", stay=True))[1][-1].conversation
+    assert talk("thinking").partner == 1
+    spoken = talk("speaking", seconds=2.0)
     assert spoken.ends_s == spoken.since_s + 2.0 and spoken.confidence > 0.8
     running.go(1.0)
-    longer = running.do(Talk("speaking", text="x" * 30, who="a", stay=True))[1][-1]
-    changed = longer.conversation  # the plan is corrected, the state continues
+    changed = talk("speaking", text="x" * 30)  # the plan is corrected, the state continues
     assert (changed.number, changed.since_s) == (spoken.number, spoken.since_s)
-    assert changed.ends_s == pytest.approx(longer.t_s + 2.0, abs=0.01)
+    assert changed.ends_s == pytest.approx(running.ticks[-1].t_s + 2.0, abs=0.01)
     assert changed.confidence < 0.5
-    blank = running.do(Talk("speaking", text=" ", who="a", stay=True))[1][-1].conversation
-    assert blank.ends_s is None
-    words = Talk("speaking", words=(("a", 0.0), ("b", 3.0)), who="a", stay=True)
-    timed = running.do(words)[1][-1].conversation
+    assert talk("speaking", text=" ").ends_s is None
+    timed = talk("speaking", words=(("a", 0.0), ("b", 3.0)))
     assert timed.ends_s == pytest.approx(running.ticks[-1].t_s + 3.4, abs=0.01)
     state = head_state(running.ticks[-1])
     assert state.conversation == timed
     assert msgspec.json.decode(msgspec.json.encode(state), type=HeadState) == state
-    assert (
-        running.do(Talk("interrupt", who="a", stay=True))[1][-1].conversation.state == "interrupted"
-    )
-    assert running.do(Talk("idle", who="a"))[1][-1].conversation.state == "idle"
+    assert talk("interrupt").state == "interrupted"
+    assert talk("idle").state == "idle"
 
 
 @pytest.mark.parametrize(
