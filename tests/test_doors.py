@@ -4,13 +4,14 @@ import asyncio
 import base64
 import os
 import socket
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+import yaml
 from aiohttp import ClientSession, WSServerHandshakeError, web
 from fakes.talking_head import TalkingHead, until
 from fakes.voice_assistant import Assistant, free_port, lva
@@ -61,125 +62,43 @@ def event(kind: str, **rest: Any) -> dict[str, Any]:
     return {**required, "type": kind, **rest}
 
 
-def audio(seconds: float, bytes_per_s: int = 48_000) -> dict[str, Any]:
+def audio(
+    seconds: float, bytes_per_s: int = 48_000, kind: str = "response.output_audio.delta"
+) -> dict[str, Any]:
     pcm = bytes(round(seconds * bytes_per_s))
-    return event("response.output_audio.delta", delta=base64.b64encode(pcm).decode())
+    return event(kind, delta=base64.b64encode(pcm).decode())
 
 
-PCM = {"type": "realtime", "output_audio_format": "pcm16"}
-ULAW = {"type": "realtime", "audio": {"output": {"format": {"type": "audio/pcmu"}}}}
 SAID = "Sure, I have set a timer of 5 minutes for the eggs in your kitchen."  # 67 characters
 LVA, RTVI, LK = voice_assistant.VoiceAssistant, pipecat.Pipecat, livekit.LiveKit
 WYO, OAI = wyoming.Wyoming, openai_realtime.OpenAIRealtime
 
-CONVERSATIONS: dict[str, tuple[Callable[[], Any], Sequence[tuple[Mapping[str, Any], list[Any]]]]] = {
-    "voice assistant": (LVA, [
-        (lva("snapshot", muted=False, volume=0.8, ha_connected=True, last_tts_text=None), []),
-        (lva("zeroconf", status="connected"), []),
-        (lva("wake_word_detected"), ["listening"]),
-        (lva("listening"), []),
-        (lva("stt_text", text="set a timer"), ["thinking"]),
-        (lva("thinking"), []),
-        (lva("tts_text", text=SAID), []),
-        (lva("tts_speaking"), [("speaking", "67 characters")]),
-        (lva("wake_word_detected"), ["interrupt"]),  # barge-in
-        (lva("thinking"), ["thinking"]),
-        (lva("tts_text", text="Yes."), []),
-        (lva("tts_speaking"), [("speaking", "4 characters")]),
-        (lva("tts_finished"), ["idle"]),
-        (lva("idle"), []),
-        (lva("listening"), ["listening"]),
-        (lva("muted", muted=True), ["idle"]),
-        (lva("muted", muted=False), []),
-        (lva("timer_ringing", id="1", name="eggs", total_seconds=300, seconds_left=0), []),
-    ]),
-    "pipecat": (RTVI, [
-        (rtvi("bot-ready"), []),
-        (rtvi("user-started-speaking"), ["listening"]),
-        (rtvi("user-stopped-speaking"), ["thinking"]),
-        (rtvi("user-transcription", "hello"), []),
-        (rtvi("bot-llm-started"), []),
-        (rtvi("bot-llm-text", "Hello, I am the "), []),
-        (rtvi("bot-started-speaking"), ["speaking"]),  # the text has only begun
-        (rtvi("bot-llm-text", "head that you see here."), [("speaking", "39 characters")]),
-        (rtvi("bot-tts-text", "Hello,"), []),  # while it is spoken
-        (rtvi("bot-stopped-speaking"), ["listening"]),
-        (rtvi("bot-tts-text", "A sentence that no model wrote."), []),
-        (rtvi("bot-started-speaking"), [("speaking", "31 characters")]),
-        (rtvi("user-started-speaking"), ["interrupt"]),
-        (rtvi("user-stopped-speaking"), [("speaking", "31 characters")]),  # it was "mhm"
-        (rtvi("user-started-speaking"), ["interrupt"]),
-        (rtvi("bot-interrupted"), []),
-        (rtvi("bot-stopped-speaking"), []),
-        (rtvi("user-stopped-speaking"), ["thinking"]),
-    ]),
-    "livekit": (LK, [
-        (agent("initializing"), []),
-        (agent("listening"), ["listening"]),
-        (agent("thinking"), ["thinking"]),
-        (agent("speaking"), ["speaking"]),
-        ({"user": "listening"}, []),
-        (agent("listening"), ["listening"]),
-        (agent("speaking"), ["speaking"]),
-        ({"text": SAID[:40]}, [("speaking", "40 characters")]),
-        ({"user": "speaking"}, ["interrupt"]),
-        ({"user": "listening"}, [("speaking", "40 characters")]),  # it was "mhm"
-        ({"user": "speaking"}, ["interrupt"]),
-        (agent("listening"), []),
-        ({"user": "listening"}, []),
-        ({"another": "attribute"}, []),
-        (agent("speaking"), ["speaking"]),
-        (agent("thinking"), ["listening", "thinking"]),
-        (agent(""), ["idle"]),  # the attribute was deleted
-    ]),
-    "wyoming": (WYO, [
-        (wyo("run-pipeline"), []),
-        (wyo("detection", name="ok_nabu"), ["listening"]),
-        (wyo("voice-started"), []),
-        (wyo("voice-stopped"), ["thinking"]),
-        (wyo("transcript", text="set a timer"), []),
-        (wyo("synthesize", text=SAID), []),
-        (wyo("audio-start", rate=22050, width=2, channels=1), [("speaking", "67 characters")]),
-        (wyo("audio-chunk", 2.0), []),
-        (wyo("audio-chunk", 1.5), []),
-        (wyo("audio-stop"), [("speaking", 3.5)]),
-        (wyo("played"), ["idle"]),
-        (wyo("audio-start"), ["speaking"]),
-        (wyo("audio-chunk", 1.0), []),
-        (wyo("detection"), ["interrupt"]),
-        (wyo("audio-chunk", 1.0), []),
-        (wyo("audio-stop"), []),  # of the interrupted sound
-        (wyo("transcript", text=" "), ["idle"]),  # nobody spoke
-    ]),
-    "openai": (OAI, [
-        (event("session.created", session=PCM), []),
-        (event("input_audio_buffer.speech_started"), ["listening"]),
-        (event("input_audio_buffer.speech_stopped"), ["thinking"]),
-        (event("response.created"), []),
-        (audio(0.5), ["speaking"]),
-        (event("response.output_audio_transcript.delta", delta="Good"), []),
-        (audio(1.0), []),
-        (event("response.output_audio_transcript.delta", delta=" morning" * 4), [("speaking", "36 characters")]),
-        (event("response.output_audio.done"), [("speaking", 1.5)]),
-        (event("response.done"), []),
-        (event("input_audio_buffer.speech_started"), ["interrupt"]),
-        (event("session.updated", session=ULAW), []),
-        (event("response.created"), ["thinking"]),
-        (audio(1.5, 8_000) | {"type": "response.audio.delta"}, ["speaking"]),
-        (event("response.audio.done"), [("speaking", 1.5)]),
-        (event("output_audio_buffer.stopped"), ["listening"]),
-        (event("input_audio_buffer.committed"), ["thinking"]),
-        (event("response.done"), ["idle"]),  # a call of a function, without speech
-        (event("rate_limits.updated"), []),
-        (event("response.output_audio.delta", delta=None), []),
-    ]),
-}  # fmt: skip
+MAKERS: dict[str, tuple[Callable[[], Any], Callable[..., Mapping[str, Any]]]] = {
+    "voice assistant": (LVA, lva),
+    "pipecat": (RTVI, rtvi),
+    "livekit": (LK, dict),
+    "wyoming": (WYO, wyo),
+    "openai": (OAI, event),
+}
 
 
-@pytest.mark.parametrize("name", CONVERSATIONS)
+def conversation(name: str) -> list[tuple[Mapping[str, Any], list[Any]]]:
+    """Return the messages of a neighbour and the orders that each becomes."""
+    file = Path(__file__).parent / "golden" / "conversations.yaml"
+    rows = yaml.safe_load(file.read_text(encoding="utf-8"))[name]
+    make = MAKERS[name][1]
+    return [
+        (
+            (audio if "seconds" in fields else make)(**fields),
+            [tuple(order) if isinstance(order, list) else order for order in orders],
+        )
+        for fields, orders in rows
+    ]
+
+
+@pytest.mark.parametrize("name", MAKERS)
 def test_messages_become_orders(name: str) -> None:
-    make, messages = CONVERSATIONS[name]
-    door = make()
+    messages, door = conversation(name), MAKERS[name][0]()
     assert [brief(door.take(message, 10.0)) for message, _ in messages] == [
         orders for _, orders in messages
     ]

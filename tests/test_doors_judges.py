@@ -11,7 +11,7 @@ import pytest
 from aiohttp import web
 from fakes.talking_head import TalkingHead, until
 from fakes.voice_assistant import free_port
-from test_doors import CONVERSATIONS, audio, event, realtime_server, run
+from test_doors import audio, conversation, event, realtime_server, run
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
@@ -38,7 +38,7 @@ def test_openai_s_types_accept_our_messages_and_the_door_theirs() -> None:
     }
     read = set(re.findall(r'"(\w+\.[\w.]+)"', inspect.getsource(openai_realtime.OpenAIRealtime)))
     assert read - set(BETA) <= set(types)
-    for message, _ in CONVERSATIONS["openai"][1]:
+    for message, _ in conversation("openai"):
         if message["type"] not in BETA and message.get("delta", "") is not None:
             types[message["type"]].model_validate(message)
     for kind in types:
