@@ -45,6 +45,25 @@ class Trace(NamedTuple):
     error: np.ndarray
     commands: list[GazeCommand]
 
+    @property
+    def in_flight(self) -> list[bool]:
+        """Return whether each tick is in a saccade."""
+        return [command.phase == "saccade" for command in self.commands]
+
+    @property
+    def landed(self) -> int:
+        """Return the tick in which the first saccade has landed."""
+        return self.in_flight.index(False, self.in_flight.index(True))
+
+    @property
+    def rest_s(self) -> float:
+        """Return the time from the first landing to the next saccade."""
+        return (self.in_flight.index(True, self.landed) - self.landed) * DT
+
+    @property
+    def saccades(self) -> int:
+        return self.commands[-1].saccades
+
 
 class Rig:
     """A head that follows its commands immediately."""

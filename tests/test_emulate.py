@@ -3,14 +3,10 @@
 import json
 import os
 import signal
-import subprocess
-import sys
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
-from branch import Branch
+from commands_started import start
 from present import present
 from typer.testing import CliRunner
 
@@ -25,23 +21,13 @@ from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 
 ROOT = Path(__file__).parents[1]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTTIN)
-COMMAND = [sys.executable, "-c", "from gazerig.robot.cli.emulate import app; app()"]
 
 
 class Emulator:
-    """The command next to the test: in a process of its own, or in a fork of this one."""
+    """The command, in a fork of this process."""
 
-    def __init__(self, *options, command=None, stdin=subprocess.PIPE, stderr=None):
-        start: Any = partial(Branch, partial(app, options))
-        if command is not None:
-            start = partial(subprocess.Popen, [*command, *options])
-        self.process = start(
-            cwd=ROOT,
-            stdin=stdin,
-            stdout=subprocess.PIPE,
-            stderr=stderr,
-            text=True,
-        )
+    def __init__(self, *options):
+        self.process = start("emulate", *options)
         self.ready = self.hear()
         self.path = self.ready["path"]
 
@@ -49,17 +35,13 @@ class Emulator:
         return json.loads(present(self.process.stdout).readline())
 
     def type(self, line):
-        present(self.process.stdin).write(line + "\n")
-        present(self.process.stdin).flush()
+        print(line, file=self.process.stdin, flush=True)
         return self.hear()
 
-    def end(self, number=signal.SIGINT):
-        self.process.send_signal(number)
-        code = self.process.wait(60)
-        for pipe in (self.process.stdin, self.process.stdout):
-            if pipe is not None:
-                pipe.close()
-        return code
+    def end(self):
+        with self.process:
+            self.process.send_signal(signal.SIGINT)
+            return self.process.wait(60)
 
 
 def connect(path, baud=1_000_000):
@@ -89,9 +71,7 @@ def ping(port, servo_id):
 
 def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
     link = tmp_path / "servos"
-    emulator = Emulator(
-        *("--servos", "1-2:xl330-m077,7:xc330-m288@100", "--link", str(link)), command=COMMAND
-    )
+    emulator = Emulator("--servos", "1-2:xl330-m077,7:xc330-m288@100", "--link", str(link))
     assert emulator.ready == {"path": str(link), "baud": 1_000_000}
     for _ in range(2):
         port = connect(link)
@@ -108,7 +88,7 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
     assert ping(port, 1) is None
     assert ping(port, 1).model_number == 1190
     port.closePort()
-    assert emulator.end(signal.SIGINT) == 0
+    assert emulator.end() == 0
     assert not os.path.lexists(link)
 
 
@@ -140,7 +120,6 @@ def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monke
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--servos", "1:sts3215,2:xl330-m077"), "a line of kind feetech has no such model"),
         (("--maestro", "7"), "--maestro 7: a board has 6, 12, 18, 24 channels"),
         (("--servos", "1:xl330-m077", "--baud", "12"), "--baud 12: servos of this kind know 9600"),
         (("--servos", "1:xl330-m077", "--link", "README.md"), "File exists"),
@@ -150,11 +129,9 @@ def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monke
 def test_bad_input_is_one_clear_line(options, says, monkeypatch):
     monkeypatch.chdir(ROOT)
     before = {number: signal.getsignal(number) for number in SIGNALS}
-    try:
-        done = CliRunner().invoke(app, options)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    done = CliRunner().invoke(app, options)
+    for number, handler in before.items():
+        signal.signal(number, handler)
     assert done.exit_code == 2
     assert says in done.stderr
     assert done.stderr.count("\n") == 1

@@ -4,6 +4,7 @@ import json
 import signal
 import time
 from collections import Counter
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -121,24 +122,27 @@ def test_answers_that_do_not_count(study: Path, tmp_path: Path) -> None:
     assert found.decisions[0].verdict == "too few"
 
 
-def test_pages_do_not_distinguish_conditions(study: Path, tmp_path: Path) -> None:
+@pytest.fixture
+def journal(tmp_path: Path) -> Iterator[Journal]:
     journal = Journal(tmp_path / "data")
+    yield journal
+    journal.close()
+
+
+def test_pages_do_not_distinguish_conditions(study: Path, journal: Journal) -> None:
     session = session_of(study, journal)
     assert "difference" not in json.dumps(session.page_json())
     events_of = events(session)
     assert events_of == ["consent", *2 * ["ready", "presentation", "questions"], "questions"]
     assert session.page_json()["debriefing"] == ("It was the difference.",)
-    journal.close()
 
 
-def test_a_film_that_is_cut_short_starts_again(study: Path, tmp_path: Path) -> None:
-    journal = Journal(tmp_path / "data")
+def test_a_film_that_is_cut_short_starts_again(study: Path, journal: Journal) -> None:
     session = session_of(study, journal)
     session.handle(PageEvent(session.page, "consent"))
     session.handle(PageEvent(session.page, "begin"))
     session.handle(PageEvent(session.page, "seen"))  # it was not even fetched
     assert session.place.step == "ready"
-    journal.close()
 
 
 def test_an_incomplete_last_line_is_dropped(tmp_path: Path, study: Path) -> None:
