@@ -3,8 +3,9 @@
 import io
 import json
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import degrees, radians
 from pathlib import Path
 from typing import Any
 
@@ -12,17 +13,30 @@ import numpy as np
 import pytest
 from command_line import invoked
 from described_rigs import SHIPPED, Poses, compare, random_angles, shipped
+from emulated_rig import EmulatedRig
 
-from gazerig.config.schema import Rig
-from gazerig.robot.app.rig_description import description_of
+from gazerig.config.load import ConfigError, shipped_path
+from gazerig.config.rig_files import AllowedFolder
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.types import Vec3
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.bus_wiring import rig_bus
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.rig_description import description_of, sag_compensation, shape_of, statics_of
+from gazerig.robot.app.rig_limits import park_rad
+from gazerig.robot.app.rig_weight import rest_park_deg, weight_findings
+from gazerig.robot.control.body import Body
 from gazerig.robot.description.build import joint_torques_nm
 from gazerig.robot.description.files import description_files
 from gazerig.robot.description.links import Description, Inertia
 from gazerig.robot.description.mass import carried_links, join_inertias
+from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.description.mjcf import Mjcf, mjcf
+from gazerig.robot.description.own_meshes import read_mesh
 from gazerig.robot.description.urdf import Urdf, urdf
 from gazerig.robot.model.coupling import CouplingParams
-from gazerig.robot.model.mass_params import HeadMassParams, MassParams
+from gazerig.robot.model.mass_params import CounterweightParams, HeadMassParams, MassParams
 
 
 @pytest.fixture(scope="module")
@@ -123,16 +137,24 @@ def _in_mujoco(description: Description, angles: Mapping[str, float]) -> Poses:
     return _mujoco_poses(mjcf(description, looks=False), description, angles)
 
 
-def _mujoco_poses(
+def _in_pose(
     text: Mjcf | Urdf, description: Description, angles: Mapping[str, float]
-) -> Poses:
+) -> tuple[Any, Any]:
+    """Return MuJoCo's model and data of a description at joint angles."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(text.xml, text.assets)
     data = mujoco.MjData(model)
     for name, angle in description.angles(tuple(angles), tuple(angles.values())).items():
         data.qpos[model.joint(name).qposadr[0]] = angle
-    mujoco.mj_kinematics(model, data)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def _mujoco_poses(
+    text: Mjcf | Urdf, description: Description, angles: Mapping[str, float]
+) -> Poses:
+    _, data = _in_pose(text, description, angles)
     return {
         link.name: (
             data.body(link.name).xmat.reshape(3, 3).copy(),
@@ -209,19 +231,20 @@ def whole_head(rig: Rig) -> Inertia:
     return whole._replace(com_m=(x, y, z))
 
 
-def test_a_head_weighs_what_its_shapes_give() -> None:
-    whole = whole_head(shipped("desk"))
-    assert whole.mass_kg == pytest.approx(0.6)
-    # Shell and servos are above and a little behind the axes of the neck.
-    assert np.allclose(np.multiply(whole.com_m, 1e3), (-11.6, 0.0, 61.2), atol=0.5)
-
-
-def test_a_head_weighs_what_its_file_says() -> None:
-    desk = shipped("desk")
-    given = HeadMassParams(0.9, (40.0, 2.0, 30.0))
-    whole = whole_head(replace(desk, mass=MassParams(head=given)))
-    assert whole.mass_kg == pytest.approx(0.9)
-    assert np.allclose(whole.com_m, (0.040, 0.002, 0.030), atol=1e-9)
+@pytest.mark.parametrize(
+    ("mass", "mass_kg", "com_mm", "within_mm"),
+    [
+        # Shell and servos are above and a little behind the axes of the neck.
+        (MassParams(), 0.6, (-11.6, 0.0, 61.2), 0.5),
+        (MassParams(head=HeadMassParams(0.9, (40.0, 2.0, 30.0))), 0.9, (40.0, 2.0, 30.0), 1e-6),
+    ],
+)
+def test_a_head_weighs_what_its_shapes_give_or_its_file_says(
+    mass: MassParams, mass_kg: float, com_mm: Vec3, within_mm: float
+) -> None:
+    whole = whole_head(heavy("desk", mass))
+    assert whole.mass_kg == pytest.approx(mass_kg)
+    assert np.allclose(np.multiply(whole.com_m, 1e3), com_mm, rtol=0.0, atol=within_mm)
 
 
 def test_the_camera_sees_what_the_lens_covers() -> None:
@@ -237,3 +260,256 @@ def test_the_camera_sees_what_the_lens_covers() -> None:
     # It looks ahead, with its upper side up.
     assert np.allclose(data.cam_xmat[0].reshape(3, 3) @ (0, 0, -1), (1, 0, 0), atol=1e-9)
     assert np.allclose(data.cam_xmat[0].reshape(3, 3) @ (0, 1, 0), (0, 0, 1), atol=1e-9)
+
+
+# ---- A user's own meshes replace the program's; a bad one is reported with its line.
+
+
+RIG = """name: mine
+profile: robot
+bus: {kind: dynamixel, port: /dev/ttyUSB0}
+geometry:
+  {pitch_axis_height_mm: 0, eyes_ahead_mm: 0, eyes_above_mm: 90, interocular_mm: 62}
+joints:
+  eyes_pan: {id: 1, model: xl330-m077, min_deg: -35, max_deg: 35, max_speed_deg_s: 600, max_accel_deg_s2: 45000}
+  eyes_tilt: {id: 2, model: xl330-m077, min_deg: -30, max_deg: 30, max_speed_deg_s: 600, max_accel_deg_s2: 45000}
+camera: {mount: base, position_mm: [10, 0, 140]}
+meshes:
+"""
+LINE = RIG.count("\n") + 1
+
+
+def _rig(folder: Path, mesh: str) -> Path:
+    path = folder / "mine.yaml"
+    path.write_text(RIG + mesh)
+    return path
+
+
+def _box(path: Path) -> None:
+    import trimesh
+
+    trimesh.creation.box((20.0, 40.0, 60.0)).export(path)
+
+
+def test_an_stl_in_millimetres_is_shown_where_the_file_says(tmp_path: Path) -> None:
+    import mujoco
+
+    (tmp_path / "parts").mkdir()
+    _box(tmp_path / "parts" / "skull.stl")
+    path = _rig(
+        tmp_path,
+        "  head: {file: parts/skull.stl, position_mm: [-40, 0, 10], rotation_deg: [90, 0, 0]}\n",
+    )
+    description = description_of(load_rig(str(path)))
+    (look,) = description.link("head").visuals
+    points = look.painted().mesh.vertices @ np.array(look.R).T + look.p_m
+    assert np.allclose(points.min(axis=0), (-0.06, -0.01, -0.02))
+    assert np.allclose(points.max(axis=0), (-0.02, 0.01, 0.04))
+    # Faces of a box stay flat.
+    normals = look.painted().normals
+    assert normals is not None and np.allclose(np.abs(normals).max(axis=1), 1.0, atol=1e-6)
+    text = mjcf(description)
+    model = mujoco.MjSpec.from_string(text.xml, assets=text.assets).compile()
+    assert "head_own" in {model.geom(i).name for i in range(model.ngeom)}
+
+
+def test_a_gltf_file_stands_upright(tmp_path: Path) -> None:
+    import trimesh
+
+    tall = trimesh.creation.box((0.1, 0.5, 0.2))  # y is up in glTF, and z towards the viewer
+    tall.export(tmp_path / "tall.glb")
+    painted = read_mesh(MeshParams(str(tmp_path / "tall.glb"), metres_per_unit=1.0))
+    assert np.allclose(np.ptp(painted.mesh.vertices, axis=0), (0.1, 0.2, 0.5), atol=1e-6)
+    assert trimesh.Trimesh(painted.mesh.vertices, painted.mesh.faces).volume > 0.0
+
+
+@pytest.mark.parametrize(
+    ("mesh", "key", "words"),
+    [
+        ("head: {file: none.stl}", "meshes.head.file", "no such file"),
+        ("head: {file: torn.glb}", "meshes.head.file", "torn.glb"),
+        ("head: {file: box.step}", "meshes.head.file", "export it as one of these"),
+        ("haed: {file: box.stl}", "meshes.haed", "did you mean"),
+    ],
+)
+def test_a_bad_mesh_is_told_with_line_and_cure(
+    mesh: str, key: str, words: str, tmp_path: Path
+) -> None:
+    _box(tmp_path / "box.stl")
+    (tmp_path / "torn.glb").write_bytes(b"nothing here")
+    path = _rig(tmp_path, f"  {mesh}\n")
+    done = invoked("check", str(path))
+    assert done.code == 2 and len(done.err.splitlines()) == 1
+    assert f"mine.yaml:{LINE}" in done.err and key in done.err and words in done.err
+
+
+def test_a_mesh_that_went_away_is_one_clear_error(tmp_path: Path) -> None:
+    rig = load_rig(str(_rig(tmp_path, "  head: {file: gone.stl}\n")))
+    with pytest.raises(SetupError, match=r"meshes\.head\.file: .*gone\.stl.*correct the path"):
+        description_of(rig)
+    # A recorded run is shown without it.
+    assert shape_of(rig, without_lost_meshes=True) == shape_of(replace(rig, meshes={}))
+
+
+def test_the_page_may_name_meshes_in_its_folder_only(tmp_path: Path) -> None:
+    folder = AllowedFolder(tmp_path)
+    with pytest.raises(ConfigError, match="only files in"):
+        folder.check_changes({"meshes.head.file": "/etc/passwd"})
+    with pytest.raises(ConfigError, match="only files in"):
+        folder.check_changes({"meshes": {"head": {"file": "/etc/passwd"}}})
+
+
+# ---- Masses of a rig: torques of its weight, rules of its keys, and a neck that does not sag.
+
+
+REAL = MassParams(head=HeadMassParams(com_mm=(40.0, 0.0, 30.0)))
+"""A realistic skull and jaw."""
+
+
+def heavy(name: str, mass: MassParams = REAL) -> Rig:
+    return replace(shipped(name), mass=mass)
+
+
+def mujoco_loads_nm(rig: Rig, angles: Mapping[str, float]) -> dict[str, float]:
+    description = description_of(rig, looks=False)
+    model, data = _in_pose(mjcf(description, looks=False), description, angles)
+    found = dict.fromkeys(rig.joints, 0.0)
+    for joint in description.joints:
+        name = joint.follows or joint.name
+        at = model.joint(joint.name).dofadr[0]
+        found[name] += data.qfrc_passive[at] - data.qfrc_bias[at]
+    return found
+
+
+@pytest.mark.parametrize("name", ["desk", "feetech", "expressive"])
+def test_torques_are_those_of_mujoco(name: str) -> None:
+    rng = np.random.default_rng(4)
+    weights = {"back": CounterweightParams(0.2, (-60.0, 5.0, 20.0))}
+    rig = heavy(name, replace(REAL, counterweights=weights))
+    statics = statics_of(rig)
+    for _ in range(5):
+        angles = {
+            name: rng.uniform(radians(joint.min_deg), radians(joint.max_deg))
+            for name, joint in rig.joints.items()
+        }
+        expected = mujoco_loads_nm(rig, angles)
+        assert statics.load_nm(angles) == pytest.approx(expected, abs=1e-9)
+        neck = {name: angle for name, angle in angles.items() if "neck" in name}
+        quick = statics_of(rig, of_neck=True).load_nm(neck)
+        assert quick == pytest.approx({n: statics.load_nm(neck)[n] for n in quick}, abs=1e-12)
+
+
+def test_a_head_rests_where_its_weight_has_no_lever_or_on_its_stop() -> None:
+    rest = statics_of(shipped("desk")).rest_pose({})
+    assert degrees(rest["neck_pitch"]) == pytest.approx(-10.8, abs=0.1)
+    statics = statics_of(heavy("desk"))
+    assert statics.rest_pose({})["neck_pitch"] == radians(-35.0)
+    assert statics.limp_rad("neck_pitch", {"neck_pitch": radians(-12.0)}) == radians(-35.0)
+    loads = statics_of(shipped("desk")).load_nm(rest)
+    assert loads["neck_pitch"] == pytest.approx(0.0, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("lines", "key", "rule"),
+    [
+        ("head: {mass_kg: -1}", "mass.head.mass_kg", "to 50 kg"),
+        ("head: {mass_kg: 0.02}", "mass.head.mass_kg", "weigh 0.029"),
+        ("head: {com_mm: [200, 0, 30]}", "mass.head.com_mm", "outside the head"),
+        ("links: {left_eye: {mass_kg: 1}}", "mass.links", "mass.head"),
+    ],
+)  # fmt: skip
+def test_impossible_masses_are_refused(lines: str, key: str, rule: str, tmp_path: Path) -> None:
+    file = tmp_path / "own.yaml"
+    text = shipped_path("rigs", "desk").read_text(encoding="utf-8")
+    file.write_text(text + f"\nmass:\n  {lines}\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load_rig(str(file))
+    (fault,) = caught.value.faults
+    assert (fault.key, fault.line is not None) == (key, True)
+    assert rule in fault.rule, fault
+
+
+class Neck:
+    """A neck's pitch on emulated servos, with all other joints at 0."""
+
+    def __init__(self, rig: Rig, compensated: bool = True) -> None:
+        self.emulated = EmulatedRig(rig)
+        sag = sag_compensation(rig) if compensated else None
+        bus = rig_bus(rig, self.emulated.ports)
+        self.body = Body(bus, rig.joints, park_rad(rig), sag=sag)
+        self.at = self.body.names.index("neck_pitch")
+        self.goal = list(self.body.start(self.emulated.clock))
+        self.t_s = 0.0
+
+    def hold(self, angle_deg: float, for_s: float) -> list[float]:
+        """Turn to an angle at 40 deg/s, hold it, and return the errors in degrees."""
+        errors, end_s = [], self.t_s + for_s
+        while self.t_s < end_s:
+            off = radians(angle_deg) - self.goal[self.at]
+            step = radians(0.4)
+            self.goal[self.at] += min(max(off, -step), step)
+            self.body.write(tuple(self.goal))
+            self.t_s += 0.01
+            self.emulated.clock.sleep_until(self.t_s)
+            state = self.body.read(self.t_s)
+            errors.append(degrees(state.position_rad[self.at] - self.goal[self.at]))
+        return errors
+
+
+@pytest.mark.parametrize("name", ["desk", "feetech", "expressive", "nine_xl330"])
+def test_a_heavy_head_does_not_sag(name: str) -> None:
+    rig = heavy(name)
+    plain = Neck(rig, compensated=False)
+    made_up = Neck(rig)
+    for angle in (0.0, 20.0, -20.0):
+        before, after = plain.hold(angle, 3.0)[-1], made_up.hold(angle, 3.0)[-1]
+        assert before < -0.35 and abs(after) < 0.25, (angle, before, after)
+
+
+def test_sag_is_made_up_for_without_a_jump_and_within_the_limits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    neck = Neck(heavy("desk"))
+    goals: list[int] = []
+    write = neck.body.bus.write
+
+    def note(steps: Sequence[int]) -> None:
+        goals.append(steps[neck.at])
+        write(steps)
+
+    monkeypatch.setattr(neck.body.bus, "write", note)
+    joint = neck.emulated.rig.joints["neck_pitch"]
+    goals.append(round(joint.steps(neck.goal[neck.at])))
+    neck.hold(degrees(neck.goal[neck.at]), 2.0)
+    assert max(abs(b - a) for a, b in zip(goals, goals[1:], strict=False)) <= 1
+    assert abs(goals[-1] - goals[0]) > 10
+    # At the end of the range nothing is left to make up with: the bus clips the goal.
+    assert neck.hold(35.0, 3.0)[-1] < -0.3
+    assert neck.emulated.where()["neck_pitch"] <= 35.0
+
+
+def test_what_a_neck_holds_is_reported_with_its_heat() -> None:
+    well = {(one.level, one.joint) for one in weight_findings(shipped("desk"))}
+    assert well == {("note", "neck_pitch"), ("note", "neck_roll"), ("ok", "neck_pitch")}
+    assert list(weight_findings(shipped("maker"))) == []
+    pitch, _, parked = weight_findings(heavy("desk"))
+    assert "level with 25% of its stall torque (0.46 A)" in pitch.what and pitch.level == "note"
+    assert parked.what == "parked at -12 deg it sinks to -35 deg when torque is switched off"
+    twice = MassParams(head=HeadMassParams(1.2, (40.0, 0.0, 30.0)))
+    strong = next(iter(weight_findings(heavy("desk", twice))))
+    assert strong.level == "warn" and "counterweights" in strong.cure
+    assert "63% of its stall" in strong.what and "90 degC" in strong.what
+
+
+def test_a_head_that_would_sink_is_parked_where_it_rests() -> None:
+    assert rest_park_deg(shipped("desk")) == shipped("desk").park_deg
+    rig = heavy("desk")
+    made = assemble(rig, RunOptions(rig="desk", mock=True, fast=True, scene="visitor"))
+    try:
+        assert made.notes[-1].startswith("parks neck_pitch at -35 deg")
+        at = rig.names.index("neck_pitch")
+        made.robot.start(made.clock)
+        assert made.robot.park(made.park_rad, made.clock, made.loop)
+        assert degrees(made.robot.body.read(made.clock.now_s()).position_rad[at]) < -32.5
+    finally:
+        made.close()
