@@ -39,7 +39,7 @@ def hands_about_a_face(t_s: float) -> Percept:
     return Percept(t_s, Bodies(ids, kinds, p, v, np.zeros((3, 3)), np.full(3, 0.08)))
 
 
-def face_share(gaze: GazeConfig, seconds: float = 60.0) -> float:
+def face_share(gaze: GazeConfig) -> float:
     rng = np.random.default_rng(0)
     model = Attention(
         replace(gaze.attention, reaction="none"),
@@ -49,7 +49,7 @@ def face_share(gaze: GazeConfig, seconds: float = 60.0) -> float:
         rng,
         rng,
     )
-    times = [k / 15 for k in range(round(15 * seconds))]
+    times = [k / 15 for k in range(900)]
     kinds = [model.choose(hands_about_a_face(t), AHEAD, t).kind for t in times]
     return kinds.count("face") / len(kinds)
 

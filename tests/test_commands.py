@@ -202,13 +202,9 @@ def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
 # Clients that may resume, and the time
 
 
-def replied(running: Running, order: Command, seconds: float = 0.006) -> str:
+def replied(running: Running, order: Command) -> str:
     """Ask, run on, and give why it was refused."""
-    ticket = running.made.robot.command(order)
-    running.go(seconds)
-    reply = ticket.wait(0.0)
-    assert reply is not None
-    return reply.refused
+    return running.do(order)[0].refused
 
 
 def test_a_stop_holds_two_seconds_whoever_asks(running: Running) -> None:

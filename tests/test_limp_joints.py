@@ -54,10 +54,10 @@ class Jaw(NamedTuple):
     def emulate(self, command: str) -> str:
         return str(self.bus._port.faults.command(command))
 
-    def open_wide(self, seconds: float = 0.4) -> list[float]:
+    def open_wide(self) -> list[float]:
         """Open the mouth; return the measured angles."""
         found = []
-        for _ in range(round(seconds / 0.01)):
+        for _ in range(40):
             self.head.level("mouth", 0.5)
             self.head.step(0.01)
             found.append(self.now.measured_deg)

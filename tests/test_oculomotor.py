@@ -389,12 +389,12 @@ MAX_SPEED_DEG_S = SaccadeParams().max_speed_deg_s
 MAX_ACCELERATION_DEG_S2 = SaccadeParams().max_acceleration_deg_s2
 
 
-def double_step(jump_s: float, first_deg: float = 28.0, then_deg: float = 34.0) -> Trace:
+def double_step(jump_s: float) -> Trace:
     rig = Rig(params=replace(NO_REFIXATIONS, eye_lag_ms=5.0), saccade=HUMAN)
 
     def where(t: float) -> Target:
         late = t >= jump_s
-        place = at(then_deg if late else first_deg)
+        place = at(34.0 if late else 28.0)
         return target(place, at_s=t, kind="thing", salience=0.2, shift=1 + late)
 
     return rig.run(where, 0.6)
