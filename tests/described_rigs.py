@@ -1,6 +1,7 @@
 """Rigs whose descriptions are compared with the program's own geometry, shipped and others."""
 
 from collections.abc import Mapping
+from functools import cache
 from math import radians
 from typing import NamedTuple
 
@@ -82,18 +83,10 @@ def _same(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> None:
     assert np.abs(one[1] - other[1]).max() < PLACE_M
 
 
-_READ: dict[str, Rig] = {}
-
-
-def _shipped(name: str) -> Rig:
-    if name not in _READ:
-        _READ[name] = load_rig(name)
-    return _READ[name]
-
-
+@cache
 def shipped(name: str) -> Rig:
     """Return a shipped rig; it is read once."""
-    return _shipped(name)
+    return load_rig(name)
 
 
 def random_angles(rig: Rig, rng: np.random.Generator) -> dict[str, float]:

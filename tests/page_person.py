@@ -33,13 +33,13 @@ UNHURRIED_FRAMES = 2
 class Rig:
     """A simulated rig with a page, ticked by a thread."""
 
-    def __init__(self, host: str = "127.0.0.1") -> None:
+    def __init__(self) -> None:
         made = simulated()
         self.made, self.robot = made, made.robot
         self.tuning = ParamStore(made.live_params, self.robot.command, "desk")
         self.said: list[str] = []
         # Not fast: the page is for real time, of which these ticks are a slow imitation.
-        options = RunOptions(page=f"{host}:{free_port()}")
+        options = RunOptions(page=f"127.0.0.1:{free_port()}")
         say = self.said.append
         self.audience = RunObservers(made, options, say, say, self.tuning)
         self.newest: Tick | None = None
@@ -229,8 +229,8 @@ def resumed(rig: Rig, person: Person, question: str = "Fingers out?") -> None:
 
 
 @contextmanager
-def running(host: str = "127.0.0.1") -> Iterator[tuple[Rig, str]]:
-    rig = Rig(host)
+def running() -> Iterator[tuple[Rig, str]]:
+    rig = Rig()
     try:
         yield rig, rig.open()
     finally:

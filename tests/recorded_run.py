@@ -26,7 +26,7 @@ def assembly(recorder: Recorder | None = None) -> Assembly:
     return simulated(seed=7, substitutes=recorded)
 
 
-def info_for(pictures_hz: float = 4.0) -> RunInfo:
+def info_for() -> RunInfo:
     rig = load_rig("desk")
     return RunInfo(
         rig="desk",
@@ -40,7 +40,7 @@ def info_for(pictures_hz: float = 4.0) -> RunInfo:
         eyes="scene visitor",
         mock=True,
         fast=True,
-        pictures_hz=pictures_hz,
+        pictures_hz=4.0,
         versions=versions(),
     )
 

@@ -4,6 +4,7 @@ import json
 import os
 import socket
 import stat
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -17,8 +18,10 @@ import pytest
 import viser
 from page_at_the_door import ELSEWHERE, OPENED, PATIENCE_S, TOKEN, Rig, opened
 from page_visitor import VISER, fetch
+from shown_page import wait_for
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
+from websockets.sync.connection import Connection
 
 from gazerig.robot.dashboard.door.auth_proxy import MOST_LINES
 from gazerig.robot.dashboard.door.browsers import MOST as MOST_CONNECTIONS
@@ -433,3 +436,56 @@ def test_neither_websockets_nor_slow_requests_shut_out_a_stop(near: Rig) -> None
         for one in websockets:
             one.ping()
         assert len(near.stops) == 2
+
+
+# --- The panels at the page's door: who may see them, what a flood costs, and a person at them
+
+
+PANELS = "/rig/panels"
+
+
+def said(there: Connection) -> dict[str, Any]:
+    """The next message of text."""
+    while True:
+        message = there.recv(timeout=PATIENCE_S)
+        if isinstance(message, str):
+            data: dict[str, Any] = json.loads(message)
+            return data
+
+
+def test_what_is_shown_comes_and_what_is_done_is_heard(near: Rig) -> None:
+    widgets = near.door.widgets
+    heard: list[object] = []
+    panel = widgets.panel("health")
+    slider = panel.slider("neck", (-10.0, 10.0), 0.1, 0.0)
+    slider.on_change(lambda value, client: heard.append((value, widgets.browser(client))))
+    image = panel.image("heat map")
+    ana = f"{near.cookie}; {near.door._name_cookie}=ana"
+    with near.knock(PANELS, Cookie=ana) as there:
+        numbers = {props["kind"]: number for number, props in said(there)["put"]}
+        image.show(b"a picture")
+        data = there.recv(timeout=PATIENCE_S)
+        assert data == numbers["image"].to_bytes(4, "big") + b"a picture"
+        there.send(json.dumps({"set": [numbers["slider"], 4.5]}))
+        wait_for(lambda: len(heard) > 0, "the slider")
+        assert heard == [(4.5, near.door.browsers.name("ana"))]
+        there.send("no JSON")
+        assert said(there)["say"][0]["refused"] is True
+    slider.remove()
+    image.remove()
+
+
+def test_a_flood_of_one_browser_does_not_hold_up_a_stop(near: Rig) -> None:
+    slider = near.door.widgets.panel("health").slider("neck", (0.0, 1.0), 0.1, 0.0)
+    over = threading.Event()
+    slider.on_change(lambda value, client: over.wait(0.05))  # as slow as a rig that is busy
+    before = len(near.stops)
+    with near.knock(PANELS) as there:
+        for k in range(600):
+            there.send(json.dumps({"set": [slider.place.number, (k % 10) / 10.0]}))
+        start_s = time.monotonic()
+        assert near.post(b'{"do": "stop", "why": "a test"}')[0] == 204
+        assert len(near.stops) == before + 1
+        assert time.monotonic() - start_s < 0.5 * PATIENCE_S
+        over.set()  # else the browser's farewell waits for the rest of the flood
+    slider.remove()

@@ -110,11 +110,11 @@ def blob_at(p: Vec3, v: Vec3, known: bool = True, **more: Any) -> MovingBlob:
     return replace(made, box_px=(0.0, 0.0, 10.0, 10.0), **more)
 
 
-def walking(blob: MovingBlob, v_m_s: float = 0.5) -> Percept:
+def walking(blob: MovingBlob) -> Percept:
     """Return what is seen of a face that has been walking to the right for a second."""
     perception = Perception(STILL, 69.0, Tracker())
     for number in range(1, 31):
-        x = -0.25 + v_m_s * number / 30
+        x = -0.25 + 0.5 * number / 30
         blobs = (blob,) if number == 30 else ()
         percept = seen(perception, number, faces=(face_at((x, 0.0, 1.5)),), blobs=blobs)
     return percept

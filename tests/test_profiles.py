@@ -8,10 +8,8 @@ from human.measured_run import MeasuredRun, half_rate_run
 from human.profile_trace import PAGE, PROFILES, as_told, claims, ran
 from human.row_03_rests import visits
 
-from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
-from gazerig.robot.app.options import RunOptions
 
 CLAIMS = list(claims())
 HALF_RATE = {"loop.rate_hz": 100.0}
@@ -86,14 +84,3 @@ def test_the_head_of_mitake_joins_in_before_the_camera_loses_a_face() -> None:
     half_face_rad, lag_rad = atan2(0.11, 1.0), radians(4.0)  # a stroll of 10 deg/s for .4 s
     seen_rad = atan2(200.0, lens.fy_px) - half_face_rad
     assert radians(rig.gaze.head.max_offset_deg) < seen_rad - lag_rad
-
-
-def test_a_conversation_changes_the_rate_of_blinks_of_a_running_head() -> None:
-    simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
-    rig, blinks = apply_changes(load_rig("desk"), HALF_RATE), []
-    for conversation in ("talk", None):
-        options = RunOptions(
-            True, True, 0, "face-to-face", seconds=60.0, bus="ideal", conversation=conversation
-        )
-        blinks.append(simulate(rig, options).figures["blinks"])
-    assert blinks[0] > blinks[1] + 3 > 3

@@ -1,9 +1,9 @@
 """The guard: whatever is wished, nothing outside any limit leaves."""
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import pairwise
-from math import cos, inf, nan, radians, sin
+from math import cos, degrees, inf, nan, radians, sin
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,10 @@ import pytest
 from desk import GAZE_JOINTS
 from guarded_desk import DT, EYE, LIMITS, NECK, ZERO, guarding, joints_at
 
+from gazerig.config.validation import validate
+from gazerig.robot.model.guard_params import CollisionParams, GuardParams
 from gazerig.robot.model.types import GuardResult
-from gazerig.robot.safety.guard import Guard
+from gazerig.robot.safety.guard import LATE_RAD_S2, SOFT_START_RAD_S2, Guard
 
 SLACK = 1e-9
 
@@ -375,3 +377,452 @@ def test_a_stuck_joint_lets_the_others_move() -> None:
         command = verdict.command_rad
     assert verdict is not None and command[1:] == pytest.approx((0.3,) * 8)
     assert abs(command[0]) < radians(4.6)
+
+
+# --- Heat, load, voltage, torque and latched faults: slower first, then still, then limp
+
+
+JOINT = 6
+NAME = GAZE_JOINTS[JOINT]
+
+
+class ServoWorld:
+    """Joints that follow their commands one tick later, with given feedback of servos."""
+
+    def __init__(self) -> None:
+        self.guard = guarding()
+        self.t_s = 0.0
+        self.position = [0.0] * 9
+        self.path = [0.0]
+
+    def tick(self, desired: float, *, stray: float | None = None, **said: object) -> GuardResult:
+        """One tick with the joint commanded to ``desired``; stray: its true place."""
+        self.t_s += DT
+        at = list(self.position)
+        if stray is not None:
+            at[JOINT] = stray
+        columns: dict[str, Any] = {
+            name: tuple(one if k == JOINT else self._usual(name) for k in range(9))
+            for name, one in said.items()
+        }
+        wishes = tuple(desired if k == JOINT else 0.0 for k in range(9))
+        verdict = self.guard.check(wishes, joints_at(at, self.t_s, **columns), 0.0, self.t_s)
+        self.position = list(verdict.command_rad)
+        self.path.append(verdict.command_rad[JOINT])
+        return verdict
+
+    @staticmethod
+    def _usual(name: str) -> object:
+        usual = {"torque": True, "fault": "", "load": 0.0, "temperature_c": 40.0}
+        return {**usual, "voltage_v": 5.0, "rearmed": False}[name]
+
+    def speeds(self) -> np.ndarray:
+        return np.diff(self.path) / DT
+
+
+def reason(verdict: GuardResult) -> str:
+    return verdict.applied(NAME).reason
+
+
+@pytest.fixture
+def world() -> ServoWorld:
+    return ServoWorld()
+
+
+@pytest.mark.parametrize("celsius", np.linspace(50.0, 75.0, 101).tolist())
+def test_heat_slows_a_joint_down_before_it_stops_it(world: ServoWorld, celsius: float) -> None:
+    verdicts = [world.tick(0.5, temperature_c=celsius) for _ in range(60)]
+    share = min(max(1.0 - 0.8 * (celsius - 55.0) / 10.0, 0.0), 1.0)
+    speeds = world.speeds()
+    if celsius >= 65.0:
+        assert (verdicts[-1].level, reason(verdicts[-1])) == ("hold", "hot")
+        assert world.path[-1] == 0.0
+        return
+    assert speeds.max() == pytest.approx(share * NECK.speed_rad_s, rel=0.03)
+    assert speeds.max() <= share * NECK.speed_rad_s + 1e-9
+    assert np.diff(speeds, prepend=0.0).max() <= share * NECK.accel_rad_s2 * DT + 1e-9
+    assert reason(verdicts[5]) == ("hot" if celsius > 55.0 else "too fast")
+    assert verdicts[5].reasons == (f"{NAME}: {reason(verdicts[5])}",)  # and no one else
+    assert verdicts[5].level == "limited"
+
+
+def test_a_hot_joint_goes_on_slowly_when_it_has_cooled(world: ServoWorld) -> None:
+    said = [66.0, 65.0, 64.0, 63.0, 62.0]
+    verdicts = [world.tick(0.5, temperature_c=celsius) for celsius in said]
+    assert [reason(verdict) for verdict in verdicts] == ["hot"] * 4 + ["starting slowly"]
+
+
+@pytest.mark.parametrize("load", [*np.linspace(0.3, 1.0, 29).tolist(), -0.6, -1.0])
+def test_load_slows_a_joint_down_before_it_stops_it(world: ServoWorld, load: float) -> None:
+    stopped = slower = None
+    for k in range(1000):
+        verdict = world.tick(0.001 * k * DT, load=load)
+        if slower is None and world.guard._health.share[JOINT] < 1.0:
+            slower = k * DT
+        if verdict.level == "hold":
+            assert reason(verdict) == "overloaded"
+            stopped = k * DT
+            break
+    if abs(load) <= 0.5:
+        assert slower is None and stopped is None
+        return
+    bearable_s = 0.7 * (1.0 - 0.25) / (load * load - 0.25)
+    if bearable_s < 4.9:
+        assert stopped == pytest.approx(bearable_s, abs=3 * DT)
+        assert slower == pytest.approx(0.5 * bearable_s, abs=3 * DT)
+
+
+def test_full_load_is_let_go_before_the_servo_would(world: ServoWorld) -> None:
+    verdict = world.tick(0.0, load=0.0)
+    while verdict.level != "hold":
+        verdict = world.tick(0.08, stray=0.03, load=0.9)  # pushed by less than a stuck joint is
+    assert world.t_s < 1.0
+    for _ in range(60):
+        verdict = world.tick(0.08, stray=0.16, load=0.9)
+        assert reason(verdict) == "overloaded"
+    assert verdict.command_rad[JOINT] == pytest.approx(0.16)
+    assert np.abs(np.diff(world.speeds())).max() <= NECK.accel_rad_s2 * DT + 1e-9
+    full_s = world.t_s
+    while verdict.level == "hold":
+        verdict = world.tick(0.08, stray=verdict.command_rad[JOINT], load=0.1)
+    assert reason(verdict) == "starting slowly" and world.t_s - full_s > 1.0
+
+
+def test_short_bursts_of_load_strain_nothing(world: ServoWorld) -> None:
+    for k in range(2000):  # a saccade of 60 ms at full load, three times a second
+        assert world.tick(0.0, load=1.0 if k % 66 < 12 else 0.1).level == "ok"
+
+
+@pytest.mark.parametrize("volts", np.linspace(3.0, 7.5, 91).tolist())
+def test_voltage_slows_a_joint_down_before_it_stops_it(world: ServoWorld, volts: float) -> None:
+    first_hold = None
+    for k in range(160):
+        verdict = world.tick(0.5, voltage_v=volts)
+        if verdict.level == "hold" and first_hold is None:
+            assert reason(verdict) == "voltage"
+            first_hold = k * DT
+    room = min(volts - 3.5, 7.0 - volts)
+    if room < 0.0:
+        assert first_hold == pytest.approx(0.5, abs=2 * DT)
+        return
+    share = min(0.2 + 0.8 * room / 0.3, 1.0)
+    assert first_hold is None
+    assert world.speeds().max() <= share * NECK.speed_rad_s + 1e-9
+    assert world.speeds().max() >= 0.9 * share * NECK.speed_rad_s
+
+
+def test_a_short_sag_of_the_voltage_only_slows(world: ServoWorld) -> None:
+    for k in range(400):
+        assert world.tick(0.5, voltage_v=3.4 if k % 100 < 49 else 5.0).level != "hold"
+
+
+def test_a_supply_that_recovers_when_nothing_moves_is_given_a_rest(world: ServoWorld) -> None:
+    while world.tick(0.5, voltage_v=3.3).level != "hold":
+        pass
+    rest = 0
+    while world.tick(0.5, voltage_v=5.0).level == "hold":
+        rest += 1
+    assert rest * DT == pytest.approx(0.5, abs=2 * DT)
+
+
+def test_unknown_values_strain_nothing(world: ServoWorld) -> None:
+    for _ in range(100):
+        verdict = world.tick(0.0, temperature_c=None, voltage_v=None, load=nan)
+        assert verdict.level == "ok"
+    assert world.tick(0.0, temperature_c=nan, voltage_v=nan).level == "ok"
+
+
+def test_torque_off_holds_and_goes_along_with_the_joint(world: ServoWorld) -> None:
+    for k in range(100):  # turned by hand at 57 deg/s, then let go
+        where = min(0.005 * k, 0.3)
+        verdict = world.tick(-0.2, stray=where, torque=False)
+        assert (verdict.level, reason(verdict)) == ("hold", "torque off")
+    assert verdict.command_rad[JOINT] == pytest.approx(0.3)
+    verdict = world.tick(-0.2, torque=True)
+    assert reason(verdict) == "starting slowly"
+    assert 0.3 - verdict.command_rad[JOINT] <= radians(300.0) * DT * DT + 1e-9
+
+
+@pytest.mark.parametrize("torque", [{"torque": False}, {}])
+def test_a_latched_fault_is_limp_with_its_words(world: ServoWorld, torque: dict[str, bool]) -> None:
+    for _ in range(80):
+        verdict = world.tick(0.5, stray=0.1, fault="overload and input voltage", **torque)
+        assert verdict.level == "torque_off"
+        assert verdict.reasons == (f"{NAME}: overload and input voltage",)
+    assert verdict.command_rad[JOINT] == pytest.approx(0.1)
+
+
+def test_the_gravest_reasons_stand_by_themselves() -> None:
+    guard = guarding(gentle=True)
+    fault = tuple("overload" if k == JOINT else "" for k in range(9))
+    joints = joints_at(ZERO, DT, fault=fault)
+    verdict = guard.check((0.5,) * 9, joints, 0.0, DT)
+    assert len(verdict.reasons) == 9 and verdict.critical_reasons == (f"{NAME}: overload",)
+    assert ServoWorld().tick(0.0).critical_reasons == ()
+
+
+def test_what_still_moves_with_a_fault_moves_slowly_and_the_others_as_they_should(
+    world: ServoWorld,
+) -> None:
+    for _ in range(100):
+        verdict = world.tick(0.5, fault="input voltage", torque=True)
+        assert verdict.level == "torque_off" and reason(verdict) == "input voltage"
+    assert 0.0 < world.speeds().max() <= radians(60.0) + 1e-9
+    assert ServoWorld().tick(0.5, fault="encoder", torque=True).command_rad[JOINT] == 0.0
+
+
+def test_a_rearmed_joint_begins_where_it_is(world: ServoWorld) -> None:
+    for _ in range(40):
+        world.tick(0.4)
+    verdict = world.tick(0.4, stray=-0.25, rearmed=True)
+    assert reason(verdict) == "starting slowly"
+    assert abs(verdict.command_rad[JOINT] + 0.25) <= radians(300.0) * DT * DT + 1e-9
+    began = len(world.path)
+    while reason(verdict) == "starting slowly":
+        verdict = world.tick(0.4)
+    speeds = np.diff(world.path[began:]) / DT
+    assert speeds.max() <= radians(60.0) + 1e-9 and verdict.command_rad[JOINT] > 0.38
+    world.tick(0.4, stray=3.0, rearmed=True)
+    assert NECK.high_rad - 1e-3 <= world.path[-1] <= NECK.high_rad
+    assert np.isfinite(world.tick(0.4, stray=nan, rearmed=True).command_rad).all()
+
+
+# --- Late ticks: joints go on from their goals softly; and servos that tell no angle
+
+
+LOW, HIGH, TOP, ACCEL = NECK[:4]
+
+
+def test_a_joint_whose_ticks_do_not_come_goes_on_from_its_goal_softly() -> None:
+    accel = 3.0 * LATE_RAD_S2
+    limit = NECK._replace(speed_rad_s=radians(900.0), accel_rad_s2=accel)
+    for missed in (2, 10, 400):
+        guard = guarding((LOW,) * 9, (limit,) * 9, period_s=DT)
+        t_s, before, speed = 0.0, LOW, 0.0
+        for k in range(16):
+            t_s += DT if k != 8 else missed * DT
+            joints = joints_at((before,) * 9, t_s)
+            now = guard.check((HIGH,) * 9, joints, 0.0, t_s).command_rad[0]
+            if k >= 8:
+                braked = max(0.0, speed - accel * (missed - 1) * DT) if k == 8 else speed
+                assert (now - before) / DT <= braked + LATE_RAD_S2 * DT + 1e-9
+            before, speed = now, (now - before) / DT
+
+
+def test_a_slow_joint_regains_its_speed_after_late_ticks_and_no_more() -> None:
+    """Every third tick misses some slots."""
+    for missed in (2, 60):
+        guard = guarding(
+            (LOW,) * 9, (NECK,) * 9, gentle=True, period_s=DT, soft_start_speed_deg_s=20.0
+        )
+        t_s, before, fastest, last = 0.0, LOW, 0.0, 0.0
+        for k in range(1, 400):
+            gap = missed if k % 3 == 0 else 0
+            t_s += (1 + gap) * DT
+            joints = joints_at((before,) * 9, t_s)
+            now = guard.check((HIGH,) * 9, joints, 0.0, t_s).command_rad[0]
+            speed, before = (now - before) / DT, now
+            assert speed <= min(radians(20.0), fastest + SOFT_START_RAD_S2 * DT) + 1e-9
+            braked = max(0.0, last - ACCEL * gap * DT)
+            assert abs(speed - braked) <= ACCEL * DT + 1e-9
+            if gap > 50:  # longer than that it begins as from rest
+                assert speed <= braked + SOFT_START_RAD_S2 * DT + 1e-9
+            fastest, last = max(fastest, speed), speed
+        assert (now > LOW + 0.2) == (missed == 2)
+
+
+def test_a_loop_that_always_takes_two_slots_is_a_slower_loop() -> None:
+    guard = guarding((LOW,) * 9, (NECK,) * 9, period_s=DT)
+    before = LOW
+    for k in range(1, 25):
+        joints = joints_at((before,) * 9, 2 * k * DT)
+        now = guard.check((HIGH,) * 9, joints, 0.0, 2 * k * DT).command_rad[0]
+        speed, before = (now - before) / (2 * DT), now
+    assert speed > 0.8 * TOP
+
+
+def test_a_servo_without_feedback_is_never_found_stalled() -> None:
+    guard = guarding(limits=(NECK,) * 9, gentle=True)
+    for k in range(1, 200):
+        joints = joints_at(ZERO, k * DT, measured=(False,) * 9)
+        verdict = guard.check((0.4,) * 9, joints, 0.0, k * DT)
+        assert verdict.applied("neck_yaw").reason != "not moving"
+
+
+# --- Forbidden pairs of joint ranges: never entered, never crossed, left gently
+
+
+LEFT, PITCH = (GAZE_JOINTS.index(n) for n in ("left_upper_lid", "neck_pitch"))
+LID = CollisionParams(("neck_pitch", -30.0, -18.0), ("left_upper_lid", 10.0, 25.0))
+
+
+class PairWorld:
+    """Joints one tick behind their commands."""
+
+    def __init__(self, *pairs: CollisionParams, **start_deg: float) -> None:
+        start = tuple(radians(start_deg.get(name, 0.0)) for name in GAZE_JOINTS)
+        self.guard = guarding(start, gentle=True, collisions=pairs)
+        self.pairs = pairs
+        self.t_s = 0.0
+        self.path = [start]
+        self.measured: Callable[[tuple[float, ...]], tuple[float, ...]] = lambda angles: angles
+
+    def awake(self) -> "PairWorld":
+        self.guard._gentle = [False] * 9
+        return self
+
+    def tick(self, dt_s: float = DT, **desired_deg: float) -> GuardResult:
+        self.t_s += dt_s
+        joints = joints_at(self.measured(self.path[-1]), self.t_s)
+        desired = tuple(radians(desired_deg.get(name, 0.0)) for name in GAZE_JOINTS)
+        verdict = self.guard.check(desired, joints, 0.0, self.t_s)
+        self.path.append(verdict.command_rad)
+        return verdict
+
+    def angle(self, joint: int) -> float:
+        return degrees(self.path[-1][joint])
+
+    def crossed(self) -> bool:
+        """Whether the straight path between any two successive commands touches a box."""
+        path = np.degrees(np.array(self.path))
+        for pair in self.pairs:
+            (first, *one), (second, *other) = pair.first, pair.second
+            places = path[:, [GAZE_JOINTS.index(first), GAZE_JOINTS.index(second)]]
+            low, high = np.array([one, other]).T
+            if touches(places[:-1], places[1:], low, high).any():
+                return True
+        return False
+
+
+def touches(begin: np.ndarray, end: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Whether the straight line of each step (n, 2) meets the box, by slabs."""
+    way = end - begin
+    with np.errstate(divide="ignore", invalid="ignore"):
+        a, b = (low - begin) / way, (high - begin) / way
+    still = way == 0.0
+    inside = (begin >= low) & (begin <= high)
+    enter = np.where(still, np.where(inside, -np.inf, np.inf), np.minimum(a, b)).max(axis=1)
+    leave = np.where(still, np.where(inside, np.inf, -np.inf), np.maximum(a, b)).min(axis=1)
+    return (enter <= leave) & (enter <= 1.0) & (leave >= 0.0)
+
+
+def test_one_joint_waits_at_its_wall_and_the_other_is_free() -> None:
+    world = PairWorld(LID).awake()
+    for _ in range(400):
+        verdict = world.tick(neck_pitch=-25.0, left_upper_lid=20.0)
+    assert world.angle(PITCH) == pytest.approx(-17.0) and world.angle(LEFT) == pytest.approx(20.0)
+    assert verdict.reasons == ("neck_pitch: self-collision",) and verdict.level == "limited"
+    for _ in range(400):  # the lid makes room
+        verdict = world.tick(neck_pitch=-25.0, left_upper_lid=0.0)
+    assert world.angle(PITCH) == pytest.approx(-25.0) and verdict.level == "ok"
+    for _ in range(400):
+        verdict = world.tick(neck_pitch=-25.0, left_upper_lid=20.0)
+    assert world.angle(LEFT) == pytest.approx(9.0) and world.angle(PITCH) == pytest.approx(-25.0)
+    assert verdict.reasons == ("left_upper_lid: self-collision",)
+    for _ in range(400):
+        verdict = world.tick(neck_pitch=-40.0, left_upper_lid=20.0)
+    assert world.angle(LEFT) == pytest.approx(20.0) and world.angle(PITCH) == pytest.approx(-40.0)
+    for _ in range(400):
+        world.tick(neck_pitch=0.0, left_upper_lid=20.0)
+    assert world.angle(PITCH) == pytest.approx(-31.0)
+    for _ in range(400):
+        world.tick(neck_pitch=0.0, left_upper_lid=-20.0)
+    assert world.angle(PITCH) == pytest.approx(0.0, abs=1e-6)
+    assert not world.crossed()
+
+
+@pytest.mark.parametrize("off", np.linspace(-0.3, 0.3, 25).tolist())
+def test_the_four_walls_are_swept_densely(off: float) -> None:
+    for pitch, lid in ((-17.0 + off, 20.0), (-31.0 + off, 20.0), (-24.0, 9.0 + off)):
+        world = PairWorld(LID, neck_pitch=-45.0 if pitch < -30.0 else 0.0).awake()
+        for _ in range(200):
+            world.tick(neck_pitch=pitch, left_upper_lid=0.0 if lid > 10.0 else lid)
+            if lid > 10.0:
+                world.tick(neck_pitch=-45.0 if pitch < -30.0 else 0.0, left_upper_lid=lid)
+        for _ in range(400):
+            world.tick(neck_pitch=pitch, left_upper_lid=lid)
+        apart = (
+            world.angle(PITCH) >= -17.0 - 1e-6
+            or world.angle(PITCH) <= -31.0 + 1e-6
+            or world.angle(LEFT) <= 9.0 + 1e-6
+        )
+        assert apart and not world.crossed()
+
+
+def test_the_other_joint_waits_until_the_first_is_measured_out() -> None:
+    world = PairWorld(LID, neck_pitch=-24.0, left_upper_lid=0.0).awake()
+    at_first = world.path[-1]
+    world.measured = lambda angles: (*angles[:PITCH], at_first[PITCH], *angles[PITCH + 1 :])
+    for _ in range(24):  # the neck lags: its command leaves, its head does not yet
+        world.tick(neck_pitch=0.0, left_upper_lid=20.0)
+    assert world.angle(PITCH) > -16.0 and world.angle(LEFT) <= 9.0 + 1e-9
+    world.measured = lambda angles: angles
+    for _ in range(100):
+        world.tick(neck_pitch=0.0, left_upper_lid=20.0)
+    assert world.angle(LEFT) == pytest.approx(20.0)
+
+
+def test_a_keeper_pushed_in_by_hand_keeps_the_other_out() -> None:
+    world = PairWorld(LID).awake()
+    world.measured = lambda angles: (*angles[:PITCH], radians(-20.0), *angles[PITCH + 1 :])
+    for _ in range(25):
+        world.tick(left_upper_lid=20.0)
+    assert world.angle(LEFT) <= 9.0 + 1e-9
+
+
+@pytest.mark.parametrize("pitch", [-29.9, -24.0, -18.1])
+@pytest.mark.parametrize("lid", [10.1, 17.0, 24.9])
+def test_who_begins_in_a_box_is_led_out_gently(pitch: float, lid: float) -> None:
+    world = PairWorld(LID, neck_pitch=pitch, left_upper_lid=lid)
+    verdict = world.tick(neck_pitch=pitch, left_upper_lid=lid)
+    assert verdict.level == "hold"
+    collide = {"neck_pitch: self-collision", "left_upper_lid: self-collision"}
+    assert {one for one in verdict.reasons if "slowly" not in one} == collide
+    out = [
+        p for p in range(400) if world.tick(neck_pitch=pitch, left_upper_lid=lid).level == "hold"
+    ]
+    assert 0 < len(out) < 399
+    path = np.degrees(np.array(world.path))[:, [PITCH, LEFT]]
+    speeds = np.diff(path[: len(out)], axis=0) / DT
+    assert np.abs(speeds).max() <= 60.0 + 1e-6
+    assert np.abs(np.diff(speeds, axis=0, prepend=0.0)).max() <= 301.0 * DT
+    assert (np.ptp(path[: len(out)], axis=0) == 0.0).sum() == 1  # the other one waits
+    assert not touches(
+        path[-2:-1], path[-1:], np.array([-30.0, 10.0]), np.array([-18.0, 25.0])
+    ).any()
+
+
+def test_a_rearmed_joint_inside_a_box_is_led_out() -> None:
+    world = PairWorld(LID).awake()
+    for _ in range(100):
+        world.tick(left_upper_lid=20.0)
+    world.t_s += DT
+    at = (*world.path[-1][:PITCH], radians(-24.0), *world.path[-1][PITCH + 1 :])
+    again = tuple(k == PITCH for k in range(9))
+    joints = joints_at(at, world.t_s, rearmed=again)
+    verdict = world.guard.check(ZERO, joints, 0.0, world.t_s)
+    assert verdict.applied("neck_pitch").reason == "self-collision"
+    world.path.append(verdict.command_rad)
+    for _ in range(400):
+        verdict = world.tick(left_upper_lid=20.0)
+    assert verdict.level == "ok"
+
+
+def test_pairs_come_from_the_rig_file_and_wrong_ones_are_refused() -> None:
+    pair = {"first": ("neck_pitch", -30, -18), "second": ("left_upper_lid", 10, 25)}
+    params, errors = validate(GuardParams, {"collisions": (pair,)})
+    assert errors == [] and params is not None and params.collisions == (LID,)
+    wrong: list[tuple[dict[str, object], str]] = [
+        ({"second": ("neck_pitch", 10, 25)}, "first and second are both neck_pitch"),
+        ({"first": ("neck_pitch", -30, -30)}, "neck_pitch: -30 must be below -30"),
+    ]
+    for change, says in wrong:
+        params, errors = validate(GuardParams, {"collisions": ({**pair, **change},)})
+        assert params is None and len(errors) == 1
+        assert says in errors[0].rule
+
+
+def test_a_pair_that_leaves_no_pose_is_refused() -> None:
+    whole = CollisionParams(("neck_pitch", -60.0, 50.0), ("left_upper_lid", -34.5, 34.5))
+    with pytest.raises(ValueError, match="neck_pitch -60..50 deg of -60..50 with left_upper_lid"):
+        guarding(collisions=(whole,))

@@ -24,9 +24,9 @@ people:
 """
 
 
-def times(scene: Scene, dt_s: float = DT_S) -> list[float]:
+def times(scene: Scene) -> list[float]:
     """Return the instants of one round and a little of the next."""
-    return np.arange(0.0, scene.round_s + 0.5, dt_s).tolist()
+    return np.arange(0.0, scene.round_s + 0.5, DT_S).tolist()
 
 
 @pytest.mark.parametrize("name", scene_names())

@@ -54,16 +54,6 @@ def test_who_is_out_of_sight_comes_to_rest() -> None:
     assert track.p_m[1] - gone_m < 1.9
 
 
-def turn(x: np.ndarray, onto: np.ndarray, share: float) -> np.ndarray:
-    """Return the rotation of one unit vector by a share of the angle to another."""
-    axis = np.cross(x, onto)
-    sin = np.linalg.norm(axis)
-    angle = share * np.arctan2(sin, x @ onto)
-    kx, ky, kz = axis / sin if sin > 0.0 else axis
-    K = np.array([[0, -kz, ky], [kz, 0, -kx], [-ky, kx, 0]])
-    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
-
-
 @pytest.mark.parametrize("sd_deg", [1.0, 3.0, 6.0, 10.0, 30.0])
 def test_directions_that_jump_are_no_approach(sd_deg: float) -> None:
     """Told that across is known to millimetres and along it to a metre, range stays assumed."""

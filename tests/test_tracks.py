@@ -19,29 +19,28 @@ from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.track.pose_offset import PoseOffset
 from gazerig.gaze.track.track import POSE_CHANNELS, KeyFrame, Track, channel_keys
 from gazerig.gaze.track.track_player import OffsetState, TrackPlayer
-from gazerig.gaze.types import Floats
+from gazerig.gaze.types import Floats, GazeCommand
 from gazerig.robot.app.gaze_models import rig_kinematics
-from gazerig.robot.app.rig_limits import lid_ends, lid_spans, limits
+from gazerig.robot.app.rig_limits import lid_spans, limits
 from gazerig.robot.app.track_file import TOLERANCE_DEG
 from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.commands import EndTrack, Play, SyncTrack
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.kinematics import LIDS, NECK
 from gazerig.robot.model.motion_keys import fit_keys, smooth
 from gazerig.robot.model.track_fit import FittedTrack, TrackFit, TrackRefused, track_motions
-from gazerig.robot.model.types import further_joints
+from gazerig.robot.model.types import JointAngles, further_joints
 
 RIGS = [name for name in shipped_names("rigs") if name != "minimal"]
 """The shipped rigs but the one without neck and lids, which has nothing to laugh or tilt with."""
 
 
-def fitted(track: Track, name: str = "desk", speed: float = 1.0, **at: float) -> FittedTrack:
+def fitted(track: Track, name: str = "desk", **at: float) -> FittedTrack:
     """Return a track on a shipped rig, with joints at angles in degrees, else at 0."""
     rig = load_rig(name)
     joints = rig.names
     base = np.array([radians(at.get(name, 0.0)) for name in joints])
     fit = TrackFit(joints, lid_spans(rig))
-    return fit.fit("x", track_motions(track, joints), speed, base, limits(rig.joints))
+    return fit.fit("x", track_motions(track, joints), 1.0, base, limits(rig.joints))
 
 
 @pytest.mark.parametrize("rig", RIGS)
@@ -281,29 +280,19 @@ class Moments(NamedTuple):
 
 def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
     """Return (n, joints) angles of a head that looks at a point straight ahead all the while."""
-    rig = load_rig(rig_name)
-    kinematics, ends = rig_kinematics(rig), lid_ends(rig)
-    eyes = [
-        kinematics.eye_angles_to(TARGET, *kinematics.head_pose(one.head_rad)) for one in offsets
-    ]
-    left, right = np.array(eyes)[:, 0, :2].T, np.array(eyes)[:, 1, :2].T
-    yaw, pitch = np.array([one.eyes_rad for one in offsets]).T
-    lids = [LidOpenings(0.9, 0.9, False, 0.9, 0.9).scale(one.lids) for one in offsets]
-    openings = np.array([(one.left, one.right, one.lower_left, one.lower_right) for one in lids]).T
-    head, joints = (
-        np.array([one.head_rad for one in offsets]).T,
-        np.array([one.joints_rad for one in offsets]).T,
-    )
-    angles = {
-        "left_eye_pan": left[0] + yaw, "left_eye_tilt": left[1] + pitch,
-        "right_eye_pan": right[0] + yaw, "right_eye_tilt": right[1] + pitch,
-        "eyes_pan": 0.5 * (left[0] + right[0]) + yaw, "eyes_tilt": left[1] + pitch,
-        **dict(zip(NECK, head, strict=True)),
-        **dict(zip(further_joints(rig.joints), joints, strict=True)),
-        **{lid: ends[lid][0] + opening * (ends[lid][1] - ends[lid][0])
-           for lid, opening in zip(LIDS, openings, strict=True) if lid in ends},
-    }  # fmt: skip
-    return np.stack([angles[name] for name in rig.names], axis=1)
+    kinematics = rig_kinematics(load_rig(rig_name))
+
+    def angles(one: PoseOffset) -> JointAngles:
+        eyes = kinematics.eye_angles_to(TARGET, *kinematics.head_pose(one.head_rad))
+        left, right = ((yaw + one.eyes_rad[0], pitch + one.eyes_rad[1]) for yaw, pitch in eyes)
+        lids = LidOpenings(0.9, 0.9, False, 0.9, 0.9).scale(one.lids)
+        gaze = GazeCommand(
+            one.head_rad, left, right, lids.left, lids.right, "fixate", False, TARGET, 0, 0, 0,
+            lids.lower_left, lids.lower_right,
+        )  # fmt: skip
+        return kinematics.inverse(gaze, one.joints_rad)
+
+    return np.array([angles(one) for one in offsets])
 
 
 def interrupted(track: str, rig_name: str, moments: int, seed: int) -> Moments:

@@ -25,7 +25,6 @@ import sys
 import termios
 import time
 from collections.abc import Callable, Iterator
-from functools import partial
 from itertools import product
 from math import degrees
 from pathlib import Path
@@ -44,7 +43,6 @@ from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
-ROOT = Path(__file__).parents[2]
 RIGS = {"desk": "dynamixel", "feetech": "feetech", "maker": "maestro", "pca9685": "pca9685"}
 BOARDS = ("maker", "pca9685")
 LONGEST_S = 20.0
@@ -192,7 +190,7 @@ def started(words: list[str], way: str, begin: Begin = fresh) -> Started:
         return Started(process, -1, master)
     if way == "stderr and stdout closed":
         shell = ["bash", "-c", 'exec "$@" >&- 2>&-', "-", *command]
-        begin = partial(_shelled, shell)
+        begin = lambda *words, **options: subprocess.Popen(shell, **options)  # noqa: E731
     errors: int = pipe
     if way == "stderr on a full disk":
         errors = os.open("/dev/full", os.O_WRONLY)
@@ -215,10 +213,6 @@ def started(words: list[str], way: str, begin: Begin = fresh) -> Started:
                 os.write(full, b"." * 4096)
         os.close(full)
     return Started(process, got, -1)
-
-
-def _shelled(shell: list[str], *_: object, **options: Any) -> "subprocess.Popen[bytes]":
-    return subprocess.Popen(shell, **options)
 
 
 def wait_until(true: Callable[[], bool], within_s: float = 60.0, master: int = -1) -> bool:

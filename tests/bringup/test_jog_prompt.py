@@ -2,44 +2,27 @@
 
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_line import answers_in
 from commands_started import OnTerminal
+from stand_in import StandIn
 
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.calibration.linkage_calibration import HobbyMarker
 from gazerig.features.bringup.cli.jog_prompt import TerminalJogger
 from gazerig.features.bringup.cli.prompts import Lines
 
 
-class Servo(HobbyMarker):
-    """Records its calls."""
-
-    def __init__(self) -> None:
-        self.reported: list[tuple[str, float]] = []
-
-    def move_by_us(self, us: float) -> None:
-        self.reported.append(("by", us))
-
-    def nudge(self, us: float) -> None:
-        self.reported.append(("nudge", us))
-
-    def move_to_us(self, us: float) -> None:
-        self.reported.append(("to", us))
-
-    def live(self) -> str:
-        return "here"
-
-
-def person(tmp_path: Path, *lines: str) -> TerminalJogger:
-    return TerminalJogger(Lines(Path(answers_in(tmp_path, *lines))), lambda: None, False)
-
-
 def test_lines_move_a_servo_until_enter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    servo = Servo()
-    person(tmp_path, "+40", "-12.5", "1480", "left", "nan", "").steer("move it", servo)
-    assert servo.reported == [("by", 40.0), ("by", -12.5), ("to", 1480.0)]
+    moves: list[tuple[str, float]] = []
+    servo: Any = StandIn()
+    servo.move_by_us = lambda us: moves.append(("by", us))
+    servo.move_to_us = lambda us: moves.append(("to", us))
+    servo.live = lambda: "here"
+    lines = answers_in(tmp_path, "+40", "-12.5", "1480", "left", "nan", "")
+    TerminalJogger(Lines(Path(lines)), lambda: None, False).steer("move it", servo)
+    assert moves == [("by", 40.0), ("by", -12.5), ("to", 1480.0)]
     assert capsys.readouterr().err.count("moves it by so many us") == 2
 
 

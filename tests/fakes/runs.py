@@ -65,7 +65,6 @@ def record(
     seconds: float,
     options: RunOptions = VISIT,
     at: Callable[[int, Assembly], None] = lambda n, made: None,
-    start_s: float = 0.0,
 ) -> list[Tick]:
     """Record a run as ``gazerig run --fast --record`` does; ``at``: called after each tick."""
     recorder = Recorder(path, run_info(rig, options), patient=True)
@@ -78,7 +77,6 @@ def record(
         seen.append(tick)
         at(len(seen), made)
 
-    made.clock.sleep_until(start_s)
     made.robot.start(made.clock)
     stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(made.robot, made.clock, made.loop, stop, watch)

@@ -14,7 +14,7 @@ from human.measured_run import MeasuredRun, Runner
 _YAWS = (0, 25, 0, -35, -25, 45, 30, -20, -55, -45, 0, 14, 5, -30, 55, 40, -40, -10, 20, 50)
 _EACH_S = 2.5
 _TURNED_S = 0.75
-_FREE_DEG, _SLOPE = 17.9, 0.77
+_FREE_DEG = 17.9
 _MARGIN_DEG = 1.5
 _SEARCHED = ("search", "glance", "rest")
 """Looks about after a light has gone: many from one place, in which the head relieves the eyes."""

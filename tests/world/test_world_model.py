@@ -4,13 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from described_rigs import SHIPPED
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.run.run_world import rig_in_world
 
 pytestmark = pytest.mark.usefixtures("mujoco")
-RIGS = ("desk", "expressive", "feetech", "maker", "minimal", "nine_xl330", "six_hobby", "six_xl330")
 
 
 def model_with(name: str, path: Path | None = None) -> Any:
@@ -20,7 +20,7 @@ def model_with(name: str, path: Path | None = None) -> Any:
     return world_model(None, [rig_in_world(load_rig(name), looks=False)], path)
 
 
-@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize("name", SHIPPED)
 def test_every_shipped_rig_stands_in_a_world_at_its_first_angles(name: str) -> None:
     """Joints of a world are the rig's, one shaft a servo."""
     from gazerig.features.world.physics import World

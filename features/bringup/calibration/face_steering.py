@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from math import degrees, inf
 from typing import Literal
 
-from gazerig.gaze.angles import add, norm, rotate, rotate_back, sub
+from gazerig.gaze.angles import add, norm, rotate, sub
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Face, GazeState, Mat3, Percept, Target, Vec3
 from gazerig.robot.control.tick import Tick
@@ -139,12 +139,6 @@ def point_world_m(place_mm: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) -> V
     """Convert a position in the face frame to a point in the world."""
     x, y, z = place_mm
     return add(p_world_face_m, rotate(R_world_face, (x / 1e3, y / 1e3, z / 1e3)))
-
-
-def place_in_face_mm(p_world_m: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) -> Vec3:
-    """Convert a point in the world to a position in the face frame."""
-    x, y, z = rotate_back(R_world_face, sub(p_world_m, p_world_face_m))
-    return x * 1e3, y * 1e3, z * 1e3
 
 
 def changed_places(state: FaceCalibration) -> dict[str, Vec3]:
