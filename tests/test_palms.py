@@ -57,6 +57,8 @@ class Seen:
                 points[[0, 1, 2, 4]] = (x, y), (u - wide / 2, v), (u, v), (u + wide / 2, v)
                 spots = (points - (LEFT, TOP) + 0.5) / SIDE - ANCHORS[at]
                 boxes[at, 4:] = 192.0 * spots.ravel()
+                boxes[at, :2] = boxes[at, 4:6]
+                boxes[at, 2:4] = 192.0 * 60.0 / SIDE
                 scores[at] = np.log(score / (1.0 - score)) - 0.01 * again
         return boxes, scores
 

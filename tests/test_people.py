@@ -62,11 +62,12 @@ class Seen:
         for row, (x, y, trunk, score) in enumerate(self.people):
             for again in (0, 1):  # neighbouring anchors see the same person
                 at = 300 + 10 * row + again
-                # The face's centre, unused sizes, hips, and the top of the circle.
+                # The face's centre, the size of its box, hips, and the top of the circle.
                 head = np.array([x - left, y])
                 three = head + [(0.0, 0.1 * trunk), (0.0, 0.9 * trunk), (0.0, -0.1 * trunk)]
                 spots = (three + 0.5) / self.side - ANCHORS[at]
                 boxes[at, (0, 1, 4, 5, 6, 7)] = 224.0 * spots.ravel()
+                boxes[at, 2:4] = 224.0 * 0.5 * trunk / self.side
                 scores[at] = np.log(score / (1.0 - score)) - 0.01 * again
         return boxes, scores
 

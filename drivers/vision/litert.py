@@ -1,6 +1,6 @@
 """Networks of MediaPipe that find boxes with points from anchors, run by LiteRT."""
 
-from typing import Protocol
+from collections.abc import Callable
 
 import cv2
 import numpy as np
@@ -9,21 +9,20 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.quiet_opencv import quiet_stderr
 from gazerig.drivers.errors import ModelFileError, extra_hint
 from gazerig.drivers.types import ImageArray
-from gazerig.drivers.vision.face.preprocess import as_bgr, crop_square
+from gazerig.drivers.vision.face.preprocess import crop_square
 from gazerig.drivers.vision.model_files import ModelFile
 
 Floats = NDArray[np.float32]
 
 
-class Network(Protocol):
-    """A network that can be run."""
+Network = Callable[[Floats], tuple[Floats, Floats]]
+"""Returns boxes with points and scores of an RGB square, one row per anchor.
 
-    def __call__(self, square: Floats) -> tuple[Floats, Floats]:
-        """Return boxes with points and scores of an RGB square, one row per anchor.
-
-        Shapes are (2254, 12) and (2254,) for people, from values of -1..1, and (2016, 18) and
-        (2016,) for palms, from values of 0..1.
-        """
+Shapes are (2254, 12) and (2254,) for people, from values of -1..1, and (2016, 18) and (2016,) for
+palms, from values of 0..1.
+"""
+# Intersection over union above which two boxes are the same thing: MediaPipe's value.
+_SAME = 0.3
 
 
 def load_network(file: ModelFile) -> Network:
@@ -76,28 +75,29 @@ class PointSearch:
 
     def search(
         self, image: ImageArray, box: NDArray[np.float64], least: float
-    ) -> tuple[NDArray[np.float64], list[float]]:
-        """Return what has at least this confidence, the most certain first.
+    ) -> list[tuple[NDArray[np.float64], float]]:
+        """Return points and confidence of what has at least this confidence, the surest first.
+
+        The points (n, 2) are in pixels of the frame; the first is the centre of the thing's box. Of
+        things whose boxes overlap, one is returned.
 
         Args:
             image: The frame.
             box: The square (left, top, right, bottom), pixel edges.
             least: Smallest confidence.
-
-        Returns:
-            Points (n, points, 2) in pixels of the frame, of which the first is the centre of the
-            thing's box; and confidences.
         """
-        part, where = crop_square(as_bgr(image), box, self._side_px)
+        part, where = crop_square(image, box, self._side_px)
         rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
-        boxes, scores = self._network(rgb / self._grey_levels + self._black)
+        numbers, scores = self._network(rgb / self._grey_levels + self._black)
         sure = 1.0 / (1.0 + np.exp(-np.clip(scores, -50.0, 50.0).astype(np.float64)))
-        rows = np.argsort(-sure, kind="stable")[: int((sure >= least).sum())]
-        # The third and fourth number are the size of the box.
-        numbers = np.delete(boxes[rows], (2, 3), axis=1)
-        pairs = numbers.reshape(len(rows), boxes.shape[1] // 2 - 1, 2) / self._side_px
-        points = (pairs + self._anchors[rows][:, None]) * (where[2] - where[0]) + where[:2] - 0.5
-        return points, sure[rows].tolist()
+        # Pairs: centre and size of the box, then the other points.
+        pairs = numbers.reshape(len(numbers), -1, 2).astype(np.float64) / self._side_px
+        size = pairs[:, 1].copy()
+        pairs += self._anchors[:, None]
+        rects = np.hstack([pairs[:, 0] - size / 2.0, size])
+        rows = cv2.dnn.NMSBoxes(rects, sure, least, _SAME)  # type: ignore[arg-type]
+        points = np.delete(pairs, 1, axis=1) * (where[2] - where[0]) + where[:2] - 0.5
+        return [(points[row], float(sure[row])) for row in rows if np.isfinite(points[row]).all()]
 
 
 def anchors(side_px: int, cells: tuple[tuple[int, int], ...]) -> NDArray[np.float64]:

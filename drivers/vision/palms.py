@@ -7,8 +7,6 @@ Source: Zhang et al., "MediaPipe Hands: on-device real-time hand tracking" (2020
 opencv_zoo, models/palm_detection_mediapipe.
 """
 
-from math import hypot
-
 import numpy as np
 
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
@@ -29,8 +27,6 @@ _THERE_S = 1.0
 _CONFIDENCE = 0.5
 # Ratio of a palm's length (wrist to middle finger) to its width (index to little finger).
 _LENGTH_OF_WIDTH = 1.4
-# Palms nearer to each other than this share of their size are one.
-_SAME = 0.6
 
 
 class PalmDetector:
@@ -69,22 +65,16 @@ class PalmDetector:
         half = _REACH_M * self._px_per_m / 2.0
         y = self._y + _BELOW_M * self._px_per_m
         box = np.array([self._x - half, y - half, self._x + half, y + half])
-        found: list[DetectedPalm] = []
-        for places, sure in zip(*self._search.search(image, box, _CONFIDENCE), strict=True):
+        found = []
+        for places, sure in self._search.search(image, box, _CONFIDENCE):
             # Wrist, and roots of index, middle and little finger.
-            points = places[[1, 2, 3, 5]]
-            wrist, index, middle, little = points
+            wrist, index, middle, little = places[[1, 2, 3, 5]]
             size = max(
                 float(np.linalg.norm(middle - wrist)),
                 _LENGTH_OF_WIDTH * float(np.linalg.norm(little - index)),
             )
             x, y = ((wrist + middle) / 2.0).tolist()
-            if not (np.isfinite(points).all() and size > 1.0):
-                continue
-            if not any(
-                hypot(x - one.centre_px[0], y - one.centre_px[1]) < _SAME * max(size, one.size_px)
-                for one in found
-            ):
+            if size > 1.0:
                 found.append(DetectedPalm((x, y), size, sure))
         return tuple(found)
 

@@ -9,7 +9,6 @@ output: opencv_zoo, models/person_detection_mediapipe.
 """
 
 from math import ceil, hypot
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,21 +26,10 @@ _STEP = 0.5
 # People within this share of the side from the border of two squares count in both, one frame
 # apart.
 _BOTH = 0.05
-# Heads nearer to each other than this share of the trunk belong to one person.
-_SAME = 0.35
 # People detected with a lower confidence are discarded.
 _CONFIDENCE = 0.6
 # Half the width of a body as a share of the trunk, from head to hips.
 _HALF_WIDTH = 0.35
-
-
-class _Square(NamedTuple):
-    """A square of a frame, and the range across it in which its people count, in pixels."""
-
-    left: float
-    side: float
-    least_x: float
-    most_x: float
 
 
 class PeopleDetector:
@@ -69,32 +57,26 @@ class PeopleDetector:
         # Overlapping squares as high as the frame cover it.
         height, width = image.shape[:2]
         count = max(1, ceil((width - height) / (_STEP * height)) + 1)
-        if count == 1:
-            side = float(max(width, height))
-            squares = [_Square((width - side) / 2.0, side, -np.inf, np.inf)]
-        else:
-            apart = (width - height) / (count - 1)
-            edges = [-np.inf, *[(i + 0.5) * apart + height / 2.0 for i in range(count - 1)], np.inf]
-            both = _BOTH * height
-            squares = [
-                _Square(i * apart, float(height), edges[i] - both, edges[i + 1] + both)
-                for i in range(count)
-            ]
-        self._next %= len(squares)
+        middles = np.array([width / 2.0])
+        if count > 1:
+            middles = np.linspace(height / 2.0, width - height / 2.0, count)
+        self._next %= count
         if self._next == 0:
             self._started_s = captured_s
-        square = squares[self._next]
-        self._next = (self._next + 1) % len(squares)
+        middle = middles[self._next]
+        self._next = (self._next + 1) % count
         if self._next == 0:
             self.due_s = self._started_s + 1.0 / self._params.people_hz
-        box = np.array([square.left, 0.0, square.left + square.side, square.side])
-        found: list[DetectedPerson] = []
-        for points, sure in zip(*self._search.search(image, box, _CONFIDENCE), strict=True):
+        half = height / 2.0
+        box = np.array([middle - half, 0.0, middle + half, height])
+        found = []
+        for points, sure in self._search.search(image, box, _CONFIDENCE):
             # Face centre, hips and the top of the body's circle.
             person = _person(points[:3], sure)
-            if person is None or not square.least_x <= person.head_px[0] < square.most_x:
+            if person is None:
                 continue
-            if not any(_is_same(person, other) for other in found):
+            off = np.abs(middles - person.head_px[0])
+            if abs(middle - person.head_px[0]) <= off.min() + 2.0 * _BOTH * height:
                 found.append(person)
         return tuple(found)
 
@@ -115,14 +97,8 @@ def _person(points: NDArray[np.float64], confidence: float) -> DetectedPerson | 
     (face_x, face_y), (hips_x, hips_y), (top_x, top_y) = points.tolist()
     trunk = hypot(top_x - hips_x, top_y - hips_y)
     head = (face_x + top_x) / 2.0, (face_y + top_y) / 2.0
-    if not (np.isfinite(points).all() and trunk > 1.0 and head[1] < hips_y):
+    if not (trunk > 1.0 and head[1] < hips_y):
         return None
     half = _HALF_WIDTH * trunk
     left, right = min(head[0], hips_x) - half, max(head[0], hips_x) + half
     return DetectedPerson((left, top_y, right - left, hips_y - top_y), head, trunk, confidence)
-
-
-def _is_same(one: DetectedPerson, other: DetectedPerson) -> bool:
-    """Return whether two detections belong to one person."""
-    apart = hypot(one.head_px[0] - other.head_px[0], one.head_px[1] - other.head_px[1])
-    return apart < _SAME * max(one.trunk_px, other.trunk_px)
