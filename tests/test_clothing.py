@@ -8,7 +8,7 @@ from seeing.row_09_identities import LENS, SIZE, Crowd, detected
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Clothing, DetectedFace, DetectedPerson, ImageArray
-from gazerig.drivers.vision.clothing import ClothingReader
+from gazerig.drivers.vision.clothing import add_clothing
 from gazerig.robot.model.intrinsics import project
 
 RED, GREEN = [40.0, 40.0, 170.0], [60.0, 140.0, 60.0]
@@ -31,7 +31,7 @@ def picture(*people: tuple[DetectedFace, list[float]]) -> ImageArray:
 
 
 def worn(image: ImageArray, *faces: DetectedFace) -> list[Clothing | None]:
-    return [one.clothing for one in ClothingReader().add_clothing(image, 0.0, faces)[0]]
+    return [one.clothing for one in add_clothing(image, faces)[0]]
 
 
 def apart(one: Clothing | None, other: Clothing | None) -> float:
@@ -61,20 +61,12 @@ def test_what_somebody_nearer_covers_does_not_count() -> None:
     assert hidden is None
 
 
-def test_a_cover_whose_face_is_missed_in_a_frame_still_covers() -> None:
-    far, near = face(0.0, 2.4), face(0.05, 1.4)
-    image, reader = picture((far, RED), (near, GREEN)), ClothingReader()
-    reader.add_clothing(image, 0.0, (far, near))
-    assert reader.add_clothing(image, 0.03, (far,))[0][0].clothing is None
-    assert reader.add_clothing(image, 1.0, (far,))[0][0].clothing is not None
-
-
 def test_a_person_without_a_face_wears_the_same() -> None:
     p = np.array([0.1, -0.2, 2.0])
     one, ((x, y),) = face(0.1, 2.0), project(p[None], LENS).tolist()
     px_m = LENS.fx_px / 2.0
     body = DetectedPerson((0, 0, 1, 1), (x, y - 0.05 * px_m), 0.83 * px_m, 0.9)
-    (dressed,), (person,) = ClothingReader().add_clothing(picture((one, RED)), 0.0, (one,), (body,))
+    (dressed,), (person,) = add_clothing(picture((one, RED)), (one,), (body,))
     assert apart(dressed.clothing, person.clothing) < 0.05
 
 

@@ -92,10 +92,10 @@ class FrameAnalyzer:
         self._faults: dict[str, bool] = {}  # fault -> whether it has been reported
         # Imported here because the loop's process imports this module too, without OpenCV.
         from gazerig.drivers.camera.health import CameraHealth, TurnedFaceSearch
-        from gazerig.drivers.vision.clothing import ClothingReader
+        from gazerig.drivers.vision.clothing import add_clothing
         from gazerig.drivers.vision.cut_detector import CutDetector
 
-        self._cuts, self._clothing = CutDetector(), ClothingReader()
+        self._cuts, self._add_clothing = CutDetector(), add_clothing
         self._health, self._turned = CameraHealth(orientation.rotation), TurnedFaceSearch()
 
     def analyze(self, shot: Shot) -> Detections:
@@ -116,7 +116,7 @@ class FrameAnalyzer:
         people = () if find_people is None else find_people(image, t_s)
         find_palms = getattr(self._detector, "palms", None)
         palms = None if find_palms is None else find_palms(image, t_s, faces, people)
-        faces, people = self._clothing.add_clothing(image, t_s, faces, people)
+        faces, people = self._add_clothing(image, faces, people)
         bodies_s = perf_counter()
         blobs = self._motion(shot) if self._motion is not None else ()
         spent_s = {

@@ -28,14 +28,9 @@ _HALF_WIDTH_M, _TOP_M, _BOTTOM_M = 0.11, 0.20, 0.50
 _HEAD_HALF_M, _HEAD_UP_M, _BODY_HALF_M = 0.1, 0.18, 0.22
 # Ratio of sizes below which neither of two people is known to be nearer.
 _NEARER = 1.1
-# Largest ratio of sizes of one head from its face and its body, or in two frames.
-_AS_LARGE = 1.4
 # Sampled pixels per side of a box, and smallest visible share of it.
 _SIDE = 12
 _LEAST_SHARE = 0.12
-_LEAST_PX = 3.0
-# Time for which a missed face counts as present.
-_MISSED_S = 0.15
 
 
 def _bin_shares(middles: NDArray[np.float64], sd: float) -> Floats:
@@ -58,104 +53,49 @@ class _Head(NamedTuple):
     px_m: float
 
 
-class ClothingReader:
-    """Reader of the colours of clothes in consecutive frames."""
-
-    def __init__(self) -> None:
-        self._before: list[tuple[float, _Head]] = []
-
-    def add_clothing(
-        self,
-        image: ImageArray,
-        captured_s: float,
-        faces: tuple[DetectedFace, ...],
-        people: tuple[DetectedPerson, ...] = (),
-    ) -> tuple[tuple[DetectedFace, ...], tuple[DetectedPerson, ...]]:
-        """Return faces and people with the colours of their clothes, if visible."""
-        of_faces = [_face_head(one) for one in faces]
-        now = [(captured_s, head) for head in of_faces if head is not None]
-        self._before = now + [
-            (t_s, head)
-            for t_s, head in self._before
-            if 0.0 < captured_s - t_s <= _MISSED_S
-            and not any(_is_same(new, head) for _, new in now)
-        ]
-        if not (faces or people) or image.ndim != 3 or image.size == 0:
-            return faces, people
-        heads = [*of_faces, *[_person_head(one) for one in people]]
-        found = clothing_colours(image, heads, [head for _, head in self._before])
-        return (
-            tuple([replace(one, clothing=of) for one, of in zip(faces, found, strict=False)]),
-            tuple(
-                [
-                    replace(one, clothing=of)
-                    for one, of in zip(people, found[len(faces) :], strict=True)
-                ]
-            ),
-        )
+def add_clothing(
+    image: ImageArray,
+    faces: tuple[DetectedFace, ...],
+    people: tuple[DetectedPerson, ...] = (),
+) -> tuple[tuple[DetectedFace, ...], tuple[DetectedPerson, ...]]:
+    """Return faces and people with the colours of their clothes, if visible."""
+    worn = []
+    for heads in ([*map(_face_head, faces)], [*map(_person_head, people)]):
+        worn.append([clothing_colours(image, head, heads) if head else None for head in heads])
+    return (
+        tuple([replace(one, clothing=of) for one, of in zip(faces, worn[0], strict=True)]),
+        tuple([replace(one, clothing=of) for one, of in zip(people, worn[1], strict=True)]),
+    )
 
 
 def clothing_colours(
-    image: ImageArray, heads: Sequence[_Head | None], covering: Sequence[_Head]
-) -> list[Clothing | None]:
-    """Return the colours below each head, None if too little is visible.
+    image: ImageArray, head: _Head, covering: Sequence[_Head | None]
+) -> Clothing | None:
+    """Return the colours below a head, None if too little is visible.
 
     Args:
         image: BGR image.
-        heads: Heads whose clothes are measured.
-        covering: Heads of all people, who cover those farther away.
+        head: Head whose clothes are measured.
+        covering: Heads of people, who cover those farther away.
     """
     height, width = image.shape[:2]
-    patches, kept, shares = [], [], []
-    for k, head in enumerate(heads):
-        if head is None:
-            continue
-        left, right = head.x - _HALF_WIDTH_M * head.px_m, head.x + _HALF_WIDTH_M * head.px_m
-        top, bottom = head.y + _TOP_M * head.px_m, head.y + _BOTTOM_M * head.px_m
-        if not (
-            right - left >= _LEAST_PX
-            and left < width
-            and right > 0
-            and bottom >= 0
-            and top < height
-        ):
-            continue
-        xs = left + (np.arange(_SIDE) + 0.5) * ((right - left) / _SIDE)
-        ys = top + (np.arange(_SIDE) + 0.5) * ((bottom - top) / _SIDE)
-        seen_x, seen_y = (xs >= 0.0) & (xs < width), (ys >= 0.0) & (ys < height)
-        seen = seen_y[:, None] & seen_x
-        for other in covering:
-            beside = abs(other.x - head.x) > _HALF_WIDTH_M * head.px_m + _BODY_HALF_M * other.px_m
-            if beside or other.y - _HEAD_UP_M * other.px_m > bottom:
-                continue
-            if other.px_m > head.px_m / _NEARER and not _is_same(other, head):
-                seen &= ~_covered_mask(other, xs, ys)
-        share = float(np.count_nonzero(seen)) / seen.size
-        if share < _LEAST_SHARE:
-            continue
-        rows = np.clip(ys, 0, height - 1).astype(np.intp)
-        columns = np.clip(xs, 0, width - 1).astype(np.intp)
-        patches.append(image[rows[:, None], columns])
-        kept.append((k, seen))
-        shares.append(share)
-    out: list[Clothing | None] = [None] * len(heads)
-    if patches:
-        lab = cv2.cvtColor(np.concatenate(patches), cv2.COLOR_BGR2LAB).reshape(len(patches), -1, 3)
-        for (k, seen), pixels, share in zip(kept, lab, shares, strict=True):
-            inside = pixels[seen.ravel()]
-            light = _OF_LIGHT[inside[:, 0]].sum(axis=0)
-            a, b = _OF_CHROMA[inside[:, 1]], _OF_CHROMA[inside[:, 2]]
-            both = np.concatenate([light, (a.T @ b).ravel()]) / np.float32(2 * len(inside))
-            # The squares of these roots of the bins' shares add up to 1.
-            roots = tuple(np.sqrt(both, dtype=np.float64).round(4).tolist())
-            out[k] = Clothing(roots, round(share, 3))
-    return out
-
-
-def _is_same(one: _Head, other: _Head) -> bool:
-    """Return whether two heads belong to one person."""
-    as_large = 1.0 / _AS_LARGE < one.px_m / other.px_m < _AS_LARGE
-    return as_large and hypot(one.x - other.x, one.y - other.y) < _HEAD_HALF_M * other.px_m
+    across = np.linspace(-_HALF_WIDTH_M, _HALF_WIDTH_M, _SIDE)
+    xs = head.x + head.px_m * across
+    ys = head.y + head.px_m * np.linspace(_TOP_M, _BOTTOM_M, _SIDE)
+    seen = ((ys >= 0.0) & (ys < height))[:, None] & (xs >= 0.0) & (xs < width)
+    for other in covering:
+        if other is not None and other.px_m > head.px_m * _NEARER:
+            seen &= ~_covered_mask(other, xs, ys)
+    share = float(seen.mean())
+    if share < _LEAST_SHARE:
+        return None
+    rows, columns = np.clip(ys, 0, height - 1).astype(int), np.clip(xs, 0, width - 1).astype(int)
+    lab = cv2.cvtColor(image[rows[:, None], columns], cv2.COLOR_BGR2LAB)[seen]
+    light = _OF_LIGHT[lab[:, 0]].sum(axis=0)
+    chroma = _OF_CHROMA[lab[:, 1]].T @ _OF_CHROMA[lab[:, 2]]
+    both = np.concatenate([light, chroma.ravel()]) / np.float32(2 * len(lab))
+    # The squares of these roots of the bins' shares add up to 1.
+    return Clothing(tuple(np.sqrt(both, dtype=np.float64).round(4).tolist()), round(share, 3))
 
 
 def _covered_mask(

@@ -15,7 +15,7 @@ from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections
-from gazerig.drivers.vision.clothing import ClothingReader
+from gazerig.drivers.vision.clothing import add_clothing
 from gazerig.drivers.vision.cut_detector import CutDetector
 from gazerig.gaze.types import Percept
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
@@ -102,13 +102,13 @@ def pictures(
     ways: list[Way], seconds: float, rng: np.random.Generator
 ) -> Iterator[tuple[Detections, dict[int, Place], set[int]]]:
     """Yield what a detector finds, where people are by number, and who of them can be found."""
-    crowd, reader = Crowd(len(ways), rng.spawn(1)[0]), ClothingReader()
+    crowd = Crowd(len(ways), rng.spawn(1)[0])
     for k in range(1, int(seconds * RATE_HZ) + 1):
         places = {i: np.array(way(k / RATE_HZ)) for i, way in enumerate(ways)}
         seen = {i: p for i, p in places.items() if _in_view(p) and not _hidden(p, places.values())}
         faces = [detected(p, rng) for p in seen.values() if rng.random() >= _MISSED]
         found = tuple(faces[n] for n in rng.permutation(len(faces)))
-        found, _ = reader.add_clothing(crowd.image(places, k), k / RATE_HZ, found)
+        found, _ = add_clothing(crowd.image(places, k), found)
         yield Detections(k / RATE_HZ, k, *SIZE, faces=found), places, set(seen)
 
 
@@ -131,7 +131,7 @@ def come_and_go(people: int, seconds: float, rng: np.random.Generator) -> Counte
     The number of a visit is the one that it had in most pictures.
     """
     see, poses = perception()
-    crowd, reader = Crowd(people, rng.spawn(1)[0]), ClothingReader()
+    crowd = Crowd(people, rng.spawn(1)[0])
     last: dict[int, tuple[float, int]] = {}
     owner: dict[int, int] = {}
     count: Counter[str] = Counter()
@@ -148,7 +148,7 @@ def come_and_go(people: int, seconds: float, rng: np.random.Generator) -> Counte
                     faces.append(detected(p, rng))
             if rng.random() < _FALSE:
                 faces.append(detected(rng.uniform((-0.7, -0.2, 1.0), (0.7, 0.4, 2.0)), rng))
-            found, _ = reader.add_clothing(crowd.image(places, k), t, tuple(faces))
+            found, _ = add_clothing(crowd.image(places, k), tuple(faces))
             percept = present(see.see(Detections(t, k, *SIZE, faces=found), poses))
             numbers.update(number for i, number in _matched(places, percept) if i is not None)
         ((number, _),) = numbers.most_common(1)
