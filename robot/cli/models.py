@@ -13,7 +13,6 @@ from gazerig.drivers.vision.model_files import MODEL_FILES, models_folder
 from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.progress_bar import progress_bar
 from gazerig.robot.cli.terminal import clear_errors
-from gazerig.robot.model.clock import RealClock
 
 app = typer.Typer()
 models = typer.Typer(
@@ -72,7 +71,7 @@ def fetch_models(
             for address in dict.fromkeys(file.address for file in wanted):
                 some = [file for file in wanted if file.address == address]
                 try:
-                    brought = fetch(some, RealClock().now_s, progress, folder)
+                    brought = fetch(some, progress, folder)
                 except SetupError as error:
                     failed.append(str(error))
                     continue
