@@ -1,12 +1,12 @@
 """Face detection that searches some frames and places known faces in all of them.
 
-In every frame known faces are placed at their previous position; one that is no longer there is
-searched nearby. New faces come from two searches: of the whole frame, every few frames; and, in the
-frames between, of one tile of the frame after another, for far faces. So all frames take about the
-same time.
+In every frame known faces are placed at their previous position. New faces come from two searches:
+of the whole frame, every few frames and if a face was lost; and, in the frames between, of one tile
+of the frame after another, for far faces. So all frames take about the same time.
 
-YuNet searches if its file is present, in turns with MTCNN, which finds tilted and drawn faces
-better, and which places landmarks more accurately. Either of them is enough.
+YuNet searches if its file is present, and MTCNN too in every fourth search, as it finds tilted and
+drawn faces better. MTCNN also places landmarks more accurately. Either of them is enough. While a
+face is there that only YuNet finds, YuNet searches every frame.
 """
 
 from functools import cache
@@ -22,7 +22,7 @@ from gazerig.drivers.vision.face.params import MIN_CONFIDENCE, MIN_FACE_PX, Face
 from gazerig.drivers.vision.face.preprocess import (
     FoundFace,
     Tile,
-    as_bgr,
+    improve_contrast,
     new_faces,
     sort_by_size,
     whole_image,
@@ -86,7 +86,7 @@ def _tile_spans(length_px: int, scale: float) -> list[tuple[int, int]]:
 _KEEP_CONFIDENCE = 0.5
 # Number of frames between two searches of the whole frame; and while no face is known.
 _SEARCH_EVERY, _SEARCH_SOON = 4, 2
-# With YuNet, every n-th search is MTCNN's.
+# With YuNet, every n-th search is also MTCNN's.
 _MTCNN_EVERY = 4
 # A far face needs a higher confidence than a near one, as a few pixels can resemble a face.
 _FAR_CONFIDENCE = 0.9
@@ -95,7 +95,8 @@ _FAR_CONFIDENCE = 0.9
 class AutoDetector:
     """Detector of faces with five landmarks, which stores those of the previous frame.
 
-    searched: whether the last frame was searched as a whole
+    searched: whether the last frame was searched as a whole; not by YuNet for a lost face alone,
+        which takes a third of the time
     """
 
     def __init__(self, params: FaceDetectorParams) -> None:
@@ -105,24 +106,16 @@ class AutoDetector:
             ModelFileError: neither can be loaded.
         """
         self._params, self._log = params, EventLog()
-        self._mtcnn: MtcnnDetector | None = None
         self._networks: list[MtcnnDetector | YunetDetector] = []
-        faults: list[str] = []
-        try:
-            self._mtcnn = _mtcnn(params)
-            self._networks.append(self._mtcnn)
-        except (ImportError, ModelFileError) as error:
-            faults.append(f"{error}; until then yunet finds the faces")
-        try:
-            self._networks.append(_yunet())
-        except FileNotFoundError:
-            pass
-        except (ImportError, ModelFileError) as error:
-            faults.append(f"{error}; until then mtcnn finds the faces")
+        for load, other in ((_mtcnn, "yunet"), (_yunet, "mtcnn")):
+            try:
+                self._networks.append(load(params))
+            except FileNotFoundError:
+                pass  # YuNet's file is optional
+            except (ImportError, ModelFileError) as error:
+                self._log.add(f"{error}; until then {other} finds the faces")
         if not self._networks:
-            raise ModelFileError("; ".join(faults))
-        for fault in faults:
-            self._log.add(fault)
+            raise ModelFileError("; ".join(self._log.drain()))
         self._known: list[FoundFace] = []
         self._size: tuple[int, ...] = ()
         self._since_search, self._searches, self._next_tile = 0, 0, 0
@@ -130,9 +123,9 @@ class AutoDetector:
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Return faces, the largest first, in pixels of the image."""
-        frame = as_bgr(image)
-        if frame.size == 0:
+        if image.size == 0:
             return ()
+        frame = improve_contrast(image)
         first = frame.shape != self._size
         self._size = frame.shape
         if first:
@@ -141,23 +134,26 @@ class AutoDetector:
         near = min(1.0, self._params.work_width_px / width) * _LEAST_PX / MIN_FACE_PX
         tiles = far_tiles(width, height, near)
         known = self._track_faces(frame)
-        soon = len(known) < len(self._known)
+        is_lost = len(known) < len(self._known)
         self._since_search += 1
-        every = _SEARCH_SOON if soon or not known else _SEARCH_EVERY
+        every = _SEARCH_EVERY if known else _SEARCH_SOON
         self.searched = first or self._since_search >= every
-        if self.searched:
+        if self.searched or is_lost:
             self._since_search = 0
             self._searches += 1
+            networks = self._networks[-1:]
+            if first or self._searches % _MTCNN_EVERY == 0:
+                networks = self._networks
+            self.searched |= networks == self._networks
             tile = whole_image(frame, self._params.work_width_px)
-            turn = 0 if self._searches % _MTCNN_EVERY == 0 else -1
-            for network in self._networks if first else (self._networks[turn],):
+            for network in networks:
                 found = network.search(frame, tile, known, MIN_CONFIDENCE)
                 known += self._place_found(frame, found, known)
-        elif tiles:
-            self._next_tile = (self._next_tile + 1) % len(tiles)
-            known += self._search_tile(frame, known, tiles[self._next_tile])
-        for tile in tiles if first else ():
-            known += self._search_tile(frame, known, tile)
+        if not first:
+            self._next_tile = (self._next_tile + 1) % max(1, len(tiles))
+            tiles = tiles[self._next_tile : self._next_tile + 1] if not self.searched else ()
+        for tile in tiles:
+            known += self._networks[0].search(frame, tile, known, _FAR_CONFIDENCE)
         self._known = known
         return sort_by_size([one.face for one in known])
 
@@ -166,39 +162,29 @@ class AutoDetector:
         return self._log.drain()
 
     def _track_faces(self, frame: ImageArray) -> list[FoundFace]:
-        """Return the known faces that are still present, placed in this frame."""
-        boxes = np.array([one.box for one in self._known])
-        if self._mtcnn is None:
-            judged: list[FoundFace | None] = [None] * len(boxes)
-        else:
-            judged = self._mtcnn.place(frame, boxes, _KEEP_CONFIDENCE)
+        """Return the faces of MTCNN that are still present, placed in this frame."""
+        known = [one for one in self._known if one.by_mtcnn]
+        boxes = np.array([one.box for one in known])
+        placed = self._networks[0].place(frame, boxes, _KEEP_CONFIDENCE)
         found = []
-        for one, now in zip(self._known, judged, strict=True):
+        for one, now in zip(known, placed, strict=True):
             if now is not None:
                 # The search box is predicted by the motion between frames: the network places a
                 # face that is off the centre of its box too near to that centre.
                 moved = (now.face.landmarks_px - one.face.landmarks_px).mean(axis=0)
                 found.append(now._replace(box=now.box + np.tile(moved, 2)))
-                continue
-            for network in self._networks:
-                now = now or network.find_again(frame, one)
-            found += [now] if now else []
         return new_faces(found, [])
 
     def _place_found(
         self, frame: ImageArray, found: list[FoundFace], known: list[FoundFace]
     ) -> list[FoundFace]:
         """Return found faces, placed by MTCNN where it finds them too."""
-        if self._mtcnn is None or all(one.by_mtcnn for one in found):
+        if all(one.by_mtcnn for one in found):
             return found
-        placed = self._mtcnn.place(frame, np.array([one.box for one in found]), MIN_CONFIDENCE)
+        placed = self._networks[0].place(
+            frame, np.array([one.box for one in found]), MIN_CONFIDENCE
+        )
         return new_faces([now or one for one, now in zip(found, placed, strict=True)], known)
-
-    def _search_tile(
-        self, frame: ImageArray, known: list[FoundFace], tile: Tile
-    ) -> list[FoundFace]:
-        """Search a tile for small faces; return the new ones."""
-        return self._networks[0].search(frame, tile, known, _FAR_CONFIDENCE)
 
 
 def _mtcnn(params: FaceDetectorParams) -> "MtcnnDetector":
@@ -207,7 +193,7 @@ def _mtcnn(params: FaceDetectorParams) -> "MtcnnDetector":
     return MtcnnDetector(params)
 
 
-def _yunet() -> "YunetDetector":
+def _yunet(params: FaceDetectorParams) -> "YunetDetector":
     from gazerig.drivers.vision.face.yunet import YunetDetector
 
     return YunetDetector()

@@ -23,15 +23,13 @@ from gazerig.drivers.vision.face.preprocess import (
     Boxes,
     FoundFace,
     Tile,
-    as_bgr,
     crop_square,
-    grey_range,
+    improve_contrast,
     is_new,
     new_faces,
     sort_by_size,
     to_squares,
     whole_image,
-    widen,
 )
 
 Floats32 = NDArray[np.float32]
@@ -60,13 +58,6 @@ _SAME = 0.5
 _SHRINK = 0.709
 # Most candidates of the second stage, which limits the time for a complex image.
 _MOST = 96
-# A crop whose bright pixels are darker than the first value is brightened to the wanted value, at
-# most by the gain; one with less contrast than the second value gets that contrast.
-_DARK_GREY, _PALE_GREY, _WANTED_GREY, _MOST_GAIN = 90.0, 45.0, 180.0, 8.0
-_SAMPLED = 3
-# Square in which a lost face is searched: factor on its own square, and size in pixels at which the
-# first network works best.
-_AROUND, _AROUND_PX = 2.6, 40
 
 
 class MtcnnDetector:
@@ -90,9 +81,9 @@ class MtcnnDetector:
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Return the faces of a still, the largest first, in pixels of the image."""
-        frame = as_bgr(image)
-        if frame.size == 0:
+        if image.size == 0:
             return ()
+        frame = improve_contrast(image)
         tile = whole_image(frame, self._params.work_width_px)
         found = self.search(frame, tile, [], MIN_CONFIDENCE)
         return sort_by_size([one.face for one in found])
@@ -117,17 +108,6 @@ class MtcnnDetector:
         every = to_squares(every)
         every = self._refine(frame, every[is_new(every, known)])
         return new_faces([one for one in self.place(frame, every, least) if one], known)
-
-    def find_again(self, frame: ImageArray, one: FoundFace) -> FoundFace | None:
-        """Search for a lost face around its previous position."""
-        if not one.by_mtcnn:
-            return None
-        part, where = crop_square(frame, widen(one.box, _AROUND), _AROUND_PX)
-        boxes, _ = self._propose(part, _PROPOSE_ONE_AT)
-        boxes = boxes * ((where[2] - where[0]) / _AROUND_PX) + np.tile(where[:2], 2)
-        placed = self.place(frame, self._refine(frame, to_squares(boxes)), MIN_CONFIDENCE)
-        found = [face for face in placed if face]
-        return max(found, key=lambda face: face.face.confidence, default=None)
 
     def place(self, frame: ImageArray, boxes: Boxes, least: float) -> list[FoundFace | None]:
         """Return the face in each square box, None where the last network finds none."""
@@ -205,15 +185,6 @@ def _suppress_overlaps(boxes: Boxes, scores: NDArray[np.floating]) -> NDArray[np
 def _run(network: cv2.dnn.Net, name: str, frames: NDArray[np.uint8]) -> tuple[Floats32, ...]:
     """Run a network on (n, x, y, RGB) bytes and return its outputs in the order of _OUTPUTS."""
     blob = frames.astype(np.float32, order="C")
-    for part in blob:
-        dark, bright = grey_range(part[::_SAMPLED, ::_SAMPLED, 1])
-        if bright < _DARK_GREY:
-            part *= min(_WANTED_GREY / max(bright, 1.0), _MOST_GAIN)
-            np.minimum(part, 255.0, out=part)
-        elif bright - dark < _PALE_GREY:
-            part -= dark
-            part *= min(_WANTED_GREY / max(bright - dark, 1.0), _MOST_GAIN)
-            np.clip(part, 0.0, 255.0, out=part)
     blob -= 127.5
     blob *= 1.0 / 128.0
     network.setInput(blob)

@@ -96,12 +96,6 @@ def to_squares(boxes: Boxes) -> Boxes:
     return np.hstack([centre - half, centre + half])
 
 
-def widen(box: Boxes, times: float) -> Boxes:
-    """Return a square with the same centre, wider by a factor."""
-    middle, half = (box[:2] + box[2:]) / 2.0, times * (box[2] - box[0]) / 2.0
-    return np.concatenate([middle - half, middle + half])
-
-
 def grey_range(samples: NDArray[Any]) -> tuple[float, float]:
     """Return the grey levels below and above which a hundredth of an image is."""
     ordered = np.sort(samples, axis=None)
@@ -130,31 +124,6 @@ def sort_by_size(faces: list[DetectedFace]) -> tuple[DetectedFace, ...]:
     return tuple(sorted(faces, key=lambda f: (-f.box_px[2] * f.box_px[3], f.box_px)))
 
 
-def as_bgr(image: ImageArray) -> ImageArray:
-    """Convert any of the usual pixel layouts to contiguous BGR.
-
-    Raises:
-        ValueError: the array is not an image of 8-bit numbers.
-    """
-    shape = image.shape
-    if image.dtype != np.uint8 or len(shape) not in (2, 3) or shape[2:] not in _LAYOUTS:
-        raise ValueError(
-            f"an image is (height, width[, 1, 3 or 4]) of uint8, not {shape} of {image.dtype}"
-        )
-    code = _LAYOUTS[shape[2:]]
-    if code is None or image.size == 0:
-        return np.ascontiguousarray(image)
-    return np.asarray(cv2.cvtColor(np.ascontiguousarray(image), code), dtype=np.uint8)
-
-
-_LAYOUTS: dict[tuple[int, ...], int | None] = {
-    (): cv2.COLOR_GRAY2BGR,
-    (1,): cv2.COLOR_GRAY2BGR,
-    (3,): None,
-    (4,): cv2.COLOR_BGRA2BGR,
-}
-
-
 # Boxes that are shrunk by more than this are cropped at whole pixels and averaged; others are
 # cropped between pixels, as half a pixel matters for a face of ten.
 _AVERAGED_FROM = 1.5
@@ -171,14 +140,10 @@ def crop_square(
     """
     if box[2] - box[0] > _AVERAGED_FROM * side_px:
         box = np.rint(box)
-        left, top, right, bottom = (int(edge) for edge in box)
-        inside = image[max(0, top) : max(0, bottom), max(0, left) : max(0, right)]
-        if inside.shape[:2] != (bottom - top, right - left):
-            patch = np.zeros((bottom - top, right - left, 3), np.uint8)
-            x, y = max(0, -left), max(0, -top)
-            patch[y : y + inside.shape[0], x : x + inside.shape[1]] = inside
-            inside = patch
-        part = cv2.resize(inside, (side_px, side_px), interpolation=cv2.INTER_AREA)
+        left, top, right, bottom = box.astype(int).tolist()
+        M = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top]])
+        whole = cv2.warpAffine(image, M, (right - left, bottom - top), flags=cv2.INTER_NEAREST)
+        part = cv2.resize(whole, (side_px, side_px), interpolation=cv2.INTER_AREA)
         return np.asarray(part, np.uint8), box
     left, top, right, bottom = box.tolist()
     x, y = side_px / max(right - left, 1e-3), side_px / max(bottom - top, 1e-3)

@@ -10,10 +10,7 @@ from gazerig.drivers.vision.face.preprocess import (
     Boxes,
     FoundFace,
     Tile,
-    crop_square,
-    improve_contrast,
     new_faces,
-    widen,
 )
 from gazerig.drivers.vision.model_files import YUNET
 
@@ -23,10 +20,6 @@ _SAME, _MOST = 0.3, 5000
 _CONFIDENCE = 0.7
 # Narrower frames are not searched: OpenCV reads beyond the memory of strips a few pixels wide.
 _LEAST_PX = 24
-# A known face is dropped when its confidence falls below this.
-_KEEP_CONFIDENCE = 0.5
-# Square in which a face is searched again: factor on its own square, and size in pixels.
-_AROUND, _AROUND_PX = 2.0, 96
 # Half the side of a face's square, in root mean square distances of the five landmarks from their
 # centre, and its offset above that centre.
 _SQUARE, _ABOVE = 2.1, 0.13
@@ -57,12 +50,9 @@ class YunetDetector:
         rows = self._rows(scaled, stretch, (tile.left, tile.top), least)
         return new_faces([_found(row) for row in rows], known)
 
-    def find_again(self, frame: ImageArray, one: FoundFace) -> FoundFace | None:
-        """Search for a lost face around its previous position."""
-        part, where = crop_square(frame, widen(one.box, _AROUND), _AROUND_PX)
-        scale = float(where[2] - where[0]) / _AROUND_PX
-        rows = self._rows(part, (scale, scale), (where[0], where[1]), _KEEP_CONFIDENCE)
-        return _found(rows[np.argmax(rows[:, 14])]) if len(rows) else None
+    def place(self, frame: ImageArray, boxes: Boxes, least: float) -> list[FoundFace | None]:
+        """Return None for each box: this network only searches."""
+        return [None] * len(boxes)
 
     def _rows(
         self,
@@ -81,7 +71,7 @@ class YunetDetector:
             return np.zeros((0, 15))
         self._net.setInputSize((width, height))
         self._net.setScoreThreshold(least)
-        rows = self._net.detect(np.ascontiguousarray(improve_contrast(scaled)))[1]
+        rows = self._net.detect(np.ascontiguousarray(scaled))[1]
         if rows is None:  # OpenCV's value for no face
             return np.zeros((0, 15))
         found = np.asarray(rows, dtype=np.float64)
