@@ -35,12 +35,11 @@ class CutDetector:
         """Return the number of an image's scene, from 0; it increases with each cut.
 
         Args:
-            image: Image (h, w) or (h, w, channels), uint8, of any size.
+            image: Image (h, w, 3), uint8, of any size.
         """
         step = max(1, min(image.shape[0], image.shape[1]) // _SAMPLED_PX)
-        green = image[::step, ::step, 1] if image.ndim == 3 else image[::step, ::step]
-        size = (WIDTH, HEIGHT)
-        small = cv2.resize(np.ascontiguousarray(green), size, interpolation=cv2.INTER_AREA)
+        green = np.ascontiguousarray(image[::step, ::step, 1])
+        small = cv2.resize(green, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
         now = np.asarray(small, np.float32)
         if now.std() < _LEAST_CONTRAST:
             return self._scene  # later images are compared with the last one with content

@@ -47,7 +47,6 @@ from gazerig.drivers.vision.motion.flow import (
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.patch_motion import PatchMotion, blur, patch_motion
 from gazerig.drivers.vision.motion.segmentation import (
-    LEAST_FLOW_PX,
     is_unchanged,
     segment_motion,
 )
@@ -90,22 +89,19 @@ class Distance(NamedTuple):
 
 
 def shrink_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane | None:
-    """Resize a depth image to the small image's size; invalid distances become NaN."""
-    if depth_m is None or depth_m.ndim != 2 or depth_m.size == 0:
+    """Resize a depth image to the small image's size."""
+    if depth_m is None or depth_m.size == 0:
         return None
-    depth = np.asarray(depth_m, dtype=np.float32)
-    if depth.shape != shape:  # nearest neighbour, as the mean of two surfaces is on neither
-        size = shape[1], shape[0]
-        depth = np.asarray(cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST), np.float32)
-    out: Plane = np.where(np.isfinite(depth) & (depth > 0.0), depth, np.float32(np.nan))
-    return out
+    # Nearest neighbour, as the mean of two surfaces is on neither.
+    size, depth = (shape[1], shape[0]), depth_m.astype(np.float32)
+    return np.asarray(cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST), np.float32)
 
 
 def distance(group: PixelGroup, depth: Plane | None) -> Distance:
     """Return a thing's distance from the depth image, or the assumed one."""
     if depth is not None:
         values = depth[group.rows, group.columns]
-        values = values[np.isfinite(values)]
+        values = values[np.isfinite(values) & (values > 0.0)]
         if len(values) >= max(_LEAST_PIXELS, _LEAST_SHARE * len(group.columns)):
             z = float(np.median(values))
             spread = _MAD * float(np.median(np.abs(values - z)))
@@ -127,11 +123,6 @@ def velocity(p_m: Vec3, flow_px_s: tuple[float, float], loom_1_s: float, K: Floa
         z * flow_px_s[1] / float(K[1, 1]) - loom_1_s * y,
         -loom_1_s * z,
     )
-
-
-def radius_m(area_px: float, z_m: float, K: Floats) -> float:
-    """Return the radius of a disc with this area in the image."""
-    return z_m * float(np.sqrt(area_px / (np.pi * K[0, 0] * K[1, 1])))
 
 
 class MotionDetector:
@@ -223,24 +214,22 @@ class MotionDetector:
             return (), why
         groups = cluster_motion(segment_motion(pair, ego, R_now_before is None))
         soft = (blur(pair.fine_now), blur(pair.fine_before)) if groups else ()
-        moving: list[tuple[PixelGroup, Floats, PatchMotion]] = []
-        for group in groups:
-            places = np.column_stack((group.columns, group.rows)).astype(np.float64)
-            centre = places.mean(axis=0)
-            motion = patch_motion(places, group.flow, centre, *soft, ego.B)
-            if _motion_px(group, motion, now.grey.shape) > LEAST_FLOW_PX:
-                moving.append((group, centre, motion))
+        centres = [np.array((group.columns.mean(), group.rows.mean())) for group in groups]
+        motions = [
+            patch_motion(group, centre, *soft, ego.B)
+            for group, centre in zip(groups, centres, strict=True)
+        ]
         follows = self._tracks.step(
-            [centre for _, centre, _ in moving],
-            [np.array(motion.slide_px) / dt_s for _, _, motion in moving],
-            [float(np.sqrt(group.box[2] * group.box[3])) for group, _, _ in moving],
+            centres,
+            [np.array(motion.slide_px) / dt_s for motion in motions],
+            [float(np.sqrt(group.box[2] * group.box[3])) for group in groups],
             ego.total,
             now.captured_s,
             dt_s,
         )
         blobs = tuple(
             self._blob(group, motion, follow, now, depth, dt_s)
-            for (group, _, motion), follow in zip(moving, follows, strict=True)
+            for group, motion, follow in zip(groups, motions, follows, strict=True)
             if self._tracks.is_confirmed(follow)
         )
         return blobs, ""
@@ -282,7 +271,8 @@ class MotionDetector:
             follow.id,
             _KIND,
             p,
-            radius_m(len(group.columns), far.z_m, now.K),
+            # That of a disc with this area.
+            far.z_m * float(np.sqrt(len(group.columns) / (np.pi * now.K[0, 0] * now.K[1, 1]))),
             spin_rad_s=_shrink_by_noise(motion.spin_rad, motion.sd) / dt_s,
             loom_1_s=loom,
             v_camera_m_s=velocity(p, flow_px_s, loom, now.K),
@@ -302,18 +292,6 @@ class MotionDetector:
             / float(now.K[0, 0]),
             from_side=x <= edge_px or x + width >= now.grey.shape[1] - edge_px,
         )
-
-
-def _motion_px(group: PixelGroup, motion: PatchMotion, shape: tuple[int, ...]) -> float:
-    """Return the approximate root mean square motion of a patch's pixels."""
-    slide = float(np.hypot(*motion.slide_px))
-    if _is_cut(group, shape):
-        return slide  # its growth is unknown
-    growth = _shrink_by_noise(motion.growth, motion.sd)
-    spin = _shrink_by_noise(motion.spin_rad, motion.sd)
-    return float(
-        np.hypot(slide, 0.3 * np.sqrt(group.box[2] * group.box[3]) * np.hypot(growth, spin))
-    )
 
 
 def _is_cut(group: PixelGroup, shape: tuple[int, ...]) -> bool:

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from gazerig.drivers.vision.motion.flow import (
     Floats,
     ImagePair,
-    upper_median,
     warp_points,
 )
 
@@ -48,8 +47,9 @@ _MIXED_PX = 0.25
 # Standard deviations of a homography's numbers, in focal lengths, which regularise it between
 # points.
 _SPREADS = np.array([0.1, 0.1, 0.2, 0.1, 0.1, 0.2, 0.05, 0.05])
-_PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 _POINT_NOISE = 1e-3
+_BELIEF = np.diag((_POINT_NOISE / _SPREADS) ** 2)
+_PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 # Requirements for accepting that the whole image moved, against or without the joints: share of the
 # textured points that moved together, number of the image's cells with them, and largest share of
 # the points at the edge that may have kept their position. A person close to the lens fills most of
@@ -194,12 +194,13 @@ def _fit_homography(
     focal, centre = float(K[0, 0]), K[:2, 2]
     a, b = (points - centre) / focal, (there - centre) / focal
     # Rows (2 n, 8) of b (h6 x + h7 y + 1) = (h0 x + h1 y + h2, h3 x + h4 y + h5).
-    n = len(a)
-    rows = np.zeros((2 * n, 8))
-    for axis, part in enumerate((rows[:n], rows[n:])):
-        part[:, 3 * axis : 3 * axis + 2] = a
-        part[:, 3 * axis + 2] = 1.0
-        part[:, 6:] = -a * b[:, axis : axis + 1]
+    plain, none = np.column_stack((a, np.ones(len(a)))), np.zeros((len(a), 3))
+    rows = np.vstack(
+        (
+            np.hstack((plain, none, -a * b[:, :1])),
+            np.hstack((none, plain, -a * b[:, 1:])),
+        )
+    )
     h = _PLAIN
     errors = focal * np.hypot(*(b - a).T)
     # At worst a third of the points is room; their error is the initial scale.
@@ -210,11 +211,9 @@ def _fit_homography(
         if np.count_nonzero(weights) < _LEAST_POINTS:
             return None
         # The eight numbers, with a weak prior of no motion.
-        both = np.concatenate((weights, weights)) / _POINT_NOISE**2
-        weighted = rows * both[:, None]
-        belief = np.diag(_SPREADS**-2.0)
-        right = weighted.T @ b.T.ravel() + belief @ _PLAIN
-        last, h = h, np.asarray(np.linalg.solve(rows.T @ weighted + belief, right))
+        weighted = rows * np.tile(weights, 2)[:, None]
+        right = weighted.T @ b.T.ravel() + _BELIEF @ _PLAIN
+        last, h = h, np.asarray(np.linalg.solve(rows.T @ weighted + _BELIEF, right))
         errors = focal * np.hypot(*(warp_points(np.append(h, 1.0).reshape(3, 3), a) - b).T)
         done = np.abs(h - last).max() * focal < _SMALL_PX and scale < 2 * noise
         noise = _noise_px(errors, weights > 0.0)
@@ -233,7 +232,7 @@ def _fit_homography(
 
 def _noise_px(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
     """Return the standard deviation along one axis: the median length is 1.18 times it."""
-    return max(_LEAST_NOISE_PX, upper_median(errors[mask]) / 1.177)
+    return max(_LEAST_NOISE_PX, float(np.median(errors[mask])) / 1.177)
 
 
 def _edge_mask(points: Floats, shape: tuple[int, ...]) -> NDArray[np.bool_]:

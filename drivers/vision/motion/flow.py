@@ -93,12 +93,6 @@ def to_original_px(
     return (point_px[0] + 0.5) / scale[0] - 0.5, (point_px[1] + 0.5) / scale[1] - 0.5
 
 
-def upper_median(values: Floats) -> float:
-    """Return the upper median of (n,) values, n > 0; five times faster than NumPy's."""
-    half = len(values) // 2
-    return float(np.partition(values, half)[half])
-
-
 class ImagePair(NamedTuple):
     """Two images, aligned by the turn that the joints measured.
 

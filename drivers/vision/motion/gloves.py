@@ -79,12 +79,12 @@ class GloveDetector:
     """Detector of red gloves in consecutive images."""
 
     def __init__(self) -> None:
-        self.forget()
+        self._known: list[_Glove] = []
+        self._next_id = _FIRST_ID
 
     def forget(self) -> None:
         """Discard all gloves; numbers are not reused."""
-        self._known: list[_Glove] = []
-        self._next_id = getattr(self, "_next_id", _FIRST_ID)
+        self._known = []
 
     def add_gloves(
         self,
@@ -104,15 +104,13 @@ class GloveDetector:
         """Return the gloves in an image, the nearest first.
 
         Args:
-            bgr: Image (h, w, 3); nothing is found in an image without colours.
+            bgr: Image (h, w, 3).
             captured_s: Time of its capture, seconds.
             lens: Focal lengths and centre in its pixels.
             work_px: Longest side above which an image is scaled down to it.
         """
-        if bgr.ndim != 3 or bgr.shape[2] < 3:
-            return ()
         share = min(1.0, work_px / max(bgr.shape[:2]))
-        small = bgr[:, :, :3]
+        small = bgr
         if share < 1.0:
             size = round(share * bgr.shape[1]), round(share * bgr.shape[0])
             small = np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_AREA), np.uint8)

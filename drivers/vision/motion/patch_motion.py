@@ -14,13 +14,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.vision.motion.clustering import PixelGroup
 from gazerig.drivers.vision.motion.flow import (
     TO_FINE,
     TO_SEARCHED,
     Floats,
     Grey,
     Plane,
-    upper_median,
     warp_points,
 )
 
@@ -82,7 +82,7 @@ def blur(grey: Grey) -> Plane:
 
 
 def patch_motion(
-    places: Floats, flow: Floats, centre: Floats, now: Plane, before: Plane, B: Floats
+    group: PixelGroup, centre: Floats, now: Plane, before: Plane, B: Floats
 ) -> PatchMotion:
     """Return the motion of a patch, without the camera's.
 
@@ -91,19 +91,20 @@ def patch_motion(
     scale and its angle, not from the divergence and curl of the flow.
 
     Args:
-        places: Its pixels (n, 2) in the newer image.
-        flow: Their motion (n, 2) from the older image, without the camera's.
+        group: Its pixels.
         centre: The point (2,) whose motion is the slide.
         now: The newer of the fine images, blurred.
         before: The older one, blurred.
         B: Homography of still things from the newer image to the older one.
     """
-    area_px2, step = 4 * len(places), max(1, len(places) // _SAMPLE)
+    count = len(group.columns)
+    some = slice(None, None, max(1, count // _SAMPLE))
     # Everything is computed in pixels of the fine images.
-    places, flow, centre = 2.0 * places[::step], 2.0 * flow[::step], 2.0 * centre + 0.5
+    places = 2.0 * np.column_stack((group.columns, group.rows))[some]
+    flow, centre = 2.0 * group.flow[some], 2.0 * centre + 0.5
     arms = places - centre
     size = max(1.0, float(np.sqrt((arms**2).sum(axis=1).mean())))
-    back = _fit_to_flow(arms, flow, size, area_px2)
+    back = _fit_to_flow(arms, flow, size, 4 * count)
     if len(places) >= _LEAST_POINTS:
         at = warp_points(TO_FINE @ B @ TO_SEARCHED, centre + _AROUND)
         slope = ((at[1:] - at[0]) / _STEP_PX).T
@@ -122,7 +123,7 @@ def _fit_to_flow(arms: Floats, flow: Floats, size: float, area_px2: float) -> _A
         return _Affine(np.eye(2), -np.median(flow, axis=0), np.inf)
     M = np.asarray(fitted, np.float64)
     errors = np.hypot(*(arms @ M[:, :2].T + M[:, 2] - arms + flow).T)
-    noise_px = max(_LEAST_FLOW_NOISE_PX, upper_median(errors) / 1.177)
+    noise_px = max(_LEAST_FLOW_NOISE_PX, float(np.median(errors)) / 1.177)
     # Half of the squares of the arms is along each axis.
     sd = noise_px / size * sqrt(2.0 / max(1.0, area_px2 / _SQUARE_PX2))
     return _Affine(M[:, :2], M[:, 2], sd)
@@ -184,6 +185,6 @@ def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, F
 
 def _tukey_weights(errors: Floats) -> tuple[float, Floats]:
     """Return the noise of errors without their mean, and Tukey's weights."""
-    apart = np.abs(errors - upper_median(errors))
-    noise = max(_LEAST_NOISE, 1.4826 * upper_median(apart))
+    apart = np.abs(errors - float(np.median(errors)))
+    noise = max(_LEAST_NOISE, 1.4826 * float(np.median(apart)))
     return noise, np.maximum(1.0 - (apart / (_TUKEY * noise)) ** 2, 0.0) ** 2

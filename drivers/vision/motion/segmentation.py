@@ -25,8 +25,8 @@ from gazerig.drivers.vision.motion.flow import (
     remove_illumination,
 )
 
-LEAST_FLOW_PX = 0.125
-"""Smallest displacement that counts as motion, pixels."""
+# Smallest displacement that counts as motion, pixels.
+_LEAST_FLOW_PX = 0.125
 # Ratio to the noise of the flow on the still background that motion must exceed.
 _NOISE_FACTOR = 5.0
 # Threshold as a share of the camera's own motion: still things nearer than the background move
@@ -72,7 +72,7 @@ def segment_motion(pair: ImagePair, ego: EgoMotion, by_image: bool = False) -> M
             nearer thing cannot have (against the room or across its motion) counts.
     """
     there, at = _background_positions(ego.B, pair.now.shape), add_grid(pair.flow)
-    threshold = max(LEAST_FLOW_PX, _NOISE_FACTOR * ego.noise_px)
+    threshold = max(_LEAST_FLOW_PX, _NOISE_FACTOR * ego.noise_px)
     rest = there - at
     moves = rest
     if by_image and ego.shift_px > _STANDS_PX:

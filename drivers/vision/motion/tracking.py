@@ -97,9 +97,8 @@ class MotionTracks:
         """Predict every track to ``t_s`` and delete those unseen for too long."""
         self._patch_tracks = [f for f in self._patch_tracks if t_s - f.seen_s <= _FORGET_S]
         for follow in self._patch_tracks:
-            at = warp_points(total, follow.centre[None, :])[0] + follow.velocity_px_s * dt_s
-            if np.isfinite(at).all():
-                follow.centre = at
+            follow.centre = warp_points(total, follow.centre[None, :])[0]
+            follow.centre = follow.centre + follow.velocity_px_s * dt_s
 
     def forget(self) -> None:
         """Discard all tracks; ids are not reused."""
