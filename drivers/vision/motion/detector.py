@@ -213,10 +213,10 @@ class MotionDetector:
             self._tracks.predict(ego.total, now.captured_s, dt_s)
             return (), why
         groups = cluster_motion(segment_motion(pair, ego, R_now_before is None))
-        soft = (blur(pair.fine_now), blur(pair.fine_before)) if groups else ()
+        soft_now, soft_before = blur(pair.fine_now), blur(pair.fine_before)
         centres = [np.array((group.columns.mean(), group.rows.mean())) for group in groups]
         motions = [
-            patch_motion(group, centre, *soft, ego.B)
+            patch_motion(group, centre, soft_now, soft_before, ego.B)
             for group, centre in zip(groups, centres, strict=True)
         ]
         follows = self._tracks.step(

@@ -100,7 +100,7 @@ def patch_motion(
     count = len(group.columns)
     some = slice(None, None, max(1, count // _SAMPLE))
     # Everything is computed in pixels of the fine images.
-    places = 2.0 * np.column_stack((group.columns, group.rows))[some]
+    places = np.column_stack((2.0 * group.columns[some], 2.0 * group.rows[some]))
     flow, centre = 2.0 * group.flow[some], 2.0 * centre + 0.5
     arms = places - centre
     size = max(1.0, float(np.sqrt((arms**2).sum(axis=1).mean())))

@@ -125,7 +125,8 @@ def _parallax_part(rest: Flow, ego: EgoMotion) -> Flow:
         rest: Motion (h, w, 2) in addition to the room's.
         ego: The camera's own motion.
     """
-    room = pixel_grid(rest.shape) - _background_positions(np.linalg.inv(ego.total), rest.shape)
+    past = np.asarray(np.linalg.inv(ego.total), np.float64)
+    room: Flow = pixel_grid(rest.shape) - _background_positions(past, rest.shape)
     (u, v), (x, y) = cv2.split(rest), cv2.split(room)
     along = (u * x + v * y) / np.maximum(x * x + y * y, np.float32(1e-6))
     return np.asarray(np.clip(along, -_BEHIND, _PARALLAX_SHARE)[..., None] * room, np.float32)
