@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from browser import browsing
 from page_at_the_door import PATIENCE_S, TOKEN, Rig, opened
+from present import present
 from shown_page import wait_for
 from websockets.exceptions import ConnectionClosed
 
@@ -18,9 +19,9 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.browser_source import FIELD_DEG, LATENCY_S, BrowserSource
 from gazerig.drivers.camera.shared_slots import MOST_BYTES, JpegSlot
 from gazerig.drivers.camera.worker import CameraWorker
-from gazerig.drivers.types import Camera, Detections
+from gazerig.drivers.types import Detections
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.borrowed_camera import SILENT_S, BorrowedCamera
+from gazerig.robot.app.browser_camera import SILENT_S, BrowserCamera
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.frames import CameraMount, fixed_mount
 
@@ -68,97 +69,70 @@ def test_what_is_no_picture_is_left_out_and_told_once() -> None:
 # Who is looked through
 
 
-class Looked:
-    """A camera that counts, in the place of one with a process."""
+class Browser:
+    """A camera that finds what it is given, in the place of one with a process."""
 
-    def __init__(self, name: str) -> None:
-        self.name, self.open_count, self.closed = name, 0, False
-        self.found: Detections | None = None
-        self.said: list[str] = []
+    found: Detections | None = None
+    closed = False
 
-    def open(self) -> None:
-        self.open_count += 1
+    def open(self) -> None: ...
 
     def latest(self, now_s: float) -> Detections | None:
         return self.found
-
-    def events(self) -> tuple[str, ...]:
-        said, self.said = tuple(self.said), []
-        return said
 
     def close(self) -> None:
         self.closed = True
 
 
-def found(number: int) -> Detections:
-    return Detections(0.0, number, 64, 48)
-
-
-class Lent:
-    """A borrowed camera with a clock that is set."""
-
-    def __init__(self) -> None:
-        self.now_s = 100.0
-        self.own, self.browsers = Looked("own"), Looked("browser")
-        self.own.found = found(1)
-        self.before: list[int] = []
-        self.placed: list[bool] = []
-        self.camera = BorrowedCamera(
-            cast(Camera, self.own), self.make, lambda: self.now_s,
-            lambda: self.placed.append(self.camera.lent),
-        )  # fmt: skip
-
-    def make(self, source: Callable[[], Any], before: int) -> CameraWorker:
-        self.before.append(before)
-        return cast(CameraWorker, self.browsers)
-
-    def picture(self) -> None:
-        self.camera.take(jpeg())
-        if (starting := self.camera._starting) is not None:
-            starting.join()
-
-    def number(self) -> int:
-        seen = self.camera.latest(self.now_s)
-        assert seen is not None
-        return seen.number
-
-
 def test_the_browser_stands_in_from_its_first_frame_until_it_is_silent() -> None:
-    lent = Lent()
-    assert lent.number() == 1
-    lent.picture()
-    assert lent.number() == 1 and not lent.camera.lent  # the networks are being loaded
-    lent.browsers.found = found(7)
-    assert lent.number() == 7 and lent.camera.lent and lent.placed == [True]
-    assert "field of view is assumed to be 60 deg" in lent.camera.events()[0]
-    lent.now_s += SILENT_S + 0.1
-    assert lent.number() == 1 and lent.placed == [True, False]
-    assert lent.camera.events() == ("the browser's camera has ended: the scene continues",)
-    for _ in range(400):
-        if lent.browsers.closed:
-            break
-        time.sleep(0.01)
-    assert lent.browsers.closed and not lent.own.closed
+    now_s, browser, used, before, lines = [100.0], Browser(), list[Any](), list[int](), list[str]()
+
+    def make(source: Callable[[], Any], count: int) -> CameraWorker:
+        before.append(count)
+        return cast(CameraWorker, browser)
+
+    camera = BrowserCamera(make, lambda: now_s[0], used.append, lines.append)
+
+    def picture() -> None:
+        camera.take(jpeg())
+        if (starting := camera._starting) is not None:
+            starting.join()
+        camera.update()
+
+    camera.update()
+    picture()
+    assert not camera.in_use and used == []  # the networks are being loaded
+    browser.found = Detections(0.0, 7, 64, 48)
+    camera.update()
+    camera.update()
+    assert camera.in_use and used == [browser]
+    assert "field of view is assumed to be 60 deg" in lines[0]
+    now_s[0] += SILENT_S + 0.1
+    camera.update()
+    assert not camera.in_use and used == [browser, None]
+    assert lines[1:] == ["the browser's camera has ended: the scene continues"]
+    wait_for(lambda: browser.closed, "the end of the process")
     # And once more: another scene than that of the first time.
-    lent.picture()
-    assert lent.number() == 7 and lent.before == [1, 2]
+    picture()
+    assert used == [browser, None, browser] and before == [1, 2]
+    browser.closed = False
+    camera.close()
+    assert browser.closed
 
 
 def test_an_emulated_rig_can_be_lent_a_camera_that_stands_still() -> None:
     rig = load_rig("desk")
     made = assemble(rig, RunOptions(mock=True, scene="visitor", bus="ideal"))
     try:
-        camera = made.robot.camera
-        assert isinstance(camera, BorrowedCamera) and made.mount.on_head
-        camera.lent = True
-        camera._place()
+        browser, own, other = present(made.browser), made.robot.camera, cast(Any, Browser())
+        assert made.mount.on_head
+        browser._switch(other, "begins")
+        assert made.robot.camera is other and not made.mount.on_head
         still = CameraMount(fixed_mount(rig.camera, made.shown_rig().kinematics))
         level = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-        assert not made.mount.on_head
         assert made.mount.pose(level, (0.0, 0.0, 9.0)) == still.pose(level, (0.0, 0.0, 0.0))
-        camera.lent = False
-        camera._place()
-        assert made.mount.on_head
+        browser._switch(None, "ends")
+        assert made.robot.camera is own and made.mount.on_head
     finally:
         made.close()
 

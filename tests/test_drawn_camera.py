@@ -10,7 +10,6 @@ from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.drawn_camera import DrawnSource, scene_pixels
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.scene_files import load_scene
@@ -62,8 +61,6 @@ def test_only_a_drawn_scene_in_real_time_has_a_process() -> None:
     rig = load_rig("desk")
     made = assemble(rig, RunOptions(mock=True, pixels=True, scene="visitor", bus="ideal"))
     try:
-        lent = made.robot.camera
-        assert isinstance(lent, BorrowedCamera)
-        assert isinstance(lent.own, CameraWorker)
+        assert isinstance(made.robot.camera, CameraWorker)
     finally:
         made.close()

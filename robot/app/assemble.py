@@ -1,6 +1,8 @@
 """Assembly of a robot from real or simulated parts, with config and sim_mock."""
 
 from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
 from math import radians
 from pathlib import Path
 from typing import NamedTuple, TypeVar
@@ -23,10 +25,11 @@ from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
 from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.track.track import MAX_DURATION_S
+from gazerig.robot.app.browser_camera import BrowserCamera
 from gazerig.robot.app.camera_factory import (
+    browser_camera,
     camera_placement,
     camera_poses,
-    make_borrowed_camera,
     run_camera,
 )
 from gazerig.robot.app.gaze_models import motion_models, oculomotor, rig_kinematics, target_chooser
@@ -36,7 +39,7 @@ from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
 from gazerig.robot.app.rig_description import sag_compensation, shape_of
 from gazerig.robot.app.rig_limits import animation_tables, face_parts_m, lid_spans, limits, park_rad
 from gazerig.robot.app.rig_weight import park_note
-from gazerig.robot.app.run_bus import run_bus
+from gazerig.robot.app.run_bus import RunBus, run_bus
 from gazerig.robot.app.run_rig import scene_of, with_options
 from gazerig.robot.app.surroundings import RunRoom, surroundings
 from gazerig.robot.control.body import Body
@@ -73,6 +76,7 @@ class Assembly(NamedTuple):
     live_params: holds the present rig and applies changes to the running parts
     inject_fault: executes a fault command of the emulated servos, None for real or ideal ones
     room: the surroundings of --world, None without
+    browser: a browser's camera that may replace the emulated rig's, None for other rigs
     """
 
     robot: Robot
@@ -86,6 +90,7 @@ class Assembly(NamedTuple):
     live_params: LiveParams
     inject_fault: Callable[[str], str] | None = None
     room: RunRoom | None = None
+    browser: BrowserCamera | None = None
 
     def shown_rig(self) -> ShownRig:
         """Return the visible structure of the present rig."""
@@ -177,8 +182,6 @@ def assemble(
             seen = run_camera(
                 rig, options, scene, sight, opened, random.camera, camera, clock, program,
             )  # fmt: skip
-        if options.mock and not options.fast:
-            seen = make_borrowed_camera(seen, rig, clock, lambda: sight.mount.retune(live.camera))
         body = Body(
             opened.bus,
             rig.joints,
@@ -188,8 +191,24 @@ def assemble(
             messages.append if options.recover else None,
         )
         parts = _build_components(rig, body, kinematics, seen, sight.mount, camera, walk, random)
-        live = LiveParams(parts, rig, lambda: camera_placement(rig, options, kinematics, seen)[0])
+        browser: BrowserCamera | None = None
+
+        def placement() -> CameraParams:
+            in_use = browser is not None and browser.in_use
+            return camera_placement(rig, options, kinematics, in_use)[0]
+
+        live = LiveParams(parts, rig, placement)
         robot = _build_robot(parts, sight.poses, live, substitutes, rig, messages)
+        close = opened.close
+        if options.mock and not options.fast:
+            own_camera = robot.camera
+
+            def use(camera: Camera | None) -> None:
+                robot.camera = own_camera if camera is None else camera
+                sight.mount.retune(live.camera)
+
+            browser = browser_camera(rig, clock, use, messages.append)
+            close = partial(_close, browser, own_camera, opened)
         if room is not None and isinstance(scene, BoxingScene) and scene.opponent is not None:
             robot.set_opponent(TickClockOpponent(scene.opponent, room.start_s))
     except BaseException:
@@ -204,9 +223,18 @@ def assemble(
     if (parks := park_note(rig)) is not None:
         notes = (*notes, parks)
     return Assembly(
-        robot, clock, sight.mount, sight.poses, scene, opened.sent_bytes_digest, opened.close, notes, live,
-        opened.inject_fault, room,
+        robot, clock, sight.mount, sight.poses, scene, opened.sent_bytes_digest, close, notes, live,
+        opened.inject_fault, room, browser,
     )  # fmt: skip
+
+
+def _close(browser: BrowserCamera, own_camera: Camera, run_bus: RunBus) -> None:
+    """Close what the robot has not closed: the camera that it does not use, and its bus."""
+    with ExitStack() as stack:
+        stack.callback(run_bus.close)
+        if browser.in_use:
+            stack.callback(own_camera.close)
+        browser.close()
 
 
 class _Generators(NamedTuple):

@@ -22,7 +22,7 @@ from gazerig.drivers.plugins import CAMERA, CameraPlugin, find, is_ours, load
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.app.borrowed_camera import BorrowedCamera
+from gazerig.robot.app.browser_camera import BrowserCamera
 from gazerig.robot.app.drawn_camera import DrawnSource, HeadPose, scene_pixels
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
@@ -202,20 +202,18 @@ def _detector_factory(rig: Rig, own: ProgramParts) -> Callable[[], FaceDetector]
 
 def scene_start_s(camera: Camera) -> float | None:
     """Return the start of the scene of a camera without images, None before or without one."""
-    if isinstance(camera, BorrowedCamera):
-        return None if camera.lent else scene_start_s(camera.own)
     return camera.start_s if isinstance(camera, SceneCamera | RoomCamera) else None
 
 
 def camera_placement(
-    rig: Rig, options: RunOptions, kinematics: Kinematics, seen: Camera | None = None
+    rig: Rig, options: RunOptions, kinematics: Kinematics, by_browser: bool = False
 ) -> tuple[CameraParams, tuple[str, ...]]:
     """Return the rig's camera, with mount base if its frames cannot turn with the head.
 
-    seen: the present camera, which may be a browser's
+    by_browser: whether a browser's camera is in use
     """
     what = options.camera_source
-    if isinstance(seen, BorrowedCamera) and seen.lent:
+    if by_browser:
         return fixed_mount(rig.camera, kinematics), ()
     turns = options.video is None and options.replay is None and not options.mock
     if what is None or turns or rig.camera.mount == "base":
@@ -225,10 +223,13 @@ def camera_placement(
     return fixed_mount(rig.camera, kinematics), (note,)
 
 
-def make_borrowed_camera(
-    own: Camera, rig: Rig, clock: Clock, place: Callable[[], None]
-) -> BorrowedCamera:
-    """Return an emulated rig's camera, which a browser's may replace."""
+def browser_camera(
+    rig: Rig,
+    clock: Clock,
+    use: Callable[[CameraWorker | None], None],
+    report: Callable[[str], None],
+) -> BrowserCamera:
+    """Return a browser's camera, which may replace that of an emulated rig."""
     field_rad = radians(FIELD_DEG)
     detector = partial(face_detector, rig.detector)
     motion = partial(MotionSource, rig.motion, None, field_rad, None)
@@ -238,7 +239,7 @@ def make_borrowed_camera(
         parts = CameraParts(source, detector, motion, locate, before=before)
         return CameraWorker(parts, clock.now_s)
 
-    return BorrowedCamera(own, process, clock.now_s, place)
+    return BrowserCamera(process, clock.now_s, use, report)
 
 
 def real_camera(

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.vision.model_files import detector_status
 from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
 from gazerig.robot.app.computer import level_text
 from gazerig.robot.app.door_processes import DoorProcesses
@@ -77,7 +76,7 @@ class RunObservers:
         browse: Callable[[str], object] | None = None,
         voice: RunVoice | None = None,
     ) -> None:
-        self._led_by, self._lent, self._voice = led_by, False, voice
+        self._led_by, self._by_browser, self._voice = led_by, False, voice
         self._made, self._fast, self._say = assembly, options.fast, say
         self._agent = MockAgent(
             assembly.robot.command,
@@ -155,8 +154,8 @@ class RunObservers:
             talk=self._play_talk,
             paths=self._tuning.confined if self._tuning is not None else None,
         )
-        camera = self._made.robot.camera
-        on_picture = camera.take if isinstance(camera, BorrowedCamera) else None
+        browser = self._made.browser
+        on_picture = browser.take if browser is not None else None
         live = self._live
         return PageProcess(
             *address,
@@ -331,10 +330,13 @@ class RunObservers:
     def _follow(self, tick: Tick) -> None:
         """Store the percept for the placement of a click, and show the rig again after tuning."""
         self._picking.newest = tick
+        browser = self._made.browser
+        if browser is not None:
+            browser.update()
         if self._publisher is None:
             return
         if tick.commands:
             self._publisher.process_commands(tick.commands)
-        if self._lent != (lent := getattr(self._made.robot.camera, "lent", False)):
-            self._lent = lent
+        if browser is not None and self._by_browser != browser.in_use:
+            self._by_browser = browser.in_use
             self._publisher.resend_geometry()
