@@ -84,13 +84,12 @@ def project(points_camera_m: ArrayLike, intrinsics: Intrinsics) -> Floats:
 
 def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
     """Return the undistorted directions (n, 3) through pixels (n, 2), with z = 1."""
-    points = np.asarray(points_px, dtype=np.float64).reshape(-1, 2)
+    x, y = np.asarray(points_px, dtype=np.float64).reshape(-1, 2).T
     i = intrinsics
-    plane = (points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px)
-    if i.has_distortion and len(points):
-        plane = _undistort(plane, i.distortion)
-    found = np.empty((len(points), 3))
-    found[:, :2], found[:, 2] = plane, 1.0
+    found = np.ones((len(x), 3))
+    found[:, 0], found[:, 1] = (x - i.cx_px) / i.fx_px, (y - i.cy_px) / i.fy_px
+    if i.has_distortion and x.size:
+        found[:, :2] = _undistort(found[:, :2], i.distortion)
     return found
 
 

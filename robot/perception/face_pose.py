@@ -194,13 +194,9 @@ def _fit_face(seen: Points, noise: float) -> tuple[Mat3, Vec3, float] | None:
         normal[:3, 7] -= pull
         normal[6, 7] -= long * (length - 1.0)
         step = np.linalg.solve(normal[:7, :7], normal[:7, 7]).tolist()
-        w = step[0], step[1], step[2]
+        w = step[:3]
         turn = add(turn, sub(w, scale(cross(turn, w), 0.5)))
-        R, p, length = (
-            turn_about(unit(turn), norm(turn)),
-            add(p, (step[3], step[4], step[5])),
-            length + step[6],
-        )
+        R, p, length = turn_about(unit(turn), norm(turn)), add(p, step[3:6]), length + step[6]
         if not p[2] > 0.0:  # behind the camera, or not finite
             return None
         last = wider
