@@ -74,13 +74,12 @@ def no_process_outlives_its_test() -> Iterator[None]:
 @pytest.fixture
 def started() -> Iterator["Callable[[Rig], Assembly]"]:
     """Return what starts a rig before a visitor in simulated time; all are closed at the end."""
-    from gazerig.robot.app.assemble import assemble
-    from gazerig.robot.app.options import RunOptions
+    from fakes.runs import simulated
 
     begun = []
 
     def start(rig: "Rig") -> "Assembly":
-        made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+        made = simulated(rig)
         begun.append(made)
         made.robot.start(made.clock)
         return made

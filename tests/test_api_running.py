@@ -274,7 +274,7 @@ with ideal_buses():
 def test_the_end_of_the_interpreter(tmp_path: Path, end: str, status: int, why: str) -> None:
     """Nobody left the block: it parks even so, before the program is gone."""
     file = tmp_path / "forgetful.py"
-    file.write_text(textwrap.dedent(FORGETFUL).format(end=end), encoding="utf-8")
+    file.write_text(textwrap.dedent(FORGETFUL).format(end=end))
     done = run_script(file, fresh="SystemExit" in end)  # Python itself ends once
     last = done.stdout.splitlines()[-1]
     assert re.fullmatch(f"stopped by {why}: {LET_GO}", last), done.stderr

@@ -63,7 +63,7 @@ def text(annotation: object) -> str:
 
 
 def test_the_surface_is_as_promised() -> None:
-    promised = GOLDEN.read_text(encoding="utf-8").splitlines()
+    promised = GOLDEN.read_text().splitlines()
     assert list(surface()) == promised
 
 
@@ -97,4 +97,4 @@ def test_a_program_typed_as_strictly_as_can_be_runs() -> None:
 
 
 if __name__ == "__main__":
-    GOLDEN.write_text("\n".join(surface()) + "\n", encoding="utf-8")
+    GOLDEN.write_text("\n".join(surface()) + "\n")

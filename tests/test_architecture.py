@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 
 def packages(path: Path) -> Iterator[str]:
     """Yield the packages that a module imports."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -36,7 +36,7 @@ def test_what_stands_on_few_packages_imports_no_other(files: str, allowed: set[s
 
 
 def test_every_room_of_the_robot_has_its_storey() -> None:
-    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    text = (ROOT / "pyproject.toml").read_text()
     contracts = tomllib.loads(text)["tool"]["importlinter"]["contracts"]
     (storeys,) = (c["layers"] for c in contracts if c["id"] == "storeys")
     named = {room.strip() for layer in storeys for room in layer.split("|")}

@@ -120,7 +120,7 @@ def test_a_character_changes_one_rule_of_those_a_rig_has_by_default(
 
 def test_a_rig_of_its_own_rules_keeps_them_alone_under_a_character(tmp_path: Path) -> None:
     own = tmp_path / "own.yaml"
-    text = shipped_path("rigs", "maker").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "maker").read_text()
     rule = "gaze:\n  top_down: {rules: {wait: {look_at: face, salience: 0.9}}}\n"
     own.write_text(text.replace("gaze:  # differences", rule + "  # differences"), "utf-8")
     rules = load_rig(str(own), "sleepy").gaze.top_down.rules

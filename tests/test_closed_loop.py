@@ -4,19 +4,17 @@ Pictures are 60 ms late and come 30 times a second; the saccade's own latency is
 """
 
 from math import degrees
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
-from fakes.runs import play
+from fakes.runs import play, simulated
 from numpy.typing import NDArray
 from true_gaze import angles_of_place, gaze_angles, gaze_error_rad, true_part
 
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import Value
 from gazerig.sim_mock.cameras.frame_times import FrameParams
@@ -32,7 +30,6 @@ CORRECTED_S = 0.2
 FACE_DEG = 4.0
 """Half of a face's width at the distance of the scene, 1.1 m."""
 Column = NDArray[np.float64]
-PlacedBy = Literal["capture", "newest"]
 
 
 class Seen(NamedTuple):
@@ -54,10 +51,10 @@ class Seen(NamedTuple):
     on_face: Column
 
 
-def watched(scene: str, seconds: float, placed_by: PlacedBy = "capture") -> Seen:
+def watched(scene: str, seconds: float) -> Seen:
     """Run a drawn scene and compare the measured gaze with the true place of the face part."""
     rig = apply_changes(load_rig("desk"), KEEPS_TO_THE_FACE)
-    made = assemble(rig, RunOptions(True, True, 0, scene, pixels=True, placed_by=placed_by))
+    made = simulated(rig, scene, pixels=True)
     kinematics, _ = kinematics_and_oculomotor(rig, 0)
     assert made.scene is not None
     people = made.scene.people

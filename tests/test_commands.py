@@ -68,9 +68,7 @@ def test_orders_cross_processes_and_recordings_as_they_are(order: Command) -> No
     assert isinstance(order, Tune) or read_request(plain) == order
 
 
-REFUSED = yaml.safe_load(
-    (Path(__file__).parent / "golden" / "refused_requests.yaml").read_text(encoding="utf-8")
-)
+REFUSED = yaml.safe_load((Path(__file__).parent / "golden" / "refused_requests.yaml").read_text())
 
 
 @pytest.mark.parametrize(

@@ -25,8 +25,8 @@ def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
 
 def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
     file = Path(shutil.copy(shipped_path("rigs", "desk"), tmp_path / "my.yaml"))
-    text = file.read_text(encoding="utf-8")
-    file.write_text(f"nonsense: 1\n{text}\nmore: 2\n", encoding="utf-8")
+    text = file.read_text()
+    file.write_text(f"nonsense: 1\n{text}\nmore: 2\n")
     with pytest.raises(ConfigError) as here:
         load_rig(str(file))
     with pytest.raises(ConfigError) as there:

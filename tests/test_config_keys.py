@@ -36,11 +36,11 @@ def test_a_rig_has_at_most_so_many_keys() -> None:
 
 def test_a_removed_key_is_answered_with_what_to_do(tmp_path: Path) -> None:
     keys = set(leaves(Declaration("params", params=Rig), ""))
-    removed = yaml.safe_load((SHIPPED / "removed_keys.yaml").read_text(encoding="utf-8"))
+    removed = yaml.safe_load((SHIPPED / "removed_keys.yaml").read_text())
     assert keys.isdisjoint(removed) and all(isinstance(text, str) for text in removed.values())
-    text = shipped_path("rigs", "minimal").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "minimal").read_text()
     file = tmp_path / "mine.yaml"
-    file.write_text(f"camera_recovery: {{give_up_s: 3}}\n{text}", encoding="utf-8")
+    file.write_text(f"camera_recovery: {{give_up_s: 3}}\n{text}")
     with pytest.raises(ConfigError, match=r"mine.yaml:1: camera_recovery\S*: is gone: "):
         load_rig(str(file))
     with pytest.raises(ConfigError, match="joints.neck_yaw.play_deg: is gone: "):
@@ -48,5 +48,5 @@ def test_a_removed_key_is_answered_with_what_to_do(tmp_path: Path) -> None:
 
 
 def test_the_desk_rig_is_short() -> None:
-    text = shipped_path("rigs", "desk").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "desk").read_text()
     assert len(text.splitlines()) <= MOST_LINES

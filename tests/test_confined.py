@@ -4,12 +4,10 @@ import os
 from pathlib import Path
 
 import pytest
+from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
 from gazerig.config.rig_files import AllowedFolder
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.dashboard.requests.page_requests import PageRequestHandler
 
@@ -71,8 +69,8 @@ def test_what_starts_programs_or_opens_devices_is_not_set_from_the_network(
 
 def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     rig = home / "mine.yaml"
-    rig.write_text(Path("config/rigs/desk.yaml").read_text(encoding="utf-8"), encoding="utf-8")
-    made = assemble(load_rig(str(rig)), RunOptions(True, True, 0, "visitor"))
+    rig.write_text(Path("config/rigs/desk.yaml").read_text())
+    made = simulated(str(rig))
     tuning = ParamStore(made.live_params, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
     hear = PageRequestHandler(
         made.robot.command, tuning, refusals=(ConfigError,), paths=tuning.confined

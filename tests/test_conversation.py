@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 import pytest
 from commanded_robot import Running
+from fakes.runs import simulated
 from gaze_targets import target
 
 import gazerig
-from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between
 from gazerig.gaze.attention.conversation import (
     NOD,
@@ -20,8 +20,6 @@ from gazerig.gaze.attention.conversation import (
     ConversationParams,
 )
 from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.head_state import HeadState, head_state
 from gazerig.robot.dashboard.door.programs import ProgramSocket
 from gazerig.robot.model.commands import LookAt, Renew, Talk, TalkOrder
@@ -137,9 +135,7 @@ def test_a_short_answer_is_given_with_the_gaze_on_the_face(running: Running) -> 
 
 
 def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
-    made = assemble(
-        load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, scene="three-people")
-    )
+    made = simulated(scene="three-people", seed=3)
     made.robot.start(made.clock)
     running = Running(made)
     running.go(12.0)

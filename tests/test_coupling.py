@@ -162,10 +162,10 @@ def test_a_lost_servo_of_a_pair_makes_both_joints_stale(started: Callable[[Rig],
 
 
 def coupled_file(tmp_path: Path) -> str:
-    text = shipped_path("rigs", "feetech").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "feetech").read_text()
     text += "\ncouplings:\n  neck: {first: neck_pitch, second: neck_roll}\n"
     path = tmp_path / "coupled.yaml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text)
     return str(path)
 
 

@@ -14,15 +14,14 @@ import pytest
 from command_line import invoked
 from described_rigs import SHIPPED, Poses, compare, random_angles, shipped
 from emulated_rig import EmulatedRig
+from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError, shipped_path
 from gazerig.config.rig_files import AllowedFolder
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import rig_bus
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of, sag_compensation, shape_of, statics_of
 from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.app.rig_weight import rest_park_deg, weight_findings
@@ -420,8 +419,8 @@ def test_a_head_rests_where_its_weight_has_no_lever_or_on_its_stop() -> None:
 )  # fmt: skip
 def test_impossible_masses_are_refused(lines: str, key: str, rule: str, tmp_path: Path) -> None:
     file = tmp_path / "own.yaml"
-    text = shipped_path("rigs", "desk").read_text(encoding="utf-8")
-    file.write_text(text + f"\nmass:\n  {lines}\n", encoding="utf-8")
+    text = shipped_path("rigs", "desk").read_text()
+    file.write_text(text + f"\nmass:\n  {lines}\n")
     with pytest.raises(ConfigError) as caught:
         load_rig(str(file))
     (fault,) = caught.value.faults
@@ -504,7 +503,7 @@ def test_what_a_neck_holds_is_reported_with_its_heat() -> None:
 def test_a_head_that_would_sink_is_parked_where_it_rests() -> None:
     assert rest_park_deg(shipped("desk")) == shipped("desk").park_deg
     rig = heavy("desk")
-    made = assemble(rig, RunOptions(rig="desk", mock=True, fast=True, scene="visitor"))
+    made = simulated(rig)
     try:
         assert made.notes[-1].startswith("parks neck_pitch at -35 deg")
         at = rig.names.index("neck_pitch")

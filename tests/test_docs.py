@@ -141,7 +141,7 @@ def names_of_tests() -> set[str]:
     """Return the names of all tests."""
     names: set[str] = set()
     for path in (ROOT / "tests").rglob("test_*.py"):
-        names |= set(re.findall(r"^def (\w+)", path.read_text(encoding="utf-8"), re.MULTILINE))
+        names |= set(re.findall(r"^def (\w+)", path.read_text(), re.MULTILINE))
     return names
 
 

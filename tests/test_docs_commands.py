@@ -80,7 +80,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for language in ("yaml", "xml"):
         for block in blocks(language):
             if block.paper.name == "worlds.md":
-                (tmp_path / f"myworld.{language}").write_text(block.text, encoding="utf-8")
+                (tmp_path / f"myworld.{language}").write_text(block.text)
     film = cv2.VideoWriter("film.avi", cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (64, 48))
     for _ in range(5):
         film.write(np.zeros((48, 64, 3), np.uint8))
@@ -135,11 +135,11 @@ def test_a_paper_shows_what_is_printed(words: str, capfd: pytest.CaptureFixture[
 
 
 def test_make_and_pip_have_what_the_papers_ask_for() -> None:
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    makefile = (ROOT / "Makefile").read_text()
     made = re.findall(r"^(\w+):", makefile, re.MULTILINE)
-    extras = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    extras = (ROOT / "pyproject.toml").read_text()
     for paper in PAPERS:
-        text = paper.read_text(encoding="utf-8")
+        text = paper.read_text()
         for target in re.findall(r"(?:^|`)make (\w+)", text, re.MULTILINE):
             assert target in made, f"{paper.name}: make {target}"
         for package in re.findall(r"pip install --no-deps ([^\s'`]+)", text):

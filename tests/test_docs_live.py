@@ -55,7 +55,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 def copy(rig: str, to: Path, more: str = "") -> None:
     """Write a rig of ours under a name of the papers."""
-    to.write_text(shipped_path("rigs", rig).read_text(encoding="utf-8") + more, encoding="utf-8")
+    to.write_text(shipped_path("rigs", rig).read_text() + more)
 
 
 def works(words: str, answers: str = "") -> str:
@@ -91,7 +91,7 @@ def works_until_ctrl_c(process: subprocess.Popen[str], first: str) -> None:
 def test_commands_to_a_running_head_work(folder: Path) -> None:
     """Of one head for all: the expressive one with the track of the tutorial."""
     [agree] = [b.text for b in blocks("yaml") if b.text.startswith('description: "a small nod')]
-    (folder / "agree.yaml").write_text(agree, encoding="utf-8")
+    (folder / "agree.yaml").write_text(agree)
     own = "\ntrack_files: [agree.yaml]\nsound: {device: silent}\nloop: {rate_hz: 40.0}\n"
     copy("expressive", folder / "head.yaml", own)
     write_wav(folder / "hello.wav", b"\0\0" * 4800, 16000)

@@ -85,7 +85,7 @@ MAKERS: dict[str, tuple[Callable[[], Any], Callable[..., Mapping[str, Any]]]] = 
 def conversation(name: str) -> list[tuple[Mapping[str, Any], list[Any]]]:
     """Return the messages of a neighbour and the orders that each becomes."""
     file = Path(__file__).parent / "golden" / "conversations.yaml"
-    rows = yaml.safe_load(file.read_text(encoding="utf-8"))[name]
+    rows = yaml.safe_load(file.read_text())[name]
     make = MAKERS[name][1]
     return [
         (

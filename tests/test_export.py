@@ -9,16 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
-from fakes.runs import play
+from fakes.runs import play, simulated
 from gaze_targets import joints_at
 from msgspec.structs import replace
 from present import present
 
-from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import GazeState
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
@@ -40,7 +37,7 @@ from gazerig.robot.recording.gaze_angles import (
 
 def seen(scene: str, seconds: float) -> list[Tick]:
     """Run a simulated head and give its ticks."""
-    made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene=scene))
+    made = simulated(scene=scene)
     ticks: list[Tick] = []
     play(made, seconds, ticks.append)
     return ticks

@@ -25,8 +25,8 @@ NAMES = (
 def test_a_jaw_is_calibrated_by_motion(tmp_path: Path) -> None:
     pytest.importorskip("gazerig.features.bringup")
     rig = tmp_path / "face.yaml"
-    text = shipped_path("rigs", "expressive").read_text(encoding="utf-8")
-    rig.write_text(text, encoding="utf-8")
+    text = shipped_path("rigs", "expressive").read_text()
+    rig.write_text(text)
     done = invoked(
         "calibrate", "joints", str(rig), "--joint", "jaw", "--by", "motion", "--mock", "--dry-run",
         "--answers", answers_in(tmp_path, *["yes"] * 6),

@@ -17,14 +17,14 @@ class Rig:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / "rig.yaml"
-        self.path.write_text(OLD, encoding="utf-8")
+        self.path.write_text(OLD)
         self.reported: list[str] = []
         self.watch = FileWatch(lambda: [self.path], self._changed)
         self.watch.look()
 
     def _changed(self, path: Path) -> None:
         assert path == self.path
-        self.reported.append(path.read_text(encoding="utf-8") if path.exists() else "(gone)")
+        self.reported.append(path.read_text() if path.exists() else "(gone)")
 
     def looks(self, number: int) -> list[str]:
         for _ in range(number):
@@ -32,7 +32,7 @@ class Rig:
         return self.reported
 
     def write(self, text: str) -> None:
-        self.path.write_text(text, encoding="utf-8")
+        self.path.write_text(text)
 
 
 @pytest.fixture
@@ -62,7 +62,7 @@ def test_same_time_and_size_but_other_content_is_news(rig: Rig) -> None:
 
 def test_an_editor_that_renames_a_new_file_over_it(rig: Rig) -> None:
     beside = rig.path.with_suffix(".tmp")
-    beside.write_text(NEW, encoding="utf-8")
+    beside.write_text(NEW)
     beside.replace(rig.path)
     assert rig.looks(3) == [NEW]
 
@@ -101,11 +101,11 @@ def test_what_the_program_saved_itself_is_no_news(rig: Rig) -> None:
 
 def test_the_thread_looks_by_itself_and_ends(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
-    path.write_text(OLD, encoding="utf-8")
+    path.write_text(OLD)
     reported = threading.Event()
     watch = FileWatch(lambda: [path], lambda _: reported.set())
     watch.start()
-    path.write_text(NEW, encoding="utf-8")
+    path.write_text(NEW)
     assert reported.wait(10.0)
     watch.stop()
     assert threads_named("file watch") == []

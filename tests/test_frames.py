@@ -98,10 +98,10 @@ camera:
 def _rig_with(tmp_path: Path, camera: str) -> str:
     """Write the desk rig with another camera section."""
     shipped = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
-    before, _, after = shipped.read_text(encoding="utf-8").partition("\ncamera:")
+    before, _, after = shipped.read_text().partition("\ncamera:")
     rest = after[after.index("\nloop:") :]
     rig = tmp_path / "rig.yaml"
-    rig.write_text(f"{before}{camera}{rest}", encoding="utf-8")
+    rig.write_text(f"{before}{camera}{rest}")
     return str(rig)
 
 

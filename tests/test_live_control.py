@@ -6,12 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from fakes.runs import simulated
 from slow_rigs import at_rate
 
 from gazerig.config.load import ConfigError
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.remote.client import connect_to_all
 from gazerig.robot.remote.live_server import LiveServer
@@ -25,7 +23,7 @@ class Rig:
 
     def __init__(self, folder: Path) -> None:
         self.path = Path(at_rate(folder, "desk", 80.0))
-        made = assemble(load_rig(str(self.path)), RunOptions(mock=True, fast=True, scene="visitor"))
+        made = simulated(str(self.path))
         self.tuning = ParamStore(
             made.live_params,
             lambda order: made.live_params(order, 0.0),
@@ -99,7 +97,7 @@ def test_a_file_that_went_away_is_said_and_the_values_stay(rig: Rig) -> None:
 
 
 def test_without_a_socket_it_says_so_and_watches_the_file(folder: Path) -> None:
-    (folder / "gazerig").write_text("in the way", encoding="utf-8")
+    (folder / "gazerig").write_text("in the way")
     rig = Rig(folder)
     rig.live.open()
     try:

@@ -6,15 +6,13 @@ from dataclasses import fields
 from typing import NamedTuple
 
 import pytest
-from fakes.runs import play
+from fakes.runs import play, simulated
 from msgspec import structs
 from page_feed import IN_TIME
 from shown_page import wait_for
 from world_shapes import SmallWorld
 
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.feed.live_feed import (
@@ -39,8 +37,7 @@ class Run(NamedTuple):
 @pytest.fixture(scope="module", params=["desk", "maker"])
 def ran(request: pytest.FixtureRequest) -> Run:
     """Two simulated seconds, so that there are saccades, a fixation and a blink."""
-    options = RunOptions(rig=request.param, mock=True, fast=True, seed=0, scene="visitor")
-    made, ticks = assemble(load_rig(request.param), options), list[Tick]()
+    made, ticks = simulated(request.param), list[Tick]()
     play(made, 2.0, ticks.append)
     return Run(made, ticks)
 
@@ -48,7 +45,7 @@ def ran(request: pytest.FixtureRequest) -> Run:
 class Page:
     """A page's process that is a socket here, and what feeds it."""
 
-    def __init__(self, made: Assembly, every_s: float = 0.0399) -> None:
+    def __init__(self, made: Assembly) -> None:
         ours, self.feed = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self.page = PageProcess("127.0.0.1", 0)
         self.page.join(ours)
@@ -61,7 +58,7 @@ class Page:
         self.publisher = Publisher(
             self.page, lambda: self._rig(made), lambda: self.state, None, self.said.append
         )
-        self.stream = TickStream(self.said.append, every_s)
+        self.stream = TickStream(self.said.append, 0.0399)
         self.stream.add_sink("the page", self.publisher.take)
         self.live = LiveFeed()
 

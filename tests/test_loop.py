@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
-from fakes.runs import go
+from fakes.runs import go, simulated
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, Located, MovingBlob
 from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import PARTS
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.loop import PARK_S, Tick
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
@@ -31,11 +30,6 @@ from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.safety.guard import SOFT_START_RAD_S2
-
-
-def made(seed: int = 0, rig: Rig | None = None) -> Assembly:
-    rig = load_rig("desk") if rig is None else rig
-    return assemble(rig, RunOptions(mock=True, fast=True, seed=seed, scene="visitor"))
 
 
 def ticks(assembly: Assembly, seconds: float) -> list[Tick]:
@@ -50,7 +44,7 @@ def test_it_starts_slowly_from_where_the_joints_are() -> None:
     rig = load_rig("desk")
     head = replace(rig.gaze.head, eye_only_range_deg=0.0)
     rig = replace(rig, gaze=replace(rig.gaze, head=head))
-    seen = ticks(made(rig=rig), 3.0)
+    seen = ticks(simulated(rig), 3.0)
     neck = np.degrees([tick.joints.position_rad[6] for tick in seen])
     eye = np.degrees([tick.joints.position_rad[0] for tick in seen])
     assert neck[0] == pytest.approx(-12.0, abs=0.1)
@@ -63,7 +57,7 @@ def test_it_starts_slowly_from_where_the_joints_are() -> None:
 def test_every_goal_on_the_bus_is_inside_the_limits() -> None:
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
-    run_of = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="visitor", bus="ideal"))
+    run_of = simulated(rig, seed=3, bus="ideal")
     commands = np.array([tick.guard_result.command_rad for tick in ticks(run_of, 30.0)])
     speeds = np.diff(commands, axis=0) / 0.010
     for i, name in enumerate(GAZE_JOINTS):
@@ -75,7 +69,7 @@ def test_every_goal_on_the_bus_is_inside_the_limits() -> None:
 
 
 def test_a_servo_fault_ends_the_loop_with_its_cause() -> None:
-    assembly = made()
+    assembly = simulated()
     assembly.robot.start(assembly.clock)
     chain = assembly.robot.body.bus._port.chain  # type: ignore[attr-defined]
     seen: list[Tick] = []
@@ -91,7 +85,7 @@ def test_a_servo_fault_ends_the_loop_with_its_cause() -> None:
 
 
 def test_parking_reaches_the_pose_and_torque_goes_off() -> None:
-    assembly = made()
+    assembly = simulated()
     ticks(assembly, 4.0)
     assert assembly.robot.park(assembly.park_rad, assembly.clock, assembly.loop)
     chain = assembly.robot.body.bus._port.chain  # type: ignore[attr-defined]
@@ -243,7 +237,7 @@ class LateClock:
 @pytest.mark.parametrize("name", ["desk", "maker"])
 def test_it_parks_in_time_on_a_host_that_is_late(name: str, host: str) -> None:
     rig = load_rig(name)
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+    made = simulated(rig)
     robot, period_s = made.robot, 1.0 / made.loop.rate_hz
     limits = robot._guard.limits
     robot.start(made.clock)

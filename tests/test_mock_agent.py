@@ -49,8 +49,8 @@ def test_an_agent_reports_the_turns_of_its_script(scene: str) -> None:
     ],
 )
 def test_a_faulty_script_is_refused_with_its_line(tmp_path: Path, line: str, fault: str) -> None:
-    text = shipped_path("scenes", "interview").read_text(encoding="utf-8")
-    (path := tmp_path / "mine.yaml").write_text(text + line + "\n", encoding="utf-8")
+    text = shipped_path("scenes", "interview").read_text()
+    (path := tmp_path / "mine.yaml").write_text(text + line + "\n")
     with pytest.raises(ConfigError, match=fault) as refused:
         load_scene(str(path))
     assert f"mine.yaml:{len(text.splitlines()) + 1}" in str(refused.value)

@@ -5,18 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fakes.runs import go
+from fakes.runs import go, simulated
 from mixed_rig import rig_of
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.tick import Tick
 
 
 def ran(rig: Rig, seconds: float) -> tuple[Assembly, list[Tick], tuple[str, ...]]:
     """Run a rig before a visitor; return the run, every tick, and the messages at the start."""
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+    made = simulated(rig)
     ticks: list[Tick] = []
     made.robot.start(made.clock)
     said = made.robot.body.bus.events()

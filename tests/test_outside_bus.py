@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fakes.runs import ticks
+from fakes.runs import simulated, ticks
 from outside_bus import EXAMPLE, HEAD, install_example
 from outside_package import on_path
 from typer.testing import CliRunner
@@ -19,9 +19,7 @@ from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.robot.app import run_bus as run_buses
-from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.main import app
 from gazerig.robot.dashboard.feed.live_feed import LiveFeed, LiveRig, rig_message
@@ -56,8 +54,7 @@ def test_it_passes_the_shipped_suites(tmp_path):
 
 
 def test_a_rig_on_it_looks_at_people(example):
-    rig = load_rig(str(HEAD))
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+    made = simulated(str(HEAD))
     made.robot.start(made.clock)
     seen = ticks(made, 399, 0.025)
     made.robot.stop()
@@ -71,8 +68,7 @@ def test_a_rig_on_it_looks_at_people(example):
 def test_a_joint_far_outside_moves_inside_slowly_on_request(example, monkeypatch):
     monkeypatch.setattr(run_buses, "_CROOKED_DEG", {"eyes_pan": 100.0})
     monkeypatch.setattr(run_buses, "STOP_BEYOND_DEG", 80.0)
-    options = RunOptions(mock=True, fast=True, seed=0, scene="visitor", recover=True)
-    made = assemble(load_rig(str(HEAD)), options)
+    made = simulated(str(HEAD), recover=True)
     made.robot.start(made.clock)
     pan = made.robot.body.names.index("eyes_pan")
     outside = [degrees(tick.joints.position_rad[pan]) > 32.5 for tick in ticks(made, 199, 0.025)]
@@ -82,7 +78,7 @@ def test_a_joint_far_outside_moves_inside_slowly_on_request(example, monkeypatch
 
 
 def test_its_section_is_checked(example, tmp_path):
-    text = HEAD.read_text(encoding="utf-8")
+    text = HEAD.read_text()
     for old, new, told in (
         ("reply_timeout_ms: 5.0", "reply_timeout_ms: 900.0", "is 900.0, wanted a number"),
         ("kind: lx16a", "kind: lx61a", "did you mean 'lx16a'?"),
@@ -93,7 +89,7 @@ def test_its_section_is_checked(example, tmp_path):
         ),
     ):
         file = tmp_path / "head.yaml"
-        file.write_text(text.replace(old, new, 1), encoding="utf-8")
+        file.write_text(text.replace(old, new, 1))
         with pytest.raises(ConfigError, match=re.escape(told)):
             load_rig(str(file))
 
@@ -113,7 +109,7 @@ def test_the_guardian_switches_its_torque_off(example):
 
 
 def test_the_page_draws_it(example):
-    made = assemble(load_rig(str(HEAD)), RunOptions(mock=True, fast=True))
+    made = simulated(str(HEAD))
     message = rig_message(LiveRig(made.shown_rig()))
     made.close()
     del SERVOS["lx-16a"]  # the page's process loads no package

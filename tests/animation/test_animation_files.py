@@ -23,7 +23,7 @@ from gazerig.robot.model.track_fit import track_motions
 
 def table(folder: Path, text: str) -> Path:
     path = folder / "table.csv"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text)
     return path
 
 
@@ -339,6 +339,6 @@ def test_a_file_far_too_large_is_refused_at_once(
 def test_a_table_in_radians_gets_a_hint(largest: str, hinted: bool, tmp_path: Path) -> None:
     path = tmp_path / "turn.csv"
     text = f"time,neck_yaw,neck_pitch\n0,0,0.1396\n1,{largest},-0.1\n2,0,0.1396\n"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text)
     notes = animation(path).notes
     assert any("degrees? these look like radians" in note for note in notes) == hinted

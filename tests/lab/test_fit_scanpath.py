@@ -40,7 +40,7 @@ NAN = float("nan")
 @pytest.fixture
 def boxes(tmp_path: Path) -> PartBoxes:
     path = tmp_path / "parts.yaml"
-    path.write_text(BOXES_YAML, encoding="utf-8")
+    path.write_text(BOXES_YAML)
     return load(path, PartBoxes)
 
 
@@ -80,7 +80,7 @@ def samples(boxes: PartBoxes, looks: Iterator[tuple[str, float]], seed: int) -> 
 
 
 def written(path: Path, header: str, rows: Iterator[str]) -> Path:
-    path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    path.write_text("\n".join([header, *rows]) + "\n")
     return path
 
 
@@ -94,7 +94,7 @@ def test_labelled_fixations_are_taken_as_they_are(tmp_path: Path) -> None:
     looks = "start,duration,part\n" + "".join(
         f"{300 * k},250,{'N' if k % 2 else 'RE'}\n" for k in range(80)
     )
-    (tmp_path / "looks.csv").write_text(looks, encoding="utf-8")
+    (tmp_path / "looks.csv").write_text(looks)
     report = fit_to_recording(tmp_path / "looks.csv", None, tmp_path / "mine.yaml")
     assert "80 fixations on the face, 0 elsewhere, 79 transitions" in report
     walk = load(tmp_path / "mine.yaml", Walk)
@@ -117,7 +117,7 @@ def test_samples_of_a_known_walk_give_it_back(tmp_path: Path, boxes: PartBoxes) 
         assert np.abs(found[i] - wanted[i]).max() < 4.0 * np.sqrt(0.25 / n), PARTS[i]
         assert walk.dwell_mean_s[i] == pytest.approx(0.2, abs=0.015), PARTS[i]
     assert "at 250 Hz" in report and "% lost; column time is in s" in report
-    text = out.read_text(encoding="utf-8")
+    text = out.read_text()
     assert "#   gaze.csv" in text and "95 %" in text and "# from RE" in text
 
 
@@ -142,7 +142,7 @@ def test_files_that_cannot_be_trusted_are_refused(
     tmp_path: Path, boxes: PartBoxes, text: str, why: str
 ) -> None:
     recording, out = tmp_path / "bad.csv", tmp_path / "mine.yaml"
-    recording.write_text(text, encoding="utf-8")
+    recording.write_text(text)
     with pytest.raises(SetupError, match=why) as caught:
         fit_to_recording(recording, boxes, out)
     assert "\n" not in str(caught.value) and "bad.csv" in str(caught.value)

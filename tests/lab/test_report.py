@@ -15,7 +15,7 @@ import pytest
 from command_line import typed
 from described_rigs import shipped
 from desk import GAZE_JOINTS
-from fakes.runs import play
+from fakes.runs import play, simulated
 from msgspec import structs
 from recorded_rigs import Run, recorded
 from six_joints import SIX
@@ -60,8 +60,6 @@ from gazerig.gaze.lids.blink import closure
 from gazerig.gaze.oculomotor.saccade import SaccadeModel as Jumps
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.types import PARTS, Bodies, Percept, Vec3
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
@@ -89,7 +87,7 @@ def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -
 def looked(rig: Rig, scene: str, seconds: float, **choice: str) -> GazeTrace:
     """Gather a simulated run, with half the ticks: a minute of them takes longest here."""
     slower = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
-    made = assemble(slower, RunOptions(True, True, 0, scene, **choice))  # type: ignore[arg-type]
+    made = simulated(slower, scene, **choice)
     gathering = GazeTraceBuilder()
     play(made, seconds, gathering.update)
     return gathering.trace()
@@ -205,7 +203,7 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
     )
     out = tmp_path / "deep" / "report.html"
     made = make_report(walking, about, out, lambda words, share: None)
-    raw = out.read_text(encoding="utf-8")
+    raw = out.read_text()
     page = unescape(raw)
     assert "a &lt;run&gt;" in raw and "cut &amp; short" in raw
     assert page.count("data:image/png;base64,") == len(DRAWINGS) == len(made.figures)
@@ -214,7 +212,7 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
     for path in made.figures:
         picture = cv2.imread(str(path))
         assert picture is not None and picture.std() > 5.0
-    numbers = json.loads(made.data.read_text(encoding="utf-8"))
+    numbers = json.loads(made.data.read_text())
     assert {row["key"] for row in numbers} == {f.band.key for f in made.findings}
     for finding in made.findings:
         assert finding.band.title in page and band_text(finding.band) in page
@@ -264,7 +262,7 @@ STEP_DEG = 360.0 / 4096.0
 @pytest.fixture(scope="module")
 def ticks(desk_rig: Rig) -> list[Tick]:
     seen: list[Tick] = []
-    play(assemble(desk_rig, RunOptions(True, True, 0, "face-to-face")), SECONDS, seen.append)
+    play(simulated(desk_rig, "face-to-face"), SECONDS, seen.append)
     return seen
 
 
@@ -497,7 +495,7 @@ def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: P
     made = make_report(read_run(maker.ticks, about, quiet), about, out, quiet)
     rows = {row["key"]: row for row in json.loads(made.data.read_text())}
     assert {row["basis"] for row in rows.values()} == {"estimated"}
-    page = unescape(out.read_text(encoding="utf-8"))
+    page = unescape(out.read_text())
     assert "Nothing here is measured: the servos of this rig have no feedback" in page
     assert "not measured" in page.partition("Saccades <span")[2][:120]
     assert "measured from the servos" not in page

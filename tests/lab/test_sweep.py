@@ -52,7 +52,7 @@ def swept(out: Path, *words: str) -> Invoked:
 
 
 def table(out: Path) -> list[dict[str, str]]:
-    with (out / "table.csv").open(encoding="utf-8") as file:
+    with (out / "table.csv").open() as file:
         return list(csv.DictReader(file))
 
 
@@ -120,7 +120,7 @@ def test_a_line_that_was_being_written_when_the_power_went_is_done_again(tmp_pat
         kept = store.get({"a": (1, 2)}, 0)
         assert kept is not None and kept.figures == {"x": 1.5}
         store.add(Outcome({"a": (1, 2)}, 1, {"x": 2.5}))
-    assert len(file.read_text(encoding="utf-8").splitlines()) == 2
+    assert len(file.read_text().splitlines()) == 2
 
 
 def test_two_processes_make_the_table_of_one(desk_rig: Rig, tmp_path: Path) -> None:
@@ -315,5 +315,5 @@ def test_a_small_fit_writes_what_it_found(tmp_path: Path) -> None:
     assert f"to run it: gazerig run desk --character {out}/best.yaml" in done.err
     best = load_rig("desk", str(out / "best.yaml")).gaze
     assert (best.saccade.profile, best.lids.hold_ms) == ("min_jerk", 50.0)
-    rows = (out / "table.csv").read_text(encoding="utf-8").splitlines()
+    rows = (out / "table.csv").read_text().splitlines()
     assert [row.split(",")[0] for row in rows] == [key, "literal_frame", "min_jerk"]
