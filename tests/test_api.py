@@ -15,10 +15,6 @@ from gazerig.robot.recording.read import RunRecording
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
-def quiet(line: str) -> None:
-    """Stay silent."""
-
-
 @pytest.fixture
 def head() -> Iterator[gazerig.SimulatedHead]:
     yield from _opened()
@@ -31,7 +27,7 @@ def shared_head() -> Iterator[gazerig.SimulatedHead]:
 
 
 def _opened() -> Iterator[gazerig.SimulatedHead]:
-    with gazerig.open("desk", fast=True, scene="face-to-face", say=quiet) as head:
+    with gazerig.open("desk", fast=True, scene="face-to-face") as head:
         head.step(2.0)
         yield head
 
@@ -184,9 +180,7 @@ def test_a_condition_is_waited_for(head: gazerig.SimulatedHead) -> None:
 
 def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     file = tmp_path / "program.mcap"
-    with gazerig.open(
-        "desk", fast=True, bus="emulated", scene="face-to-face", record=file, say=quiet
-    ) as head:
+    with gazerig.open("desk", fast=True, bus="emulated", scene="face-to-face", record=file) as head:
         head.step(1.0)
         head.look_at_pixel(200.0, 150.0).wait()
         head.play("nod")
@@ -201,7 +195,7 @@ def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) 
 
 
 def test_a_head_moves_in_its_block_alone() -> None:
-    closed = gazerig.open("desk", fast=True, say=quiet)
+    closed = gazerig.open("desk", fast=True)
     with pytest.raises(gazerig.Error, match="in a with block"):
         closed.look_at(1.0, 0.0, 0.0)
     with closed as head:
@@ -241,7 +235,7 @@ def test_what_does_not_fit_is_one_line_of_one_family(
     assert issubclass(error, gazerig.Error)
     with (
         pytest.raises(error, match=words),
-        gazerig.open(**{"fast": True, "say": quiet, **options}),  # type: ignore[call-overload]
+        gazerig.open(**{"fast": True, **options}),  # type: ignore[call-overload]
     ):
         pass
 
@@ -256,7 +250,7 @@ class BadRule:
 def test_an_own_rule_that_fails_ends_the_head_with_its_error() -> None:
     with (
         pytest.raises(RuntimeError, match="out of ideas"),
-        gazerig.open("desk", fast=True, attention=BadRule(), say=quiet) as head,
+        gazerig.open("desk", fast=True, attention=BadRule()) as head,
     ):
         head.step(0.1)
 

@@ -21,7 +21,7 @@ RATE = "loop.rate_hz"
 
 
 def opened(rig: str) -> gazerig.Head:
-    return gazerig.open(rig, mock=True, bus="ideal", scene="visitor", say=lambda line: None)
+    return gazerig.open(rig, mock=True, bus="ideal", scene="visitor")
 
 
 @pytest.fixture(scope="module")

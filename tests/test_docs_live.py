@@ -95,7 +95,7 @@ def test_commands_to_a_running_head_work(folder: Path) -> None:
     own = "\ntrack_files: [agree.yaml]\nsound: {device: silent}\nloop: {rate_hz: 40.0}\n"
     copy("expressive", folder / "head.yaml", own)
     write_wav(folder / "hello.wav", b"\0\0" * 4800, 16000)
-    with gazerig.open("head.yaml", mock=True, scene="face-to-face", say=lambda line: None):
+    with gazerig.open("head.yaml", mock=True, scene="face-to-face"):
         for words in TO_A_HEAD:
             _works_on_a_head(words)
 

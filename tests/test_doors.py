@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 import yaml
 from aiohttp import ClientSession, WSServerHandshakeError, web
+from command_line import invoked
 from fakes.talking_head import TalkingHead, until
 from fakes.voice_assistant import Assistant, free_port, lva
-from typer.testing import CliRunner
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
@@ -27,7 +27,6 @@ from gazerig.doors.door import Address, Door, DoorLink
 from gazerig.doors.turn_taking import Orders, UnknownMessage
 from gazerig.drivers.plugins import DOOR, SHIPPED, find
 from gazerig.robot.app.door_processes import load_door
-from gazerig.robot.cli import door as cli_door
 
 
 def brief(orders: Orders) -> list[Any]:
@@ -542,10 +541,10 @@ def test_a_door_names_who_can_reach_it_and_a_port_that_is_taken(
 
 
 def test_the_command_lists_doors_and_names_a_missing_one() -> None:
-    assert CliRunner().invoke(cli_door.app, []).output.count("\n") == len(SHIPPED[DOOR])
-    missed = CliRunner().invoke(cli_door.app, ["wyomin"])
-    assert missed.exit_code == 2
-    assert "no door is called 'wyomin': did you mean 'wyoming'?" in missed.output
+    assert invoked("door").out.count("\n") == len(SHIPPED[DOOR])
+    missed = invoked("door", "wyomin")
+    assert missed.code == 2
+    assert "no door is called 'wyomin': did you mean 'wyoming'?" in missed.err
 
 
 def test_the_newest_neighbour_takes_the_place_of_an_idle_one(

@@ -37,7 +37,7 @@ def test_every_saccade_blink_and_track_of_the_ticks_is_an_event() -> None:
 
 
 def test_people_arrive_and_leave_once() -> None:
-    with gazerig.open("desk", fast=True, scene="visitor", say=lambda line: None) as head:
+    with gazerig.open("desk", fast=True, scene="visitor") as head:
         head.step(40.0)
         events = list(head.events(0.0, kinds=("person_arrived", "person_left", "target")))
         texts = [event.text for event in head.events(0.0)]

@@ -11,6 +11,7 @@ from slow_rigs import at_rate
 
 from gazerig.config.load import ConfigError
 from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.model.commands import Command, Tune
 from gazerig.robot.remote.client import connect_to_all
 from gazerig.robot.remote.live_server import LiveServer
 
@@ -24,9 +25,10 @@ class Rig:
     def __init__(self, folder: Path) -> None:
         self.path = Path(at_rate(folder, "desk", 80.0))
         made = simulated(str(self.path))
+        self._live_params = made.live_params
         self.tuning = ParamStore(
             made.live_params,
-            lambda order: made.live_params(order, 0.0),
+            self._apply,
             str(self.path),
             elsewhere=lambda work, *words: work(*words),
         )
@@ -35,6 +37,10 @@ class Rig:
         self.live = LiveServer(
             made.robot, self.tuning, (ConfigError,), made.clock, about, self.said.append
         )
+
+    def _apply(self, order: Command) -> None:
+        assert isinstance(order, Tune)
+        self._live_params(order, 0.0)
 
     def look(self) -> str:
         """Look at the file until it counts, and return the last message."""

@@ -26,7 +26,7 @@ def turns(head: gazerig.SimulatedHead, seconds: float) -> list[tuple[float, str]
 @pytest.mark.parametrize("scene", ["interview", "table"])
 def test_an_agent_reports_the_turns_of_its_script(scene: str) -> None:
     acts = load_scene(scene).agent
-    with gazerig.open("desk", fast=True, bus="ideal", scene=scene, say=lambda line: None) as head:
+    with gazerig.open("desk", fast=True, bus="ideal", scene=scene) as head:
         found = turns(head, 60.0 + acts[0].at_s + 1.5)
     names = {"interrupt": "interrupted"}
     expected = [(act.at_s, names.get(act.state, act.state)) for act in acts]

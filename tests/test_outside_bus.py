@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import invoked
 from fakes.runs import simulated, ticks
 from outside_bus import EXAMPLE, HEAD, install_example
 from outside_package import on_path
-from typer.testing import CliRunner
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
@@ -21,7 +21,6 @@ from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.robot.app import run_bus as run_buses
 from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
 from gazerig.robot.app.run_bus import emulated_lines
-from gazerig.robot.cli.main import app
 from gazerig.robot.dashboard.feed.live_feed import LiveFeed, LiveRig, rig_message
 from gazerig.robot.description.build import describe
 from gazerig.robot.guardian.process import releaser
@@ -123,6 +122,6 @@ def test_what_speaks_to_our_kinds_alone_says_so_in_one_line(example, words):
     pytest.importorskip("gazerig.features.bringup")
     command, *rest = words.split(" --")
     options = [f"--{one}" for one in rest]
-    done = CliRunner().invoke(app, [*command.split(), str(HEAD), "--mock", *options])
+    done = invoked(*command.split(), str(HEAD), "--mock", *options)
     told = f"{command} cannot ask the bus 'lx16a' of gazerig-lx16a 0.1.0: run and jog"
-    assert told in done.output and done.exit_code != 0, done.output
+    assert told in done.err and done.code != 0, done.err

@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import invoked
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import SetupError
 from gazerig.features.animation.animation import ImportedAnimation, Series, joint_map
-from gazerig.features.animation.cli.import_track import app
 from gazerig.robot.app.track_file import fit_to_rig, track_text, write_track
 from gazerig.robot.description.links import Link, LinkJoint
 from gazerig.robot.model.track_fit import track_motions
@@ -79,16 +78,15 @@ def test_bad_rows_are_named_with_their_line(desk_rig: Rig, text: str, tmp_path: 
 
 def test_the_command_imports_a_table_for_a_rig(tmp_path: Path) -> None:
     path = table(tmp_path, WIDE)
-    words = ["desk", str(path), "greet", "--folder", str(tmp_path)]
-    done = CliRunner().invoke(app, words)
-    assert done.exit_code == 0 and "greet.yaml: 1.4 s on desk" in done.stderr
-    minus = [*words[:-1], str(tmp_path), "--force", "--map", "neck_yaw=-neck_yaw"]
-    assert CliRunner().invoke(app, minus).exit_code == 0
+    words = ["import", "desk", str(path), "greet", "--folder", str(tmp_path)]
+    done = invoked(*words)
+    assert done.code == 0 and "greet.yaml: 1.4 s on desk" in done.err
+    assert invoked(*words, "--force", "--map", "neck_yaw=-neck_yaw").code == 0
     assert "head_yaw_deg: -4.0" in (tmp_path / "greet.yaml").read_text()
-    again = CliRunner().invoke(app, words)
-    assert again.exit_code != 0 and "--force" in again.stderr
-    wrong = CliRunner().invoke(app, [*words[:2], "Greet!", "--folder", str(tmp_path)])
-    assert wrong.exit_code != 0 and "lower-case letters" in wrong.stderr
+    again = invoked(*words)
+    assert again.code != 0 and "--force" in again.err
+    wrong = invoked(*words[:3], "Greet!", *words[4:])
+    assert wrong.code != 0 and "lower-case letters" in wrong.err
 
 
 def glb(tree: dict[str, Any], binary: bytes = b"") -> bytes:
@@ -285,9 +283,9 @@ def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(
 ) -> None:
     times = [0.0, 1.0, 2.0]
     (tmp_path / "far.glb").write_bytes(clip(times, about("z", [40.0, -20.0, 30.0])))
-    done = CliRunner().invoke(app, ["desk", str(tmp_path / "far.glb"), "--folder", str(tmp_path)])
-    assert done.exit_code == 0 and "from the neutral pose to its first one" in done.stderr
-    assert "cannot play" not in done.stderr
+    done = invoked("import", "desk", str(tmp_path / "far.glb"), "--folder", str(tmp_path))
+    assert done.code == 0 and "from the neutral pose to its first one" in done.err
+    assert "cannot play" not in done.err
     track = load_track(tmp_path / "far.yaml")
     found = fit_to_rig(desk_rig, track)
     assert track.owns == ("neck_yaw",) and found.fitted is not None

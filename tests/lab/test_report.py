@@ -12,14 +12,13 @@ from typing import cast
 import cv2
 import numpy as np
 import pytest
-from command_line import typed
+from command_line import invoked, typed
 from described_rigs import shipped
 from desk import GAZE_JOINTS
 from fakes.runs import play, simulated
 from msgspec import structs
 from recorded_rigs import Run, recorded
 from six_joints import SIX
-from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.features.lab.analysis import human_norms as bands
@@ -33,7 +32,6 @@ from gazerig.features.lab.analysis.event_detector import (
     SaccadeEvent,
     SaccadeFinder,
 )
-from gazerig.features.lab.cli.report import app
 from gazerig.features.lab.report import face, landing, rests
 from gazerig.features.lab.report.face import published_walk
 from gazerig.features.lab.report.gaze_trace import (
@@ -219,14 +217,14 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
 
 
 def test_the_command_takes_a_file_or_a_scene() -> None:
-    runner = CliRunner()
-    for arguments in ([], ["x.mcap", "--scene", "visitor"]):
-        done = runner.invoke(app, arguments)
-        assert done.exit_code == 2 and "report takes either" in done.output
-    done = runner.invoke(app, ["--scene", "nowhere", "--seconds", "5"])
-    assert done.exit_code == 2 and "unknown; scenes" in done.output
-    done = runner.invoke(app, ["nothing.mcap"])
-    assert done.exit_code == 2 and len(done.output.strip().splitlines()) == 1
+    for words, text in (
+        ((), "report takes either"),
+        (("x.mcap", "--scene", "visitor"), "report takes either"),
+        (("--scene", "nowhere", "--seconds", "5"), "unknown; scenes"),
+        (("nothing.mcap",), "nothing.mcap"),
+    ):
+        done = invoked("report", *words)
+        assert done.code == 2 and text in done.err and done.err.count("\n") == 1
 
 
 # --- Files that a report reads and writes: nothing of the user's is lost
