@@ -89,7 +89,8 @@ def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(path: str) -> N
 
         with ExitStack() as stack:
             with going_on(show):
-                deaf = stack.enter_context(browser(visitor, path, deaf=True))
+                deaf = browser(visitor, path, deaf=True)
+                stack.enter_context(deaf)
                 reads_all = stack.enter_context(closing(Listener(visitor, path)))
                 listener = stack.enter_context(closing(Listener(visitor)))
                 wait_for(lambda: reads_all.bytes > OWED_BYTES, "what one who reads gets")

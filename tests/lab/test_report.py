@@ -7,7 +7,7 @@ from html import unescape
 from math import cos, radians, sin
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import cv2
 import numpy as np
@@ -82,7 +82,7 @@ def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -
     return GazeTrace(rows, every, (), shuts, shuts)
 
 
-def looked(rig: Rig, scene: str, seconds: float, **choice: str) -> GazeTrace:
+def looked(rig: Rig, scene: str, seconds: float, **choice: Any) -> GazeTrace:
     """Gather a simulated run, with half the ticks: a minute of them takes longest here."""
     slower = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     made = simulated(slower, scene, **choice)
