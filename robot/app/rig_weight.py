@@ -117,13 +117,7 @@ def weight_findings(rig: Rig) -> Iterator[WeightFinding]:
                 f"set park_deg.{name} to {degrees(rest[name]):.0f}, where it needs no torque",
             )
         elif name == "neck_pitch":
-            how = "friction holds it"
-            low, high = statics.joints[name].min_deg, statics.joints[name].max_deg
-            if at in (low, high):
-                how = "it rests on its stop"
-            elif _tips(statics, name, park):
-                how = "it is above its axis, held by friction: a push tips it"
-            yield WeightFinding("ok", name, f"parked at {at:.0f} deg it needs no torque: {how}")
+            yield WeightFinding("ok", name, f"parked at {at:.0f} deg it needs no torque")
 
 
 def rest_park_deg(rig: Rig) -> dict[str, float]:
@@ -157,11 +151,3 @@ def park_note(rig: Rig) -> str | None:
         return None
     where = ", ".join(f"{name} at {park[name]:.0f} deg" for name in moved)
     return f"parks {where}, where the head needs no torque: at its park_deg it would sink"
-
-
-def _tips(statics: Statics, name: str, pose_rad: Mapping[str, float]) -> bool:
-    """Return whether a small turn of a joint makes its load turn it farther."""
-    near = radians(1.0)
-    at = pose_rad.get(name, 0.0)
-    loads = [statics.load_nm({**pose_rad, name: at + by})[name] for by in (-near, near)]
-    return loads[1] > loads[0]

@@ -19,7 +19,6 @@ from gazerig.robot.app.door_processes import DoorProcesses
 from gazerig.robot.app.mock_agent import AgentScene, MockAgent
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.app.voice import RunVoice
 from gazerig.robot.control.command_handler import accept_only_stops
 from gazerig.robot.control.loop import LoopCount
@@ -78,10 +77,10 @@ class RunObservers:
     ) -> None:
         self._led_by, self._by_browser, self._voice = led_by, False, voice
         self._made, self._fast, self._say = assembly, options.fast, say
-        self._agent = MockAgent(
-            assembly.robot.command,
-            assembly.scene if isinstance(assembly.scene, AgentScene) else None,
-            self._scene_start_s,
+        self._agent = (
+            MockAgent(assembly.robot.command, assembly.scene, self._scene_start_s)
+            if isinstance(assembly.scene, AgentScene)
+            else None
         )
         self._states = 0
         self._figures: LoopFigures | None = None
@@ -150,8 +149,6 @@ class RunObservers:
             point=self._picking.point,
             refusals=(ConfigError,) if self._tuning is not None else (),
             saved=self._live.saved if self._live is not None else None,
-            depth=self._show_depth,
-            talk=self._play_talk,
             paths=self._tuning.confined if self._tuning is not None else None,
         )
         browser = self._made.browser
@@ -199,7 +196,7 @@ class RunObservers:
             observers.add("the recording", self._recorder.record)
         elif self._publisher is not None:
             observers.add("the page", self._stream.update)
-        if self._emulated:
+        if self._agent is not None:
             observers.add("the simulated voice agent", self._agent.update)
         if not self._fast:
             observers.add("the loop's time", self._record_time)
@@ -307,21 +304,10 @@ class RunObservers:
             if self._recorder is not None:
                 self._say(self._recorder.close(count.stopped_by, self._made.sent_bytes_digest()))
 
-    def _show_depth(self, on: bool) -> None:
-        if self._publisher is not None:
-            self._publisher.depth = on
-
     def _scene_start_s(self) -> float | None:
         """Return the start of the scene, None before or without one."""
         room = self._made.room
         return room.start_s() if room is not None else scene_start_s(self._made.robot.camera)
-
-    def _play_talk(self) -> str:
-        """Play a minute of conversation with the nearest person; return a message."""
-        if not self._emulated:
-            return "refused: only a head with emulated servos plays a conversation"
-        self._agent.play(load_scene("interview").agent)
-        return "the head listens, thinks, answers and is interrupted, for a minute"
 
     def _record_time(self, tick: Tick) -> None:
         """Record the time of a tick."""

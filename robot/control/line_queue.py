@@ -18,7 +18,7 @@ _END_S = 1.0
 class LineQueue:
     """A queue of lines for a function that may block or fail, in the order of the calls.
 
-    The end of the block waits for at most a second and reports lost lines on standard error.
+    The end of the block waits for at most a second. A failure is named on standard error.
 
     Args:
         deliver: Called with one line after another, in one thread.
@@ -28,14 +28,10 @@ class LineQueue:
     def __init__(self, deliver: Callable[[str], object], name: str) -> None:
         self._deliver, self._name = deliver, name
         self._lines = WorkQueue(name)
-        self._lost = 0
-        self._reason = "it was slow"
 
     def line(self, text: str) -> None:
         """Queue a line without waiting."""
-        if len(self._lines) >= _MOST:
-            self._lost += 1
-        else:
+        if len(self._lines) < _MOST:
             self._lines.add(partial(self._deliver_line, text))
 
     def __enter__(self) -> Self:
@@ -43,20 +39,14 @@ class LineQueue:
         return self
 
     def __exit__(self, *raised: object) -> None:
-        """Wait for the running delivery, and abandon it after a second."""
-        if not self._lines.wait_idle(_END_S):
-            self._lost += len(self._lines)
-            self._reason = "it does not return"
-        if self._lost:
-            with contextlib.suppress(OSError, ValueError, AttributeError):
-                sys.stderr.write(
-                    f"gazerig: {self._lost} lines were not delivered to {self._name}: "
-                    f"{self._reason}\n"
-                )
+        """Wait for the last lines, and abandon them after a second."""
+        self._lines.wait_idle(_END_S)
 
     def _deliver_line(self, text: str) -> None:
         try:
             self._deliver(text)
         except BaseException as error:
-            self._lost += 1
-            self._reason = f"it failed ({describe_error(error)})"
+            with contextlib.suppress(OSError, ValueError, AttributeError):
+                sys.stderr.write(
+                    f"gazerig: {self._name} failed ({describe_error(error)}) at: {text}\n"
+                )

@@ -9,7 +9,6 @@ from gazerig.robot.dashboard.door.viser_server import browser_of
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices, ShownWorld
 from gazerig.robot.dashboard.feed.page_process import (
-    ALL_USERS,
     CHOICES,
     MESSAGE,
     PARAMS,
@@ -63,7 +62,6 @@ class PageView:
         self._world = WorldView(server.scene)
         self._panel = PanelView(widgets)
         self._layers = OverlayPanel(server.scene)
-        self._panel.depth = lambda on: outbox.ask({"show": {"depth": on}}, ALL_USERS)
         self._controls = Controls(widgets, server.scene, outbox)
         self._newest: Snapshot | None = None
         self._menus: Mapping[str, Sequence[str]] = {}

@@ -6,22 +6,18 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import Depth, Detections, ImageArray
+from gazerig.drivers.types import Detections, ImageArray
 from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.feed.gaze_trail import EVERY_S
 from gazerig.robot.model.intrinsics import project
 
 IMAGE_WIDTH_PX = 640
-NEAREST_M, FARTHEST_M = 0.3, 6.0
-"""Ends of the colour scale of the depth image: an arm's reach and the length of a room."""
-
 _JPEG_QUALITY = 80
 _FACE = (120, 220, 90)  # BGR
 _LANDMARK = (255, 255, 255)
 _BLOB = (255, 170, 60)
 _GAZE, _GAZE_EDGE = (40, 130, 255), (250, 250, 250)
 _DARK_GROUND = 38
-_SCALE_PX = 12
 
 Point = tuple[int, int]
 
@@ -81,48 +77,6 @@ def draw_detections(
         cv2.circle(drawn, at, ring, _GAZE, line, cv2.LINE_AA)
         cv2.circle(drawn, at, dot, _GAZE, -1, cv2.LINE_AA)
     return drawn
-
-
-def background(detections: Detections, depth: bool) -> ImageArray | None:
-    """Return the background of ``draw_detections``: the image, or the depth if selected.
-
-    A camera without depth returns its image with a message.
-    """
-    if not depth:
-        return detections.image
-    if detections.depth_m is not None:
-        return depth_image(detections.depth_m)
-    scale = min(1.0, IMAGE_WIDTH_PX / detections.width_px)
-    drawn = _shrink(detections.image, detections, scale)
-    _draw_text(drawn, "this camera measures no depth", (6, drawn.shape[0] - 8), _LANDMARK)
-    return drawn
-
-
-def depth_image(depth_m: Depth) -> ImageArray:
-    """Return distances as colours, at most IMAGE_WIDTH_PX wide, with a colour scale at the bottom.
-
-    depth_m: (height, width), NaN where unknown, which is shown dark. Red is NEAREST_M or less,
-    blue FARTHEST_M or more; the colour scale is logarithmic.
-    """
-    scale = min(1.0, IMAGE_WIDTH_PX / depth_m.shape[1])
-    size = (max(1, round(depth_m.shape[1] * scale)), max(1, round(depth_m.shape[0] * scale)))
-    # No averaging: no surface is at the mean distance of a hand and the wall behind it.
-    small = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
-    known = np.isfinite(small)
-    metres = np.clip(np.where(known, small, FARTHEST_M), NEAREST_M, FARTHEST_M)
-    share = np.log(FARTHEST_M / metres) / np.log(FARTHEST_M / NEAREST_M)
-    drawn = cv2.applyColorMap((255.0 * share).astype(np.uint8), cv2.COLORMAP_TURBO)
-    drawn[~known] = _DARK_GROUND
-    height, width = drawn.shape[:2]
-    ramp = np.linspace(255, 0, width).astype(np.uint8)[None].repeat(_SCALE_PX, axis=0)
-    foot = drawn[max(0, height - _SCALE_PX) :]
-    foot[:] = cv2.applyColorMap(ramp, cv2.COLORMAP_TURBO)[: len(foot)]
-    for text, x in ((f"{NEAREST_M:g} m", 3), (f"{FARTHEST_M:g} m", width - 26)):
-        cv2.putText(
-            drawn, text, (x, height - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, (255, 255, 255), 1,
-            cv2.LINE_AA,
-        )  # fmt: skip
-    return np.asarray(drawn, np.uint8)
 
 
 def encode(image: ImageArray) -> bytes:

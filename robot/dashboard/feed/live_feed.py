@@ -80,13 +80,10 @@ class ShownFrame(NamedTuple):
     found: its lens is the one with which the frame was located, else the one that the camera
         reports
     image: array in the attached memory, None without one
-    depth: whether it is the depth image; wants_depth: whether depth should be shown
     """
 
     found: Detections
     image: PassedImage | None
-    depth: bool
-    wants_depth: bool
 
 
 def rig_message(rig: LiveRig) -> bytes:
@@ -99,9 +96,7 @@ def state_message(state: RunState) -> bytes:
     return STATE + encode(state)
 
 
-def frame_message(
-    found: Detections, image: PassedImage | None, depth: bool, wants_depth: bool
-) -> bytes:
+def frame_message(found: Detections, image: PassedImage | None) -> bytes:
     """Return a message with the detections of a frame; see ``ShownFrame``."""
     # Not by replace: a frame of the camera's process reads its image when it is asked for.
     plain = Detections(
@@ -115,7 +110,7 @@ def frame_message(
         people=found.people,
         conditions=found.conditions,
     )
-    return DETECTED + encode(ShownFrame(plain, image, depth, wants_depth))
+    return DETECTED + encode(ShownFrame(plain, image))
 
 
 class LiveFeed:
@@ -144,7 +139,6 @@ class LiveFeed:
         self._percept: Percept | None = None
         self._state = RunState({}, "", "", "")
         self._found: Detections | None = None
-        self._wants_depth = False
         self._newest: Tick | None = None
         self._new_ticks = self._new_frame = False
 
@@ -206,7 +200,7 @@ class LiveFeed:
         if tick is None or found is None or builder is None or poses is None:
             return None
         begin_s, end_s = self._undrawn_s
-        if _has_no_image(found) and begin_s < found.captured_s < end_s:
+        if found.image is None and begin_s < found.captured_s < end_s:
             return None
         self._new_frame = False
         assert builder.rig is not None  # it was in the first message
@@ -214,7 +208,7 @@ class LiveFeed:
         lens = intrinsics_of_lens(None, field_rad, found.width_px, found.height_px, found.lens)
         R, p_m = builder.rig.mount.pose(*poses.head_pose(found.captured_s))
         start_s = self._state.scene_start_s
-        if _has_no_image(found) and self._picture is not None and start_s is not None:
+        if found.image is None and self._picture is not None and start_s is not None:
             size_px = found.width_px, found.height_px
             seen_by = PinholeView(found.captured_s - start_s, lens, size_px, R, p_m)
             began_s = time.thread_time()
@@ -222,18 +216,18 @@ class LiveFeed:
             pause_s = (time.thread_time() - began_s) / _DRAWING_SHARE
             self._undrawn_s = found.captured_s, found.captured_s + pause_s
         # The page's process draws; the control loop's imports this module too, without OpenCV.
-        from gazerig.robot.dashboard.feed.camera_overlay import background, draw_detections
+        from gazerig.robot.dashboard.feed.camera_overlay import draw_detections
 
         points_m = self._trail.points() if self.choices.heat else None
         return draw_detections(
-            background(found, self._wants_depth),
+            found.image,
             found,
             gaze_pixel(self._gaze.at(found.captured_s), R, p_m, lens)
             if self.choices.gaze
             else None,
             lens,
             # Without an image only the detections can be drawn.
-            faces=self.choices.faces or _has_no_image(found),
+            faces=self.choices.faces or found.image is None,
             heat_px=None if points_m is None else project_points(points_m, R, p_m, lens),
         )
 
@@ -255,13 +249,8 @@ class LiveFeed:
         found = frame.found
         if frame.image is not None and fd >= 0:
             array = take_image(frame.image._replace(fd=fd))
-            found = replace(found, depth_m=array) if frame.depth else replace(found, image=array)
-        self._found, self._wants_depth, self._new_frame = found, frame.wants_depth, True
-
-
-def _has_no_image(found: Detections) -> bool:
-    """Return whether there is neither an image nor a depth image."""
-    return found.image is None and found.depth_m is None
+            found = replace(found, image=array)
+        self._found, self._new_frame = found, True
 
 
 def gaze_pixel(point_m: Vec3, R: Mat3, p_m: Vec3, lens: Intrinsics) -> tuple[float, float] | None:

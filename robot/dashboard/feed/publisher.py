@@ -160,8 +160,6 @@ class Publisher:
         feed: sends the parameters to the page.
         tell: Prints a line on the terminal, such as the page's address.
         browse: opens an address in the user's browser, once; None: leaves that to the user.
-
-    depth: whether the depth image is shown in place of the camera's
     """
 
     def __init__(
@@ -176,7 +174,6 @@ class Publisher:
         self._browse = browse
         self._page, self._rig, self._state, self._tell = page, rig, state, tell
         self._params = ParamThread(feed, tell) if feed is not None else None
-        self.depth = False
         self._url_told = False
         self._started = 0
         self._rig_sent = False
@@ -242,16 +239,15 @@ class Publisher:
         if found is None or found.number == self._frame:
             return
         self._frame = found.number
-        depth = self.depth and found.depth_m is not None
-        array = found.depth_m if depth else found.image
+        array = found.image
         if array is None and self._images:
             return  # its slot has been overwritten
         if array is None:
-            self._page.send(frame_message(found, None, False, self.depth))
+            self._page.send(frame_message(found, None))
             return
         self._images = True
         image = copy_image(array)
         try:
-            self._page.send(frame_message(found, image, depth, self.depth), image.fd)
+            self._page.send(frame_message(found, image), image.fd)
         finally:
             os.close(image.fd)

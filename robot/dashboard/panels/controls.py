@@ -20,7 +20,6 @@ from gazerig.robot.model.types import Snapshot, order_joints
 BEHAVIOUR, CONVERSATION, CHARACTER = "behaviour", "conversation", "character"
 
 _TARGET_SCALE = 0.12
-_DEMO = "play a minute of conversation"
 _DRAG, _FREE, _AHEAD = "drag a target", "look freely", "look straight ahead"
 
 
@@ -35,7 +34,7 @@ class Controls:
         self._tuning = ParamPanel(widgets, self._tune, outbox)
         self._face = ExpressionPanel(self._steer, outbox)
         self._play = PlayPanel(widgets.panel("play"), outbox)
-        self._talk = TalkPanel(self._steer, outbox)
+        self._talk = TalkPanel(self._steer)
         self._first = FirstMenus(self._tune, outbox, self._lead.let_go)
 
     def offer(self, menus: Mapping[str, Sequence[str]]) -> None:
@@ -80,18 +79,10 @@ class Controls:
 
 
 class TalkPanel:
-    """State of a conversation, as a voice agent reports it, and a conversation to watch."""
+    """State of a conversation, as a voice agent reports it."""
 
-    def __init__(self, place: Container, outbox: Outbox) -> None:
-        section = place.section("voice agent", is_open=False, order=15)
-        self.state = section.html(order=1)
-        self.demo = section.buttons(
-            "",
-            (_DEMO,),
-            hint="a simulated agent listens, thinks, speaks and is interrupted",
-            order=2,
-        )
-        self.demo.on_press(lambda _, who: outbox.ask({"play_talk": True}, who))
+    def __init__(self, place: Container) -> None:
+        self.state = place.section("voice agent", is_open=False, order=15).html(order=1)
 
     def show(self, snapshot: Snapshot) -> None:
         """Show what the agent does."""

@@ -1,6 +1,5 @@
 """Panels that show the rig: camera, reasons, traces and health."""
 
-from collections.abc import Callable
 from functools import partial
 from math import inf
 
@@ -23,14 +22,12 @@ class PanelView:
     A drawer that no browser has open is not drawn.
 
     layers: layers of the scene, as selected by the users
-    depth: called when a user selects the depth image or the camera image
     """
 
     def __init__(self, widgets: Widgets) -> None:
         self._widgets = widgets
         self._shown = 0
         self._open: frozenset[str] = frozenset()
-        self.depth: Callable[[bool], object] = lambda on: None
         self.silence = widgets.panel("watch").html(order=0)
         self.panels = PagePanels(widgets.panel("watch"))
         self._begin()
@@ -50,8 +47,6 @@ class PanelView:
         for order, (name, says) in enumerate(OverlayChoices.NAMES.items()):
             box = self.view.checkbox(says, getattr(layers, name), order=order)
             box.on_change(partial(select, name))
-        depth = self.view.checkbox("depth instead of the camera image", value=False, order=99)
-        depth.on_change(lambda on, _: self.depth(on))
         self.health = widgets.panel("health").html(note("waiting for the rig"))
 
     def _begin(self) -> None:

@@ -41,8 +41,6 @@ class PageRequestHandler:
         command: executes commands.
         params: parameters that can be changed; None: there are none.
         point: returns the point in the world at a position in the image; None: there is no image.
-        depth: switches the depth image on or off; None: there is none.
-        talk: plays a minute of conversation and returns a message; None: it cannot.
         refusals: exceptions besides ValueError that ``params`` raises for values that break a rule.
         saved: called with each written file.
         paths: permitted files; None: any.
@@ -53,8 +51,6 @@ class PageRequestHandler:
         command: CommandTaker,
         params: ParamAccess | None = None,
         point: Point | None = None,
-        depth: Callable[[bool], None] | None = None,
-        talk: Callable[[], str] | None = None,
         refusals: tuple[type[Exception], ...] = (),
         saved: Callable[[Path], None] | None = None,
         paths: PathGuard | None = None,
@@ -62,7 +58,6 @@ class PageRequestHandler:
         self._handler = CommandHandler(command, params, refusals, saved)
         self._paths = paths
         self._point = point
-        self._depth, self._talk = depth, talk
         self._clock = RealClock()
         self._limited_s = -_SAID_EVERY_S
 
@@ -87,11 +82,6 @@ class PageRequestHandler:
                     return "refused: there is no camera image to look into yet"
                 who = str(rest.get("who") or PAGE)
                 return self._execute(LookAt(point, who=who))
-            case {"show": {"depth": bool(on)}} if self._depth is not None:
-                self._depth(on)
-                return None
-            case {"play_talk": True} if self._talk is not None:
-                return self._talk()
         raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} is not available here")
 
     def _execute(self, request: Request) -> str | None:
