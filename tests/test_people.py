@@ -181,7 +181,9 @@ class Searching:
 
 
 @pytest.mark.parametrize("rate_hz", [8.0, 30.0])
-def test_a_picture_gets_one_of_the_three_searches_and_each_has_its_turn(rate_hz: float) -> None:
+def test_a_picture_gets_two_of_the_three_searches_at_most_and_each_has_its_turn(
+    rate_hz: float,
+) -> None:
     network, runs = Seen((), 480.0), [0]
     network.left_of = [0.0]
 
@@ -197,8 +199,8 @@ def test_a_picture_gets_one_of_the_three_searches_and_each_has_its_turn(rate_hz:
         found = detector.find(frame)
         people = detector.people(frame, i / rate_hz)
         detector.palms(frame, i / rate_hz, found, people)
-        assert network.runs + runs[0] - before + faces.searched <= 1
-    assert network.runs >= 8 and runs[0] >= (12 if rate_hz > 20.0 else 8)
+        assert network.runs + runs[0] - before + faces.searched <= 2
+    assert network.runs >= 8 and runs[0] >= 16
 
 
 def test_the_doctor_names_what_is_missing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

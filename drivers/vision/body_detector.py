@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 class BodyDetector:
     """A face detector that also finds meshes, people whose face is not visible, and palms.
 
-    Of a search of the whole picture for faces, one for people and one for palms, each picture gets
-    at most one, the one that is due first; the others wait for the next picture.
+    Of a search of the whole picture for faces, one for people and one for palms, a picture gets two
+    at most: palms wait for the next picture.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class BodyDetector:
         faults: tuple[str, ...] = (),
     ) -> None:
         self._faces, self._people, self._palms, self._meshes = faces, people, palms, meshes
-        self._is_searched = False
+        self._searches = 0
         self._log = EventLog()
         for fault in faults:
             self._log.add(fault)
@@ -45,7 +45,7 @@ class BodyDetector:
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Return faces, the largest first and with a mesh, in pixels of the image."""
         faces = self._faces.find(image)
-        self._is_searched = getattr(self._faces, "searched", False)
+        self._searches = int(getattr(self._faces, "searched", False))
         if self._meshes is None or not faces:
             return faces
         first, *others = faces
@@ -53,13 +53,10 @@ class BodyDetector:
 
     def people(self, image: ImageArray, captured_s: float) -> tuple[DetectedPerson, ...]:
         """Return the people in the next part of a picture; none while no search is due."""
-        people, palms = self._people, self._palms
-        if people is None or self._is_searched or not people.is_due(captured_s):
+        if self._people is None or not self._people.is_due(captured_s):
             return ()
-        if palms is not None and palms.is_due(captured_s) and palms.due_s < people.due_s:
-            return ()
-        self._is_searched = True
-        return people.find(image, captured_s)
+        self._searches += 1
+        return self._people.find(image, captured_s)
 
     def palms(
         self,
@@ -72,7 +69,7 @@ class BodyDetector:
         if self._palms is None:
             return None
         self._palms.watch(captured_s, faces, people)
-        if self._is_searched or not self._palms.is_due(captured_s):
+        if self._searches == 2 or not self._palms.is_due(captured_s):
             return None
         return self._palms.find(image, captured_s)
 
