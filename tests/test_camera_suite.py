@@ -3,9 +3,8 @@
 import time
 from typing import Any
 
-import cv2
-import numpy as np
 import pytest
+from test_webcam import Capture
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.webcam import Webcam
@@ -15,38 +14,21 @@ from gazerig.testing import CameraBench, CameraSuite
 from gazerig.testing.camera_suite import of_source
 
 
-class Video4Linux:
+class Video4Linux(Capture):
     """A capture device that can be pulled out."""
 
     def __init__(self, file):
-        self.file, self.grabs = file, 0
+        super().__init__()
+        self.file, self.lose, self.restore = file, file.unlink, file.touch
+        self.stated_hz = 30.0
         self.restore()
-
-    def lose(self):
-        self.file.unlink()
-
-    def restore(self):
-        self.file.touch()
 
     def isOpened(self):  # noqa: N802
         return self.file.exists()
 
     def grab(self):
         time.sleep(0.001)
-        self.grabs += 1
-        return self.file.exists()
-
-    def retrieve(self):
-        return True, np.full((4, 6, 3), self.grabs % 256, np.uint8)
-
-    def get(self, what):
-        return 30.0 if what == cv2.CAP_PROP_FPS else 0.0
-
-    def set(self, what, value):
-        return True
-
-    def release(self):
-        pass
+        return super().grab() and self.file.exists()
 
 
 class TestWebcam(CameraSuite):
