@@ -63,13 +63,12 @@ class Terms(NamedTuple):
 def salience(
     model: BottomUp,
     seen: Bodies,
-    eye: Vec3,
     t_s: float,
     v_eye: Vec3 = (0.0, 0.0, 0.0),
     gaze: Vec3 = (1.0, 0.0, 0.0),
     in_view: bool = True,
 ) -> Terms:
-    rows = model.step(seen.rows(), eye, t_s, v_eye, gaze, seen.ids if in_view else ())
+    rows = model.step(seen.rows(), (0.0, 0.0, 0.0), t_s, v_eye, gaze, seen.ids if in_view else ())
     return Terms(*(np.array([getattr(row, name) for row in rows]) for name in Terms._fields))
 
 

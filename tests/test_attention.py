@@ -39,7 +39,7 @@ def test_what_spins_about_the_line_of_view_is_attended_to_and_what_spins_across_
     things = percept(0.0, *(body(n, "thing", (far, 0, 0)) for n, far in ((1, 1), (2, 4), (3, 1))))
     spins = np.array([[0.0, 0, 0], [-6.0, 0, 0], [0, 6.0, 0]])
     turning = structs.replace(things.bodies, w_world_rad_s=spins)
-    found = salience(BottomUp(BottomUpParams()), turning, (0, 0, 0), 9.0)
+    found = salience(BottomUp(BottomUpParams()), turning, 9.0)
     assert found.rotation == pytest.approx([0.0, 2.0, 0.0])
     assert found.total == pytest.approx([0.0, 0.35 * (1.0 - exp(-2.0 / 0.35)), 0.0])
 
@@ -161,18 +161,18 @@ def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
     seen = bodies(body(1, "x", (5, 3, 0), (1, 2, 0)), body(2, "x", (1, 0, 0), (1, 2, 0)))
     seen = structs.replace(seen, w_world_rad_s=np.array([[3.0, 0, 4.0], [3.0, 0, 4.0]]))
     for gaze in ((1.0, 0.0, 0.0), (7.0, 0.0, 0.0)):
-        saliences = salience(model, seen, (0, 0, 0), 0.0, (1.0, 1.0, 1.0), gaze)
+        saliences = salience(model, seen, 0.0, (1.0, 1.0, 1.0), gaze)
         for term, value in zip(saliences, (2.0, 1.0, 3.0, 0.0, 6.0), strict=True):
             assert term.tolist() == [value, value]
-    aside = salience(model, seen, (0, 0, 0), 0.0, gaze=(0.0, 1.0, 0.0))
+    aside = salience(model, seen, 0.0, gaze=(0.0, 1.0, 0.0))
     assert (aside.translation[0], aside.looming[0], aside.rotation[0]) == (1.0, 2.0, 0.0)
 
 
 def test_retinal_form_is_relative_to_the_moving_eye() -> None:
     seen = bodies(body(1, "x", (2, 0, 0), (0, 1, 0)), body(2, "x", (2, 0, 0)))
-    with_it = salience(BottomUp(BottomUpParams()), seen, (0, 0, 0), 9.0, (0, 1, 0))
+    with_it = salience(BottomUp(BottomUpParams()), seen, 9.0, (0, 1, 0))
     assert with_it.translation.tolist() == [0.0, 1.0]  # what is stationary slides by 0.5 rad/s
-    coming = salience(BottomUp(BottomUpParams()), seen, (0, 0, 0), 9.0, (2, 0, 0))
+    coming = salience(BottomUp(BottomUpParams()), seen, 9.0, (2, 0, 0))
     assert coming.looming.tolist() == [2.0, 2.0]
 
 
@@ -191,20 +191,20 @@ def test_what_has_just_come_into_view_pulls_and_that_wears_off() -> None:
     model = BottomUp(BottomUpParams(onset_salience=0.8))
     first, second = body(1, "x", (1, 0, 0)), body(2, "x", (1, 0.3, 0))
     for k in range(11):
-        assert salience(model, bodies(first), (0, 0, 0), k / 10).onset.tolist() == [0.0]
+        assert salience(model, bodies(first), k / 10).onset.tolist() == [0.0]
     for age in (0.0, 0.25, 0.5, 0.75, 1.0):
-        onset = salience(model, bodies(second, first), (0, 0, 0), 1.0 + age).onset
+        onset = salience(model, bodies(second, first), 1.0 + age).onset
         assert onset.tolist() == pytest.approx([0.8 * exp(-age / 0.5), 0.0])
     model.reset(9.0)
-    assert salience(model, bodies(second), (0, 0, 0), 9.0).onset.tolist() == [0.0]
+    assert salience(model, bodies(second), 9.0).onset.tolist() == [0.0]
 
 
 def test_nothing_is_new_in_the_first_moments_but_later_after_an_empty_view() -> None:
     for arrives, onset in ((0.2, 0.0), (0.4, 1.0)):
         model = BottomUp(BottomUpParams())
         for k in range(round(arrives * 20)):
-            salience(model, bodies(), (0, 0, 0), k / 20)
-        assert salience(model, bodies(FACE), (0, 0, 0), arrives).onset.tolist() == [onset]
+            salience(model, bodies(), k / 20)
+        assert salience(model, bodies(FACE), arrives).onset.tolist() == [onset]
 
 
 @pytest.mark.parametrize(("from_s", "onset"), [(0.3, 0.0), (0.7, 1.0)])
@@ -214,7 +214,7 @@ def test_what_moves_in_the_first_moments_has_not_just_begun_to(from_s: float, on
     for k in range(20):
         speed = 1.0 if k / 20 >= from_s else 0.0
         seen = bodies(body(1, "hand", (1.0, 0.0, 0.0), (0.0, speed, 0.0)))
-        found.append(float(salience(model, seen, (0, 0, 0), k / 20).onset[0]))
+        found.append(float(salience(model, seen, k / 20).onset[0]))
     assert max(found) == pytest.approx(onset)
 
 
@@ -224,14 +224,14 @@ def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset
     model = BottomUp(BottomUpParams())
     moving = bodies(body(1, "hand", (1, 0, 0), (0, 1, 0)))
     for k in range(21):
-        before = salience(model, moving, (0, 0, 0), k / 10).translation[0]
+        before = salience(model, moving, k / 10).translation[0]
     gone = 2.0
     while (gone := gone + 0.05) < 2.0 + gap_s - 1e-9:
         if how == "missed":
-            salience(model, bodies(), (0, 0, 0), gone)
+            salience(model, bodies(), gone)
         else:
-            salience(model, moving, (0, 0, 0), gone, in_view=False)
-    back = salience(model, moving, (0, 0, 0), 2.0 + gap_s)
+            salience(model, moving, gone, in_view=False)
+    back = salience(model, moving, 2.0 + gap_s)
     assert back.onset.tolist() == [onset]
     if how == "missed":
         assert bool(back.translation[0] > 0.5 * before) is (onset == 0.0)
@@ -240,14 +240,14 @@ def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset
 def test_nothing_is_new_after_a_pause_of_the_camera() -> None:
     model = BottomUp(BottomUpParams())
     for k in range(11):
-        salience(model, bodies(FACE), (0, 0, 0), k / 10)
-    back = salience(model, bodies(FACE, body(8, "face", (1, 1, 0))), (0, 0, 0), 3.0)
+        salience(model, bodies(FACE), k / 10)
+    back = salience(model, bodies(FACE, body(8, "face", (1, 1, 0))), 3.0)
     assert back.onset.tolist() == [0.0, 0.0]
 
 
 def test_a_pause_of_the_camera_keeps_smoothed_motion() -> None:
     model, moving = BottomUp(BottomUpParams()), body(1, "x", (1, 0, 0), (0, 1, 0))
     for k in range(100):
-        before = salience(model, bodies(moving), (0, 0, 0), k / 10).translation[0]
-    still = salience(model, bodies(body(1, "x", (1, 0, 0))), (0, 0, 0), 10.4)
+        before = salience(model, bodies(moving), k / 10).translation[0]
+    still = salience(model, bodies(body(1, "x", (1, 0, 0))), 10.4)
     assert still.translation[0] == pytest.approx(before * exp(-0.5 / 0.1))

@@ -226,7 +226,7 @@ SCALARS = st.one_of(
 
 
 @given(value=st.one_of(SCALARS, st.lists(SCALARS, max_size=3)))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_what_is_written_is_read_back(tmp_path_factory, value):
     path = tmp_path_factory.getbasetemp() / "written.yaml"
     path.write_bytes(f"a: {format_value(value)}\n".encode())

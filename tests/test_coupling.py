@@ -33,7 +33,7 @@ def rig_with(coupling: CouplingParams) -> Rig:
     return replace(load_rig("desk"), couplings={"neck": coupling}, mass=balanced)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(first=st.floats(-PITCH, PITCH), second=st.floats(-ROLL, ROLL))
 def test_servo_angles_come_back_as_joint_angles_to_1e_9(first: float, second: float) -> None:
     at = radians(first), radians(second)

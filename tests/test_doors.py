@@ -185,7 +185,7 @@ def test_a_voice_assistant_is_followed_and_found_again() -> None:
             await assistant.sockets[-1].close()
             await until(lambda: head.last == "idle" and len(assistant.sockets) == 2)
             await assistant.send(lva("listening"))
-            await until(lambda: head.last == "listening")
+            await head.reaches("listening")
 
     head = run(voice_assistant.DOOR, scenario, f"ws://127.0.0.1:{assistant.port}")
     assert len(head.orders) < 200  # of 801: the newest ones
@@ -301,16 +301,16 @@ def test_realtime_sessions_are_relayed_with_their_key() -> None:
                 kinds = [(await program.receive_json())["type"] for _ in range(2)]
                 assert kinds[1] == audio(0)["type"]
                 assert (await program.receive()).data == "no JSON"
-                await until(lambda: head.last == "speaking")
+                await head.reaches("speaking")
                 await sockets[0].send_json(event("response.output_audio.done"))
                 await sockets[0].send_json(event("response.done"))
-                await until(lambda: head.last == "listening")
+                await head.reaches("listening")
                 assert head.mouths == [(24_000, 1, bytes(4800))] and not head.sounds
                 await sockets[0].close(code=4000)
                 while not program.closed:
                     await program.receive()
                 assert program.close_code == 4000
-                await until(lambda: head.last == "idle")
+                await head.reaches("idle")
 
     head = run(openai_realtime.DOOR, scenario, f"ws://127.0.0.1:{port}", bind)
     assert seen == [("/v1/realtime?model=m", "Bearer hush"), "hello"]
@@ -348,18 +348,18 @@ def test_a_satellite_s_sound_is_said_and_reported_as_played() -> None:
                 await sounds.write_event(one.event())
             answer = await sounds.read_event()
             assert answer is not None and Played.is_type(answer.type)
-            await until(lambda: head.last == "idle")
+            await head.reaches("idle")
             # The first one opens the loudspeaker.
             assert head.sounds == [(16000, 1, bytes(1280)), (16000, 1, pcm)]
             assert any(order[:2] == ("speaking", 0.4) for order in head.orders), head.orders
             # A long sound is interrupted: most of it is never said.
             await sounds.write_event(AudioStart(**shape).event())
             await sounds.write_event(AudioChunk(**shape, audio=bytes(960_000)).event())
-            await until(lambda: head.last == "speaking")
+            await head.reaches("speaking")
             await events.write_event(VoiceStarted().event())
             await until(lambda: "interrupt" in head.states)
             await until(lambda: head.ended_tracks == ["speech"])  # and is silent at once
-        await until(lambda: head.last == "idle")
+        await head.reaches("idle")
 
     head = run(wyoming.DOOR, scenario, bind=f"127.0.0.1:{port}")
     assert len(head.sounds) == 3 and len(head.sounds[2][2]) < 960_000
@@ -476,13 +476,13 @@ def test_an_agent_in_a_room_steers_the_head() -> None:
         await until(lambda: head.states == ["thinking"])
         assert room.joined == ("ws://room", "token", "options") and subscribed == [True]
         room.handlers["participant_attributes_changed"](agent("speaking"), None)
-        await until(lambda: head.last == "speaking")
+        await head.reaches("speaking")
         room.handlers["track_subscribed"](bytes(640), sound, known)
         for identity in ("someone", "a"):
             room.streams["lk.transcription"](stream(SAID), identity)
         await until(lambda: ("speaking", None, SAID) in head.orders)
         room.handlers["participant_disconnected"](SimpleNamespace(attributes=agent("speaking")))
-        await until(lambda: head.last == "idle")
+        await head.reaches("idle")
         room.handlers["disconnected"]("closed")
         await following
         await link.close()
@@ -561,7 +561,7 @@ def test_the_newest_neighbour_takes_the_place_of_an_idle_one(
             sockets.append(await session.ws_connect(f"ws://{bind}"))
             assert (await sockets[0].receive()).type.name in ("CLOSED", "CLOSE", "ERROR")
             await sockets[-1].send_json(rtvi("bot-started-speaking"))
-            await until(lambda: head.last == "speaking")
+            await head.reaches("speaking")
             with pytest.raises(WSServerHandshakeError, match="503"):  # all have spoken
                 await session.ws_connect(f"ws://{bind}")
             monkeypatch.setattr(admission, "IDLE_S", 0.0)  # a long time later
@@ -569,7 +569,7 @@ def test_the_newest_neighbour_takes_the_place_of_an_idle_one(
             assert not sockets[-1].closed  # the idlest one was closed
             await sockets[-1].send_json({"type": "x"})
             await sockets[-1].close()
-            await until(lambda: head.last == "idle")
+            await head.reaches("idle")
 
     head = run(pipecat.DOOR, scenario, bind=bind)
     assert [line.split(" at once")[0] for line in head.said[1:3]] == ["more than 8 connections"] * 2

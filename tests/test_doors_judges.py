@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import pytest
 from aiohttp import web
-from fakes.talking_head import TalkingHead, until
+from fakes.talking_head import TalkingHead
 from fakes.voice_assistant import free_port
 from test_doors import audio, conversation, event, realtime_server, run
 
@@ -77,9 +77,9 @@ def test_openai_s_client_talks_through_the_relay() -> None:
             await program.response.create()
             kinds = [(await program.recv()).type for _ in answer]
             assert kinds == [one["type"] for one in answer]
-            await until(lambda: head.last == "listening")
+            await head.reaches("listening")
             assert "speaking" in head.states
-        await until(lambda: head.last == "idle")
+        await head.reaches("idle")
 
     run(openai_realtime.DOOR, scenario, f"ws://127.0.0.1:{port}", bind)
     assert seen == [("/v1/realtime?model=m", "Bearer hush"), "response.create"]

@@ -139,7 +139,7 @@ def test_a_machine_that_stood_still_has_not_hung_its_loop():
 
 
 @given(st.lists(st.floats(0.001, 0.09), min_size=1, max_size=200))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_silence_adds_up_to_a_hang(looks_s):
     detector, now_s = HangDetector(7, 0.0), 0.0
     for look_s in looks_s:

@@ -211,7 +211,7 @@ def ends(
     return degrees(arc), degrees(went), degrees(left)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(MODELS, EYES, PLACES, PLACES, INTERESTS)
 def test_e65_the_head_never_goes_past_the_target_as_seen_from_where_it_comes(
     model: Model, eyes_deg: float, start: Angles2, place: Angles2, salience: float
@@ -221,7 +221,7 @@ def test_e65_the_head_never_goes_past_the_target_as_seen_from_where_it_comes(
     assert went + left == pytest.approx(arc, abs=1e-4), "along the great circle"
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(MODELS, EYES, PLACES, PLACES, INTERESTS, INTERESTS)
 def test_e65_less_interest_never_turns_the_head_further(
     model: Model, eyes_deg: float, start: Angles2, place: Angles2, one: float, other: float
@@ -281,7 +281,7 @@ def test_parts_of_a_face_do_not_pull_the_head_further_each_time() -> None:
     assert yaws[-1] == pytest.approx(0.77 * (45.0 - 17.9), abs=0.5)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.floats(-80.0, 80.0), INTERESTS, INTERESTS)
 def test_e75_the_roll_goes_to_the_side_of_the_target_and_grows_with_interest(
     yaw_deg: float, one: float, other: float

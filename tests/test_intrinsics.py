@@ -17,7 +17,7 @@ BENT = Intrinsics(480.0, 482.0, 327.0, 190.0, (-0.25, 0.09, 0.002, -0.001, -0.01
 LENS = LensParams((640, 400), (480.0, 482.0), (327.0, 190.0), BENT.distortion)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     x=st.floats(0.0, 639.0),
     y=st.floats(0.0, 399.0),

@@ -487,7 +487,7 @@ def fastest_per_s(params: LidParams) -> float:
     return blink + 4.0 * STEEPEST / GLIDE_S  # following changes as well, by up to 60 deg
 
 
-@settings(max_examples=60, deadline=None, phases=WITHOUT_SHRINKING)
+@settings(max_examples=60, phases=WITHOUT_SHRINKING)
 @given(admissible(), admissible(), st.lists(EVENTS, min_size=1, max_size=10), st.integers(0, 99))
 def test_lids_stay_within_bounds_and_never_jump(
     first: LidParams, other: LidParams, events: list[Event], seed: int

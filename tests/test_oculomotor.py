@@ -252,7 +252,7 @@ def test_it_begins_where_head_and_eyes_are() -> None:
 # Eyes and head keep their limits and reach any target. Checks: docs/checks.md
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     seed=st.integers(0, 2**32 - 1),
     eye=st.floats(15, 55),
@@ -321,7 +321,7 @@ def test_e19_no_eye_beyond_its_limit_and_no_head_beyond_its_range() -> None:
     assert 50.0 < np.abs(trace.head).max() <= 60.0 + 1e-9
 
 
-@settings(max_examples=16, deadline=None)
+@settings(max_examples=16)
 @given(
     yaw=st.floats(-70, 70), pitch=st.floats(-30, 30), salience=st.floats(0, 3), top=st.booleans()
 )

@@ -7,24 +7,18 @@ from typing import Any
 
 from fakes.waiting import PATIENCE_S
 
-import gazerig
-
 
 class TalkingHead:
-    """Has the methods that a door uses; ``refuses`` and ``ended`` make it refuse or end."""
+    """Has the methods that a door uses."""
 
     def __init__(self) -> None:
         self.orders: list[tuple[Any, ...]] = []
         self.sounds: list[tuple[int, int, bytes]] = []
         self.mouths: list[tuple[int, int, bytes]] = []
         self.ended_tracks: list[str] = []
-        self.connected = self.refuses = ""
-        self.ended = False
         self.said: list[str] = []
 
     def connect(self) -> "TalkingHead":
-        if self.ended:
-            raise gazerig.NotFound("no rig is running")
         return self
 
     def __exit__(self, *raised: object) -> None:
@@ -35,11 +29,9 @@ class TalkingHead:
         return self._order()
 
     def _order(self, *order: Any) -> Any:
-        if self.ended:
-            raise gazerig.HeadEnded("the rig has ended")
         if order:
             self.orders.append(order)
-        return SimpleNamespace(reply=SimpleNamespace(refused=self.refuses), tracks=())
+        return SimpleNamespace(reply=SimpleNamespace(refused=""), tracks=())
 
     def listening(self, person: int | None = None) -> Any:
         return self._order("listening")
@@ -76,6 +68,10 @@ class TalkingHead:
     @property
     def last(self) -> str:
         return self.states[-1] if self.orders else ""
+
+    async def reaches(self, state: str) -> None:
+        """Wait until a state is the last that was ordered."""
+        await until(lambda: self.last == state)
 
 
 async def until(condition: Callable[[], object]) -> None:

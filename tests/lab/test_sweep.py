@@ -229,7 +229,7 @@ OTHER_AXES = (
 )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(2, 60), st.integers(0, 2**32))
 def test_a_latin_hypercube_falls_once_into_each_part_of_every_axis(n: int, seed: int) -> None:
     points = latin_hypercube(OTHER_AXES, n, seed)
