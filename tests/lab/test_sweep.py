@@ -1,8 +1,8 @@
-"""Sweeps: the same table whatever the number of processes, resumed, and no process left behind."""
+"""Sweeps: the same table whatever the number of processes, and no process left behind."""
 
 import csv
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,9 +35,8 @@ from gazerig.features.lab.sweep.run_outcome import (
     grade,
     table_rows,
 )
-from gazerig.features.lab.sweep.sweep import RUNS, run_store
 from gazerig.features.lab.sweep.worker import figures_at
-from gazerig.features.lab.sweep.worker_pool import Job, WorkerPool
+from gazerig.features.lab.sweep.worker_pool import Job, SweepInterrupted, WorkerPool
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.tune import read_value
 
@@ -84,43 +83,25 @@ def test_a_run_that_fails_is_a_row_with_its_reason(finished: Path) -> None:
     assert "wall_seconds" not in rows[0]  # no two runs take the same
 
 
-def test_the_picture_and_parquet_hold_the_same(finished: Path) -> None:
+def test_the_responses_are_drawn_and_a_second_sweep_needs_another_folder(finished: Path) -> None:
     image = cv2.imdecode(np.frombuffer((finished / "response.png").read_bytes(), np.uint8), 1)
     assert image is not None and image.shape[0] > 200 and image.std() > 5.0
-    parquet = pytest.importorskip("pyarrow.parquet")
-    columns = parquet.read_table(finished / "table.parquet").to_pydict()
-    rows = table(finished)
-    assert list(columns) == list(rows[0])
-    assert columns[HIGH] == [0.0, 25.0, 0.0, 25.0] and columns["seconds"][2] is None
-    assert columns[OUTSIDE][0] == int(rows[0][OUTSIDE])
+    done = swept(finished, "--set", f"{LOW}=-25.0,0.0", "--seeds", "1")
+    assert done.code == 2 and "holds other files: give an empty folder with --out" in done.err
 
 
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (("--seeds", "2"), "seeds was [0], is now [0, 1]"),
-        (("--seeds", "1", "--character", "shy"), "options.character was None, is now 'shy'"),
-    ],
-)
-def test_other_arguments_are_refused_with_what_differs(
-    finished: Path, words: tuple[str, ...], text: str
+def test_ctrl_c_leaves_the_table_of_what_is_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    done = swept(finished, "--set", f"{LOW}=-25.0,0.0", "--set", f"{HIGH}=0.0,25.0", *words)
-    assert done.code == 2 and text in done.err and "another folder with --out" in done.err
+    def interrupted(pool: WorkerPool, runs: Sequence[tuple[Point, int]]) -> Iterator[object]:
+        yield 0, Outcome(*runs[0], {OUTSIDE: 2})
+        raise SweepInterrupted
 
-
-def test_a_line_that_was_being_written_when_the_power_went_is_done_again(tmp_path: Path) -> None:
-    with run_store(tmp_path, {}) as store:
-        store.add(Outcome({"a": (1, 2)}, 0, {"x": 1.5}))
-        store.add(Outcome({"a": (1, 2)}, 1, {}, "too bad"))
-    file = tmp_path / RUNS
-    file.write_bytes(file.read_bytes()[:-4])
-    with run_store(tmp_path, {}) as store:
-        assert len(store) == 1 and store.get({"a": (1, 2)}, 1) is None
-        kept = store.get({"a": (1, 2)}, 0)
-        assert kept is not None and kept.figures == {"x": 1.5}
-        store.add(Outcome({"a": (1, 2)}, 1, {"x": 2.5}))
-    assert len(file.read_text().splitlines()) == 2
+    monkeypatch.setattr(WorkerPool, "outcomes", interrupted)
+    done = swept(tmp_path / "cut", "--set", f"{LOW}=-25.0,-20.0", "--seeds", "1")
+    assert done.code == 130 and "table.csv: 1 of 2 runs" in done.err
+    (row,) = table(tmp_path / "cut")
+    assert (row[LOW], row[OUTSIDE]) == ("-25.0", "2")
 
 
 def test_two_processes_make_the_table_of_one(desk_rig: Rig, tmp_path: Path) -> None:

@@ -115,7 +115,7 @@ def sweep(
 ) -> None:
     """Vary parameters over many simulated runs; write a table and a figure of the responses.
 
-    Every finished run is stored immediately: the same command continues after Ctrl-C.
+    After Ctrl-C the table has the finished runs.
 
     --fit searches for the values with most measures inside people's bands.
     """
@@ -227,41 +227,43 @@ def _write(
 ) -> None:
     """Write table and figure, and print their paths."""
     from gazerig.features.lab.sweep.response_figure import PICTURE, response_png
-    from gazerig.features.lab.sweep.run_outcome import write_tables
+    from gazerig.features.lab.sweep.run_outcome import write_table
 
-    files = [*write_tables(folder, outcomes)]
+    files = [write_table(folder, outcomes)]
     if not all(one.failure for one in outcomes):
         files.append(folder / PICTURE)
         write_file(files[-1], response_png(spec.axes, outcomes, shown), force=True)
     points = len(outcomes) // len(spec.seeds)
     count = f"{points} points, {len(spec.seeds)} seeds each: {len(outcomes)} runs"
-    say(f"{files[0]}: {count}; also {', '.join(file.name for file in files[1:])}")
+    say(f"{files[0]}: {count}" + "".join(f"; also {file.name}" for file in files[1:]))
 
 
 @contextmanager
 def _running_sweep(
     spec: "SweepSpec", folder: Path, jobs: int | None
 ) -> "Iterator[tuple[Sweep, Progress]]":
-    """Yield the sweep and its progress function; Ctrl-C ends the sweep and keeps its runs."""
+    """Yield the sweep and its progress function; after Ctrl-C the table has the finished runs."""
+    from gazerig.features.lab.sweep.run_outcome import write_table
     from gazerig.features.lab.sweep.sweep import open_sweep
     from gazerig.features.lab.sweep.worker_pool import SweepInterrupted
 
     reached = [0, 0]
-    try:
-        with (
-            progress_bar(remaining=True) as tell,
-            record_signals() as stopped,
-            open_sweep(spec, folder, jobs, stopped) as work,
-        ):
+    with (
+        progress_bar(remaining=True) as tell,
+        record_signals() as stopped,
+        open_sweep(spec, folder, jobs, stopped) as work,
+    ):
 
-            def runs(done: int, total: int) -> None:
-                reached[:] = done, total
-                tell(f"{total} runs", done / max(1, total))
+        def runs(done: int, total: int) -> None:
+            reached[:] = done, total
+            tell(f"{total} runs", done / max(1, total))
 
+        try:
             yield work, runs
-    except SweepInterrupted:
-        say(f"{reached[0]} of {reached[1]} runs are kept in {folder}: the same command continues")
-        raise typer.Exit(INTERRUPTED) from None
+        except SweepInterrupted:
+            file = write_table(folder, work.finished)
+            say(f"{file}: {reached[0]} of {reached[1]} runs")
+            raise typer.Exit(INTERRUPTED) from None
 
 
 def _column(name: str) -> str:

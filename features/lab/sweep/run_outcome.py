@@ -1,7 +1,6 @@
 """The result of one run of a sweep: figures of the summary and of the report as flat columns."""
 
 import csv
-import importlib.util
 import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.drivers.files.file_output import output_file, write_file
+from gazerig.drivers.files.file_output import write_file
 from gazerig.features.lab.analysis.human_norms import BANDS, BY_KEY
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.measures import measure_run
@@ -35,14 +34,12 @@ class Outcome(NamedTuple):
         seed: seed of its random generators.
         figures: columns; empty if it failed.
         failure: reason of a failure, "" otherwise.
-        has_died: whether its process ended, perhaps for a reason that does not recur.
     """
 
     point: Point
     seed: int
     figures: Figures
     failure: str = ""
-    has_died: bool = False
 
 
 def run_figures(figures: Mapping[str, object], trace: GazeTrace) -> dict[str, Column]:
@@ -103,7 +100,7 @@ def _flat(held: Mapping[str, object], above: str = "") -> Iterator[tuple[str, Co
 
 
 SEED, FAILED = "seed", "failed"
-CSV, PARQUET = "table.csv", "table.parquet"
+CSV = "table.csv"
 
 
 def table_rows(outcomes: Sequence[Outcome]) -> tuple[list[str], list[list[Any]]]:
@@ -125,11 +122,11 @@ def table_rows(outcomes: Sequence[Outcome]) -> tuple[list[str], list[list[Any]]]
     return [*keys, SEED, FAILED, *figures], rows
 
 
-def write_tables(folder: Path, outcomes: Sequence[Outcome]) -> tuple[Path, ...]:
-    """Write ``CSV`` and, if PyArrow is installed, ``PARQUET``; return the files.
+def write_table(folder: Path, outcomes: Sequence[Outcome]) -> Path:
+    """Write ``CSV``; return the file.
 
     Raises:
-        SetupError: one cannot be written.
+        SetupError: it cannot be written.
     """
     columns, rows = table_rows(outcomes)
     text = io.StringIO()
@@ -137,23 +134,4 @@ def write_tables(folder: Path, outcomes: Sequence[Outcome]) -> tuple[Path, ...]:
     writer.writerow(columns)
     writer.writerows(rows)
     write_file(folder / CSV, text.getvalue(), force=True)
-    if importlib.util.find_spec("pyarrow") is None:
-        return (folder / CSV,)
-    path = folder / PARQUET
-    import pyarrow
-    import pyarrow.parquet
-
-    arrays = [_column([row[i] for row in rows]) for i in range(len(columns))]
-    with output_file(path, force=True) as file:
-        pyarrow.parquet.write_table(pyarrow.table(dict(zip(columns, arrays, strict=True))), file)
-    return folder / CSV, folder / PARQUET
-
-
-def _column(values: list[Any]) -> list[Any]:
-    """Return the values of a column as one type: numbers, or text for mixed types."""
-    kinds = {type(value) for value in values if value is not None}
-    if kinds == {int, float}:
-        return [None if value is None else float(value) for value in values]
-    if len(kinds) > 1:
-        return [None if value is None else str(value) for value in values]
-    return values
+    return folder / CSV

@@ -151,7 +151,7 @@ class WorkerPool:
         self._workers.remove(worker)
         failed = worker.death()
         self._close(worker)
-        return Outcome(point, seed, {}, failed, has_died=True)
+        return Outcome(point, seed, {}, failed)
 
     @staticmethod
     def _close(worker: _Worker) -> None:
