@@ -4,14 +4,11 @@ The run is simulated with the condition's rig, whose robot description is the he
 """
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from fractions import Fraction
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import av
 import msgspec
 import numpy as np
 
@@ -19,7 +16,7 @@ from gazerig.config.parameters import values
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder
-from gazerig.drivers.types import ImageArray
+from gazerig.features.lab.film_writer import film_writer
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.study.design import SEED, Study
 from gazerig.gaze.types import Vec3
@@ -31,8 +28,6 @@ from gazerig.robot.description.files import description_files
 from gazerig.robot.model.types import order_joints
 
 SIZE_PX, RATE_HZ = 720, 25.0
-_BITS_PER_S = 2_000_000
-_OPTIONS = {"deadline": "good", "auto-alt-ref": "0"}
 # Time of a simulated run before its film, in which the head finds the person, seconds.
 _SETTLES_S = 3.0
 # Position of the camera for a head that looks at no one.
@@ -105,34 +100,3 @@ def _render(study: Study, key: str, path: Path, progress: Callable[[str, float],
             write(renderer.render(data, lens, R, p_m))
             progress(f"film of {key}", i / len(ticks))
     os.replace(partial, path)
-
-
-@contextmanager
-def film_writer(
-    path: Path, size_px: tuple[int, int], rate_hz: float
-) -> Iterator[Callable[[ImageArray], None]]:
-    """Yield a function that appends BGR pictures to a WebM film with VP8, which all browsers play.
-
-    Args:
-        path: Path of the film, ending in .webm; an existing file is overwritten.
-        size_px: Width and height of all pictures.
-        rate_hz: Pictures per second.
-
-    Raises:
-        SetupError: the file cannot be written.
-    """
-    try:
-        container = av.open(str(path), "w")
-    except (av.FFmpegError, OSError) as error:
-        raise SetupError(f"cannot write the film {path} ({error}): name another file") from error
-    with container:
-        rate = Fraction(rate_hz).limit_denominator(1000)
-        stream = container.add_stream("libvpx", rate=rate, options=_OPTIONS)
-        stream.width, stream.height = size_px
-        stream.pix_fmt, stream.bit_rate = "yuv420p", _BITS_PER_S
-
-        def write(picture: ImageArray) -> None:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
-
-        yield write
-        container.mux(stream.encode())

@@ -8,9 +8,9 @@ import pytest
 from shown_page import free_port
 from study_helpers import Program
 
+from gazerig.features.lab.film_writer import film_writer
 from gazerig.features.study import film
 from gazerig.features.study.design import Study, load_study
-from gazerig.features.study.film import film_writer
 
 STUDY = """\
 title: Short
