@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.types import ImageArray, Pixels
+from gazerig.drivers.types import DetectedFace, ImageArray, Pixels
 
 EYES_M = 0.063
 """Distance between the pupils of an adult."""
@@ -114,6 +114,12 @@ def paste(
     mask = cv2.warpAffine(shape, M, size)[..., np.newaxis]
     image[:] = np.rint(image * (1.0 - mask) + cv2.warpAffine(soft, M, size) * mask)
     return np.asarray(who.landmarks_px @ M[:, :2].T + M[:, 2])
+
+
+def landmark_error(face: DetectedFace, truth: Pixels) -> float:
+    """Return the mean landmark error in distances of the eyes."""
+    eyes = np.linalg.norm(truth[1] - truth[0])
+    return float(np.linalg.norm(face.landmarks_px - truth, axis=1).mean() / eyes)
 
 
 def noisy(

@@ -5,7 +5,15 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from seeing.material import background, carphone, eyes_at, noisy, paste, portrait
+from seeing.material import (
+    background,
+    carphone,
+    eyes_at,
+    landmark_error,
+    noisy,
+    paste,
+    portrait,
+)
 
 from gazerig.drivers.types import FaceDetector, ImageArray
 from gazerig.drivers.vision.face.detector import face_detector
@@ -91,8 +99,7 @@ def placing_error(frames: int) -> float:
                 truth = paste(frame, portrait(who), at, eyes, 10.0 * np.sin(step / 6.0))
                 frame = noisy(frame, 2.0, np.random.default_rng(step))
                 for face in detector.find(frame):
-                    off = np.linalg.norm(face.landmarks_px - truth, axis=1).mean() / eyes
-                    errors.append(float(min(off, 1.0)))
+                    errors.append(min(landmark_error(face, truth), 1.0))
     return float(np.mean(errors))
 
 
