@@ -208,7 +208,7 @@ class Registration:
         Raises:
             PluginError: it cannot be imported or does not exist.
         """
-        module, _, attribute = self.value.partition("[")[0].partition(":")
+        module, _, attribute = self.value.partition(":")
         try:  # importlib.metadata, which does the same, takes 15 ms to import
             part = import_module(module.strip())
             return attrgetter(attribute.strip())(part) if attribute else part

@@ -14,7 +14,7 @@ from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig, load_rules, load_walk
 from gazerig.drivers.camera.recorder import RecordingWriter
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.files.file_output import output_text, refuse_existing, write_file
+from gazerig.drivers.files.file_output import output_file, refuse_existing, write_file
 from gazerig.robot.recording.recorder import Recorder
 
 SECRET = "root:$6$abcdefgh:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n"
@@ -129,8 +129,8 @@ def test_what_is_there_is_kept_unless_forced(tmp_path: Path) -> None:
 def test_what_fails_half_way_leaves_the_old_file(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("old")
-    with pytest.raises(RuntimeError), output_text(file, force=True) as out:
-        out.write("half")
+    with pytest.raises(RuntimeError), output_file(file, force=True) as out:
+        out.write(b"half")
         raise RuntimeError
     assert file.read_text() == "old" and os.listdir(tmp_path) == ["file"]
 
@@ -171,8 +171,8 @@ def test_a_full_disk_leaves_the_old_file_whole(tmp_path: Path, small_disk: None)
     file.write_text("old")
     with pytest.raises(SetupError, match="File too large"):
         write_file(file, b"x" * 80_000, force=True)
-    with pytest.raises(SetupError, match="File too large"), output_text(file, force=True) as out:
-        out.write("x" * 80_000)
+    with pytest.raises(SetupError, match="File too large"), output_file(file, force=True) as out:
+        out.write(b"x" * 80_000)
     assert file.read_text() == "old" and os.listdir(tmp_path) == ["file"]
 
 

@@ -9,7 +9,6 @@ import contextlib
 import os
 import secrets
 import shutil
-from codecs import StreamWriter, getwriter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -79,17 +78,6 @@ def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
                 os.replace(fresh, target)
             finally:
                 fresh.unlink(missing_ok=True)
-
-
-@contextlib.contextmanager
-def output_text(path: Path, force: bool = False) -> Iterator[StreamWriter]:
-    """Yield a text file to write to, in UTF-8 and with unchanged line ends.
-
-    Raises:
-        SetupError: see ``output_file``.
-    """
-    with output_file(path, force) as raw:
-        yield getwriter("utf-8")(raw)
 
 
 def write_file(path: Path, content: str | bytes, force: bool = False) -> None:

@@ -6,13 +6,14 @@ A JSON file next to the samples lists which of them were measured and which were
 
 import csv
 import json
+from codecs import getwriter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
-from gazerig.drivers.files.file_output import output_text, refuse_existing, write_file
+from gazerig.drivers.files.file_output import output_file, refuse_existing, write_file
 from gazerig.robot.control.feedback_basis import ESTIMATED
 from gazerig.robot.recording.gaze_angles import MOVEMENTS, GazeAngles, LabelledInterval, Labels
 
@@ -71,8 +72,8 @@ def write_csv(
         (FIXATIONS, _fixation_rows(stretches)),
     )
     for path, (names, rows) in zip(paths[:3], tables, strict=True):
-        with output_text(path, force) as file:
-            writer = csv.writer(file, lineterminator="\n")
+        with output_file(path, force) as file:
+            writer = csv.writer(getwriter("utf-8")(file), lineterminator="\n")
             writer.writerow(names)
             writer.writerows(rows)
     write_file(paths[3], json.dumps(_basis_by_column(trace), indent=2) + "\n", force)
