@@ -240,12 +240,8 @@ class TargetPrediction:
 
     def _has_moved(self, least_m: float) -> bool:
         """Return whether the target's positions span this length along any axis."""
-        past = [*islice(self._past, 0, None, _SPARSE)]
-        for axis in (1, 2, 3):  # indices in _Seen
-            places = [seen[axis] for seen in past]
-            if max(places) - min(places) >= least_m:
-                return True
-        return False
+        _, x, y, z, *_ = zip(*islice(self._past, 0, None, _SPARSE), strict=True)  # as in _Seen
+        return bool(max(max(x) - min(x), max(y) - min(y), max(z) - min(z)) >= least_m)
 
 
 def _limit_length(v: Vec3, most: float) -> Vec3:
