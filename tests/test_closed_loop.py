@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fakes.runs import play, simulated
 from numpy.typing import NDArray
-from true_gaze import angles_of_place, gaze_angles, gaze_error_rad, true_part
+from true_gaze import gaze_angles, gaze_error_rad, true_part
 
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
@@ -35,7 +35,7 @@ Column = NDArray[np.float64]
 class Seen(NamedTuple):
     """One run, a row a tick; degrees, seconds from the scene's beginning.
 
-    off_deg: gaze off the true face part; gaze_deg, face_deg: yaws of gaze and of that part
+    off_deg: gaze off the true face part; gaze_deg: yaw of the gaze
     head_deg, facing_deg: the head's yaw, and that which would point it at the face
     jumps: in a saccade; captured_s: of the picture the tick went by
     """
@@ -43,7 +43,6 @@ class Seen(NamedTuple):
     t_s: Column
     off_deg: Column
     gaze_deg: Column
-    face_deg: Column
     head_deg: Column
     facing_deg: Column
     jumps: Column
@@ -71,7 +70,6 @@ def watched(scene: str, seconds: float) -> Seen:
                 t_s,
                 degrees(gaze_error_rad(part, pose)),
                 degrees(gaze_angles(pose)[0]),
-                degrees(angles_of_place(part, pose)[0]),
                 degrees(pose.head_rad[0]),
                 degrees(kinematics.neck_angles_to(person.p_world_face_m)[0]),
                 tick.gaze.phase == "saccade",

@@ -10,7 +10,6 @@ from fakes.runs import play, simulated
 from msgspec import structs
 from page_feed import IN_TIME
 from shown_page import wait_for
-from world_shapes import SmallWorld
 
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.tick import Tick
@@ -26,7 +25,6 @@ from gazerig.robot.dashboard.feed.snapshot import RunState, SnapshotBuilder
 from gazerig.robot.model.control_source import TrackState
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.types import Snapshot
-from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 
 
 class Run(NamedTuple):
@@ -52,9 +50,6 @@ class Page:
         self.said: list[str] = []
         self.state = RunState({"lost": 3}, "wait", "talking", "shy", timing=IN_TIME)
         self.rigs = 0
-        self.picture: DrawnScene | None = None
-        self.world: SmallWorld | None = None
-        self.detector = ""
         self.publisher = Publisher(
             self.page, lambda: self._rig(made), lambda: self.state, None, self.said.append
         )
@@ -64,7 +59,7 @@ class Page:
 
     def _rig(self, made: Assembly) -> LiveRig:
         self.rigs += 1
-        return LiveRig(made.shown_rig(), False, self.picture, self.world, self.detector)
+        return LiveRig(made.shown_rig())
 
     def comes_up(self) -> None:
         before = self.page.started

@@ -30,7 +30,7 @@ class Scripted:
 
     def __init__(self, name, steps, log):
         self.name, self.steps, self.log = name, list(steps), log
-        self.wrong, self.silent, self.absent, self.reads_s = {}, False, (), []
+        self.wrong = {}
 
     def _do(self, what):
         self.log.append(f"{self.name} {what}")
@@ -42,11 +42,7 @@ class Scripted:
 
     def read(self, now_s):
         self._do("read")
-        self.reads_s.append(now_s)
-        gone = range(len(self.steps)) if self.silent else self.absent
-        return feedback_of(
-            [None if i in gone else row_at(at, now_s) for i, at in enumerate(self.steps)]
-        )
+        return feedback_of([row_at(at, now_s) for at in self.steps])
 
     def enable_torque(self):
         self._do("enable_torque")
@@ -93,10 +89,6 @@ class Mixture:
 @pytest.fixture
 def mixture():
     return Mixture()
-
-
-def steps(readings):
-    return [None if reading is None else reading.position_steps for reading in readings]
 
 
 def test_every_sequence_is_in_the_order_of_the_whole(mixture):

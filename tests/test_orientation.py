@@ -5,18 +5,21 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import radians
 
+import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
-from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.robot.app.camera_factory import frame_orientation
 from gazerig.robot.model.frames import LensParams
-from gazerig.robot.model.intrinsics import intrinsics_of_lens, project, rays
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fits, project, rays
 from gazerig.robot.perception.frame_locator import FrameLocator
 
 ALL = [FrameOrientation(r, m) for r in (0, 90, 180, 270) for m in (False, True)]
@@ -119,3 +122,56 @@ def test_the_rig_says_how_frames_are_turned() -> None:
     assert turned == FrameOrientation(180, True)
     assert turned.turned_by(270) == FrameOrientation(90, True)
     assert pickle.loads(pickle.dumps(turned)) == turned  # it goes to the camera's process
+
+
+# ---- The lens model: pixels to directions and back, other sizes of picture, and what perception
+
+
+BENT = Intrinsics(480.0, 482.0, 327.0, 190.0, (-0.25, 0.09, 0.002, -0.001, -0.01))
+BENT_LENS = LensParams((640, 400), (480.0, 482.0), (327.0, 190.0), BENT.distortion)
+
+
+@settings(max_examples=60)
+@given(
+    x=st.floats(0.0, 639.0),
+    y=st.floats(0.0, 399.0),
+    k1=st.floats(-0.28, 0.3),
+    p=st.floats(-0.003, 0.003),
+)
+def test_a_pixel_comes_back_through_its_ray(x: float, y: float, k1: float, p: float) -> None:
+    lens = Intrinsics(480.0, 482.0, 327.0, 190.0, (k1, 0.05, p, -p, 0.0))
+    found = project(rays([(x, y)], lens) * 2.5, lens)
+    assert found[0] == pytest.approx((x, y), abs=1e-4)
+
+
+def test_points_are_projected_as_opencv_does() -> None:
+    points = np.random.default_rng(0).uniform((-0.5, -0.3, 0.8), (0.5, 0.3, 2.0), (50, 3))
+    theirs, _ = cv2.projectPoints(
+        points, np.zeros(3), np.zeros(3), BENT.matrix, np.array(BENT.distortion)
+    )
+    assert np.allclose(project(points, BENT), theirs[:, 0], atol=1e-9)
+
+
+def test_what_is_behind_the_camera_has_no_pixel() -> None:
+    assert np.isnan(project([(0.1, 0.1, -1.0), (0.1, 0.1, 0.0)], BENT)).all()
+
+
+@pytest.mark.parametrize("distortion", [(0.0,) * 4, (0.0, 0.0, 0.0, 0.0, float("nan"))])
+def test_distortion_that_is_none_is_refused(distortion: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match="five finite numbers"):
+        Intrinsics(1.0, 1.0, 0.0, 0.0, distortion)  # type: ignore[arg-type]
+
+
+def test_a_picture_of_half_the_size_shows_the_same_directions() -> None:
+    half = BENT.scaled(0.5, 0.5)
+    # The middle of a block of 2 x 2 pixels becomes the middle of one pixel.
+    assert rays([(100.0, 60.0)], half)[0] == pytest.approx(rays([(200.5, 120.5)], BENT)[0])
+
+
+def test_a_measured_lens_serves_every_picture_of_its_shape() -> None:
+    view = radians(69.0)
+    assert intrinsics_of_lens(BENT_LENS, view, 640, 400) == BENT
+    assert intrinsics_of_lens(BENT_LENS, view, 1280, 800) == BENT.scaled(2.0, 2.0)
+    assert intrinsics_of_lens(BENT_LENS, view, 640, 480) == intrinsics_of_view(view, 640, 480)
+    assert intrinsics_of_lens(None, view, 640, 400) == intrinsics_of_view(view, 640, 400)
+    assert not lens_fits(BENT_LENS, 0, 0)

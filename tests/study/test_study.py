@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import pytest
 from browser import browsing
@@ -17,9 +16,12 @@ from study_helpers import Program, Start, events, session_of
 from gazerig.config.load import ConfigError
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
+from gazerig.features.study.analyse import analyse_study
 from gazerig.features.study.design import HOME, load_study, participant_order, williams
 from gazerig.features.study.journal import Journal, StudyFolder
+from gazerig.features.study.report import answers_csv, write_report
 from gazerig.features.study.session import PageEvent
+from gazerig.features.study.simulate import simulate_study
 
 
 @pytest.mark.parametrize("n", range(2, 7))
@@ -31,16 +33,7 @@ def test_orders_balance_positions_and_successors(n: int) -> None:
     assert len(successors) == n * (n - 1) and set(successors.values()) == {each}
 
 
-def analysed(data: Path) -> Any:
-    from gazerig.features.study.analyse import analyse_study
-
-    return analyse_study(data)
-
-
 def test_pairs_are_seen_in_both_orders(tmp_path: Path) -> None:
-    from gazerig.features.study.report import write_report
-    from gazerig.features.study.simulate import simulate_study
-
     path = tmp_path / "pairs.yaml"
     path.write_text(
         "title: Pairs\ntask: pairwise\nquestionnaires: [choice]\nparticipants: 12\n"
@@ -52,7 +45,7 @@ def test_pairs_are_seen_in_both_orders(tmp_path: Path) -> None:
     assert len(seen) == 6 and set(seen.values()) == {6}
     folder = StudyFolder(tmp_path / "data")
     simulate_study(study, folder, 12, 0, effect=2.0)
-    found = analysed(folder.path)
+    found = analyse_study(folder.path)
     assert found.decisions[0].verdict == "supported" and found.decisions[0].means[0] > 0.8
     write_report(found, tmp_path)
 
@@ -80,13 +73,10 @@ def test_faults_name_line_and_key(study: Path) -> None:
 
 @pytest.mark.parametrize("name", shipped_names("studies", HOME))
 def test_shipped_studies_find_their_effects_in_simulated_answers(name: str, tmp_path: Path) -> None:
-    from gazerig.features.study.report import write_report
-    from gazerig.features.study.simulate import simulate_study
-
     study = load_study(name)
     folder = StudyFolder(tmp_path / "data")
     simulate_study(study, folder, 24, 1, effect=1.5)
-    found = analysed(folder.path)
+    found = analyse_study(folder.path)
     assert [one.verdict for one in found.decisions] == ["supported"] * len(study.design.hypotheses)
     page = write_report(found, tmp_path / "report").read_text()
     assert "simulated participants" in page and page.count("<svg") == len(found.scores)
@@ -95,8 +85,6 @@ def test_shipped_studies_find_their_effects_in_simulated_answers(name: str, tmp_
 
 
 def test_answers_that_do_not_count(study: Path, tmp_path: Path) -> None:
-    from gazerig.features.study.report import answers_csv
-
     loaded, folder = load_study(str(study)), StudyFolder(tmp_path / "data")
     folder.claim(loaded)
     for number in (1, 2):
@@ -114,7 +102,7 @@ def test_answers_that_do_not_count(study: Path, tmp_path: Path) -> None:
         else:
             events(session)
         journal.close()
-    found = analysed(folder.path)
+    found = analyse_study(folder.path)
     assert found.reasons == {"P001": "withdrew", "P002": ""}
     reasons = [one.left_out for one in found.answers]
     assert reasons == ["withdrew"] * 2 + [""] * 5
@@ -199,7 +187,7 @@ def test_a_killed_session_resumes_with_every_answer(study: Path, program: Start)
     assert again.page()["step"] == "end"
     again.process.send_signal(signal.SIGINT)
     assert again.process.wait() == 0
-    found = analysed(study.parent / "data")
+    found = analyse_study(study.parent / "data")
     assert [one.record.value for one in found.answers] == [2, 5, 4, 4, "remark"]
 
 
@@ -272,7 +260,7 @@ def test_a_session_in_chromium_with_the_keyboard(study: Path, program: Start) ->
         assert "alpha" not in shown and "beta" not in shown
         tab.run("document.querySelector('button.main').click()")
         wait_for("It was the difference.")
-    found = analysed(study.parent / "data")
+    found = analyse_study(study.parent / "data")
     assert [one.record.value for one in found.answers] == [4, 2, 4, 2, ""]
 
 
