@@ -31,12 +31,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-from present import present
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from board_rig import on_pca9685
 from child_processes import running_as
+from present import present
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.rig_limits import park_rad
