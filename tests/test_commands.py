@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 import yaml
 from commanded_robot import YAW, Running
@@ -12,6 +13,7 @@ from fakes.runs import go
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
+from gazerig.gaze.types import Floats
 from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import head_activity, tick_control_source
@@ -101,6 +103,14 @@ def test_an_invalid_order_of_this_program_is_refused(order: Command, words: str)
         check_command(order)
 
 
+def fastest_rad_s(ticks: list[Tick]) -> Floats:
+    """Return the highest commanded speed of each joint."""
+    angles = np.array([tick.guard_result.command_rad for tick in ticks])
+    times = np.array([tick.t_s for tick in ticks])
+    speeds: Floats = np.abs(np.diff(angles, axis=0)) / np.diff(times)[:, None]
+    return speeds.max(axis=0)
+
+
 def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(
     running: Running,
 ) -> None:
@@ -126,9 +136,7 @@ def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running) -> No
     assert not ticks[0].stopped and all(ticks[2].joints.torque)
     start = ticks[0].guard_result.command_rad
     assert start == pytest.approx(before.joints.position_rad, abs=radians(0.5))
-    for a, b in zip(ticks, ticks[1:100], strict=False):
-        for old, new in zip(a.guard_result.command_rad, b.guard_result.command_rad, strict=True):
-            assert abs(new - old) <= GENTLE_RAD_S * (b.t_s - a.t_s) * 1.01 + 1e-9
+    assert fastest_rad_s(ticks[:100]).max() <= GENTLE_RAD_S * 1.01
     assert ticks[-1].guard_result.level in ("ok", "limited")
     assert ticks[-1].target.kind == "face"
 
@@ -174,11 +182,7 @@ def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running
     assert all(
         abs(a - b) < 1e-3 for i, (a, b) in enumerate(zip(end, held, strict=True)) if i != YAW
     )
-    steps = [
-        abs(b.guard_result.command_rad[YAW] - a.guard_result.command_rad[YAW]) / (b.t_s - a.t_s)
-        for a, b in zip(ticks, ticks[1:], strict=False)
-    ]
-    assert max(steps) <= GENTLE_RAD_S * 1.01
+    assert fastest_rad_s(ticks)[YAW] <= GENTLE_RAD_S * 1.01
     running.order(Jog(()))
     assert running.go(2.0)[-1].target.kind == "face"
 
@@ -285,10 +289,7 @@ def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None
         "a show (process 7): jog neck_yaw 17.2: not renewed, so the gaze models are in control again"
         in words
     )
-    yaw = [tick.guard_result.command_rad[YAW] for tick in ticks]
-    assert (
-        max(abs(b - a) for a, b in zip(yaw, yaw[1:], strict=False)) <= GENTLE_RAD_S * 0.005 * 1.01
-    )
+    assert fastest_rad_s(ticks)[YAW] <= GENTLE_RAD_S * 1.01
 
 
 def test_a_lead_holds_while_it_is_renewed_by_the_one_who_leads(running: Running) -> None:

@@ -108,8 +108,4 @@ def test_the_thread_looks_by_itself_and_ends(tmp_path: Path) -> None:
     path.write_text(NEW)
     assert reported.wait(10.0)
     watch.stop()
-    assert threads_named("file watch") == []
-
-
-def threads_named(name: str) -> list[threading.Thread]:
-    return [thread for thread in threading.enumerate() if thread.name == name]
+    assert "file watch" not in [thread.name for thread in threading.enumerate()]

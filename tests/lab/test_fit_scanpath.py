@@ -79,14 +79,10 @@ def samples(boxes: PartBoxes, looks: Iterator[tuple[str, float]], seed: int) -> 
     return Samples(np.arange(len(p)) * step_s, p[:, 0], p[:, 1], "")  # type: ignore[arg-type]
 
 
-def written(path: Path, header: str, rows: Iterator[str]) -> Path:
-    path.write_text("\n".join([header, *rows]) + "\n")
-    return path
-
-
 def as_csv(path: Path, s: Samples) -> Path:
-    rows = zip(s.time_s, s.x, s.y, strict=True)
-    return written(path, "time,x,y", (f"{t:.4f},{x:.2f},{y:.2f}" for t, x, y in rows))
+    rows = [f"{t:.4f},{x:.2f},{y:.2f}\n" for t, x, y in zip(s.time_s, s.x, s.y, strict=True)]
+    path.write_text("".join(["time,x,y\n", *rows]))
+    return path
 
 
 def test_labelled_fixations_are_taken_as_they_are(tmp_path: Path) -> None:
