@@ -21,7 +21,6 @@ from gazerig.gaze.oculomotor.pursuit import Pursuit, PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.types import GazeCommand, Target
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.types import JointState
 
 CENTRED = GeometryParams(0.0, 0.0, 0.0)
 DESK = GeometryParams(60.0, 40.0, 50.0)
@@ -110,7 +109,7 @@ class Rig:
         command = self.oculomotor.step(target, state, t, dt)
         now = self.kinematics.inverse(command)
         rates = tuple((a - b) / dt for a, b in zip(now, self.joints.position_rad, strict=True))
-        self.joints = JointState(now, rates, (t,) * 9, ())
+        self.joints = joints_at(now, t, velocity_rad_s=rates)
         return command
 
     def row(self, t: float, target: Target) -> tuple[float, ...]:
