@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from desk import GAZE_JOINTS, LIDS
-from gaze_targets import DT, joints_at, target
+from gaze_targets import DT, target
+from guarded_desk import ZERO, joints_at
 
 from gazerig.gaze.angles import add, angle_between, direction, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
@@ -93,7 +94,7 @@ class Rig:
             np.random.default_rng(dice),
             drift,
         )
-        self.joints = joints_at(*[0.0] * 9)
+        self.joints = joints_at(ZERO, 0.0)
 
     def run(self, where: Callable[[float], Target], seconds: float) -> Trace:
         rows, commands = [], []
