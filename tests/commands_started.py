@@ -58,14 +58,6 @@ class OnTerminal:
     def types(self, keys: bytes) -> None:
         os.write(self.fd, keys)
 
-    def enters(self, press: Callable[[], object], words: str) -> None:
-        """Press Enter, again if the eyes were too late, until there is output."""
-        while True:
-            press()
-            taken = self.reads_one_of(words, "not taken: the eyes are")
-            if taken == words:
-                return
-
     def reads_one_of(self, *several: str) -> str:
         """Wait for the first of several that comes; return it."""
         end_s = time.monotonic() + PATIENCE_S

@@ -79,26 +79,3 @@ def test_a_jammed_joint_overloads_after_its_time_and_only_a_reboot_clears_it():
     assert not bench.at(2400)
     assert bench.at(2600)
     assert (bench.get(70), bench.put(64, 1), bench.get(64)) == (0, 0, 1)
-
-
-def test_overheating_latches_above_the_limit_register():
-    bench = Bench()
-    bench.put(64, 1)
-    bench.servo.sense("temperature", 69.5)
-    bench.at(40)
-    assert bench.get(70) == 0
-    bench.servo.sense("temperature", 71.0)
-    bench.at(80)
-    assert (bench.get(70), bench.get(64), bench.get(146)) == (0x04, 0, 71)
-
-
-@pytest.mark.parametrize(("volts", "bits"), [(3.3, 1), (3.5, 0), (7.2, 1)])
-def test_an_xl330_loses_its_torque_outside_its_voltage_limits(volts, bits):
-    bench = Bench()
-    bench.put(64, 1)
-    bench.servo.sense("input_voltage", 10.0 * volts)
-    bench.at(100)
-    assert (bench.get(70), bench.get(64), bench.get(144)) == (bits, 1 - bits, volts * 10)
-    bench.servo.sense("input_voltage", 50.0)
-    bench.at(200)
-    assert bench.get(70) == bits

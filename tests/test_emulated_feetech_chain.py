@@ -1,12 +1,11 @@
 """The emulated STS bus: the maker's packets, memory, lock, faults and protections."""
 
 import pytest
-from servo_bench import ALL, PING, READ, SYNC_READ, FeetechBench
+from servo_bench import PING, FeetechBench
 
-from gazerig.sim_mock.feetech.packets import signed
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-VOLTAGE, HEAT, OVERLOAD = 1, 4, 32
+OVERLOAD = 32
 
 
 @pytest.fixture
@@ -37,13 +36,6 @@ def test_the_makers_examples_are_answered_to_the_byte():
     assert [bench.read(i, 42, 2) for i in (1, 2, 3, 4)] == [2048] * 4
 
 
-@pytest.mark.parametrize(
-    ("raw", "bit", "value"), [(0x8001, 15, -1), (0x7FFF, 15, 32767), (0x0464, 10, -100)]
-)
-def test_signs_stand_in_one_bit(raw, bit, value):
-    assert signed(raw, bit) == value
-
-
 # --- memory
 
 
@@ -66,33 +58,6 @@ def test_only_what_is_written_while_it_is_open_is_kept(bench):
 
 
 # --- protections
-
-
-@pytest.mark.parametrize(("volts", "bits"), [(8.0, 0), (8.2, 1), (3.9, 1)])
-def test_voltage_stands_in_every_answer_as_long_as_it_is_wrong(bench, volts, bits):
-    bench.chain.faults.command(f"voltage 1 {volts}")
-    bench.wait(0.1)
-    assert bench.read(1, 62) == round(volts * 10)
-    assert bench.read(1, 65) == bits
-    assert [error for _, error, _ in bench.ask(1, READ, 0, 5)] == [bits]
-    assert [error for _, error, _ in bench.ask(ALL, SYNC_READ, 56, 2, 1)] == [bits]
-    bench.chain.faults.command("voltage 1 7.4")
-    bench.wait(0.1)
-    assert bench.error() == 0
-
-
-def test_heat_takes_the_torque_until_it_has_cooled_and_someone_switches_it_on(bench):
-    bench.enable_torque()
-    bench.chain.faults.command("temperature 1 75")
-    bench.wait(0.04)
-    assert (bench.error(), bench.read(1, 40), bench.read(1, 63)) == (HEAT, 0, 75)
-    bench.write(1, 40, 1)
-    assert bench.read(1, 40) == 0
-    bench.chain.faults.command("temperature 1 40")
-    bench.wait(0.1)
-    assert (bench.error(), bench.read(1, 40)) == (0, 0)
-    bench.write(1, 40, 1)
-    assert bench.read(1, 40) == 1
 
 
 def jammed():

@@ -41,20 +41,6 @@ def test_its_table_has_the_high_byte_first(model, number, turn_steps):
     assert bench.word(56) == 1023
 
 
-@pytest.mark.parametrize("speed", [0, 300])
-def test_it_goes_to_its_goal_at_the_speed_it_was_told(speed):
-    bench = ScsBench()
-    bench.write(1, 40, 1)
-    bench.ask(1, WRITE, 42, (711).to_bytes(2, "big"), 0, 0, speed.to_bytes(2, "big"))
-    bench.wait(0.3)
-    if speed:
-        assert bench.word(56) == pytest.approx(511 + 90, abs=8)
-        assert bench.word(58) == pytest.approx(300, rel=0.1)
-        assert bench.read(1, 66) == 1
-    bench.wait(1.0)
-    assert bench.word(56) == pytest.approx(711, abs=2)
-
-
 def test_it_answers_no_sync_read_and_takes_sync_writes():
     bench = ScsBench((1, "scs0009", 100.0), (2, "scs0009", 200.0))
     assert bench.chain.receive(FeetechBench.instruction(ALL, SYNC_READ, 56, 2, 1, 2)) == b""

@@ -160,6 +160,3 @@ def test_stops_are_never_passed_and_a_stalled_motor_draws_its_stall_current():
     assert made.effort == pytest.approx(1.0)
     assert min(go(made, -2000, 500)) == -50.0
     assert made.effort == pytest.approx(-1.0)
-
-
-# --- numbers

@@ -6,7 +6,6 @@ import pytest
 from dynamixel_sdk import PacketHandler
 from fakes.sdk_port import SdkPort
 
-from gazerig.drivers.errors import BusLost, PortError
 from gazerig.sim_mock.devices import DynamixelLine, build
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -65,28 +64,6 @@ def test_an_echo_and_noise_on_all_bytes(world):
     assert world.raw() != whole
     world.now_s += 1.0
     assert world.raw() == whole
-
-
-def test_colliding_servos_mix_where_they_differ(world):
-    whole = world.raw()
-    world.faults.command("collide 2")
-    mixed = world.raw()
-    assert mixed != whole and len(mixed) == len(whole)
-    assert world.raw(1)[9:13] == struct.pack("<i", 2001)
-
-
-def test_unplugged_until_plugged_and_opened_again(world):
-    world.faults.command("unplug")
-    for use in (lambda: world.port.write(b"\xff"), world.port.drain):
-        with pytest.raises(BusLost, match="gone"):
-            use()
-    with pytest.raises(PortError, match="No such file"):
-        world.port.setBaudRate(1_000_000)
-    world.faults.command("plug")
-    with pytest.raises(BusLost):
-        world.port.read_until(1, 0.0)
-    world.port.setBaudRate(1_000_000)
-    assert len(world.raw()) == 15
 
 
 def test_faults_last_for_a_count_a_time_or_until_cleared(world):

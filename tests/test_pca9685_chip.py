@@ -92,18 +92,6 @@ def test_boards_have_their_own_registers_and_strangers_are_not_there(bench):
         build_bridge((0x40, 0x40), lambda: 0.0)
 
 
-def test_a_servo_follows_its_pulses_and_is_limp_without(bench):
-    bench.wake()
-    bench.set(LED0, 0, 0, 0x9A, 0x01)
-    bench.wait(0.5)
-    place = bench.bridge.positions_steps()[0]
-    assert place == pytest.approx(0x19A * 122 / 25 * 4, abs=21)
-    bench.bridge.faults.command("brown-out")
-    bench.wait(0.5)
-    assert bench.bridge.find_servo(0).width_steps == 0
-    assert bench.bridge.positions_steps()[0] == pytest.approx(place, abs=30)
-
-
 class CircuitPythonI2C:
     """What Adafruit's library asks of a bus, over smbus2's messages."""
 

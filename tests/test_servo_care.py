@@ -146,18 +146,6 @@ def test_a_servo_that_keeps_its_torque_is_named(xl):
     assert "servo 2: torque still on: cut the servo power" in xl.bus.events()
 
 
-def test_a_release_while_the_port_is_known_to_be_lost_follows_when_it_is_back(sts):
-    sts.command("unplug")
-    sts.bus.read(sts.now_s)
-    with pytest.raises(BusLost, match="is gone: torque could not be switched off"):
-        sts.bus.disable_torque()
-    sts.command("plug")
-    for _ in range(50):
-        sts.now_s += 0.01
-        sts.bus.read(sts.now_s)
-    assert not any(servo.torque for servo in sts.chain.servos)
-
-
 def test_release_and_close_before_open_do_nothing():
     rig = DynamixelRig()
     rig.bus.disable_torque()
