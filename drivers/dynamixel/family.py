@@ -26,8 +26,6 @@ STEEPEST_PWM = 255
 """PWM Slope. With the factory value 140 a motor needs 36 ms from full drive to full brake, during
 which a lid at 600 deg/s overshoots by 4 deg."""
 
-_SENSED = ("effort", "velocity", "position")
-
 
 def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
     """Return the required register values by name, in register units."""
@@ -72,7 +70,7 @@ DYNAMIXEL = Family(
     format_firmware=str,
     updater="Dynamixel Wizard 2.0",
     # Present Current, Velocity and Position (126..135).
-    window=Window(126, "<hii", _SENSED),
+    window=Window(126, "<hii", ("effort", "velocity", "position")),
     # Between them are addresses without a register, whose reads are refused.
     polled=(
         ("torque_enable", "torque_enable"),

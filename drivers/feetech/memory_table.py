@@ -18,7 +18,6 @@ from gazerig.params import Choices
 STEPS_PER_TURN = 4096
 ACCELERATION_UNIT_STEPS_S2 = 100.0
 CURRENT_UNIT_MA = 6.5
-RETURN_DELAY_UNIT_S = 2e-6
 TORQUE_FULL = 1000
 """Register value of Torque Limit and Max Torque for 100 %."""
 

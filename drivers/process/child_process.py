@@ -16,8 +16,6 @@ from contextlib import contextmanager
 from subprocess import DEVNULL
 from types import ModuleType
 
-from gazerig.drivers.process.priority import share_priority
-
 _HIDING = threading.Lock()
 _NO_VARIABLES: Mapping[str, str] = {}
 
@@ -47,7 +45,7 @@ def start(
     Raises:
         OSError: it cannot be started.
     """
-    process = subprocess.Popen(
+    return subprocess.Popen(
         _command(module, arguments),
         stdin=stdin,
         stdout=stdout,
@@ -57,8 +55,6 @@ def start(
         start_new_session=True,
         bufsize=bufsize,
     )
-    share_priority(process.pid)  # before it lowers its own
-    return process
 
 
 def run(module: str, given: bytes, timeout_s: float) -> subprocess.CompletedProcess[bytes]:

@@ -16,12 +16,6 @@ BLAME_S = 1.5
 as a stalled computer, which late answers identify afterwards.
 """
 
-STOOD_STILL = (
-    "this computer was busy, or the emulator was suspended: no answer for {:.1f} s, then late but "
-    "intact ones; plugs and power are not the cause"
-)
-
-
 LATE_COMPUTER = "late computer"
 """Kind of servo events that are caused by delays of this computer, not by the servos."""
 

@@ -22,7 +22,6 @@ _SCHED_SETATTR = {"x86_64": 314, "aarch64": 274}
 _RESET_ON_FORK = 1
 _ATTRIBUTES = "=IIQiIQQQ"
 """struct sched_attr: size, policy, flags, nice, priority, runtime, deadline, period (ns)."""
-_RAISED = -10
 _AGAIN_S = (0.0, 0.15, 0.3)
 """Waits before attempts: the kernel allows unprivileged users one write per 0.1 s."""
 
@@ -69,29 +68,3 @@ def lower_priority(steps: int, group: Path = Path("/proc/self/autogroup")) -> No
         with suppress(OSError):
             group.write_text(str(steps // 2), encoding="ascii")
             return
-
-
-def raise_priority(group: Path = Path("/proc/self/autogroup")) -> None:
-    """Raise the priority of the session that this process leads, if the system permits it.
-
-    It permits that to root and to users with a limit of niceness (``ulimit -e``).
-
-    Args:
-        group: file with the niceness of the session.
-    """
-    if os.getsid(0) == os.getpid():
-        with suppress(OSError):
-            group.write_text(str(_RAISED), encoding="ascii")
-
-
-def share_priority(pid: int, processes: Path = Path("/proc")) -> None:
-    """Raise the priority of another process's session if that of this process's session is raised.
-
-    Args:
-        pid: the other process, which leads its session.
-        processes: folder with a folder of each process.
-    """
-    with suppress(OSError, ValueError, IndexError):
-        nice = int((processes / "self/autogroup").read_text(encoding="ascii").split()[-1])
-        if nice < 0:
-            (processes / f"{pid}/autogroup").write_text(str(nice), encoding="ascii")
