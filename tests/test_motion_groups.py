@@ -32,7 +32,9 @@ def test_apart_is_two_and_near_is_one() -> None:
     assert boxes(near) == [(10, 10, 52, 40)]
 
 
-def test_people_who_walk_together_are_one() -> None:
+def test_people_who_pass_are_two_and_who_walk_together_are_one() -> None:
+    passing = things(((50, 50, 30, 60), (3, 0)), ((80, 50, 30, 60), (-3, 0)))
+    assert sorted(boxes(passing)) == [(50, 50, 30, 60), (80, 50, 30, 60)]
     together = things(((50, 50, 30, 60), (3, 0)), ((80, 50, 30, 60), (2.5, 0.3)))
     assert boxes(together) == [(50, 50, 60, 60)]
 

@@ -98,9 +98,9 @@ def add_body_detection(faces: FaceDetector, params: FaceDetectorParams) -> FaceD
     meshes = loaded("face.mesh", "MeshNetworks", "face meshes")
     people = palms = None
     if params.people_hz > 0.0:
-        people = loaded("people", "people_detector", "people without a visible face", params)
+        people = loaded("people", "PeopleDetector", "people without a visible face", params)
     if params.hands_hz > 0.0:
-        palms = loaded("palms", "palm_detector", "hands that are held still", params)
+        palms = loaded("palms", "PalmDetector", "hands that are held still", params)
     if not (meshes or people or palms or faults):
         return faces
     return BodyDetector(faces, people, palms, meshes, tuple(faults))

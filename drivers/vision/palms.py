@@ -32,9 +32,10 @@ _LENGTH_OF_WIDTH = 1.4
 class PalmDetector:
     """Detector of palms of the nearest person."""
 
-    def __init__(self, params: FaceDetectorParams, network: Network) -> None:
+    def __init__(self, params: FaceDetectorParams, network: Network | None = None) -> None:
+        """Load the network, unless one is given; it raises as ``load_network`` does."""
         self._params = params
-        self._search = PointSearch(network, _SIDE_PX, _CELLS, 255.0, 0.0)
+        self._search = PointSearch(network or load_network(PALMS), _SIDE_PX, _CELLS, 255.0, 0.0)
         self.due_s = self._seen_s = -np.inf
         self._x = self._y = self._px_per_m = 0.0
 
@@ -77,8 +78,3 @@ class PalmDetector:
             if size > 1.0:
                 found.append(DetectedPalm((x, y), size, sure))
         return tuple(found)
-
-
-def palm_detector(params: FaceDetectorParams) -> PalmDetector:
-    """Return the detector with its network; it raises as ``load_network`` does."""
-    return PalmDetector(params, load_network(PALMS))

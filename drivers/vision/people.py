@@ -35,9 +35,10 @@ _HALF_WIDTH = 0.35
 class PeopleDetector:
     """Detector of people, which searches a part of each frame."""
 
-    def __init__(self, params: FaceDetectorParams, network: Network) -> None:
+    def __init__(self, params: FaceDetectorParams, network: Network | None = None) -> None:
+        """Load the network, unless one is given; it raises as ``load_network`` does."""
         self._params = params
-        self._search = PointSearch(network, _SIDE_PX, _CELLS, 127.5, -1.0)
+        self._search = PointSearch(network or load_network(PEOPLE), _SIDE_PX, _CELLS, 127.5, -1.0)
         self._next = 0
         self.due_s = self._started_s = -np.inf
 
@@ -79,11 +80,6 @@ class PeopleDetector:
             if abs(middle - person.head_px[0]) <= off.min() + 2.0 * _BOTH * height:
                 found.append(person)
         return tuple(found)
-
-
-def people_detector(params: FaceDetectorParams) -> PeopleDetector:
-    """Return the detector with its network; it raises as ``load_network`` does."""
-    return PeopleDetector(params, load_network(PEOPLE))
 
 
 def _person(points: NDArray[np.float64], confidence: float) -> DetectedPerson | None:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.flow import Floats
+from gazerig.drivers.vision.motion.flow import Floats, Mask
 from gazerig.drivers.vision.motion.segmentation import MotionMask
 
 Indices = NDArray[np.intp]
@@ -15,6 +15,9 @@ Indices = NDArray[np.intp]
 _LEAST_AREA_SHARE = 0.001
 # Moving regions closer to each other are merged, in pixels of the scaled-down image.
 _CLOSE_PX = 3
+# Surroundings of a pixel, and difference from their motion as a share of its own, from which on two
+# things meet.
+_AROUND_PX, _PARTED_SHARE = 5, 0.3
 MOST_BLOBS = 8
 """Most moving regions reported; the largest are chosen."""
 # Number of regions that are examined: some are shadows.
@@ -59,22 +62,35 @@ def cluster_motion(things: MotionMask) -> list[PixelGroup]:
     least = max(4, round(_LEAST_AREA_SHARE * things.mask.size))
     small = _SMALL_SHARE * things.mask.size
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_CLOSE_PX, _CLOSE_PX))
-    closed = cv2.morphologyEx(things.mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
+    mask = things.mask & ~_parting_mask(things)
+    closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
     areas = stats[1:, cv2.CC_STAT_AREA]
+    # Pixels where two things meet belong to one of them.
+    grown = cv2.dilate(labels.astype(np.float32), np.ones((_AROUND_PX, _AROUND_PX), np.uint8))
+    labels = np.where(labels > 0, labels, grown)
     groups: list[PixelGroup] = []
     for k in (np.argsort(-areas, kind="stable")[:_LOOKED_AT] + 1).tolist():
-        left, top, width, height = (int(v) for v in stats[k, :4])
-        window = np.s_[top : top + height, left : left + width]
-        y, x = np.nonzero((labels[window] == k) & things.mask[window])
+        y, x = np.nonzero((labels == k) & things.mask)
         if len(x) < least:
             continue
-        x, y = x + left, y + top
         change = float(np.quantile(things.change[y, x], 0.97))
         if change > (_LEAST_CHANGE * min(1.0, small / len(x))) ** 2:
             groups.append(PixelGroup(x, y, things.flow[y, x].astype(np.float64)))
-    groups.sort(key=lambda group: (-len(group.columns), group.columns[0], group.rows[0]))
     return groups[:MOST_BLOBS]
+
+
+def _parting_mask(things: MotionMask) -> Mask:
+    """Return a mask of pixels that move otherwise than their surroundings: where two things meet.
+
+    What turns or grows moves like the mean of its surroundings.
+    """
+    window = _AROUND_PX, _AROUND_PX
+    flow = np.where(things.mask[..., None], things.flow, np.float32(0.0))
+    share = np.maximum(cv2.blur(things.mask.astype(np.float32), window), np.float32(1e-6))
+    off = flow - cv2.blur(flow, window) / share[..., None]
+    out: Mask = np.linalg.norm(off, axis=2) > _PARTED_SHARE * np.linalg.norm(flow, axis=2)
+    return out
 
 
 def inscribed_radius_px(group: PixelGroup, shape: tuple[int, ...]) -> float:
