@@ -129,7 +129,7 @@ def test_slot_holds_the_newest_find_and_close_ends_the_thread(source):
     assert camera.latest(0.0) is camera.latest(99.0)
     assert first.number == 1  # what was handed out stays as it was
     feed(source, camera, 5)
-    assert (camera.frames, camera.frames_with_face) == (7, 3)
+    assert camera.frames == 7
     camera.close()
     assert source.closed == 1
     wait_for(lambda: not threads())
@@ -292,6 +292,21 @@ class Flawed(Ticking):
         if self.number == 9:
             raise RuntimeError("no memory")
         return super().take(now_s, stop)
+
+
+class Stuck(Ticking):
+    """A source that cannot be closed."""
+
+    def close(self):
+        raise RuntimeError("no answer")
+
+
+def test_an_error_as_a_process_closes_its_source_is_reported():
+    camera = process(Stuck)
+    camera.open()
+    wait_for(lambda: camera.frames)
+    camera.close()
+    assert camera.events() == ("closing the camera: RuntimeError: no answer",)
 
 
 @pytest.mark.parametrize(

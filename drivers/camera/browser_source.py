@@ -40,9 +40,8 @@ class BrowserSource:
             self._number = picture.number
             import cv2  # only in the camera's process, not in that of the control loop
 
-            found = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
-            image = to_bgr(found) if found is not None and max(found.shape) <= _LARGEST_PX else None
-            if image is None:
+            image = to_bgr(cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR))
+            if image is None or max(image.shape) > _LARGEST_PX:
                 if not self._reported:
                     self._reported = True
                     self._events.append(

@@ -103,15 +103,10 @@ class FrameAnalyzer:
         began_s = perf_counter()
         shot = self._orientation.turn_shot(shot)
         height, width = shot.image.shape[:2]
-        faces = tuple(
-            [
-                face
-                for face in self._detector.find(shot.image)
-                if not is_off_frame(face, width, height)
-            ]
-        )
-        faces_s = perf_counter()
         image, t_s = shot.image, shot.captured_s
+        found_faces = self._detector.find(image)
+        faces = tuple([face for face in found_faces if not is_off_frame(face, width, height)])
+        faces_s = perf_counter()
         find_people = getattr(self._detector, "people", None)
         people = () if find_people is None else find_people(image, t_s)
         find_palms = getattr(self._detector, "palms", None)
@@ -197,7 +192,7 @@ class CaptureLoop:
             parts.motion() if parts.motion is not None else None,
             parts.locate,
             parts.orientation,
-            bool(getattr(self.source, "is_film", False)),
+            getattr(self.source, "is_film", False),
         )
         self._now_s, self._recovery, self._report = now_s, recovery, report
         self._record = parts.record

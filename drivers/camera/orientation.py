@@ -78,8 +78,7 @@ class FrameOrientation:
         across = self._image_rotation()
         far = np.array([width_px - 1, height_px - 1], dtype=np.float64)
         least = np.minimum(across @ far, 0.0)  # the corner that becomes the upper left one
-        out: Floats = np.asarray(points_px, dtype=np.float64) @ across.T - least
-        return out
+        return np.asarray(points_px, dtype=np.float64) @ across.T - least
 
     def turn_lens(self, lens: Intrinsics, width_px: int, height_px: int) -> Intrinsics:
         """Return the lens of upright frames from that of original frames of this size."""

@@ -45,9 +45,6 @@ _POLL_S = 0.1
 # Bytes of messages that wait in the pipe: if the loop is suspended, few frames wait in memory.
 _WAITING_BYTES = 1 << 14
 
-DetectionMessage = tuple[Detections, PassedImage | None, PassedImage | None]
-"""Detections in one frame, then its image and depth; their file descriptors follow the message."""
-
 
 class CaptureProcess:
     """The methods of ``CaptureLoop``, executed in another process.
@@ -70,7 +67,7 @@ class CaptureProcess:
         self._report = report
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
-        self._starts, self._is_retrying = 0, False
+        self._is_retrying = False
 
     def open(self) -> None:
         """Start the process and wait until its source is open.
@@ -96,17 +93,12 @@ class CaptureProcess:
                 if not pipe.poll(_POLL_S):
                     self._judge_silence()
                     continue
-                message = pipe.recv()
-                self._heard_s = self._now_s()
-                if isinstance(message, tuple):
-                    return self._receive(pipe, message)
+                found = self._receive(pipe)
             except (EOFError, OSError):
                 self._restart("the camera process has ended")
                 continue
-            if isinstance(message, SetupError):
-                raise message
-            self._is_retrying = self._is_retrying or message.startswith(LOST)
-            self._report(message)
+            if found is not None:
+                return found
         return None
 
     def close(self, timeout_s: float = LONGEST_END_S) -> None:
@@ -114,9 +106,13 @@ class CaptureProcess:
         process, pipe = self._process, self._pipe
         if process is None or pipe is None:
             return
+        end_s = self._now_s() + timeout_s
         with suppress(OSError):  # it may have ended already
             pipe.send("stop")
-        process.join(timeout_s)
+        with suppress(EOFError, OSError, SetupError):  # what it still sends would block it
+            while pipe.poll(max(0.0, end_s - self._now_s())):
+                self._receive(pipe)
+        process.join(max(0.0, end_s - self._now_s()))
         if process.is_alive():
             process.kill()
             process.join()
@@ -180,12 +176,24 @@ class CaptureProcess:
             self._lost_s = self._now_s()
             self._report(f"{LOST} ({reason}")
 
-    def _receive(self, pipe: Connection, message: DetectionMessage) -> Detections:
-        """Return detections with their frame.
+    def _receive(self, pipe: Connection) -> Detections | None:
+        """Receive a message; return detections with their frame, None for an event.
 
         The scene is another one than that of earlier processes: what was in front of the camera
         meanwhile is unknown, as is whether it is the same camera.
+
+        Raises:
+            SetupError: sent by the process.
         """
+        message = pipe.recv()
+        self._heard_s = self._now_s()
+        if isinstance(message, SetupError):
+            raise message
+        if isinstance(message, str):
+            self._is_retrying = self._is_retrying or message.startswith(LOST)
+            self._report(message)
+            return None
+        found: Detections
         found, image, depth = message
         self._number = self._counted + found.number
         self._is_retrying = False
@@ -252,8 +260,10 @@ def _await_end(pipe: Connection, stop: threading.Event) -> None:
 
 
 def _send_detections(pipe: Connection, found: Detections) -> None:
-    arrays = found.image, found.depth_m
-    passed = [None if array is None else copy_image(array) for array in arrays]
+    """Send detections, then the file descriptors of their image and depth."""
+    passed = [
+        None if array is None else copy_image(array) for array in (found.image, found.depth_m)
+    ]
     pipe.send((replace(found, image=None, depth_m=None), *passed))
     for image in passed:
         if image is not None:

@@ -97,10 +97,8 @@ def encode_shot(shot: Shot) -> list[tuple[str, bytes]]:
         )
         found.append((LENS, lens))
     if shot.depth_m is not None:
-        file = _encode_png(to_millimetres(shot.depth_m), _DEPTH_PNG)
-        found.append((DEPTH, RecordedImage(stamp, _FRAME, "png", file)))
-    file = _encode_png(shot.image, _COLOUR_PNG)
-    found.append((PICTURE, RecordedImage(stamp, _FRAME, "png", file)))
+        found.append((DEPTH, _encode_image(stamp, to_millimetres(shot.depth_m), _DEPTH_PNG)))
+    found.append((PICTURE, _encode_image(stamp, shot.image, _COLOUR_PNG)))
     return [(topic, msgspec.json.encode(message)) for topic, message in found]
 
 
@@ -123,9 +121,9 @@ def decode_shot(messages: dict[str, bytes]) -> Shot:
     return Shot(0.0, 0, image, None if depth is None else to_metres(depth), lens)
 
 
-def _encode_png(pixels: NDArray[Any], how: list[int]) -> bytes:
+def _encode_image(stamp: RecordedTime, pixels: NDArray[Any], how: list[int]) -> RecordedImage:
     _, file = cv2.imencode(".png", pixels, how)
-    return bytes(file)
+    return RecordedImage(stamp, _FRAME, "png", bytes(file))
 
 
 def _decode_image(data: bytes) -> NDArray[Any]:

@@ -30,7 +30,7 @@ class CameraWorker:
         in_thread: Whether the parts run in a thread of this process, for those of a program, which
             exist only there; otherwise they run in a process, which cannot delay the control loop.
 
-    frames, frames_with_face: counts of analysed frames since open
+    frames: count of analysed frames since open
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class CameraWorker:
         self._thread: threading.Thread | None = None
         self._newest: Detections | None = None
         self._failure: BaseException | None = None
-        self.frames = self.frames_with_face = 0
+        self.frames = 0
 
     def open(self) -> None:
         """Open the source and start detection.
@@ -66,7 +66,7 @@ class CameraWorker:
         self._frames.open()
         self._stop.clear()
         self._newest, self._failure = None, None
-        self.frames = self.frames_with_face = 0
+        self.frames = 0
         self._thread = threading.Thread(target=self._watch, name="camera", daemon=True)
         self._thread.start()
 
@@ -100,7 +100,6 @@ class CameraWorker:
         try:
             while (found := self._frames.next_detections(self._stop)) is not None:
                 self.frames += 1
-                self.frames_with_face += bool(found.faces)
                 self._newest = found
         except BaseException as failure:  # raised to the loop by latest()
             self._failure = failure

@@ -442,7 +442,9 @@ class RunVoice:
         elif not self._over and now_s - self._synced_s >= _SYNC_EVERY_S:
             self._synced_s = now_s
             if abs(error_s) > _SYNC_ERROR_S:
-                self._try(SyncTrack(wanted.number, track_s + error_s, "sound"))
+                # The command is executed in the next tick.
+                until_s = max(0.0, tick.t_s + 1.0 / self._rig().loop.rate_hz - now_s)
+                self._try(SyncTrack(wanted.number, track_s + error_s + until_s, "sound"))
 
     def _start_sound(self, wanted: TrackState, tick: Tick) -> None:
         self._played, self._over, self._started_s = wanted, False, self._clock.now_s()
