@@ -181,7 +181,7 @@ def test_a_bus_without_any_answer_is_given_up_in_the_end():
         for _ in range(1000):
             assert rig.tick() == (None, None, None)
     assert 1.6 <= rig.now_s - start_s <= 1.63
-    assert rig.bus.events() == ("no servo answers: check servo power and cable",)
+    assert rig.bus.events() == ("no servo has answered for 1.5 s: check servo power and cable",)
 
 
 def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(xl):

@@ -3,11 +3,13 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from math import inf
 from typing import Any
 
 from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.process.host_lateness import BLAME_S
 from gazerig.drivers.serial.port import BusPort, open_port
 from gazerig.drivers.types import BusHealth, ServoConfig
 
@@ -22,7 +24,7 @@ class PortBus(ABC):
 
     A bus creates its parts before any of these methods is called, and may replace them.
 
-    _line: has the counts tx_bytes, rx_bytes and errors
+    _line: has the counts tx_bytes, rx_bytes and errors, and lateness
     _labels: labels of servos for messages, by id
     _give_up_s: longest loss of the port, seconds
     _is_down: whether the port is lost
@@ -37,8 +39,9 @@ class PortBus(ABC):
     _target_setups: tuple[ServoConfig, ...]
     _baud: int
     _give_up_s: float
-    _opened = _is_down = _release_due = False
+    _opened = _is_down = _release_due = _is_silence_told = False
     _now_s = _lost_s = _next_s = 0.0
+    _silent_since_s = inf
 
     @abstractmethod
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
@@ -149,6 +152,27 @@ class PortBus(ABC):
             self._log.add(f"{self._labels[servo_id]}: torque still on: {CUT}")
         for servo_id in released.unconfirmed_ids:
             self._log.add(f"{self._labels[servo_id]}: torque-off not confirmed: {CUT}")
+
+    def _check_silence(self, answered: bool, fault: str, remedy: str) -> None:
+        """Report that nothing answers any more, once after a longer silence.
+
+        Raises:
+            BusLost: it has lasted for longer than ``_give_up_s``.
+        """
+        if answered:
+            self._silent_since_s, self._is_silence_told = inf, False
+            return
+        since_s = self._silent_since_s = min(self._silent_since_s, self._now_s)
+        silent_s = self._now_s - since_s
+        if silent_s < min(BLAME_S, self._give_up_s):
+            return
+        text = f"{fault} for {silent_s:.1f} s"
+        text = self._line.lateness.blame(text, remedy, self._now_s, since_s)
+        if silent_s >= self._give_up_s:
+            raise BusLost(f"{self._port.port_name}: {text}")
+        if not self._is_silence_told:
+            self._is_silence_told = True
+            self._log.add(text)
 
     def _record_loss(self, lost: BusLost) -> None:
         """Record that the port is lost."""

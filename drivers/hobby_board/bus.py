@@ -18,7 +18,6 @@ from gazerig.drivers.bus.servo_models import HOBBY_STEPS_PER_TURN, US_STEPS
 from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import CHECK_SUPPLY, TRIES, Board, are_alike
-from gazerig.drivers.process.host_lateness import BLAME_S
 from gazerig.drivers.serial.port import open_port, wait_until
 from gazerig.drivers.types import Feedback, ServoConfig
 
@@ -164,8 +163,7 @@ class HobbyBoardBus(PortBus):
         self._engaged, self._may_send = False, True
         self._failed_tries, self._trouble_s, self._fault = 0, -inf, ""
         self._rearmed, self._turn = False, 0
-        # Begin of a silence of the board, and its length from which on it is reported next.
-        self._silent_since_s, self._report_s = inf, 0.0
+        self._silent_since_s, self._is_silence_told = inf, False
         self._is_down = self._release_due = False
 
     # --- torque on and off
@@ -283,12 +281,9 @@ class HobbyBoardBus(PortBus):
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
-        if not answered:
-            self._may_send = False
-            self._check_silence(now_s)
-            return self._nothing
-        self._silent_since_s = inf
-        return self._nothing if self._due else self._estimate()
+        self._check_silence(answered, "the board has not answered", CHECK_SUPPLY)
+        self._may_send &= answered
+        return self._estimate() if answered and not self._due else self._nothing
 
     @property
     def _due(self) -> list[Channel]:
@@ -357,21 +352,6 @@ class HobbyBoardBus(PortBus):
         for channel in self._channels:
             channel.record_release()
         self._switch_off()
-
-    def _check_silence(self, now_s: float) -> None:
-        """Report that the board is silent; give up after ``give_up_s``."""
-        give_up_s = self._give_up_s
-        if self._silent_since_s == inf:
-            self._silent_since_s, self._report_s = now_s, min(BLAME_S, give_up_s)
-        silent_s = now_s - self._silent_since_s
-        if silent_s < self._report_s:
-            return
-        fault = f"the board has not answered for {silent_s:.1f} s"
-        fault = self._board.lateness.blame(fault, CHECK_SUPPLY, now_s, self._silent_since_s)
-        if silent_s >= give_up_s:
-            raise BusLost(f"{self._port.port_name}: {fault}")
-        self._report_s = give_up_s
-        self._log.add(fault)
 
     def _estimate(self) -> Feedback:
         """Return the estimated state of all servos; none is measured."""

@@ -80,6 +80,7 @@ class SmartServoBus(PortBus):
         line, log, family = self._line, self._log, self._family
         self._apply_target()
         self._is_down = self._release_due = False
+        self._silent_since_s, self._is_silence_told = inf, False
         self._poll_list = PollList(self._labels, log, line.lateness)
         self._feedback = FeedbackColumns(family, self._setups)
         since = family.fast_read_since
@@ -195,10 +196,9 @@ class SmartServoBus(PortBus):
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
-        silent_s = self._poll_list.all_silent_s(now_s) if self._poll_list.silent_since_s else 0.0
-        if silent_s >= self._give_up_s:
-            fault = f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s"
-            raise BusLost(line.lateness.blame(fault, CHECK_SUPPLY, now_s, now_s - silent_s))
+        if self._is_troubled or self._silent_since_s < inf:
+            answered = len(feedback.now.missing) < len(self._ids)
+            self._check_silence(answered, "no servo has answered", CHECK_SUPPLY)
         return feedback.now
 
     def enable_torque(self) -> tuple[int, ...]:

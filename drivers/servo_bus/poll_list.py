@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from math import inf
 
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S, HostLateness
+from gazerig.drivers.process.host_lateness import SILENCE_S, HostLateness
 
 AGAIN_S = 0.15
 """Interval of attempts to read silent servos, which take turns; less than a servo's watchdog."""
@@ -37,8 +37,7 @@ class PollList:
         self._next_s = -inf
         self._damaged: set[int] = set()
         self._reported: set[int] = set()
-        self._all_since_s, self._all_until_s = inf, -inf
-        self._all_reported = False
+        self._all_silent_until_s = -inf
         self.group = tuple(labels)
         self.silent_since_s: dict[int, float] = {}
 
@@ -85,12 +84,7 @@ class PollList:
             now_s: Present time.
         """
         if not answered:
-            self._all_since_s = min(self._all_since_s, now_s)
-            if self.all_silent_s(now_s) >= BLAME_S and not self._all_reported:
-                self._all_reported = True
-                self._blame("no servo answers", CHECK_SUPPLY, now_s, self._all_since_s)
-        elif self._all_since_s < inf:
-            self._all_since_s, self._all_until_s, self._all_reported = inf, now_s, False
+            self._all_silent_until_s = now_s
         back = [servo_id for servo_id in self.silent_since_s if servo_id not in self._silent]
         silences_s = {i: now_s - self.silent_since_s.pop(i) for i in back}
         for servo_id in self._reported.intersection(back):
@@ -99,21 +93,15 @@ class PollList:
             self._log.add(f"{self._labels[servo_id]} answers again after {silent_s:.1f} s")
         for servo_id, since_s in self.silent_since_s.items() if answered else ():
             # While no servo answered, none in particular was silent.
-            silent_s = now_s - max(since_s, self._all_until_s)
+            silent_s = now_s - max(since_s, self._all_silent_until_s)
             if servo_id not in self._reported and silent_s >= SILENCE_S:
                 self._reported.add(servo_id)
                 fault, remedy = "does not answer", CHECK_SUPPLY
                 if servo_id in self._damaged:
                     fault, remedy = "answers, but its bytes arrive damaged", BAD_LINE
-                self._blame(f"{self._labels[servo_id]} {fault}", remedy, now_s)
+                fault = f"{self._labels[servo_id]} {fault}"
+                self._log.add(self._lateness.blame(fault, remedy, now_s))
         return silences_s
-
-    def _blame(self, fault: str, remedy: str, now_s: float, since_s: float = inf) -> None:
-        self._log.add(self._lateness.blame(fault, remedy, now_s, since_s))
-
-    def all_silent_s(self, now_s: float) -> float:
-        """Return the time for which no servo has answered, seconds."""
-        return max(0.0, now_s - self._all_since_s)
 
 
 def silent_servos(ids: Sequence[int], answered: Collection[int]) -> tuple[int, ...]:

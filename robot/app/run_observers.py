@@ -175,17 +175,14 @@ class RunObservers:
         """Return the values of the page that are not in ticks."""
         robot = self._made.robot
         errors = {kind: n for kind, n in robot.body.bus.health().errors.items() if n}
-        start_s = scene_start_s(robot.camera)
-        if not start_s and self._made.room is not None:
-            start_s = self._made.room.start_s()
         menus = robot.menus()
         character = self._tuning.character_name if self._tuning is not None else ""
-        in_force = menus["behaviour"][0], menus["conversation"][0], character
         self._states += 1
         if self._states % _STATES_PER_FIGURES == 1:  # computing them takes half a millisecond
             self._figures = self._timing.figures()
         return RunState(
-            errors, *in_force, start_s,
+            errors, menus["behaviour"][0], menus["conversation"][0], character,
+            self._scene_start_s(),
             self._figures,
             menus.get("expression", ("",))[0],
         )  # fmt: skip

@@ -240,10 +240,9 @@ class Publisher:
             return
         self._frame = found.number
         array = found.image
-        if array is None and self._images:
-            return  # its slot has been overwritten
         if array is None:
-            self._page.send(frame_message(found, None))
+            if not self._images:  # else its slot has been overwritten
+                self._page.send(frame_message(found, None))
             return
         self._images = True
         image = copy_image(array)
