@@ -8,8 +8,6 @@ from gazerig.drivers.types import ServoBus
 
 IDS = (1, 2, 3, 4)
 NAMES = ("eye", "jaw", "neck", "lid")
-LONGEST_S = 0.1
-"""No read takes longer, but the one that opens a port again or sets a servo up again."""
 
 
 class MovingBus:

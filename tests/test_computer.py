@@ -11,7 +11,7 @@ from gazerig.robot.app.computer import (
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import with_options
 
-CARD, SOFTWARE, NOTHING = False, True, None
+CARD, SOFTWARE = False, True
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,6 @@ from gazerig.sim_mock.dynamixel.servo import (
 )
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-instruction = DynamixelBench.instruction
-
 
 def vector(text: str) -> bytes:
     return bytes.fromhex(text.replace(" ", ""))

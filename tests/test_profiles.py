@@ -12,7 +12,6 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 
 CLAIMS = list(claims())
-HALF_RATE = {"loop.rate_hz": 100.0}
 """Nothing here is asked of single ticks."""
 
 

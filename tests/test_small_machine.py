@@ -47,14 +47,6 @@ def test_the_service_parks_before_anything_is_killed() -> None:
     assert "20 s" in PAPER and service["TimeoutStopSec"] == "20"
 
 
-def test_the_service_comes_back_after_a_fault_and_starts_at_boot() -> None:
-    parsed = unit()
-    assert parsed["Service"]["Restart"] == "on-failure"
-    assert parsed["Unit"]["StartLimitIntervalSec"] == "0"  # or it gives up after five times
-    assert parsed["Install"]["WantedBy"] == "default.target"
-    assert f"every {parsed['Service']['RestartSec']} s" in PAPER
-
-
 def test_systemd_finds_no_fault_in_the_service(tmp_path: Path) -> None:
     program = shutil.which("systemd-analyze")
     if program is None:

@@ -2,10 +2,6 @@
 
 import io
 import json
-import os
-import pty
-import subprocess
-import sys
 from typing import Any
 
 import pytest
@@ -67,18 +63,3 @@ def test_what_a_command_prints_is_shown(capfd):
     with pytest.raises(SystemExit):
         run_app(lambda words: print(*words), [EVIL], "")
     assert capfd.readouterr().out == f"{visible(EVIL)}\n"
-
-
-def test_keys_of_a_yaml_are_shown_on_a_terminal(tmp_path):
-    file = tmp_path / "rig.yaml"
-    file.write_text('name: x\n"' + r"\e]0;owned\a\e[31m" + '": 1\n')
-    near, far = pty.openpty()
-    subprocess.run(
-        [sys.executable, "-c", START, "check", str(file)], stdout=far, stderr=far, timeout=60
-    )
-    os.set_blocking(near, False)
-    shown = os.read(near, 65536).decode()
-    os.close(near)
-    os.close(far)
-    assert r"\x1b]0;owned\x07\x1b[31m" in shown, shown
-    assert "\x1b]" not in shown and "\x07" not in shown and "\x1b[31m" not in shown

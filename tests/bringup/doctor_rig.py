@@ -78,11 +78,6 @@ class Rig:
         self.now_s += seconds
         self.chain.positions_steps()
 
-    def kept(self):
-        """Return what the servos hold, without what lives."""
-        end = 120 if self.kind is DYNAMIXEL else 56
-        return [bytes(self.chain[i].memory.bytes[:end]) for i in (1, 2, 7)]
-
     def check(self):
         self.reported.clear()
         return examine_bus(

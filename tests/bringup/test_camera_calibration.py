@@ -25,10 +25,7 @@ from gazerig.features.bringup.calibration.camera_procedure import (
 )
 from gazerig.features.bringup.calibration.charuco_views import (
     PAPERS_MM,
-    BoardView,
-    ViewParams,
     board_view,
-    coverage,
     write_page,
 )
 from gazerig.features.bringup.calibration.hand_eye import (
@@ -158,21 +155,6 @@ def test_views_that_do_not_show_the_lens_are_refused(
 def test_corners_that_jump_about_are_refused_with_the_number() -> None:
     with pytest.raises(CameraCalibrationRefused, match=r"error 2\.\d+ px, wanted at most 0.70"):
         calibrated(some_views(1.6))
-
-
-def test_coverage_says_what_to_do_next() -> None:
-    middle = BoardView(0.4, 0.6, 0.4, 0.6, 0.0, 0.0)
-    params = ViewParams(least_views=2)
-    wishes = coverage([middle], params).missing
-    assert len(wishes) == 10 and wishes[-1] == "show 1 more view, each a new one"
-    left = middle._replace(left=0.05, tilt_right_deg=20.0)
-    fewer = coverage([middle, left], params).missing
-    assert len(set(wishes) - set(fewer)) == 4
-    assert "bring the board to the left edge of the image" not in fewer
-    full = BoardView(0.05, 0.95, 0.05, 0.95, 0.0, 0.0)
-    tilts = [full._replace(tilt_right_deg=t) for t in (20.0, -20.0)]
-    tilts += [full._replace(tilt_down_deg=t) for t in (20.0, -20.0)]
-    assert coverage(tilts, params).enough
 
 
 # --- The calibration board: on paper in true size, and found in pictures

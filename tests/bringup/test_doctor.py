@@ -19,7 +19,6 @@ from gazerig.drivers.pca9685.board import (
     Pca9685Params,
     pulse_registers,
 )
-from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
@@ -33,7 +32,6 @@ from gazerig.features.bringup.bus_search import (
 from gazerig.features.bringup.cli.scan import scan_remarks
 from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685
 from gazerig.features.bringup.doctor.diagnostics import Diagnostic, Fix, worst_level
-from gazerig.features.bringup.doctor.examination import examine_port
 from gazerig.features.bringup.doctor.servo_checks import CHECKS
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, KINDS
@@ -182,16 +180,6 @@ def test_a_wrong_model_or_two_servos_are_not_judged_further(kind):
 
 
 @each
-def test_a_good_rig_is_well(kind):
-    findings = Rig(kind).check()
-    assert {f.level for f in findings} == {"ok", "note"}
-    assert [f.where for f in findings if f.level == "ok"] == [PAN, TILT, YAW]
-    version = "53" if kind is DYNAMIXEL else "3.53"
-    well = one(findings, "ok", YAW, f"{NECK[kind.name]}, firmware {version}, ")
-    assert "degC, at step 2048" in well.what and not well.remedy and not well.fixes
-
-
-@each
 def test_a_missing_servo_a_stranger_and_one_at_another_rate(kind):
     eye, neck = EYE[kind.name], NECK[kind.name]
     rig = Rig(kind, [ServoSpec(1, eye), ServoSpec(2, eye), ServoSpec(30, neck)])
@@ -222,17 +210,6 @@ def test_two_servos_with_one_id_and_one_of_which_only_pieces_come(kind, fault, s
     rig = Rig(kind)
     rig.command(fault)
     assert "alone" in one(rig.check(), "error", TILT, says).remedy
-
-
-@each
-def test_reading_changes_nothing(kind):
-    rig = Rig(kind)
-    odd = {"bus_watchdog": 255} if kind is DYNAMIXEL else {"lock": 0}
-    rig.set(2, return_delay_time=250, operating_mode=1, **odd)
-    rig.hold(1)
-    before = rig.kept()
-    rig.check()
-    assert rig.kept() == before
 
 
 # --- Fixes of the doctor, its findings about ports, and its texts
@@ -304,17 +281,6 @@ def test_a_servo_that_does_not_take_it_is_said(kind, value, fault, says):
 
 
 # --- ports
-
-
-def test_a_port_that_cannot_be_opened_is_a_finding(tmp_path):
-    port = BlockingPort(str(tmp_path / "ttyUSB0"))
-
-    def examine():
-        port.setBaudRate(BAUD)
-        return []
-
-    (only,) = examine_port(port, examine)
-    assert only.level == "error" and "no serial port" in only.what
 
 
 # --- words
@@ -672,14 +638,6 @@ def test_a_port_of_pololu_is_never_sent_servo_packets_even_where_nobody_answers(
 
 def memory(servo):
     return bytes(servo.memory.bytes[:80])
-
-
-def test_dynamixel_servos_are_found_and_the_search_ends_there():
-    chain = build_dynamixel([ServoSpec(1, "xl330-m077"), ServoSpec(7, "xc330-m288")], lambda: 0.0)
-    rounds = Line(chain).search()
-    assert {one.kind for one in rounds} == {"maestro", "dynamixel"}
-    kinds = {(kind, servo.id) for kind, servo in found_servos(rounds)}
-    assert kinds == {("dynamixel", 1), ("dynamixel", 7)}
 
 
 def test_no_packet_changes_dynamixel_servos():

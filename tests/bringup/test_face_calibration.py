@@ -1,7 +1,7 @@
 """Keys to offsets in the face's own frame, and from there to points in the world."""
 
 from collections.abc import Iterator
-from math import degrees, dist, radians
+from math import degrees, radians
 from typing import Any, get_args
 
 import pytest
@@ -47,16 +47,6 @@ def after(*keys: Key) -> FaceCalibration:
 
 
 @given(KEYS)
-def test_an_enter_stores_the_place_that_was_steered_to(keys: list[Key]) -> None:
-    state = initial_calibration({})
-    for key in keys:
-        part, place = state.part, state.place_mm(state.part or "N")
-        state = apply_key(state, key)
-        if key == "enter" and part is not None:
-            assert dist(changed_places(state)[f"face_parts_mm.{part}"], place) < 0.1
-
-
-@given(KEYS)
 def test_no_keys_lead_off_the_face_or_out_of_its_plane(keys: list[Key]) -> None:
     state = initial_calibration({})
     for key in keys:
@@ -80,15 +70,6 @@ def test_left_is_the_owners_left_and_up_is_up_whatever_the_face_does() -> None:
     lying = compose(facing, rotation((0.0, 0.0, radians(90.0))))
     x, y, z = point_world_m(state.place_mm("N"), (1.0, 0.0, 0.2), lying)
     assert z == pytest.approx(0.205) and abs(y) == pytest.approx(0.005)
-
-
-def test_only_parts_with_an_enter_are_written() -> None:
-    state = after("left", "enter", "up", "skip", "down", "enter", "end")
-    assert changed_places(state) == {
-        "face_parts_mm.N": (0.0, 5.0, 0.0),
-        "face_parts_mm.RE": (-33.0, -30.9, 30.0),
-    }
-    assert state.part is None and apply_key(state, "left") is state
 
 
 def test_back_and_skip_take_a_choice_back() -> None:

@@ -211,19 +211,6 @@ STOPS = (1700.0, 2500.0)
 each = pytest.mark.parametrize("joint", [EYE, STS], ids=["dynamixel", "feetech"])
 
 
-@each
-def test_by_hand_zero_sign_and_range_are_found(joint: JointParams) -> None:
-    bench = Bench(joint)
-    bench.script = [-400, 850, -440]  # left end at fewer steps: the sign is -1
-    bench.joint.check()
-    found = calibrate_by_hand(bench.joint, bench, 2.0)
-    assert found.sign == -1 and found.zero_step == pytest.approx(2110, abs=2)
-    assert found.max_deg == pytest.approx((2110 - 1700) / STEPS_PER_DEG - 2.0, abs=0.2)
-    assert found.min_deg == pytest.approx(-(2550 - 2110) / STEPS_PER_DEG + 2.0, abs=0.2)
-    assert "turn left_eye_pan to its LEFT end, then press Enter" in bench.said
-    assert bench.get("torque_enable") == 0
-
-
 def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> None:
     bench = Bench(STS, 3900)
     bench.script = [600, -1200, 600]
