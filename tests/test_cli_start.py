@@ -6,16 +6,13 @@ import sys
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import pytest
-import typer
 from command_line import gazerig, typed
-from typer.core import TyperGroup
 
 from gazerig import __version__
 from gazerig.drivers.serial.list_ports import SerialPort
-from gazerig.robot.cli.main import CommandsByName, app, next_steps
+from gazerig.robot.cli.main import CommandsByName, next_steps
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, exit_on_signals
 
 ON_BOARD = SerialPort("/dev/ttyS0", "n/a", "", None)
@@ -41,12 +38,6 @@ def test_without_anything_the_first_step_needs_no_hardware() -> None:
 def test_gazerig_alone_shows_it_and_is_no_error() -> None:
     done = gazerig()
     assert done.returncode == 0 and "What next?" in done.stdout and not done.stderr
-
-
-def commands() -> dict[str, Any]:
-    group = typer.main.get_command(app)
-    assert isinstance(group, TyperGroup)
-    return dict(group.commands)
 
 
 def test_the_list_of_commands_is_that_of_their_modules() -> None:

@@ -76,11 +76,6 @@ def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it() -> None
     assert "not saved yet: 2 values" in done.err
 
 
-def test_what_takes_effect_later_is_said() -> None:
-    done = invoked("ctl", "set", "bus.port", "/dev/ttyUSB7")
-    assert "bus.port = /dev/ttyUSB7 (at the next start)" in done.out
-
-
 @pytest.mark.parametrize(
     ("words", "rule"),
     [

@@ -111,6 +111,7 @@ def test_a_slider_moves_the_wish_of_its_joint(at_the_rig: tuple[Rig, Person]) ->
         lambda: structs.replace(cast(Any, rig.orders[-1]), who="") == LookAt(None),
         "the rig being let go",
     )
+    assert cast(Any, rig.orders[-1]).who.startswith("browser ")
 
 
 def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]) -> None:

@@ -44,7 +44,7 @@ from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.requests.page_requests import PAGE, PageRequestHandler
 from gazerig.robot.dashboard.widgets.widget import TextField
 from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
-from gazerig.robot.model.commands import Command, Jog, LookAt, Stop, set_client
+from gazerig.robot.model.commands import Command, Jog, LookAt, Stop
 from gazerig.robot.model.parameter import Parameter
 
 
@@ -148,16 +148,6 @@ def heard() -> Heard:
         refusals=(ConfigError,),
     )
     return Heard(hear, orders, tuning)
-
-
-def test_orders_are_obeyed(heard: Heard) -> None:
-    orders: tuple[Command, ...] = (Stop("a test"), LookAt(None), Jog((("neck_yaw", 0.1),)))
-    for order in orders:
-        assert heard.hear(msgspec.to_builtins(order)) is None
-        assert heard.orders[-1] == set_client(order, PAGE)
-    named = Stop("a test", who="browser 3")
-    assert heard.hear(msgspec.to_builtins(named)) is None
-    assert heard.orders[-1] == named
 
 
 def test_what_is_no_order_is_refused_with_the_rule(heard: Heard) -> None:

@@ -18,10 +18,8 @@ import pytest
 import viser
 from page_at_the_door import ELSEWHERE, OPENED, PATIENCE_S, TOKEN, Rig, opened
 from page_visitor import VISER, fetch
-from shown_page import wait_for
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
-from websockets.sync.connection import Connection
 
 from gazerig.robot.dashboard.door.auth_proxy import MOST_LINES
 from gazerig.robot.dashboard.door.browsers import MOST as MOST_CONNECTIONS
@@ -161,16 +159,6 @@ def test_too_much_is_not_even_read(near: Rig) -> None:
         or "pipe" in str(refused.value)
     )
     assert len(near.asked) == before
-
-
-def test_the_stop_button_is_told_of_every_change(near: Rig) -> None:
-    near.door.send_state({"stopped": ""})
-    with near.knock("/rig/line") as line:
-        first = json.loads(line.recv(timeout=PATIENCE_S))["state"]
-        assert (first["stopped"], first["you"]) == ("", "the page")
-        near.door.send_state({"stopped": "a test"})
-        reported = (json.loads(line.recv(timeout=PATIENCE_S)) for _ in range(20))
-        assert any(said["state"]["stopped"] == "a test" for said in reported)
 
 
 # --- stop -----------------------------------------------------------------------------------
@@ -442,37 +430,6 @@ def test_neither_websockets_nor_slow_requests_shut_out_a_stop(near: Rig) -> None
 
 
 PANELS = "/rig/panels"
-
-
-def said(there: Connection) -> dict[str, Any]:
-    """The next message of text."""
-    while True:
-        message = there.recv(timeout=PATIENCE_S)
-        if isinstance(message, str):
-            data: dict[str, Any] = json.loads(message)
-            return data
-
-
-def test_what_is_shown_comes_and_what_is_done_is_heard(near: Rig) -> None:
-    widgets = near.door.widgets
-    heard: list[object] = []
-    panel = widgets.panel("health")
-    slider = panel.slider("neck", (-10.0, 10.0), 0.1, 0.0)
-    slider.on_change(lambda value, client: heard.append((value, widgets.browser(client))))
-    image = panel.image("heat map")
-    ana = f"{near.cookie}; {near.door._name_cookie}=ana"
-    with near.knock(PANELS, Cookie=ana) as there:
-        numbers = {props["kind"]: number for number, props in said(there)["put"]}
-        image.show(b"a picture")
-        data = there.recv(timeout=PATIENCE_S)
-        assert data == numbers["image"].to_bytes(4, "big") + b"a picture"
-        there.send(json.dumps({"set": [numbers["slider"], 4.5]}))
-        wait_for(lambda: len(heard) > 0, "the slider")
-        assert heard == [(4.5, near.door.browsers.name("ana"))]
-        there.send("no JSON")
-        assert said(there)["say"][0]["refused"] is True
-    slider.remove()
-    image.remove()
 
 
 def test_a_flood_of_one_browser_does_not_hold_up_a_stop(near: Rig) -> None:

@@ -44,21 +44,6 @@ def page_here() -> int | None:
     return found[0] if found else None
 
 
-def test_sending_side_needs_no_viewer_and_no_opencv() -> None:
-    check = (
-        "import gazerig.robot.dashboard.feed.page_process, sys;"
-        "sys.exit(bool({'viser', 'cv2'} & set(sys.modules)))"
-    )
-    assert subprocess.run([sys.executable, "-c", check]).returncode == 0
-
-
-def test_unopened_page_drops() -> None:
-    page = PageProcess("127.0.0.1", 8080)
-    page.check()
-    assert not page.send(b"t") and (page.url(), page.notice()) == (None, None)
-    page.close()
-
-
 # A page for the four that follow.
 
 

@@ -28,7 +28,6 @@ from gazerig.robot.control.loop import Robot, Tick
 from gazerig.robot.model import commands, lease
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import LookAt, Value
-from gazerig.robot.model.parameter import ParamChange
 from gazerig.robot.remote import client
 from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote import socket_server as server_module
@@ -46,7 +45,6 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
 RATE = "loop.rate_hz"
-BLINKS = "gaze.lids.blinks_per_min"
 
 
 class Beat:
@@ -237,23 +235,6 @@ def test_several_rigs_are_named_and_chosen_by_process(folder: Path, rig: RobotCl
 
 
 # Requests
-
-
-def test_values_rules_and_changes(rig: RobotClient, tmp_path: Path) -> None:
-    assert rig.get(BLINKS) == {BLINKS: 17.0} and {RATE, BLINKS} <= set(rig.get())
-    (described,) = rig.parameters(RATE)
-    assert described.high == 1000.0 and described.group == "loop"
-    assert rig.set_many({RATE: 100.0}) == (f"{RATE} = 100.0 (at the next start)",)
-    assert rig.get(RATE) == {RATE: 100.0}
-    change = ParamChange(RATE, "200.0", "100.0")
-    assert rig.unsaved() == (change,)
-    assert rig.status()["version"] == 1 and rig.status()["unsaved"] == 1
-    saved = rig.save(str(tmp_path / "my.yaml"))
-    assert saved.path == tmp_path / "my.yaml" and saved.changes == (change,)
-    assert rig.unsaved() == ()
-    rig.set_many({BLINKS: 3.0})
-    rig.revert()
-    assert rig.get(BLINKS) == {BLINKS: 17.0}
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), object(), b"1"])

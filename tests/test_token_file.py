@@ -4,12 +4,10 @@ import os
 from pathlib import Path
 
 import pytest
-from command_line import invoked
 from shown_page import free_port, wait_for
 
 import gazerig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.run import StartLine
 from gazerig.robot.dashboard.door.token_file import read_token
 
@@ -59,15 +57,6 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(SetupError, match=f"--token-file {path}: ({reason})"):
             read_token(path)
-
-
-def test_a_run_is_refused_in_one_line_before_anything_is_done(tmp_path: Path) -> None:
-    path = written(tmp_path / "token", "weak")
-    done = invoked("run", "--mock", "--seconds", "1", "--token-file", str(path))
-    assert done.code == 2 and done.err.count("\n") == 1
-    assert done.err.startswith(f"--token-file {path}: a token is 22 to 200 random letters")
-    # Without a page it is not requested.
-    assert RunOptions(mock=True, fast=True, page="127.0.0.1:1", token_file=path).page_token == ""
 
 
 @pytest.mark.usefixtures("ideal_servos")
