@@ -1,6 +1,7 @@
 """Exports contain the measured values, and tools of other projects read the same."""
 
 import csv
+import json
 from collections import Counter
 from collections.abc import Sequence
 from math import cos, degrees, radians, sin
@@ -260,6 +261,7 @@ def test_a_row_a_sample_with_what_was_measured(face: Run, tables: tuple[Path, ..
     ]  # fmt: skip
     read = rows(tables[0])
     assert tuple(read[0]) == columns(GAZE_JOINTS) and len(read) == len(face.ticks)
+    assert set(json.loads(tables[3].read_text())["basis"].values()) == {"measured"}
     tick, row = face.ticks[2000], read[2000]
     space = gaze_in_space(tick.pose)
     assert float(row["left_x_deg"]) == pytest.approx(space.left_deg[0], abs=6e-5)

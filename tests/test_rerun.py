@@ -79,12 +79,6 @@ def test_the_same_code_and_configuration_give_the_same_to_the_bit(once: Run) -> 
     assert list(map(exact, again)) == list(map(exact, once.ticks))
 
 
-def test_emulated_servos_do_what_they_did(once: Run) -> None:
-    found = rerun(once.recording, joints="emulated")
-    assert found.joints == "emulated"
-    assert found.is_same and found.sent_bytes_same is True
-
-
 def test_the_last_bit_of_one_joint_is_seen(once: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     real = RunRecording.moments
 
