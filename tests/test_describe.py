@@ -20,7 +20,6 @@ from gazerig.config.load import ConfigError, shipped_path
 from gazerig.config.rig_files import AllowedFolder
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.types import Vec3
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.rig_description import description_of, sag_compensation, shape_of, statics_of
 from gazerig.robot.app.rig_limits import park_rad
@@ -28,8 +27,7 @@ from gazerig.robot.app.rig_weight import rest_park_deg, weight_findings
 from gazerig.robot.control.body import Body
 from gazerig.robot.description.build import joint_torques_nm
 from gazerig.robot.description.files import description_files
-from gazerig.robot.description.links import Description, Inertia
-from gazerig.robot.description.mass import carried_links, join_inertias
+from gazerig.robot.description.links import Description
 from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.description.mjcf import Mjcf, mjcf
 from gazerig.robot.description.own_meshes import read_mesh
@@ -214,36 +212,6 @@ def test_the_whole_model_is_compiled_with_looks(name: str) -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert data.ncon == 0
-
-
-def whole_head(rig: Rig) -> Inertia:
-    """The head with all it carries, about its own centre, placed from the pitch axis."""
-    description = description_of(rig, looks=False)
-    links = list(description.links)
-    own = description.link("head")
-    after = links[links.index(own) + 1 :]
-    carried = carried_links([link for link in after if link.parent != "base_link"])
-    whole = join_inertias([*carried, own.inertia] if own.inertia is not None else carried)
-    geometry = rig.geometry
-    pivot = (-geometry.eyes_ahead_mm / 1e3, 0.0, -geometry.eyes_above_mm / 1e3)
-    x, y, z = np.subtract(whole.com_m, pivot).tolist()
-    return whole._replace(com_m=(x, y, z))
-
-
-@pytest.mark.parametrize(
-    ("mass", "mass_kg", "com_mm", "within_mm"),
-    [
-        # Shell and servos are above and a little behind the axes of the neck.
-        (MassParams(), 0.6, (-11.6, 0.0, 61.2), 0.5),
-        (MassParams(head=HeadMassParams(0.9, (40.0, 2.0, 30.0))), 0.9, (40.0, 2.0, 30.0), 1e-6),
-    ],
-)
-def test_a_head_weighs_what_its_shapes_give_or_its_file_says(
-    mass: MassParams, mass_kg: float, com_mm: Vec3, within_mm: float
-) -> None:
-    whole = whole_head(heavy("desk", mass))
-    assert whole.mass_kg == pytest.approx(mass_kg)
-    assert np.allclose(np.multiply(whole.com_m, 1e3), com_mm, rtol=0.0, atol=within_mm)
 
 
 def test_the_camera_sees_what_the_lens_covers() -> None:

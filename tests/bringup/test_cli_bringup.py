@@ -250,15 +250,6 @@ def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig: Path, tmp_pa
     assert "joints.left_eye_pan.zero_step" in done.out
 
 
-def test_a_no_writes_nothing(rig: Path, tmp_path: Path) -> None:
-    before = rig.read_bytes()
-    answers = answers_in(tmp_path, "", "turn -400", "", "turn 200", "", "n")
-    words = ("--joint", "left_eye_tilt", "--mock", "--answers", answers)
-    done = calibrate(str(rig), *words)
-    assert done.code == 0 and "nothing written" in done.err
-    assert rig.read_bytes() == before and not list(tmp_path.glob("*.bak-*"))
-
-
 def test_what_makes_no_calibration_is_refused_and_the_rest_is_kept(
     rig: Path, tmp_path: Path
 ) -> None:

@@ -346,21 +346,6 @@ def test_a_board_with_fewer_channels_than_the_rig():
     assert bytes.fromhex("9008") not in rig.sent  # an error to a board sends all channels home
 
 
-@pytest.mark.parametrize(
-    ("bit", "says", "level", "cure"),
-    [
-        (0, "serial signal error", "warn", "check ground and cable"),
-        (5, "serial timeout", "note", "while no program runs"),
-    ],
-)
-def test_errors_that_it_held(bit, says, level, cure):
-    rig = BoardRig()
-    rig.board.faults.command(f"error {bit}")
-    found = one(rig.check(), level, "the board", f"cleared now: {says}")
-    assert cure in found.remedy
-    assert not any("cleared now" in f.what for f in rig.check())
-
-
 # --- PCA9685
 
 CHANNELS = (

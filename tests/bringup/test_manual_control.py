@@ -156,15 +156,3 @@ def test_several_joints_arrive_together(bench: Bench) -> None:
 
 
 # --- other kinds of servo
-
-
-def test_hobby_servos_arrive_and_it_is_said_that_this_is_estimated(maker_rig: Rig) -> None:
-    other = Bench(maker_rig, 40.0)
-    other.control.start()
-    moved = other.control.pose({"eyes_pan": -15.0, "left_lower_lid": 12.0})
-    assert moved.arrived
-    assert str(moved.joint_move("eyes_pan")) == "eyes_pan: desired -15.0, estimated -15.0 deg"
-    where = other.where()
-    assert where["eyes_pan"] == pytest.approx(-15.0, abs=1.0)
-    assert where["left_lower_lid"] == pytest.approx(12.0, abs=1.0)
-    other.control.stop()

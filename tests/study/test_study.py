@@ -161,12 +161,6 @@ def test_a_design_does_not_change_after_the_first_participant(study: Path, tmp_p
         folder.claim(load_study(str(study)))
 
 
-def test_the_example_is_a_study(tmp_path: Path) -> None:
-    path = str(tmp_path / "study.yaml")
-    assert invoked("study", "design", "--example", path).code == 0
-    assert "good" in invoked("study", "design", path).out
-
-
 @pytest.mark.pty
 def test_a_killed_session_resumes_with_every_answer(study: Path, program: Start) -> None:
     first = program(str(study))

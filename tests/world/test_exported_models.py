@@ -11,7 +11,6 @@ from world_rigs import WorldBench, arm, write
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.rig_description import description_of
-from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.app.servo_drives import servo_drives
 from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.description.urdf import urdf
@@ -82,20 +81,6 @@ def test_an_exported_motor_moves_as_that_of_the_running_world(mujoco: Any) -> No
         mujoco.mj_step(model, data)
         angle = data.joint("left_eye_pan").qpos[0]
         assert angle == pytest.approx(bench.world.joints_rad()["left_eye_pan"], abs=0.05 * 0.35)
-
-
-def test_an_exported_eye_has_the_inertia_of_the_emulated_one(mujoco: Any, desk_rig: Rig) -> None:
-    model = exported(desk_rig)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    full = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, full)
-    at = model.joint("left_eye_pan").dofadr[0]
-    (line,) = emulated_lines(desk_rig).values()
-    rotor = servo_drives(desk_rig)["left_eye_pan"].armature_kg_m2
-    load: Any = line
-    assert rotor == pytest.approx(2.0e-4, rel=0.01)
-    assert full[at, at] == pytest.approx(rotor + load.servos[0].physics.load_kg_m2, rel=0.01)
 
 
 def test_two_servos_of_a_pair_share_their_joints(desk_rig: Rig) -> None:

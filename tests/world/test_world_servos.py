@@ -67,17 +67,6 @@ def test_a_step_is_as_that_of_servos_with_mechanics_of_their_own(
     assert abs(world[-1][0] - STEP) < 6.0
 
 
-def test_without_torque_a_hand_turns_the_joint_and_it_stays_there() -> None:
-    """Dry friction of the gear holds what is balanced."""
-    bench = WorldBench("desk")
-    servo = bench.servos["neck_yaw"]
-    before = servo.position_steps
-    servo.turn(150.0)
-    bench.pass_ms(300)
-    assert servo.position_steps == pytest.approx(before + 150.0, abs=1.0)
-    assert servo.shaft.effort == 0.0
-
-
 def test_a_stop_holds_a_servo_that_runs_against_it() -> None:
     """It does not bounce, its registers have the current, the overload protection acts."""
     bench = _armed("desk", "left_eye_pan")
@@ -274,16 +263,6 @@ def test_a_push_shows_in_the_registers_and_the_head_comes_back() -> None:
     bench.pass_ms(1500)
     assert abs(read(yaw, "present_position") - goal) <= 6
     assert abs(read(yaw, "present_current")) < 80 and not yaw.errors
-
-
-def test_servos_yield_within_their_torque_limits() -> None:
-    """Of a push that is too strong for them they keep all their torque and no more."""
-    bench = _held()
-    roll = bench.servos["neck_roll"]
-    bench.world.push("head", (0.0, 40.0, 0.0), 0.3)
-    bench.pass_ms(280)
-    assert abs(bench.world.joints_rad()["neck_roll"]) > 0.3
-    assert 0.8 < abs(roll.shaft.effort) <= 1.01
 
 
 # --- as a command
