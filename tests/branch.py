@@ -100,16 +100,6 @@ def gazerig(*words: str) -> Callable[[], None]:
     return work
 
 
-def ran(*words: str, timeout_s: float = 120.0) -> "subprocess.CompletedProcess[str]":
-    """Run a command of gazerig to its end."""
-    pipe = subprocess.PIPE
-    with Branch(
-        gazerig(*words), stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, text=True
-    ) as branch:
-        out, err = branch.communicate(timeout=timeout_s)
-    return subprocess.CompletedProcess(branch.args, branch.returncode, out, err)
-
-
 def script(file: Path, *words: str) -> Callable[[], None]:
     """Return what ``python`` does with a file."""
 

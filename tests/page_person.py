@@ -169,16 +169,13 @@ class Person:
             opened = f"(() => {{ const d = {fold}; if (d) d.open = true; return d !== null }})()"
             wait_for(lambda: self.run(opened), "all parameters")
 
-    def press(self, key: str, code: str, number: int) -> None:
-        text = {"text": key} if len(key) == 1 else {}  # others write nothing
+    def space(self) -> None:
+        """Press the space bar."""
         for kind in ("keyDown", "keyUp"):
             self.tab.ask(
                 "Input.dispatchKeyEvent",
-                type=kind, key=key, code=code, windowsVirtualKeyCode=number, **text,
+                type=kind, key=" ", code="Space", windowsVirtualKeyCode=32, text=" ",
             )  # fmt: skip
-
-    def space(self) -> None:
-        self.press(" ", "Space", 32)
 
     def type(self, text: str) -> None:
         self.tab.ask("Input.insertText", text=text)

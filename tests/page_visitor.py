@@ -10,7 +10,6 @@ from urllib.parse import urlsplit
 
 import msgspec
 import viser
-import zstandard
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
@@ -32,18 +31,6 @@ LOOKING = msgspec.msgpack.encode(
         "up_direction": [0.0, 0.0, 1.0],
     }
 )
-
-
-def unpacked(data: bytes) -> Any:
-    """Data of viser: sizes, then packed messages."""
-    size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
-    plain = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
-    return msgspec.msgpack.decode(plain)
-
-
-def said(data: bytes) -> str:
-    """Data of viser, as text."""
-    return str(unpacked(data))
 
 
 class Opener(urllib.request.HTTPRedirectHandler):

@@ -1,6 +1,5 @@
 """The page opens on a face: how much of the canvas the head fills, and whether its lids shut."""
 
-import io
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
@@ -11,7 +10,6 @@ import pytest
 import viser
 from gaze_targets import joints_at
 from shown_page import SNAPSHOT
-from shown_page import SNAPSHOT as SHOT
 from viser import transforms
 
 from gazerig.config.load import shipped_path
@@ -19,7 +17,6 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_description import shape_of
-from gazerig.robot.dashboard.view.glb import EYE, painted_glb
 from gazerig.robot.dashboard.view.head_view import HeadView, head_dimensions
 from gazerig.robot.dashboard.view.viewpoints import FACE, View, named_view
 from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh, stored_shape
@@ -112,24 +109,6 @@ def test_faces_are_turned_outwards_for_their_backs_are_not_drawn(part: str) -> N
     assert (a * np.cross(b, c)).sum() > 0.0  # six times the volume within
 
 
-def test_another_reader_finds_the_mesh_in_the_file() -> None:
-    import trimesh
-
-    mesh, colours, normals = stored_shape("eye")
-    data = painted_glb(Painted(mesh, colours, normals), EYE._replace(is_lit=False))
-    scene = trimesh.load_scene(io.BytesIO(data), "glb")
-    (found,) = scene.geometry.values()
-    assert np.asarray(found.vertices) == pytest.approx(mesh.vertices, abs=1e-6)
-    assert (np.asarray(found.faces) == mesh.faces).all()
-    on_screen = np.asarray(found.visual.vertex_attributes["color"], float)[:, :3] / 255.0
-    linear = np.where(
-        colours <= 10.31, colours / 255.0 / 12.92, ((colours / 255.0 + 0.055) / 1.055) ** 2.4
-    )
-    assert on_screen == pytest.approx(linear[:, :3], abs=0.003)
-    unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    assert np.asarray(found.vertex_normals) == pytest.approx(unit, abs=1e-6)
-
-
 # ---- The page's head is the rig's description: its links, where its joints put them.
 
 
@@ -147,7 +126,7 @@ def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer) -> None:
     view.shape = shape_of(rig)
     angles = tuple((0.3 * np.sin(np.arange(len(kinematics.names)))).tolist())
     pose = kinematics.forward(joints_at(*angles))
-    view.show(replace(SHOT, joints=kinematics.names, measured_rad=angles))
+    view.show(replace(SNAPSHOT, joints=kinematics.names, measured_rad=angles))
     for link, p_world_m in (
         ("head", pose.p_world_head_m),
         ("left_eye", pose.p_world_eye_left_m),
@@ -184,16 +163,16 @@ def test_a_rig_without_brows_and_jaw_shows_expressions_drawn_only(
     server: viser.ViserServer,
 ) -> None:
     view = HeadView(server.scene)
-    view.show(SHOT)
+    view.show(SNAPSHOT)
     assert _turned_deg(view, "left_brow_link") == _turned_deg(view, "jaw_link") == 0.0
     both = ("surprised", "happy")  # a track comes before the expression beneath it
     angles = []
     for k in range(1, 21):
-        view.show(replace(SHOT, t_s=SHOT.t_s + 0.05 * k, expressed=both))
+        view.show(replace(SNAPSHOT, t_s=SNAPSHOT.t_s + 0.05 * k, expressed=both))
         angles.append(_turned_deg(view, "left_brow_link"))
     assert angles[-1] == pytest.approx(18.0, abs=0.1)
     assert np.all(np.diff(angles) >= 0.0) and max(np.diff([0.0, *angles])) < 6.0  # without a jump
     assert _turned_deg(view, "right_brow_link") == angles[-1]
     assert _turned_deg(view, "jaw_link") == pytest.approx(-12.0, abs=0.1)
-    view.show(replace(SHOT, t_s=SHOT.t_s + 3.0, expressed=("", "neutral")))
+    view.show(replace(SNAPSHOT, t_s=SNAPSHOT.t_s + 3.0, expressed=("", "neutral")))
     assert _turned_deg(view, "left_brow_link") == pytest.approx(0.0, abs=0.01)

@@ -1,7 +1,6 @@
 """Actions on the page reach the rig: menus, joints, parameters; and its answers return."""
 
 import json
-import re
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -166,18 +165,6 @@ def test_a_click_in_the_picture_is_looked_at(heard: Heard) -> None:
     assert heard.orders == [LookAt((1.0, 0.5, 1.0), who=PAGE)]
     words = heard.hear({"pick": {"x": 0.95, "y": 0.5}})
     assert words is not None and "no camera image" in words
-
-
-def test_parameters_are_put_in_force_or_refused(heard: Heard) -> None:
-    words = heard.hear({"do": "set", "changes": {CLOSE: 90, "loop.rate_hz": 100}})
-    assert heard.tuning.get(CLOSE) == {CLOSE: 90.0}
-    # What did work is seen in the controls.
-    assert words == "loop.rate_hz = 100.0 (at the next start)"
-    for wrong in ({"do": "set", "changes": {CLOSE: 9e9}}, {"do": "character", "name": "mad"}):
-        words = heard.hear(wrong)
-        assert words is not None and re.match(r"refused: .*(500 ms|'mad')", words)
-    assert heard.hear({"do": "revert"}) is not None
-    assert heard.tuning.get(CLOSE) == {CLOSE: 75.0}
 
 
 def test_the_feed_tells_all_once_and_then_what_changed(heard: Heard) -> None:

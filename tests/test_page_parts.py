@@ -18,9 +18,8 @@ from six_joints import SIX, of_six
 from ticked_rig import Outbox
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import BusHealth, DetectedFace, Detections, MovingBlob
+from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.types import PARTS, Face, Salience
-from gazerig.robot.control.tick_text import health_text
 from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.dashboard.feed.camera_overlay import IMAGE_WIDTH_PX, draw_detections
 from gazerig.robot.dashboard.panels.attention_panel import reason_text, salience_bars, target_text
@@ -271,16 +270,6 @@ def test_the_winner_comes_first_term_by_term_and_runs_no_markup() -> None:
                   "conversation: listen"):  # fmt: skip
         assert words in named
     assert "wanders" in salience_bars(healthy()) and "slide &lt;0.4&gt;" in target_text(healthy())
-
-
-# --- on a page --------------------------------------------------------------------------
-
-
-def test_bus_faults_are_told_in_plain_words() -> None:
-    errors = {"timeout": 74, "rearmed": 1, "late computer": 0, "pulse": 2}
-    said = health_text(BusHealth(0, 0, errors))
-    assert said == "bus: pulse 2 times, torque switched on again 1 time, no answer 74 times"
-    assert health_text(BusHealth(0, 0, {})) == "bus ok"
 
 
 # --- The page's panels: what browsers are sent, what they may send, and who is sent what

@@ -213,24 +213,6 @@ def test_a_killed_rig_leaves_a_socket_that_is_no_rig_and_that_the_next_removes(
     server.close()
 
 
-def test_several_rigs_are_named_and_chosen_by_process(folder: Path, rig: RobotClient) -> None:
-    with listening() as other:
-        with pytest.raises(NoRobotError) as which:
-            RobotClient.connect()
-        assert f"desk (process {os.getpid()})" in str(which.value) and str(other.pid) in str(
-            which.value
-        )
-        assert "\n" not in str(which.value)
-        with RobotClient.connect(os.getpid()) as mine:
-            assert mine.pid == os.getpid()
-        with RobotClient.connect("desk") as mine:
-            assert mine.pid == os.getpid() and mine.name == "desk"
-        with pytest.raises(NoRobotError, match="no rig named eva is running: .*desk .*other "):
-            RobotClient.connect("eva")
-        with pytest.raises(NoRobotError, match=f"no rig of process 1 is running: .*{other.pid}"):
-            RobotClient.connect(1)
-
-
 # Other programs steer a running rig: requests are executed, rubbish has no effect
 
 

@@ -205,16 +205,6 @@ def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: st
 # A running head with a changed range
 
 
-def test_a_tune_is_in_force_at_the_very_next_tick_and_in_its_record() -> None:
-    running = started()
-    running.go(10)
-    running.tune({"gaze.lids.close_ms": 90.0, "bus.port": "/dev/ttyACM0"})
-    tick = running.go(1)
-    assert tick.commands == (Tune((("gaze.lids.close_ms", 90.0),)),)
-    assert running.rig.gaze.lids.close_ms == 90.0 and running.rig.bus == load_rig("desk").bus
-    assert tick.events == ("tuned: gaze.lids.close_ms = 90.0",)
-
-
 def test_an_order_that_crossed_processes_is_checked_in_its_tick() -> None:
     running = started()
     running.go(10)

@@ -1,7 +1,6 @@
 """Snapshots of a running rig for people: nothing is lost between two of them."""
 
 from functools import cache
-from math import radians
 
 import numpy as np
 import pytest
@@ -9,13 +8,11 @@ from desk import GAZE_JOINTS
 from fakes.runs import play, simulated
 from msgspec.structs import replace
 from page_feed import STATE
-from six_joints import SIX
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, snapshot
+from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder
 from gazerig.robot.model.types import SeenBlink, SeenSaccade, Snapshot
 from gazerig.robot.safety.health import HOT_C
 
@@ -25,31 +22,19 @@ TICKS_BETWEEN = 8
 
 
 @cache
-def visit(name: str = "desk", last_s: float = 8.0) -> tuple[Rig, Assembly, tuple[Tick, ...]]:
+def visit() -> tuple[Assembly, tuple[Tick, ...]]:
     """Some seconds of a rig that talks with a person."""
-    rig = load_rig(name)
-    made = simulated(rig, "face-to-face")
+    made = simulated("desk", "face-to-face")
     ticks: list[Tick] = []
-    play(made, last_s, ticks.append)
-    return rig, made, tuple(ticks)
-
-
-def shown_rig() -> ShownRig:
-    rig, made, _ = visit()
-    limits = tuple(rig.joints[name].limit() for name in GAZE_JOINTS)
-    return ShownRig(
-        kinematics_and_oculomotor(rig, 0)[0],
-        limits,
-        made.mount,
-        radians(made.horizontal_field_deg),
-    )
+    play(made, 8.0, ticks.append)
+    return made, tuple(ticks)
 
 
 @cache
 def taken() -> tuple[Snapshot, ...]:
-    snapshots = SnapshotBuilder(shown_rig())
+    snapshots = SnapshotBuilder(visit()[0].shown_rig())
     out = []
-    for number, tick in enumerate(visit()[2]):
+    for number, tick in enumerate(visit()[1]):
         snapshots.update(tick)
         if number % TICKS_BETWEEN == TICKS_BETWEEN - 1:
             shot = snapshots.build(STATE)
@@ -64,7 +49,7 @@ def test_nothing_is_shown_before_the_first_tick() -> None:
 
 def test_every_eye_movement_is_shown_once() -> None:
     last_s = taken()[-1].t_s
-    gaze = [tick.gaze for tick in visit()[2] if tick.t_s <= last_s]
+    gaze = [tick.gaze for tick in visit()[1] if tick.t_s <= last_s]
     pairs = list(zip(gaze, gaze[1:], strict=False))
     seen = [event for shot in taken() for event in shot.events]
     jumps = [event for event in seen if isinstance(event, SeenSaccade)]
@@ -79,7 +64,7 @@ def test_every_eye_movement_is_shown_once() -> None:
 
 
 def test_joints_are_shown_a_hundred_times_a_second_as_wished_permitted_and_measured() -> None:
-    by_time = {tick.t_s: tick for tick in visit()[2]}
+    by_time = {tick.t_s: tick for tick in visit()[1]}
     rows = [row for shot in taken() for row in shot.trail]
     assert np.allclose(np.diff([row.t_s for row in rows]), 0.01)
     for row in rows:
@@ -103,21 +88,21 @@ def test_the_camera_sits_on_the_head_and_sees_the_face() -> None:
 
 
 def test_servos_come_with_their_limits_and_their_silences() -> None:
-    rig, _, ticks = visit()
-    snapshots = SnapshotBuilder(shown_rig())
+    made, ticks = visit()
+    snapshots = SnapshotBuilder(made.shown_rig())
     silent = replace(ticks[3].joints, missing=("neck_yaw",))
     for tick in (*ticks[:3], replace(ticks[3], joints=silent)):
         snapshots.update(tick)
     shot = snapshots.build(STATE)
     assert shot is not None and shot.servos.limits is not None
     assert shot.servos.unanswered == tuple(int(name == "neck_yaw") for name in GAZE_JOINTS)
-    hottest = rig.joints["neck_yaw"].limit().hottest_c
+    hottest = load_rig("desk").joints["neck_yaw"].limit().hottest_c
     assert shot.servos.limits.hot_c[6] == hottest - HOT_C
     assert shot.servos.limits.warm_c[6] < shot.servos.limits.hot_c[6]
 
 
 def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
-    ticks = visit()[2]
+    ticks = visit()[1]
     snapshots = SnapshotBuilder()
     calm = [tick for tick in ticks if tick.guard_result.level == "ok"][:4]
     short = replace(calm[1], guard_result=replace(calm[1].guard_result, level="hold"))
@@ -128,29 +113,3 @@ def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
     snapshots.update(calm[3])
     after = snapshots.build(STATE)
     assert after is not None and after.worst == "ok"
-
-
-@cache
-def maker_shown() -> tuple[tuple[Tick, ...], Snapshot]:
-    """Two seconds of six hobby servos on a Maestro, in one snapshot."""
-    _, made, ticks = visit("maker", 2.0)
-    snapshots = SnapshotBuilder(made.shown_rig())
-    for tick in ticks:
-        snapshots.update(tick)
-    shot = snapshots.build(STATE)
-    assert shot is not None
-    return ticks, shot
-
-
-def test_joints_of_servos_that_tell_nothing_are_shown_as_estimated() -> None:
-    ticks, shot = maker_shown()
-    assert shot.joints == shot.estimated == load_rig("maker").names == SIX
-    assert len(shot.measured_rad) == len(shot.desired_rad) == len(shot.commanded_rad) == 6
-    assert shot.servos.temperature_c == shot.servos.voltage_v == (None,) * 6
-    assert shot.servos.unanswered == (0,) * 6
-    assert all(len(row.measured_rad) == 6 for row in shot.trail)
-    one = replace(ticks[-1].joints, measured=(True, False, True, True, True, False))
-    mixed = snapshot(replace(ticks[-1], joints=one))
-    assert mixed.estimated == ("eyes_tilt", "right_lower_lid")
-    measured = snapshot(visit()[2][-1])
-    assert measured.joints == GAZE_JOINTS and measured.estimated == ()

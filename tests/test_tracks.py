@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.schema import Rig, load_rig
-from gazerig.config.tracks import load_track, shipped_tracks, tracks_of
+from gazerig.config.tracks import load_track, shipped_tracks
 from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.track.pose_offset import PoseOffset
-from gazerig.gaze.track.track import POSE_CHANNELS, KeyFrame, Track, channel_keys
+from gazerig.gaze.track.track import POSE_CHANNELS, KeyFrame, Track
 from gazerig.gaze.track.track_player import OffsetState, TrackPlayer
 from gazerig.gaze.types import Floats, GazeCommand
 from gazerig.robot.app.gaze_models import rig_kinematics
@@ -139,16 +139,6 @@ def test_joints_that_a_rig_lacks_are_left_out_where_optional_else_refused_by_nam
         track_motions(Track("a yawn", (KeyFrame(0.3, joints_deg={"jaw": 9.0}),), optional=("jaw",)), desk_rig.names)  # fmt: skip
 
 
-def test_a_loop_repeats_and_all_ends_at_rest() -> None:
-    laugh = shipped_tracks()["laugh"]
-    once, often = (channel_keys(laugh, laugh.frames, count) for count in (1, 5))
-    pitch = once["head_pitch"], often["head_pitch"]
-    assert len(pitch[1].times_s) == len(pitch[0].times_s) + 4 * 2
-    assert pitch[1].times_s[-1] == pytest.approx(pitch[0].times_s[-1] + 4 * 0.3)
-    aside = Track("aside", (KeyFrame(0.3, eyes_yaw_deg=5.0),), return_s=0.7)
-    assert channel_keys(aside, aside.frames, 1)["eyes_yaw"].times_s == (0.3, 1.0)
-
-
 def test_in_joint_space_the_eyes_go_along_with_the_head(desk_rig: Rig) -> None:
     for space, follows in (("gaze", 0.0), ("joint", 1.0)):
         motion = track_motions(nod(space=space), desk_rig.names).motion
@@ -222,15 +212,6 @@ def test_a_bad_file_is_answered_with_line_key_and_rule(text: str, tmp_path: Path
     (fault,) = caught.value.faults
     assert fault.key == key and rule in fault.rule
     assert fault.line is not None and fault.line >= 1
-
-
-def test_a_rig_with_tracks_of_its_own_is_checked_with_them(tmp_path: Path) -> None:
-    good, bad = tmp_path / "wave_back.yaml", tmp_path / "twitch.yaml"
-    good.write_text("description: x\nframes:\n  - {time_s: 0.5, head_yaw_deg: 5}\n")
-    bad.write_text("description: x\nframes:\n  - {time_s: 0.05}\n")
-    assert "wave_back" in tracks_of([str(good)])
-    with pytest.raises(ConfigError, match="twitch.yaml:3: frames.0: .*names no motion"):
-        tracks_of([str(good), str(bad)])
 
 
 # --- Files of tracks, and fits of keys to samples
