@@ -37,7 +37,13 @@ ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
 
 RATES: Mapping[BusKind, Sequence[int]] = {
     "maestro": (MaestroParams().baud,),
-    **{kind.name: kind.family.baud_rates for kind in KINDS.values()},
+    # The usual rate first, then that of the factory.
+    **{
+        kind.name: tuple(
+            dict.fromkeys((1_000_000, kind.family.factory_baud, *kind.family.baud_rates))
+        )
+        for kind in KINDS.values()
+    },
 }
 
 
