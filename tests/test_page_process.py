@@ -44,7 +44,7 @@ def page_here() -> int | None:
     return found[0] if found else None
 
 
-# A page for the four that follow.
+# A page for the three that follow.
 
 
 def test_busy_port_moves_on_and_says_so(shared: tuple[PageProcess, str, int]) -> None:

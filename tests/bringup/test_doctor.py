@@ -280,9 +280,6 @@ def test_a_servo_that_does_not_take_it_is_said(kind, value, fault, says):
     assert "not done" in done and says in done
 
 
-# --- ports
-
-
 # --- words
 
 

@@ -153,6 +153,3 @@ def test_several_joints_arrive_together(bench: Bench) -> None:
     halfway = bench.steps[len(bench.steps) // 3]
     i, j = GAZE_JOINTS.index("left_eye_pan"), GAZE_JOINTS.index("neck_yaw")
     assert halfway.desired_rad[i] < radians(6.0) and halfway.desired_rad[j] > radians(-12.0)
-
-
-# --- other kinds of servo

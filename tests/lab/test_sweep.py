@@ -118,9 +118,6 @@ def test_two_processes_make_the_table_of_one(desk_rig: Rig, tmp_path: Path) -> N
     assert ordered[0].figures != ordered[1].figures
 
 
-# ---- figures
-
-
 # ---- what is refused
 
 
