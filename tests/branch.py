@@ -1,6 +1,7 @@
 """A callable of a test as a program: a fork of this process with all that subprocess.Popen has."""
 
 import atexit
+import gc
 import os
 import runpy
 import signal
@@ -33,6 +34,7 @@ class Branch(subprocess.Popen[Any]):
             preexec_fn()
             become(work, env)
 
+        gc.collect()  # an unclosed film would wait for its decoder's threads, which no fork has
         super().__init__(["fork"], preexec_fn=begin, **options)
 
 
