@@ -64,7 +64,7 @@ _FASTEST_TURN_DEG_S, _LEAST_BACKGROUND_SHARE = 200.0, 0.35
 # Frames further apart in time are not compared.
 _LONGEST_GAP_S = 0.3
 # Margin at the image's edge, as a share of its width, where flow is unknown if the camera turns.
-_EDGE_SHARE = 0.06
+_EDGE_SHARE = 0.065
 # Distance from the edge at which a patch continues beyond it.
 _CUT_PX = 1
 
