@@ -103,9 +103,11 @@ def running() -> Iterator["Running"]:
 def small_disk() -> Iterator[None]:
     """Let no file grow beyond 60 kB, as on a disk that is nearly full."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # by default it ends the process
     resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, before[1]))
     yield
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
 
 
 @pytest.fixture
