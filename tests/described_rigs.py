@@ -32,8 +32,8 @@ class Expected(NamedTuple):
 def expected(rig: Rig, angles: Mapping[str, float]) -> Expected:
     """Return where everything is according to robot/model/kinematics.py."""
     kinematics = rig_kinematics(rig)
-    values = (angles[name] for name in rig.names)
-    state = kinematics.forward(joints_at(*values))
+    values = [angles[name] for name in rig.names]
+    state = kinematics.forward(joints_at(values))
     R, p = CameraMount(rig.camera).pose(state.R_world_head, state.p_world_head_m)
     return Expected(state, (np.array(R), np.array(p)))
 

@@ -1,9 +1,11 @@
 """Targets of the gaze, a head that turns to them, and joints at rest."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import radians
+from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.types import Floats, Target, Vec3
@@ -50,7 +52,8 @@ def turn(
     return np.degrees(yaws)
 
 
-def joints_at(*angles_rad: float) -> JointState:
-    """Return joints at rest at these angles, measured at 0 s."""
-    still = (0.0,) * len(angles_rad)
-    return JointState(angles_rad, still, still, ())
+def joints_at(position_rad: Sequence[float], t_s: float = 0.0, **columns: Any) -> JointState:
+    """Return joints at rest, measured at a time; columns: others than usual."""
+    still = (0.0,) * len(position_rad)
+    at = JointState(tuple(position_rad), still, (t_s,) * len(still), ())
+    return replace(at, **columns)

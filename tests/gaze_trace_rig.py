@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from desk import GAZE_JOINTS, LIDS
-from gaze_targets import DT, target
-from guarded_desk import ZERO, joints_at
+from gaze_targets import DT, joints_at, target
+from guarded_desk import ZERO
 
 from gazerig.gaze.angles import add, angle_between, direction, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight

@@ -1,15 +1,12 @@
-"""Guards of nine joints as quick as those of the desk rig, and what servos report of them."""
+"""Guards of nine joints as quick as those of the desk rig."""
 
-from collections.abc import Sequence
 from math import radians
 from typing import Any
 
 from desk import GAZE_JOINTS
-from msgspec.structs import replace
 
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.types import JointState
 from gazerig.robot.safety.guard import Guard
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000), 70.0, 3.5, 7.0)
@@ -17,13 +14,6 @@ NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500), 70.0,
 LIMITS = (EYE,) * 6 + (NECK,) * 3
 ZERO = (0.0,) * 9
 DT = 0.005
-
-
-def joints_at(position_rad: Sequence[float], t_s: float, **columns: Any) -> JointState:
-    """Return joints at rest, measured at a time; columns: others than usual."""
-    still = (0.0,) * len(position_rad)
-    at = JointState(tuple(position_rad), still, (t_s,) * len(still), ())
-    return replace(at, **columns)
 
 
 def guarding(

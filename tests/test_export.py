@@ -68,7 +68,7 @@ def pose(left_deg: tuple[float, float], right_deg: tuple[float, float], yaw: flo
     """Eyes in the head, and the head's yaw."""
     kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
     degs = (*left_deg, *right_deg, 0.0, 0.0, yaw, 0.0, 0.0)
-    return kinematics.forward(joints_at(*map(radians, degs)))
+    return kinematics.forward(joints_at([radians(deg) for deg in degs]))
 
 
 # --- angles

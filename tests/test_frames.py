@@ -182,7 +182,7 @@ def test_eyes_on_a_point_and_the_lines_of_sight_meet_in_it(
     angles = (head[0] * 1.2, head[1] * 0.6, head[2] * 0.5)
     R, p = WIDE.head_pose(angles)
     left, right = WIDE.eye_angles_to(point, R, p)
-    state = WIDE.forward(joints_at(*left, *right, 0.0, 0.0, *angles))
+    state = WIDE.forward(joints_at((*left, *right, 0.0, 0.0, *angles)))
     for is_left in (True, False):
         eye = state.p_world_eye_left_m if is_left else state.p_world_eye_right_m
         assert angle_between(line_of_sight(state, is_left), sub(point, eye)) < 1e-9
@@ -199,7 +199,7 @@ def test_forward_of_inverse_is_the_identity(
     command = GazeCommand(
         head, (q[0], q[1]), (q[2], q[3]), *lids, "fixate", False, (1.0, 0.0, 0.0), 0, 0, 0
     )
-    state = WIDE.forward(joints_at(*WIDE.inverse(command)))
+    state = WIDE.forward(joints_at(WIDE.inverse(command)))
     assert state.head_rad == head
     assert (*state.eye_left_rad, *state.eye_right_rad) == q
     assert (state.lid_left, state.lid_right) == pytest.approx(lids, abs=1e-9)
@@ -224,7 +224,7 @@ def test_signs_are_left_up_and_right_ear_down() -> None:
 
 
 def test_eyes_are_where_the_geometry_says() -> None:
-    state = WIDE.forward(joints_at(*[0.0] * 9))
+    state = WIDE.forward(joints_at([0.0] * 9))
     assert state.p_world_head_m == pytest.approx((0.038, 0.0, 0.113))
     gap = sub(state.p_world_eye_left_m, state.p_world_eye_right_m)
     assert norm(gap) == pytest.approx(0.0619)
@@ -282,8 +282,8 @@ def kinematics() -> Kinematics:
 
 def test_the_lower_neck_carries_the_head() -> None:
     made, pitch = kinematics(), radians(-30.0)
-    angles = (pitch if name == LOWER[0] else 0.0 for name in made.names)
-    pose = made.forward(joints_at(*angles))
+    angles = [pitch if name == LOWER[0] else 0.0 for name in made.names]
+    pose = made.forward(joints_at(angles))
     # From the lower axis: 38 mm ahead and 120 + 55 mm up, pitched down by 30 deg.
     ahead, up = 0.038, 0.175
     assert pose.p_world_head_m == pytest.approx(

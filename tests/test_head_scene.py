@@ -34,7 +34,7 @@ def at_rest(name: str) -> Snapshot:
     rig = load_rig(name)
     kinematics = rig_kinematics(rig)
     zero = (0.0,) * len(kinematics.names)
-    pose = kinematics.forward(joints_at(*zero))
+    pose = kinematics.forward(joints_at(zero))
     own, _ = kinematics.body_volumes(pose.R_world_head, pose.p_world_head_m)
     return replace(
         SNAPSHOT,
@@ -125,7 +125,7 @@ def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer) -> None:
     kinematics, view = rig_kinematics(rig), HeadView(server.scene)
     view.shape = shape_of(rig)
     angles = tuple((0.3 * np.sin(np.arange(len(kinematics.names)))).tolist())
-    pose = kinematics.forward(joints_at(*angles))
+    pose = kinematics.forward(joints_at(angles))
     view.show(replace(SNAPSHOT, joints=kinematics.names, measured_rad=angles))
     for link, p_world_m in (
         ("head", pose.p_world_head_m),

@@ -149,7 +149,7 @@ def whole_head(blinking: Lids, reach_deg: float) -> Oculomotor:
 @pytest.mark.parametrize("law", ["people", "nakamoto"])
 def test_e53_no_blink_storm_with_the_head_held_aside(law: str) -> None:
     model = whole_head(lids(2, law=law), 55.0)
-    state = KINEMATICS.forward(joints_at(*(0.0,) * 6, radians(40.0), 0.0, 0.0))
+    state = KINEMATICS.forward(joints_at((*(0.0,) * 6, radians(40.0), 0.0, 0.0)))
     aside = target((cos(radians(40.0)), sin(radians(40.0)), 0.0), top_down=True)
     commands = [model.step(aside, state, k * 0.02, 0.02) for k in range(round(60.0 / 0.02))]
     assert 5 <= commands[-1].blinks <= 25
@@ -174,7 +174,7 @@ def test_e74_a_shift_of_3_degrees_brings_no_blink() -> None:
 def test_e74_blinks_of_new_targets_begin_about_when_the_gaze_does_before_it_or_after() -> None:
     """A person moves from side to side every 2 s; eyes and head wait for the lids."""
     model = whole_head(lids(3, blinks_per_min=0.0), 60.0)
-    state = KINEMATICS.forward(joints_at(*[0.0] * 9))
+    state = KINEMATICS.forward(joints_at([0.0] * 9))
     blinks_s, waits_s, counts, every = [], [], (0, 0), 400
     for k in range(120 * every):
         side = radians(20.0) * (1 if k // every % 2 else -1)

@@ -188,9 +188,9 @@ def test_e31_eyes_hold_the_gaze_through_any_turn_of_the_head() -> None:
     for k in range(200):
         share = k / 199
         turned = (radians(40.0) * share, radians(20.0) * share, radians(10.0) * share)
-        state = rig.kinematics.forward(joints_at(*rig.joints.position_rad[:6], *turned))
+        state = rig.kinematics.forward(joints_at((*rig.joints.position_rad[:6], *turned)))
         command = rig.oculomotor.step(fixed, state, 1.0 + k * DT, DT)
-        seen = rig.kinematics.forward(joints_at(*rig.kinematics.inverse(command)[:6], *turned))
+        seen = rig.kinematics.forward(joints_at((*rig.kinematics.inverse(command)[:6], *turned)))
         for left in (True, False):
             eye = seen.p_world_eye_left_m if left else seen.p_world_eye_right_m
             error = angle_between(line_of_sight(seen, left), sub(fixed.p_world_m, eye))
@@ -241,7 +241,7 @@ def test_a_point_on_the_nose_is_converged_on_no_nearer_than_the_limit() -> None:
 def test_it_begins_where_head_and_eyes_are() -> None:
     rig = Rig(geometry=DESK)
     q = (0.2, -0.1, 0.25, -0.1, 0.0, 0.0, 0.4, 0.1, 0.05)
-    state = rig.kinematics.forward(joints_at(*q))
+    state = rig.kinematics.forward(joints_at(q))
     ahead = add(state.p_world_head_m, rotate(state.R_world_head, (1.0, 0.2, -0.1)))
     first = rig.oculomotor.step(target(ahead, kind="thing", top_down=True), state, 0.0, DT)
     assert first.head_rad == pytest.approx(state.head_rad)
@@ -500,7 +500,7 @@ class Alone:
         self._controller, self._gaze = BinocularController(), (1.0, 0.0, 0.0)
 
     def tick(self, target: Target, head_rad: tuple[float, ...], t: float, dt: float) -> Eyes:
-        state = self.kinematics.forward(joints_at(*(0.0,) * 6, *head_rad))
+        state = self.kinematics.forward(joints_at((*(0.0,) * 6, *head_rad)))
         on = self.kinematics.eye_angles_to
         view = EyeGeometry(state.R_world_head, state.p_world_head_m, on, lambda eyes: eyes)
         if not self._controller.started:
@@ -716,7 +716,7 @@ def test_e31_the_reflex_alone_holds_the_gaze_through_any_turn_of_the_head() -> N
         share = min(max((k - 400) / 199, 0.0), 1.0)
         head = (radians(40.0) * share, radians(20.0) * share, radians(10.0) * share)
         left, right = alone.tick(seen if k < 390 else lost, head, k * DT, DT)
-        state = alone.kinematics.forward(joints_at(*left, *right, 0.0, 0.0, *head))
+        state = alone.kinematics.forward(joints_at((*left, *right, 0.0, 0.0, *head)))
         lines.append(add(line_of_sight(state, True), line_of_sight(state, False)))
     # It is late by its delay of 10 ms, and turns of three axes do not commute.
     assert max(degrees(angle_between(one, lines[389])) for one in lines[400:]) < 0.9

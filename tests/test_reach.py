@@ -5,7 +5,7 @@ from math import degrees, radians
 
 import msgspec
 import pytest
-from guarded_desk import joints_at
+from gaze_targets import joints_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace

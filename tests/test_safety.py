@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
-from guarded_desk import DT, EYE, LIMITS, NECK, ZERO, guarding, joints_at
+from gaze_targets import joints_at
+from guarded_desk import DT, EYE, LIMITS, NECK, ZERO, guarding
 
 from gazerig.config.validation import validate
 from gazerig.robot.model.guard_params import CollisionParams, GuardParams

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
-from guarded_desk import DT, EYE, NECK, guarding, joints_at
+from gaze_targets import joints_at
+from guarded_desk import DT, EYE, NECK, guarding
 from numpy.typing import NDArray
 
 from gazerig.robot.model.guard_params import CollisionParams, GuardParams
