@@ -121,8 +121,7 @@ class GazeConfig(PluginSections):
     attention: Annotated[AttentionParams, "who wins"] = AttentionParams()
     idle: Annotated[IdleParams, "idle gaze without a target"] = IdleParams()
     looks_away: Annotated[LooksAway,
-        "looks away from a face; people: as measured in remote talk, mostly aside; eyes_alive: in reported turns as while talking, "
-        "listening and thinking, which looks up; none: never"] = "people"
+        "looks away from a face; people: a speaker's often, mostly aside, a thinker's up, as measured in talk; none: never"] = "people"
     aversion: Annotated[AversionParams, "looks away in reported turns"] = AversionParams()
     conversation: Annotated[ConversationParams, "signs of listening"] = ConversationParams()
     scanpath: Annotated[ScanpathParams, "scanpath over a face"] = ScanpathParams()

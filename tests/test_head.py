@@ -9,6 +9,7 @@ import pytest
 from gaze_targets import DT, target, turn
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from gazerig.gaze.angles import angle_between, direction
 from gazerig.gaze.minimum_jerk import Quintic
@@ -88,22 +89,25 @@ def test_a_new_goal_in_flight_makes_no_step() -> None:
     assert second.state_at(9.0) == (-0.5, 0.0, 0.0)
 
 
-def test_an_eye_held_aside_is_relieved_slowly() -> None:
-    model = HeadModel(HeadParams(eye_only_range_deg=60.0), radians(35.0), NECK)
-    moved = turn(model, 8.0, lambda t: (target(kind="thing", top_down=True), 21.0))
-    assert np.abs(moved[:600]).max() == 0.0
-    assert moved[-1] == pytest.approx(21.0 - 5.0, abs=0.5)
-    assert np.abs(np.diff(moved)).max() / DT <= 12.0 + 1e-6
+@pytest.mark.parametrize(("aside_deg", "wait_s"), [(10.0, 6.0), (15.0, 1.7), (17.5, 0.92)])
+def test_an_eye_held_aside_is_relieved_slowly_and_the_sooner_the_farther(
+    aside_deg: float, wait_s: float
+) -> None:
+    model = HeadModel(HeadParams(), radians(35.0), NECK)
+    moved = turn(model, 10.0, lambda t: (target(kind="thing", top_down=True), aside_deg))
+    assert np.flatnonzero(moved)[0] * DT == pytest.approx(wait_s, rel=0.06)
+    assert moved[-1] == pytest.approx(aside_deg - 3.25, abs=0.1)
+    assert np.abs(np.diff(moved)).max() / DT <= 20.0 + 1e-6
 
 
 def aimed(params: HeadParams, centre: float, point: float, eye_deg: float = 20.0) -> float:
     """Return where a shift brings the head for a far centre and a point."""
     model = HeadModel(params, radians(eye_deg), NECK)
-    return float(turn(model, 2.5, lambda t: (target(), point), centre)[-1])
+    return float(turn(model, 1.2, lambda t: (target(), point), centre)[-1])
 
 
 def test_head_turns_to_the_centre_but_never_so_that_the_point_is_out_of_reach() -> None:
-    assert aimed(HeadParams(), 40.0, 39.0) == pytest.approx(40.0 - 18.0, abs=0.1)
+    assert aimed(HeadParams(), 40.0, 39.0) == pytest.approx(29.8, abs=0.1)
     assert aimed(HeadParams(), 40.0, 50.0) == pytest.approx(50.0 - 18.0, abs=0.1)
 
 
@@ -125,8 +129,9 @@ def test_alignment_faces_the_target_once_it_is_beyond_the_eyes() -> None:
 def test_stahl_share_is_lifted_where_the_eyes_cannot_reach(
     eye_deg: float, place: float, head_deg: float
 ) -> None:
-    params = HeadParams(goal_model="stahl")
-    assert aimed(params, place, place, eye_deg) == pytest.approx(head_deg, abs=0.1)
+    share = HeadShare(HeadParams(), radians(eye_deg))
+    went = place - degrees(share.undershoot_rad(0.5, radians(place)))
+    assert went == pytest.approx(head_deg, abs=0.1)
 
 
 def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
@@ -159,9 +164,9 @@ def test_a_head_does_not_turn_away_because_the_interest_has_fallen() -> None:
 
 
 def test_an_eye_left_aside_by_a_shift_is_relieved_by_people_alone() -> None:
-    """The head stops short of the target; after 3 s it comes after the eyes."""
-    yaws = turned(HeadParams(), 50.0, lambda t: 0.2)
-    assert yaws[int(0.6 / DT)] < 26.0 and yaws[-1] > yaws[500] + 3.0
+    """The head stops short of the target; later it comes after the eyes."""
+    yaws = turned(HeadParams(), 90.0, lambda t: 0.2)
+    assert yaws[200] == pytest.approx(75.2, abs=0.1) and yaws[-1] > 85.0
     paper = turned(EQ_7, 50.0, lambda t: 0.2)
     assert paper[-1] == paper[300] and paper[-1] == pytest.approx(20.03, abs=0.1)
 
@@ -190,7 +195,12 @@ EYES = st.floats(10.0, 60.0)
 
 
 def ends(
-    model: Model, eyes_deg: float, start: Angles2, place: Angles2, salience: float
+    model: Model,
+    eyes_deg: float,
+    start: Angles2,
+    place: Angles2,
+    salience: float,
+    kind: str = "face",
 ) -> tuple[float, float, float]:
     """Let a head at rest turn to a place; angles in degrees.
 
@@ -202,7 +212,7 @@ def ends(
     at = (radians(start[0]), radians(start[1]))
     facing = (radians(place[0]), radians(place[1]))
     head.reset(0.0, (*at, 0.0))
-    seen = target(salience=salience)
+    seen = target(kind=kind, salience=salience)
     arc = angle_between(direction(at), direction(facing))
     for t in (0.0, 0.4, 2.9):
         yaw, pitch, _ = head.step(seen, facing, facing, arc, 1.0, t)
@@ -245,7 +255,7 @@ def test_e75_stahls_law_holds_for_any_range_of_the_eyes(range_deg: float) -> Non
 def test_e75_the_model_goes_as_far_as_the_report_expects_of_people(
     start: float, place: float
 ) -> None:
-    arc, went, _ = ends("stahl", 75.0, (start, 0.0), (place, 0.0), 0.5)
+    arc, went, _ = ends("stahl", 75.0, (start, 0.0), (place, 0.0), 0.5, "thing")
     assert went == pytest.approx(
         human_norms.STAHL_SLOPE * max(0.0, arc - human_norms.STAHL_FREE_DEG), abs=1.0
     )
@@ -264,12 +274,6 @@ def test_e65_a_head_in_flight_stops_where_it_can_and_not_behind_a_nearer_target(
     assert np.diff(yaws[50:]).min() > -0.02, "it does not swing back"
 
 
-def test_e65_eyes_that_are_being_brought_back_do_not_take_the_head_to_the_next_target() -> None:
-    yaws = turn(model(), 4.9, lambda t: (target(), 50.0) if t < 3.9999 else (target(id=0), 38.0))
-    assert yaws[801] > yaws[600] + 2.0, "it is being brought back"
-    assert yaws[-1] == pytest.approx(yaws[801], abs=2.0), "the eyes go alone"
-
-
 def test_parts_of_a_face_do_not_pull_the_head_further_each_time() -> None:
     """The same person all the while: the law counts from where the head was at first."""
     rng = np.random.default_rng(0)
@@ -278,7 +282,7 @@ def test_parts_of_a_face_do_not_pull_the_head_further_each_time() -> None:
         return target(shift=round(t / DT) // 60), 45.0 + 2.0 * float(rng.standard_normal())
 
     yaws = turn(HeadModel(HeadParams(), radians(50.0), TALL_NECK, ROLL), 2.9, part, facing_deg=45.0)
-    assert yaws[-1] == pytest.approx(0.77 * (45.0 - 17.9), abs=0.5)
+    assert yaws[-1] == pytest.approx(0.908 * (45.0 - 0.4 * 17.9), abs=0.5)
 
 
 @settings(max_examples=100)
@@ -396,39 +400,50 @@ def test_the_head_goes_on_with_a_walker_during_a_look_away() -> None:
     assert 0.0 < place - yaws[-1] < 4.0
 
 
-def test_recentring_is_late_random_and_slow() -> None:
-    place = np.full(round(30.0 / DT), 32.0)
-    starts, peaks, ends = [], [], []
+def test_recentring_is_random_and_slow() -> None:
+    place = np.full(round(8.0 / DT), 15.0)
+    starts, ends = [], []
     for seed in range(30):
         yaws = follow(small_head(seed), place, "thing")
-        held = yaws[round(2.0 / DT)]
-        assert held == pytest.approx(0.77 * (32.0 - 17.9), abs=3.5)
-        after = yaws[round(2.0 / DT) :]
-        moved = np.flatnonzero(after > held + 0.1)
-        if len(moved):
-            starts.append(2.0 + moved[0] * DT)
-            peaks.append(np.diff(after).max() / DT)
-            ends.append(32.0 - after[-1])
-    assert len(starts) > 20 and min(starts) >= 3.0
-    assert 5.0 < np.mean(starts) < 11.0 and np.std(starts) > 1.5
-    assert max(peaks) <= 12.1
-    assert min(ends) >= 0.25 * 10.0 - 0.1 and max(ends) <= 10.0
+        starts.append(float(np.flatnonzero(yaws > 0.1)[0]) * DT)
+        ends.append(15.0 - yaws[-1])
+        assert np.diff(yaws).max() / DT <= 20.1
+    assert np.mean(starts) == pytest.approx(2.0, abs=0.3) and np.std(starts) > 0.25
+    assert min(ends) >= 2.0 - 0.1 and max(ends) <= 4.6
 
 
-@pytest.mark.parametrize(("elsewhere", "id"), [("away", 1), ("hand", 1_000_001), ("face", 1)])
-def test_the_head_comes_to_face_a_person_in_spite_of_short_looks_elsewhere(
-    elsewhere: str, id: int
-) -> None:
+@pytest.mark.parametrize(("elsewhere", "id"), [("hand", 1_000_001), ("face", 2)])
+def test_glances_do_not_end_the_strain_of_the_eyes(elsewhere: str, id: int) -> None:
     def place(t: float) -> tuple[Target, float]:
-        return seen(id, elsewhere) if t % 2.0 > 1.4 else seen(), 10.0
+        return (seen(id, elsewhere), 6.0) if t % 1.0 > 0.8 else (seen(1, "thing"), 15.0)
 
-    yaws = np.array([turn(small_head(seed), 20.0, place) for seed in range(24)])
-    assert np.abs(yaws[:, : round(3.0 / DT)]).max() == 0.0
-    turned = yaws[:, -1] > 5.0
-    assert 0.7 < turned.mean() < 1.0 and yaws.max() <= 8.01
-    half = [np.argmax(row > 3.0) * DT for row in yaws[turned]]
-    assert 6.0 < np.mean(half) < 11.0 and np.std(half) > 2.0
-    assert np.diff(yaws).max() / DT <= 12.1
+    still, glancing = (
+        [np.argmax(turn(small_head(seed), 6.0, where) > 0.1) * DT for seed in range(12)]
+        for where in (lambda t: (seen(1, "thing"), 15.0), place)
+    )
+    assert np.mean(glancing) == pytest.approx(np.mean(still) / 0.8, rel=0.2)
+
+
+def test_the_head_takes_a_share_in_looks_away_and_returns_from_them() -> None:
+    def place(t: float) -> tuple[Target, float]:
+        return (seen(1, "away"), 25.0) if 1.0 < t % 3.0 < 2.5 else (seen(), 5.0)
+
+    head, yaws = small_head(), [0.0]
+    for k in range(round(9.0 / DT)):
+        on, gaze_deg = place(k * DT)
+        gaze, centre = radians(gaze_deg), radians(5.0 + 0.4 * (gaze_deg - 5.0))
+        aside = abs(gaze - yaws[-1])
+        yaws.append(head.step(on, (centre, 0.0), (gaze, 0.0), aside, 1.0, k * DT)[0])
+    averted, back = (np.degrees([yaws[round(t / DT)] for t in row]) for row in
+                     ((2.5, 5.5, 8.5), (3.9, 6.9)))  # fmt: skip
+    assert averted == pytest.approx(8.0, abs=0.1) and back == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize("kind", ["face", "thing"])
+def test_the_head_comes_at_once_to_who_is_urgent(kind: str) -> None:
+    on = replace(seen(kind=kind), urgent=True)
+    assert turn(small_head(), 1.0, lambda t: (on, 40.0))[-1] == pytest.approx(40.0, abs=8.0)
+    assert turn(small_head(), 0.8, lambda t: (on, 15.0))[-1] == pytest.approx(15.0, abs=6.0)
 
 
 @pytest.mark.parametrize(
@@ -448,9 +463,9 @@ def shifts(seed: int | None) -> Floats:
         head.reset(n * 2.0, (0.0, 0.0, 0.0))
         place = (radians(40.0), 0.0)
         yaw = 0.0
-        for k in range(240):
+        for k in range(180):
             t = n * 2.0 + k * DT
-            yaw = head.step(seen(n), place, place, abs(place[0] - yaw), 1.0, t)[0]
+            yaw = head.step(seen(n, "thing"), place, place, abs(place[0] - yaw), 1.0, t)[0]
         turned.append(degrees(yaw))
     return np.array(turned)
 
@@ -473,8 +488,8 @@ def test_the_head_is_first_in_half_of_its_own_looks_and_never_in_a_reaction() ->
 
 def test_a_search_is_completed_by_the_head() -> None:
     place = np.full(round(3.0 / DT), 15.0)
-    assert follow(small_head(), place, "search")[-1] == pytest.approx(9.0, abs=1.1)
-    assert follow(small_head(), place, "glance")[-1] == 0.0
+    assert follow(small_head(), place, "search")[-1] == pytest.approx(8.4, abs=2.1)
+    assert follow(small_head(), place[:200], "glance")[-1] == 0.0
 
 
 @pytest.mark.parametrize("law", ["attention", "align"])

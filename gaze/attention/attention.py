@@ -16,7 +16,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from msgspec.structs import replace
 
-from gazerig.gaze.angles import add, scale, sub
+from gazerig.gaze.angles import add, norm, scale, sub
 from gazerig.gaze.attention.bottom_up import OWN_MOTION, BottomUp
 from gazerig.gaze.attention.face_memory import FaceMemory
 from gazerig.gaze.attention.habituation import Habituation, HabituationParams
@@ -297,7 +297,8 @@ class Attention:
         gaze = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
         v_eye = self._eye_velocity(eye, t_s)
         raised, own = self._persons.raised, self._persons.parts if self._social else {}
-        motion = self._bottom_up.step(rows, eye, t_s, v_eye, gaze, seen, raised, own)
+        head_rad_s = norm(state.head_rate_rad_s)
+        motion = self._bottom_up.step(rows, eye, t_s, v_eye, gaze, seen, raised, own, head_rad_s)
         elsewhere = {
             face.id
             for face in percept.faces

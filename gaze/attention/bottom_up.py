@@ -15,7 +15,9 @@ none      No motion attracts: rules alone select targets.
 A body that has just entered the view has a further, decaying term: the paper's behaviour (e), a
 hand that reaches in from outside the field, is not in eq 1. If motion saturates, a body that begins
 to move has it too: it captures attention like a new one (Abrams & Christ 2003). Onsets that follow
-each other weigh less, as people stop looking at repeated appearances (Neo & Chua 2006).
+each other weigh less, as people stop looking at repeated appearances (Neo & Chua 2006). While the
+head turns fast, the view moves: what comes into it is not new, and motion is not seen, as in
+people's gaze shifts.
 
 In the retinal form the sum saturates for the comparison: no motion alone outweighs a face for long.
 An approach that would arrive within two seconds is exempt, such as a hand that reaches for the
@@ -27,7 +29,7 @@ than calls of NumPy.
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from math import exp, expm1, inf
+from math import exp, expm1, inf, radians
 from typing import Annotated, Literal
 
 from gazerig.gaze.angles import dot, norm, perpendicular, sub, unit
@@ -37,6 +39,8 @@ from gazerig.params import Bounds
 _BLINK_S = 0.3
 """A body unseen for at most this time was missed by the detector and did not leave."""
 
+_TURNS_RAD_S, _TURNED_S = radians(40.0), 0.3
+"""Speed of the head at which it turns fast, and time after it in which pictures still show that."""
 _MOVES, _STILL_BELOW = 0.5, 0.15
 """Sums of eq 1 above which a body moves, and below which it rests."""
 _SETTLED_S = 0.5
@@ -149,6 +153,7 @@ class BottomUp:
         self._at_s = t_s
         self._onset_s = -inf
         self._started_s = inf
+        self._turned_s = -inf
 
     def step(
         self,
@@ -160,6 +165,7 @@ class BottomUp:
         seen: Collection[int],
         raised: Collection[int] = (),
         own: Collection[int] = (),
+        head_rad_s: float = 0.0,
     ) -> list[Salience]:
         """Return the smoothed salience of all bodies, in their order; 0 for those not in view.
 
@@ -174,6 +180,7 @@ class BottomUp:
             seen: ids of the bodies in view.
             raised: ids of raised hands.
             own: ids of people's own hands and clothes, of whose motion only a share counts.
+            head_rad_s: speed at which the head turns; only the retinal form needs it.
         """
         par, states = self._params, self._states
         if par.form == "none":
@@ -181,8 +188,13 @@ class BottomUp:
         self._shift_times(t_s)
         fresh = -expm1((self._onset_s - t_s) / _RECOVERY_S)
         new, gain, most = 0.0, 1.0, inf
+        turns = False
         if par.form == "retinal":
             new, gain = par.onset_salience, 1.0 - exp(min(0.0, self._at_s - t_s) / _SMOOTHING_S)
+            if head_rad_s > _TURNS_RAD_S:
+                self._turned_s = t_s
+            if turns := t_s - self._turned_s < _TURNED_S:
+                gain = 0.0
         found = []
         for i, id in enumerate(rows.ids):
             state = states.get(id)
@@ -195,7 +207,8 @@ class BottomUp:
             if state is None or t_s - state.seen_s > _BLINK_S:
                 moves = slide + abs(loom) + spin > _MOVES
                 # A body seen in the first moments was there before: it entered long ago.
-                entered_s = t_s if t_s - self._started_s > _BLINK_S else -inf
+                was_there = turns or t_s - self._started_s <= _BLINK_S
+                entered_s = -inf if was_there else t_s
                 state = states[id] = _BodyState(entered_s, fresh, moves, t_s)
                 self._onset_s = max(self._onset_s, state.entered_s)
             state.seen_s = t_s

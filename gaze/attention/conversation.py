@@ -9,17 +9,23 @@ none       Without a conversation two people who face each other prefer periods 
            them is known, a listener's short ones are used.
 talk       Talking and listening people (Lee, Badler & Badler 2002, Eyes Alive).
 listen
-think      Thinking people look mostly up, for longer (Andrist et al. 2014).
+think      Thinking people look mostly up, for longer (Andrist et al. 2014: 70 % up, 20 down).
+thinking
 speaking   In reported turns the numbers are those of 19 people in remote talk (Dembinsky et
 listening  al. 2024, medians): speaking .45 of the time averted, 13.5 times a minute; listening .04,
-thinking   3.2 times; three quarters of the looks go aside, most others up.
+           3.2 times; three quarters of the looks go aside, most others up. Turns last some seconds,
+           so times on the face are exponential: they are as likely to end early in a turn as late.
 
 A look away starts when the rest on a part of the face is over, instead of the next shift between
-parts, and goes beyond the outline of the face: a near face is wider than the published angles.
+parts, and goes beyond the outline of the face: a near face is wider than the published angles. The
+eyes do not rest in it: they move from place to place, a speaker's or thinker's head takes a share
+of .4 in it (Andrist et al. 2014), and something that moves near by ends it. A look to where the
+person looks (gazerig.gaze.attention.followed_look) is a look away with a goal.
 
 A voice agent reports its state. A thinker looks away immediately; most long turns begin averted
 (Kendon 1967: more than 70 %), for the cognitive aversion of Andrist et al. 2014, and the gaze is on
-the face again N(2.3, .5) s before the planned end (their turn yield).
+the face again N(2.3, .5) s before the planned end (their turn yield). Such a look goes on if the
+partner is another person than the one looked at.
 
 Of several people a listener looks most at the one who speaks, a speaker at the addressee (Vertegaal
 et al. 2001: 88 and 77 %). A side participant, whom the present speaker does not look at, is a
@@ -29,7 +35,7 @@ Nods and brow flashes of a listener are individual (Blomsma 2024): each head has
 """
 
 from dataclasses import dataclass
-from math import atan2, cos, degrees, exp, hypot, inf, log, radians, sin
+from math import atan2, cos, degrees, exp, hypot, inf, radians, sin
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -37,11 +43,12 @@ from msgspec.structs import replace
 
 from gazerig.gaze.angles import add, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.attention.attention import Attention
+from gazerig.gaze.attention.followed_look import FollowedLook
 from gazerig.gaze.draws import draw_lognormal
-from gazerig.gaze.types import AWAY, Target, TurnState, Vec3
+from gazerig.gaze.types import AWAY, Percept, Target, TurnState, Vec3
 from gazerig.params import Bounds
 
-LooksAway = Literal["people", "eyes_alive", "none"]
+LooksAway = Literal["people", "none"]
 MODES = ("none", "talk", "listen", "think")
 """Roles that a user can choose; the others are those of reported turns."""
 
@@ -49,10 +56,11 @@ MODES = ("none", "talk", "listen", "think")
 class Role(NamedTuple):
     """Numbers of one role.
 
-    face_s, face_sd_s: mean and standard deviation of the time on the face
+    face_s, face_sd_s: mean and standard deviation of the time on the face; 0: an exponential time
     away_s, away_sd_s: of the time away
     least_deg, most_deg: smallest and largest angle of a look away
-    ways: directions: any, by the sectors of Eyes Alive; up; aside, as in reported turns
+    ways: shares of looks that go aside, and up, the rest down; None: by the sectors of Eyes Alive
+    head: share of the head in a look away
     """
 
     face_s: float
@@ -61,23 +69,23 @@ class Role(NamedTuple):
     away_sd_s: float
     least_deg: float
     most_deg: float
-    ways: Literal["any", "up", "aside"]
+    ways: tuple[float, float] | None = None
+    head: float = 0.0
 
 
+_THINKS_UP, _SIDEWAYS, _HEAD = (0.10, 0.70), (0.78, 0.15), 0.4
 ROLES = {
-    "none": Role(3.62, 1.63, 0.60, 0.30, 5.0, 22.7, "any"),
-    "talk": Role(3.13, 3.16, 0.93, 0.80, 5.0, 27.5, "any"),
-    "listen": Role(7.92, 1.57, 0.43, 0.24, 5.0, 22.7, "any"),
-    "think": Role(1.50, 0.80, 3.54, 1.26, 5.0, 27.5, "up"),
-    "speaking": Role(3.20, 1.60, 2.00, 0.90, 7.5, 27.5, "aside"),
-    "listening": Role(14.0, 3.00, 0.65, 0.30, 7.5, 22.7, "aside"),
-    "thinking": Role(1.50, 0.80, 3.54, 1.26, 7.5, 27.5, "aside"),
+    "none": Role(3.62, 1.63, 0.60, 0.30, 5.0, 22.7),
+    "talk": Role(3.13, 3.16, 0.93, 0.80, 5.0, 27.5, head=_HEAD),
+    "listen": Role(7.92, 1.57, 0.43, 0.24, 5.0, 22.7),
+    "think": Role(1.50, 0.80, 3.54, 1.26, 5.0, 27.5, _THINKS_UP, _HEAD),
+    "speaking": Role(3.00, 0.0, 2.00, 0.90, 7.5, 27.5, _SIDEWAYS, _HEAD),
+    "listening": Role(25.0, 0.0, 0.65, 0.30, 7.5, 22.7, _SIDEWAYS),
+    "thinking": Role(1.50, 0.80, 3.54, 1.26, 7.5, 27.5, _THINKS_UP, _HEAD),
 }
 """With a smallest angle of 0, as in the published distribution, half of the looks away would still
 be on the face.
 """
-_PUBLISHED = {"listening": "listen", "thinking": "think", "speaking": "talk"}
-"""Role of a reported turn -> that of Eyes Alive."""
 
 _LONGEST_S = 14.5
 """Longest time on the face; beyond 15 s it is a stare."""
@@ -88,17 +96,22 @@ _BESIDE_DEG = 2.0
 _DRIFT_DEG = 0.75
 """Motion of a person during a look away of a reported turn, which must stay beside the face."""
 
-# A = -6.9 ln(P / 15.7) deg, P uniform in 0..15 % (Eyes Alive).
-_SCALE_DEG, _P_TOP, _P_MOST = 6.9, 15.7, 15.0
+_SCALE_DEG = 6.9
+"""Mean angle of a look away beyond the smallest: A = -6.9 ln(P / 15.7) deg, P uniform (Eyes Alive).
+"""
 # Share of gaze shifts, percent, to 0, 45, ... 315 deg; 0 is right, 90 up (Eyes Alive).
 DIRECTIONS_PERCENT = (15.54, 6.46, 17.69, 7.44, 16.80, 7.89, 20.38, 7.79)
 _ENDS = np.cumsum(DIRECTIONS_PERCENT)
-_UP_SECTOR, _THINKS_UP = 2, 0.8
-"""Sector that is up; share of a thinker's looks that go there, the others in any direction."""
-_ASIDE, _UP, _SPREAD_DEG = 0.78, 0.15, 35.0
-"""Reported turns: shares of looks that go aside and up, the rest down; largest angle between
-them and level, or straight up or down.
-"""
+_SPREAD_DEG = 35.0
+"""Largest angle of a look between it and level, or straight up or down, in roles with ``ways``."""
+_PLACE_S, _PLACE_SPREAD = 0.45, 0.5
+"""Mean duration of a rest within a look away, and its standard deviation / mean. A speaker's rests
+last 0.19 s (median of Dembinsky et al. 2024), which sounds hectic on servos."""
+_STEP_DEG = 7.0, 4.0
+"""Standard deviation of the steps between places of a look away, to the side and up or down."""
+_TRIES = 8
+_MOVES = 1.0
+"""Motion of another body that ends a look away: translation, looming and onset of eq 1."""
 
 _HALF_WIDE_M, _HALF_HIGH_M = 0.085, 0.125
 """Half axes of the oval of a face, a little larger than an adult's."""
@@ -113,6 +126,8 @@ _START_AWAY_S, _START_AWAY_SD_S = 1.2, 0.25
 """Time into a turn until the gaze returns to the face."""
 _YIELD_S, _YIELD_SD_S = 2.3, 0.5
 """Time before the planned end at which the gaze is on the face again."""
+_YIELD_SHARE = 0.4
+"""Largest share of a turn for which the gaze is on the face again before its end."""
 _UNSURE_RATIO = 0.2
 """Share of the remaining time by which the gaze returns earlier if the end is quite uncertain."""
 _LATE_S = 1.5
@@ -127,9 +142,9 @@ class AversionParams:
 
     # fmt: off
     speaking_s: Annotated[tuple[float, float], Bounds(0.1, 60),
-        "reported speech: mean time on the face, and away"] = (3.2, 2.0)
+        "reported speech: mean time on the face, and away"] = (3.0, 2.0)
     listening_s: Annotated[tuple[float, float], Bounds(0.1, 60),
-        "reported listening: mean time on the face, and away"] = (14.0, 0.65)
+        "reported listening: mean time on the face, and away"] = (25.0, 0.65)
     # fmt: on
 
 
@@ -166,6 +181,7 @@ class ConversationGaze:
     ) -> None:
         self._attention, self._rng, self._turn_rng = attention, rng, turn_rng
         self._own = turn_rng.standard_normal(2).tolist()
+        self._followed = FollowedLook(turn_rng)
         self.retune(looks_away, aversion, signs)
         self._state: TurnState = "idle"
         self.chosen_mode = self._mode = "none"
@@ -190,6 +206,9 @@ class ConversationGaze:
         self._until_s = self._away_s = t_s
         self._away: Vec3 | None = None
         self._averts_s: float | None = None
+        self._place_until_s = self._kept_until_s = t_s
+        self._why = ""
+        self._followed.reset()
         self._shifts = self._away_shift = 0
 
     @property
@@ -229,8 +248,6 @@ class ConversationGaze:
             self._take_role(self.chosen_mode, t_s)
             return
         role = "listening" if state == "interrupted" else str(state)
-        if self._law == "eyes_alive":
-            role = _PUBLISHED[role]
         if state == "speaking":
             self._plan_speech(role, confidence, before != state, t_s)
         elif state != before:
@@ -259,11 +276,12 @@ class ConversationGaze:
         t_s: float,
         ordered: bool = False,
         rests_until_s: float = -inf,
+        percept: Percept | None = None,
     ) -> Target:
         """Return the target itself, or a place next to the face during a look away.
 
-        A place next to a face has kind "away", the id of the face, the face's centre as centre (the
-        head stays with the person) and its own shift number, which increases on leaving and on
+        A place next to a face has kind "away", the id of the face, a centre between them by the
+        head's share, and its own shift number, which increases with each place and on
         returning. An unchanged target includes the shifts of earlier looks away in its count.
 
         A lost face that the gaze is waiting for is not looked away from.
@@ -271,24 +289,57 @@ class ConversationGaze:
         ordered: a user has chosen the target, from which only a conversation averts the gaze
         rests_until_s: end of the rest on a part of the face, which the gaze does not leave
             sooner; inf while it is moving there
+        percept: the newest percept, with the looks of people
         """
         kept = (ordered and self._mode == "none") or target.is_lost or self._law == "none"
         face = target.id if target.kind == "face" and not kept else None
         if face != self._face:
-            self._face, self._away_s = face, t_s
-            self._return()
-            if face is not None and self._averts_s is None:
-                self._until_s = t_s + self._draw_face_s()
+            self._face = face
+            if face is None or t_s >= self._kept_until_s:
+                self._away_s = t_s
+                self._return()
+                if face is not None and self._averts_s is None:
+                    self._until_s = t_s + self._draw_face_s()
+        if face is None:
+            return self._count(target)
+        if self._away is not None and self._is_disturbed(target):
+            self._until_s = t_s
         leaves = self._away is not None or t_s >= rests_until_s or self._averts_s is not None
-        if self._face is not None and t_s >= self._until_s and leaves:
+        if t_s >= self._until_s and leaves:
             self._turn(target, p_world_head_m, t_s)
-        if self._away is not None:
-            self._away_s = t_s
-            centre = _centre_of_target(target)
-            if self._role.ways == "aside" and _is_on_face(self._away, centre, p_world_head_m):
-                self._avert(target, p_world_head_m)  # the person has moved into the look away
-            return self._away_target(target, self._away, t_s)
+        elif percept is not None:
+            self._follow_look(target, percept, p_world_head_m, t_s)
+        if self._away is None:
+            return self._count(target)
+        self._away_s = t_s
+        centre = _centre_of_target(target)
+        if not self._why and (
+            t_s >= self._place_until_s or _is_on_face(self._away, centre, p_world_head_m)
+        ):  # also if the person has moved into the look away
+            self._move_on(target, p_world_head_m, t_s)
+        return self._away_target(target, self._away, t_s)
+
+    def _count(self, target: Target) -> Target:
+        """Return a target with the shifts of earlier looks away."""
         return replace(target, shift=target.shift + self._shifts) if self._shifts else target
+
+    def _is_disturbed(self, target: Target) -> bool:
+        """Return whether another body moves so much that it ends a look away."""
+        return any(
+            one.id != target.id
+            and one.kind != "hand"
+            and one.translation + one.looming + one.onset > _MOVES
+            for one in target.saliences
+        )
+
+    def _follow_look(self, target: Target, percept: Percept, p_eye: Vec3, t_s: float) -> None:
+        """Look where the person has turned to look."""
+        followed = self._followed.step(percept, target.id, p_eye)
+        if followed is None or self._away is not None or self._averts_s is not None:
+            return
+        self._why = f"following the look of face {target.id}"
+        self._go_to(target, followed.p_world_m)
+        self._until_s = t_s + followed.seconds
 
     @property
     def _role(self) -> Role:
@@ -315,12 +366,12 @@ class ConversationGaze:
             if self._away is None:
                 self._averts_s, self._until_s = duration_s, t_s
             else:
-                self._until_s = t_s + duration_s
+                self._until_s = self._kept_until_s = t_s + duration_s
             return
         self._return()
         if self._face is not None:
             self._until_s = t_s if mode == "think" else t_s + self._draw_face_s()
-            if self._role.ways == "aside":  # the look began in an earlier turn: both are no stare
+            if mode not in MODES:  # the look began in an earlier turn: both are no stare
                 self._until_s = min(self._until_s, max(t_s, self._away_s + _LONGEST_S))
 
     def _turn(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
@@ -329,17 +380,52 @@ class ConversationGaze:
             self._return()
             self._until_s = t_s + self._draw_face_s()
             return
-        self._avert(target, p_world_head_m)
-        away_s, self._averts_s = self._averts_s, None
+        away_s, averts = self._averts_s, self._averts_s is not None
+        self._averts_s = None
+        self._avert(target, p_world_head_m, t_s)
         self._until_s = t_s + (self._draw_away_s() if away_s is None else away_s)
+        if averts:
+            self._kept_until_s = self._until_s
 
-    def _avert(self, target: Target, p_world_head_m: Vec3) -> None:
-        """Look at a new place next to the face."""
-        self._away = self._draw_place(_centre_of_target(target), p_world_head_m)
+    def _avert(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
+        """Look at a place next to the face."""
+        self._why = ""
+        self._offset_deg = self._draw_offset_deg(_centre_of_target(target), p_world_head_m)
+        self._go_to_offset(target, p_world_head_m, t_s)
+
+    def _move_on(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
+        """Look at the next place of a look away."""
+        centre, (right_deg, up_deg) = _centre_of_target(target), self._offset_deg
+        for _ in range(_TRIES):
+            step = self._rng.standard_normal(2) * _STEP_DEG
+            x, y = right_deg + float(step[0]), up_deg + float(step[1])
+            least_deg = self._least_deg(atan2(y, x), centre, p_world_head_m)
+            if least_deg <= hypot(x, y) <= max(least_deg, self._role.most_deg):
+                self._offset_deg = x, y
+                break
+        else:
+            self._offset_deg = self._draw_offset_deg(centre, p_world_head_m)
+        self._go_to_offset(target, p_world_head_m, t_s)
+
+    def _go_to_offset(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
+        """Look at the place at the present offset from the face, at its distance."""
+        rel = sub(_centre_of_target(target), p_world_head_m)
+        ahead, right, up = _axes_to(rel)
+        x, y = self._offset_deg
+        way, angle = atan2(y, x), radians(hypot(x, y))
+        aside = add(scale(right, cos(way)), scale(up, sin(way)))
+        looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
+        self._go_to(target, add(p_world_head_m, scale(looking, norm(rel))))
+        rest_s = draw_lognormal(self._rng, _PLACE_S, _PLACE_SPREAD)
+        self._place_until_s = t_s + max(rest_s, _SHORTEST_S)
+
+    def _go_to(self, target: Target, place: Vec3) -> None:
+        self._away = place
         self._shifts += 1
         self._away_shift = target.shift + self._shifts
 
     def _return(self) -> None:
+        self._kept_until_s = -inf
         if self._away is not None:
             self._away = None
             self._shifts += 1
@@ -347,6 +433,7 @@ class ConversationGaze:
     def _away_target(self, target: Target, away: Vec3, t_s: float) -> Target:
         """Return the target of a look away."""
         role = "no conversation" if self._mode == "none" else self._mode
+        centre = _centre_of_target(target)
         return replace(
             target,
             p_world_m=away,
@@ -356,47 +443,43 @@ class ConversationGaze:
             top_down=True,
             part=None,
             shift=self._away_shift,
-            why=f"looking away from face {target.id} ({role})",
-            centre_world_m=_centre_of_target(target),
+            why=self._why or f"looking away from face {target.id} ({role})",
+            centre_world_m=add(centre, scale(sub(away, centre), self._role.head)),
         )
 
-    def _draw_place(self, face: Vec3, p_world_head_m: Vec3) -> Vec3:
-        """Draw a point next to the face, at the distance of the face."""
-        rel = sub(face, p_world_head_m)
-        ahead, right, up = _axes_to(rel)
+    def _draw_offset_deg(self, face: Vec3, p_world_head_m: Vec3) -> tuple[float, float]:
+        """Draw angles to the right and up from a face, past its edge."""
         way = radians(self._draw_direction_deg())
-        angle = radians(self._draw_angle_deg(face_extent_deg(way, norm(rel))))
-        aside = add(scale(right, cos(way)), scale(up, sin(way)))
-        looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
-        return add(p_world_head_m, scale(looking, norm(rel)))
+        least_deg = self._least_deg(way, face, p_world_head_m)
+        beyond_deg = _SCALE_DEG * float(self._rng.standard_exponential())
+        angle_deg = min(max(least_deg, self._role.most_deg), least_deg + beyond_deg)
+        return angle_deg * cos(way), angle_deg * sin(way)
 
-    def _draw_angle_deg(self, edge_deg: float) -> float:
-        """Draw the angle of a look away past the edge of the face, in degrees."""
-        role = self._role
-        drift_deg = _DRIFT_DEG if role.ways == "aside" else 0.0
-        least = max(role.least_deg, edge_deg + _BESIDE_DEG + drift_deg)
-        # The law's P, restricted to amplitudes of at least the required one; never 0.
-        p_most = min(_P_MOST, _P_TOP * exp(-least / _SCALE_DEG))
-        p = (1.0 - float(self._rng.random())) * p_most
-        return min(max(least, role.most_deg), -_SCALE_DEG * log(p / _P_TOP))
+    def _least_deg(self, way_rad: float, face: Vec3, p_world_head_m: Vec3) -> float:
+        """Return the least angle of a look away in a direction, 0 right and pi/2 up."""
+        edge_deg = face_extent_deg(way_rad, norm(sub(face, p_world_head_m)))
+        return max(self._role.least_deg, edge_deg + _BESIDE_DEG + _DRIFT_DEG)
 
     def _draw_direction_deg(self) -> float:
-        """Draw the direction, 0 right and 90 up: a sector of the role, uniform within it."""
+        """Draw the direction, 0 right and 90 up, uniform within a sector of the role."""
         rng, ways = self._rng, self._role.ways
-        if ways == "aside":
-            draw, spread_deg = float(rng.random()), float(rng.uniform(-_SPREAD_DEG, _SPREAD_DEG))
-            if draw < _ASIDE:
-                return spread_deg + (0.0 if draw < 0.5 * _ASIDE else 180.0)
-            return spread_deg + (90.0 if draw < _ASIDE + _UP else 270.0)
-        sector = _UP_SECTOR
-        if ways == "any" or rng.random() >= _THINKS_UP:
-            draw = float(rng.random()) * _ENDS[-1]
-            sector = int(np.searchsorted(_ENDS, draw, side="right"))
-        return 45.0 * sector + float(rng.uniform(-22.5, 22.5))
+        draw = float(rng.random())
+        if ways is None:
+            sector = int(np.searchsorted(_ENDS, draw * _ENDS[-1], side="right"))
+            return 45.0 * sector + float(rng.uniform(-22.5, 22.5))
+        aside, up = ways
+        spread_deg = float(rng.uniform(-_SPREAD_DEG, _SPREAD_DEG))
+        if draw < aside:
+            return spread_deg + (0.0 if draw < 0.5 * aside else 180.0)
+        return spread_deg + (90.0 if draw < aside + up else 270.0)
 
     def _draw_face_s(self) -> float:
         """Draw a duration on the face."""
-        return min(_LONGEST_S, self._draw_s(self._role.face_s, self._role.face_sd_s))
+        mean_s, sd_s = self._role.face_s, self._role.face_sd_s
+        if sd_s == 0.0:
+            drawn_s = mean_s * float(self._rng.standard_exponential())
+            return min(_LONGEST_S, max(drawn_s, _SHORTEST_S))
+        return min(_LONGEST_S, self._draw_s(mean_s, sd_s))
 
     def _draw_away_s(self) -> float:
         return self._draw_s(self._role.away_s, self._role.away_sd_s)
@@ -410,6 +493,7 @@ class ConversationGaze:
         left_s = self._ends_s - t_s
         if self._ends_s < inf:
             early_s = max(0.0, self._draw_normal(_YIELD_S, _YIELD_SD_S))
+            early_s = min(early_s, _YIELD_SHARE * left_s)
             early_s += (1.0 - confidence) * _UNSURE_RATIO * left_s
             self._yields_s = max(t_s, self._ends_s - early_s)
         if begins:

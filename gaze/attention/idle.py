@@ -4,7 +4,8 @@ A person who leaves the frame often returns immediately, and a detector has gaps
 stays. Then it searches in steps: towards the side to which the person left, and around the place of
 the loss. From a far side it also returns in such steps. If no person is found it explores: one to
 two shifts of gaze per second, as people make in front of a scene, with an occasional rest straight
-ahead.
+ahead. A camera sees a part of the room: every few seconds the head turns far to one side, to the
+left and to the right in turn.
 
 A glance goes to a thing in view, or to a recently seen one, or otherwise to a plausible point.
 Shifts are mostly small (Malinov 2000: half below 5 deg, 83 % below 15) and more sideways than up or
@@ -58,6 +59,8 @@ _LEAVING_DEG_S = 4.0
 
 _REST_S, _GLANCE_S = 1.5, 0.9
 """Mean time of a rest straight ahead between series of glances, and of a glance."""
+_ASIDE_S, _STAYS_ASIDE_S = (3.0, 5.0), (1.4, 1.8)
+"""Range of the time between looks as far to one side as the reach, and of their duration."""
 _AGAIN = 0.9
 """Share of glances that are followed by another one without a rest."""
 _GLANCE_DEG, _LEAST_DEG = 13.0, 2.0
@@ -112,6 +115,7 @@ class Idle:
         self._now = _idle_target("rest", -1, REST_M, t_s, "no one in sight")
         self._until_s = self._search_until_s = t_s
         self._count = 0
+        self._side, self._aside_s = 1.0, t_s + _ASIDE_S[0]
         self._gone: Target | None = None
         self._seen: dict[int, tuple[Vec3, float]] = {}
         self._in_view: frozenset[int] = frozenset()
@@ -178,6 +182,7 @@ class Idle:
         self._gone = replace(gone, p_world_m=there)
         self._until_s = t_s + self._params.hold_ms / 1e3
         self._search_until_s = self._until_s + SEARCH_S
+        self._aside_s = self._search_until_s + _ASIDE_S[0]
 
     def _start_next_phase(self, t_s: float) -> None:
         """Start the next phase at ``t_s``, when the duration of the last one is over."""
@@ -187,6 +192,8 @@ class Idle:
             self._search(self._gone, t_s)
         elif self._is_far_aside():
             self._look_back(t_s)
+        elif t_s >= self._aside_s and self._now.kind != "rest":
+            self._look_aside(t_s)
         elif self._now.kind == "rest" or (
             self._now.kind == "glance" and self._rng.random() < _AGAIN
         ):
@@ -243,12 +250,23 @@ class Idle:
         return abs(degrees(self._yaw_pitch_now()[0])) > most_deg
 
     def _look_back(self, t_s: float) -> None:
-        """Take a step back from a far side."""
+        """Look back from a far side: in steps after a search, otherwise at once."""
         yaw, pitch = self._yaw_pitch_now()
-        back = self._draw_step_rad() * (-1.0 if yaw > 0.0 else 1.0)
-        place = yaw + back, 0.5 * pitch
+        if self._gone is None:
+            place = self._draw_glance_point(_AHEAD)
+        else:
+            back = self._draw_step_rad() * (-1.0 if yaw > 0.0 else 1.0)
+            place = yaw + back, 0.5 * pitch
         self._look(SEARCH, place, REST_M[0], t_s, "looking back from the side")
         self._until_s = t_s + self._draw_s(_SEARCH_FIXATION_S)
+
+    def _look_aside(self, t_s: float) -> None:
+        """Look far to the other side."""
+        self._side = -self._side
+        place = self._side * radians(self._params.reach_deg), 0.0
+        self._look(SEARCH, place, REST_M[0], t_s, "looking about, no one in sight")
+        self._until_s = t_s + float(self._rng.uniform(*_STAYS_ASIDE_S))
+        self._aside_s = self._until_s + float(self._rng.uniform(*_ASIDE_S))
 
     def _heading_yaw_pitch(self, rel: Vec3, v_world_m_s: Vec3) -> Angles2:
         """Return the yaw and pitch from the loss towards its heading; 0 for a target at rest."""

@@ -17,19 +17,21 @@ it (Nakamoto & Tsuruno 3.5). What follows belongs to the first of these laws alo
 People roll their heads by a few degrees when they turn to a person next to them; the direction of
 the roll and its dependence on interest are choices made here.
 
-Equal shifts differ: slope, onset and duration scatter within bounds. The head stays at the position
-that its law determines. When an eye has been eccentric for a random time of some seconds, the head
-turns slowly to recentre it. It comes closer to a face, as people face each other; looks away from
-the face, and short ones elsewhere, do not restart that time. A target in sustained motion is
+Equal shifts differ: slope, onset and duration scatter within bounds. The head comes closer to a
+face than to a thing, as people face each other, and at once to an urgent target: a speaker, an
+addressed partner, a person who has just come. Eyes in their corners strain: the strain grows faster
+the more eccentric they are, whatever they look at, while the head rests, and when it is large the
+head turns slowly to recentre them. So a glance elsewhere does not end it. A target in sustained motion is
 pursued by the head too: each tick plans a minimum-jerk movement of .6 s to where the target will be
 soon. On a ramp this lags by .6 of that time, .36 s, less the .2 s of foresight; people's heads lag
 by .1 to .2 s. When the motion ends, the last plan brings the head to rest.
-During a look away the eyes rest on a place of the room, and the head goes on with the person.
+During a look away the head goes on with the person, and takes the share in it that the centre of
+its target has in the way from the face; it returns to where it was.
 """
 
 from dataclasses import dataclass
 from math import degrees, exp, hypot, inf, radians
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -56,6 +58,8 @@ _MOST_SALIENCE = 1.0
 _SLOPE, _SLOPE_SD = 0.77, 0.1
 """Degrees of head for each degree beyond the eye-only range, people's is .61 to .93, and its
 standard deviation from one shift to the next; between people it is .16."""
+_USUAL_RAD = radians(17.9)
+"""Half of people's mean eye-only range."""
 _MARGIN_RAD = radians(2.0)
 """Distance that the eyes keep from their limit."""
 _ROLL_RAD, _LATERAL_RAD = radians(4.0), radians(30.0)
@@ -92,20 +96,21 @@ def interest(params: HeadParams, salience: float) -> float:
 class HeadShare:
     """Share of the head in gaze shifts, from the present parameters and the limit of the eyes.
 
+    half_range_rad: largest eccentricity of a thing that the eyes reach alone
     trigger_rad: eccentricity from which the head takes part
     reach_rad: largest eccentricity of the eyes
     """
 
     def __init__(self, params: HeadParams, eye_limit_rad: float) -> None:
         self._params = params
-        self._half_range_rad = radians(params.eye_only_range_deg) / 2.0
+        self.half_range_rad = radians(params.eye_only_range_deg) / 2.0
         printed = radians(params.max_offset_deg)
         self._margin_rad = _MARGIN_RAD if params.goal_model == "stahl" else 0.0
         self._reachable_rad = reachable = max(0.0, eye_limit_rad - self._margin_rad)
         # If the head stopped short by more than the eye can cover, the gaze would never reach the
         # target; and a trigger beyond the eye's limit never fires. Eq 7 is taken as printed.
         if params.goal_model == "stahl":
-            self.trigger_rad, self.reach_rad = min(self._half_range_rad, reachable), reachable
+            self.trigger_rad, self.reach_rad = min(self.half_range_rad, reachable), reachable
         elif params.goal_model == "align":
             self.trigger_rad = self.reach_rad = min(printed, reachable)
         else:
@@ -121,20 +126,24 @@ class HeadShare:
         """Return the angle by which the head stops short of the target (eq 7, sign corrected)."""
         return self.trigger_rad * (1.0 - interest(self._params, salience))
 
-    def undershoot_rad(self, salience: float, arc_rad: float, steeper: float = 0.0) -> float:
+    def undershoot_rad(
+        self, salience: float, arc_rad: float, steeper: float = 0.0, range_share: float = 1.0
+    ) -> float:
         """Return the angle by which the head stops short of a target.
 
         Args:
             salience: salience of the target.
             arc_rad: angle of the target from the head's direction at the start.
             steeper: deviation of the slope in this shift.
+            range_share: eye-only range for this kind of target, as a share of that for things; the
+                slope approaches 1 as it approaches 0.
         """
         if self._params.goal_model == "attention":
             return self.offset_rad(salience)
         if self._params.goal_model == "align":
             return 0.0
-        slope = min(1.0, max(0.0, _SLOPE + steeper))
-        short = arc_rad - slope * max(0.0, arc_rad - self._half_range_rad)
+        slope = min(1.0, max(0.0, 1.0 - (1.0 - _SLOPE) * range_share + steeper))
+        short = arc_rad - slope * max(0.0, arc_rad - range_share * self.half_range_rad)
         return min(short, self.reach_rad)
 
     def roll_rad(self, salience: float, yaw_rad: float) -> float:
@@ -176,25 +185,24 @@ _FASTEST = 3.0
 """Factor on the threshold to which speeds are clipped, so that it is not reached within .32 s."""
 _GOES_ON = 0.3
 """Share of the threshold at which a pursuit ends."""
-_COMFORT_RAD = radians(10.0)
-"""Eccentricity up to which an eye is not recentred."""
-_RECENTRE_S, _RECENTRE_SPREAD_S = 3.0, 7.0
-"""Least time after which an eccentric eye is recentred, and the mean of an added random time."""
-_RECENTRE_DEG_S = 12.0
+_STRAIN_S, _STRAIN_RAD, _STRAIN_SCALE_RAD = 6.0, radians(10.0), radians(4.0)
+"""Mean time after which an eye is recentred at an eccentricity, and the change of that by which it
+is e times shorter: 1.7 s at 15 deg, .5 s at 20 and beyond."""
+_MOST_STRAIN_RAD = radians(20.0)
+_STRAIN_SPREAD = 0.4
+"""Largest relative deviation of the strain at which the head relieves the eyes."""
+_FIRST_SHIFT_S = 0.3
+"""Time after a change of target in which the head only turns to it."""
+_RELAXED_RAD, _RELAXES_S = radians(5.0), 1.0
+"""Eccentricity up to which strain decays, and the time constant of that."""
+_RELIEF_RAD = radians(2.0), radians(4.5)
+"""Eccentricity to which the head recentres an eye, at random."""
+_RECENTRE_DEG_S = 20.0
 _AT_ONCE_ABOVE = 0.85
-"""Salience of a rule's target, other than a face, above which the head recentres it at once."""
-_SEARCH_RAD = radians(6.0)
-"""Eccentricity at which the head follows the eyes in the search for a lost person."""
-_RELIEF = (0.4, 0.9)
-"""Eccentricity to which the head recentres an eye, as a share of the one that is comfortable."""
-_BEFORE_FACE = 0.5
-"""Comfortable eccentricity of a face, as a share of ``_COMFORT_RAD``."""
-_SHORT_LOOK_S = 6.0
-"""Duration of looks elsewhere up to which the time to recentre a face continues.
-
-Looks at each of several people last 2 to 5 s. The head comes between them, so that the camera sees
-those beside them.
-"""
+"""Salience of a rule's target, other than a face, that is urgent."""
+_FACE, _SEARCHED, _URGENT = 0.4, 0.33, 0.22
+"""Eye-only range for faces, for the places where a lost person is searched, and for urgent targets,
+as shares of that for things: 7, 6 and 4 deg to a side."""
 _FARTHEST_AWAY_RAD = radians(22.0)
 """Eccentricity of a look away from a walker up to which the head goes on with the walker."""
 _SWINGS = 2.5
@@ -204,20 +212,6 @@ _SWINGS = 2.5
 def _draw_bounded(rng: np.random.Generator, most: float) -> float:
     """Draw a standard normal deviate within bounds."""
     return min(most, max(-most, float(rng.standard_normal())))
-
-
-class _Facing(NamedTuple):
-    """The last look at a face.
-
-    until_s: its end
-    since_s: time from which the face has been aside
-    later, relief: random deviates of the time until the head recentres, and of how far
-    """
-
-    until_s: float
-    since_s: float
-    later: float
-    relief: float
 
 
 class HeadModel:
@@ -259,8 +253,6 @@ class HeadModel:
         self.range_rad, self._roll = neck_limit_rad, roll_limit_rad
         self.share = self._share = HeadShare(params, eye_limit_rad)
         self._people = params.goal_model == "stahl"
-        # The papers' heads leave an eye aside; only an urgent target is recentred, to the trigger.
-        self._comfort_rad = _COMFORT_RAD if self._people else inf
         self.foresees_s = _FORESEES_S if self._people else 0.0
 
     def reset(self, t_s: float, head_rad: Angles3) -> None:
@@ -271,13 +263,14 @@ class HeadModel:
         self._ends_s = t_s
         self._follows = False
         self._relieves = False
-        self._aside_since_s = self._stepped_s = t_s
-        self._facings: dict[int, _Facing] = {}
+        self._stepped_s = self._since_s = t_s
+        self._strain, self._bearable = 0.0, 1.0
+        self._facing: Angles2 = head_rad[:2]
+        self._met: tuple[Angles3, Angles2] | None = None
         self._lead_s = 0.0
         self._drift, self._pursues = _NO_DRIFT, False
         self._steeper: float
-        self._later: float
-        self._relief: float
+        self._relief_rad: float
         self._draw_variation()
         self._level = head_rad[2] == 0.0
         self._start = self._goal_direction
@@ -327,9 +320,11 @@ class HeadModel:
         """
         share, start = self._share_for(target, both_eyes_rad), self._goal_direction
         arc_rad = angle_between(start, direction(facing_rad))
-        short_rad = share.undershoot_rad(target.salience, arc_rad)
-        if min(short_rad, arc_rad) > self._comfort_rad:
-            short_rad = min(self._comfort_rad / 2.0, self.share.trigger_rad)
+        short_rad = share.undershoot_rad(
+            target.salience, arc_rad, range_share=self._range_share(target)
+        )
+        if self._people and min(short_rad, arc_rad) > _RELAXED_RAD:
+            short_rad = _RELAXED_RAD
         return self._reachable_goal(target, facing_rad, facing_rad, short_rad, start, share)
 
     def draw_lead_s(
@@ -375,10 +370,13 @@ class HeadModel:
         """
         self._share = self._share_for(target, both_eyes_rad)
         there = direction(facing_rad)
-        self._decide(target, facing_rad, there, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
+        dt_s, self._stepped_s = max(0.0, t_s - self._stepped_s), t_s
+        self._decide(
+            target, facing_rad, there, gaze_rad, eccentricity_rad, since_eye_onset_s, dt_s, t_s
+        )
         if self._pursues and target.kind == AWAY and eccentricity_rad < _FARTHEST_AWAY_RAD:
             soon_rad = yaw_pitch(add(there, scale(self._drift, self.foresees_s)))
-        if self._is_in_sustained_motion(there, soon_rad, since_eye_onset_s, t_s):
+        if self._is_in_sustained_motion(there, soon_rad, since_eye_onset_s, dt_s):
             self._pursue(target, facing_rad, facing_rad if soon_rad is None else soon_rad, t_s)
         since_s = t_s - self._planned_s
         if since_s >= self._lasts_s:
@@ -397,6 +395,7 @@ class HeadModel:
         gaze: Angles2,
         eccentricity: float,
         since_onset: float,
+        dt_s: float,
         t_s: float,
     ) -> None:
         """Choose between turning to the target, recentring an eccentric eye, and rest.
@@ -404,20 +403,12 @@ class HeadModel:
         there: direction of ``facing``
         """
         share, trigger_rad = self._share, self._trigger_rad(target)
-        moving, is_face = t_s < self._ends_s, target.kind in _FACES
+        moving = t_s < self._ends_s
         if (target.kind, target.id) != self._target:
             if self._target is None or target.id != self._target[1]:  # not a look past a face
-                self._drift, self._pursues = _NO_DRIFT, False
-            if self._target is not None and self._target[0] in _FACES:
-                now = _Facing(t_s, self._aside_since_s, self._later, self._relief)
-                self._facings[self._target[1]] = now
-            recent = self._facings.items()
-            self._facings = {i: one for i, one in recent if t_s - one.until_s <= _SHORT_LOOK_S}
-            self._target = target.kind, target.id
-            self._aside_since_s = t_s
+                self._drift, self._pursues, self._met = _NO_DRIFT, False, None
+            self._target, self._since_s = (target.kind, target.id), t_s
             self._draw_variation()
-            if is_face and (last := self._facings.get(target.id)):
-                self._aside_since_s, self._later, self._relief = last[1:]
             self._start = self._extrapolated_direction(t_s) if moving else self._goal_direction
             # The reason for the last movement ends when the eyes return from the target.
             self._follows, self._relieves = moving, False
@@ -427,72 +418,94 @@ class HeadModel:
             and angle_between(self._goal_direction, there) < trigger_rad
         ):
             self._start = self._goal_direction
-        comfort_rad, aside_rad = self._comfort_rad, eccentricity
-        if is_face:
-            comfort_rad *= _BEFORE_FACE
+        if self._people and not moving:
+            self._update_strain(eccentricity, dt_s)
+        if target.kind == AWAY and self._people:
+            self._accompany(facing, gaze, t_s)
+            return
+        if self._met is not None:  # back on the face
+            self._accompany(facing, gaze, t_s)
+            self._met, self._follows = None, False
+        self._facing, aside_rad = facing, eccentricity
+        if target.kind in _FACES and self._people:
             aside_rad = angle_between(self._goal_direction, there)
-        if aside_rad <= comfort_rad:
-            self._aside_since_s = t_s
-        wait_s = _RECENTRE_S + self._later * _RECENTRE_SPREAD_S
-        if self._is_urgent(target):
-            wait_s = 0.0
-        if t_s - self._aside_since_s >= wait_s and not moving:
-            self._follows, self._relieves = False, True
-        elif eccentricity >= trigger_rad and since_onset >= -self._lead_s - 1e-9:
+        strains = self._strain > self._bearable and t_s - self._since_s > _FIRST_SHIFT_S
+        if strains and not moving and aside_rad > _RELAXED_RAD:
+            self._follows, self._relieves, self._strain = False, True, 0.0
+        elif aside_rad >= trigger_rad and since_onset >= -self._lead_s - 1e-9:
             self._follows, self._relieves = True, False
         elif not moving:
             self._follows = self._relieves = False
         if self._relieves:
-            relief_rad = min(self._relief * comfort_rad, share.trigger_rad)
-            self._follow(target, facing, there, gaze, relief_rad, t_s)
+            self._follow(target, facing, there, gaze, self._relief_rad, t_s)
         elif self._follows:
             arc_rad = angle_between(self._start, there)
             steeper = self._steeper * _SLOPE_SD
-            short_rad = share.undershoot_rad(target.salience, arc_rad, steeper)
-            if target.kind == SEARCH:
-                short_rad = min(short_rad, _SEARCH_RAD)
+            short_rad = share.undershoot_rad(
+                target.salience, arc_rad, steeper, self._range_share(target)
+            )
             self._follow(target, facing, there, gaze, short_rad, t_s)
 
-    def _is_urgent(self, target: Target) -> bool:
-        """Return whether a rule's target matters so much that the head does not wait."""
-        is_rule = target.top_down and target.kind != ORDERED and target.kind not in _FACES
-        return is_rule and target.salience > _AT_ONCE_ABOVE
+    def _update_strain(self, eccentricity: float, dt_s: float) -> None:
+        """Add the strain of an eccentric eye, 1 when it is time to recentre it."""
+        usual = eccentricity * _USUAL_RAD / max(self.share.half_range_rad, _RELAXED_RAD)
+        if usual < _RELAXED_RAD:
+            self._strain *= exp(-dt_s / _RELAXES_S)
+        else:
+            farther = (min(usual, _MOST_STRAIN_RAD) - _STRAIN_RAD) / _STRAIN_SCALE_RAD
+            self._strain += dt_s / _STRAIN_S * exp(farther)
+
+    def _accompany(self, facing: Angles2, gaze: Angles2, t_s: float) -> None:
+        """Turn as far as the centre has moved from where it was with the gaze on the face."""
+        if self._met is None:
+            self._met = self._goal, self._facing
+        (yaw, pitch, roll), before = self._met
+        goal = yaw + facing[0] - before[0], pitch + facing[1] - before[1]
+        start, reach_rad = direction(goal), self._share.reach_rad
+        if angle_between(start, direction(gaze)) > reach_rad:
+            goal = self.goal_rad(gaze, reach_rad, start)
+        self._plan_to(self.clip_to_range((*goal, roll)), t_s)
+
+    def _range_share(self, target: Target) -> float:
+        """Return the eye-only range for a target, as a share of that for things."""
+        is_face = target.kind in _FACES
+        is_rule = target.top_down and target.kind != ORDERED and not is_face
+        if target.urgent or (is_rule and target.salience > _AT_ONCE_ABOVE):
+            return _URGENT
+        return _FACE if is_face else _SEARCHED if target.kind == SEARCH else 1.0
 
     def _trigger_rad(self, target: Target) -> float:
         """Return the eccentricity of a target from which the head takes part."""
-        if target.kind == SEARCH:
-            return min(_SEARCH_RAD, self._share.trigger_rad)
-        return self._share.trigger_rad
+        if not self._people:
+            return self._share.trigger_rad
+        return min(self._range_share(target) * self.share.half_range_rad, self._share.trigger_rad)
 
     def _draw_variation(self) -> None:
-        """Draw the deviations of this shift from others, and the time and amount of recentring.
+        """Draw the deviations of this shift from others, and the start and amount of recentring.
 
         Deviates in standard deviations.
         """
-        self._steeper = self._longer = self._later = 0.0
-        self._relief = 0.5
+        self._steeper = self._longer = 0.0
+        self._bearable, self._relief_rad = 1.0, sum(_RELIEF_RAD) / 2.0
         if self._people and (rng := self._rng) is not None:
             self._steeper, self._longer = (
                 _draw_bounded(rng, _MOST_SD),
                 _draw_bounded(rng, _MOST_DURATION_SD),
             )
-            self._later, self._relief = (
-                float(rng.standard_exponential()),
-                float(rng.uniform(*_RELIEF)),
-            )
+            self._bearable = 1.0 + _STRAIN_SPREAD * float(rng.uniform(-1.0, 1.0))
+            self._relief_rad = float(rng.uniform(*_RELIEF_RAD))
 
     def _is_in_sustained_motion(
-        self, there: Vec3, soon: Angles2 | None, since_onset: float, t_s: float
+        self, there: Vec3, soon: Angles2 | None, since_onset: float, dt_s: float
     ) -> bool:
         """Return whether the target is in sustained motion, which the head pursues."""
-        dt_s, self._stepped_s = t_s - self._stepped_s, t_s
         if not self._people:
             return False
         least, v = _PURSUES_RAD_S, _NO_DRIFT
         if soon is not None:
             v = scale(sub(direction(soon), there), 1.0 / _FORESEES_S)
             v = scale(v, min(1.0, _FASTEST * least / max(norm(v), 1e-9)))
-        new = 1.0 - exp(-max(0.0, dt_s) / _MEAN_S)
+        new = 1.0 - exp(-dt_s / _MEAN_S)
         self._drift = add(self._drift, scale(sub(v, self._drift), new))
         if since_onset < 0.0 and not self._pursues:
             return False
@@ -510,9 +523,8 @@ class HeadModel:
             Quintic(start, end, _PURSUES_S) for start, end in zip(starts, goal, strict=True)
         )
         self._set_goal(goal)
-        self._start, self._level = self._goal_direction, True
+        self._start, self._level, self._met = self._goal_direction, True, None
         self._follows = self._relieves = False
-        self._aside_since_s = t_s
         self._planned_s, self._lasts_s, self._ends_s = t_s, _PURSUES_S, t_s + _PURSUES_S
 
     def _follow(

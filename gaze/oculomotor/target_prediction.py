@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.angles import add, norm, scale, sub
-from gazerig.gaze.types import Floats, Target, Vec3
+from gazerig.gaze.types import AWAY, Floats, Target, Vec3
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _HORIZON_S, _FADE_S = 0.12, 0.3
@@ -138,7 +138,7 @@ class TargetPrediction:
         self._share = 1.0
         self._fastest_m_s = fastest_rad_s * norm(sub(p, eye))
         self._most_m_s = norm(v)
-        if not self._predicts or target.id < 0:
+        if not self._predicts or target.id < 0 or target.kind == AWAY:
             self._bend, self.sine = _STILL, None
             return
         past = self._past

@@ -289,7 +289,7 @@ class Robot:
         target = self._lead.target(chosen, percept, t_s)
         rests_s = self._scanpath.rests_until_s
         target = self._conversation_gaze.look(
-            target, pose.p_world_head_m, t_s, self._lead.active, rests_s
+            target, pose.p_world_head_m, t_s, self._lead.active, rests_s, percept
         )
         target = self._scanpath.wander(
             target, percept, t_s, self._oculomotor.has_arrived, pose.p_world_head_m, self._gaze_m
