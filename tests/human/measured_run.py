@@ -30,8 +30,8 @@ from gazerig.features.lab.report.gaze_trace import GazeTrace  # noqa: E402
 from gazerig.features.lab.simulated_run import simulate  # noqa: E402
 
 BEGIN_S = 3.0
-"""So long the guard lets the joints start slowly: rows of what a joint does at its best speed, or at
-rest, begin after it."""
+"""So long the guard lets the joints start slowly: rows of what a joint does at its best speed,
+or at rest, begin after it."""
 
 _EYES = ("left_eye_pan", "left_eye_tilt"), ("right_eye_pan", "right_eye_tilt")
 _NECK = ("neck_yaw", "neck_pitch", "neck_roll")
