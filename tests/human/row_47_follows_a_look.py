@@ -71,11 +71,16 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     }
     back = [back for each in looks.values() for went, back in each if went]
     return {
-        "a thing is there: followed in 1 s, %": 100.0 * np.mean([went for went, _ in looks[True]]),
-        "nothing is there: followed in 1 s, %": 100.0 * np.mean([went for went, _ in looks[False]]),
+        "a thing is there: followed in 1 s, %": 100.0 * share(looks[True]),
+        "nothing is there: followed in 1 s, %": 100.0 * share(looks[False]),
         "back on the face in 3 s, %": 100.0 * float(np.mean(back)) if back else np.nan,
         "looks": sum(len(each) for each in looks.values()),
     }
+
+
+def share(looks: Sequence[tuple[bool, bool]]) -> float:
+    """Return the share of looks that are followed."""
+    return float(np.mean([went for went, _ in looks]))
 
 
 def followed(one: MeasuredRun, furnished: bool) -> Iterator[tuple[bool, bool]]:
