@@ -210,15 +210,6 @@ def test_what_is_near_is_looked_at_without_a_saccade_and_what_is_far_is_not(face
     assert [trace.names[k].part for k in trace.looked_at] == ["LE", "RE", "RE", "N"]
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
-def test_a_gaze_of_which_one_eye_is_estimated_is_so_in_part(face: Run, side: str) -> None:
-    trace = face.trace._replace(estimated=(f"{side}_eye_pan",))
-    other = "left" if side == "right" else "right"
-    assert [trace.basis(of) for of in (side, other, "cyclopean", "head")] == [
-        "partly estimated", "measured", "partly estimated", "measured",
-    ]  # fmt: skip
-
-
 @pytest.mark.parametrize(("pitch_deg", "share"), [(0.0, 1.0), (60.0, 0.5), (-60.0, 0.5)])
 def test_a_gaze_that_is_up_turns_about_the_upright_axis_by_less(
     pitch_deg: float, share: float
@@ -287,6 +278,3 @@ def test_a_blink_ends_no_stay_and_a_saccade_does(face: Run, tmp_path: Path) -> N
     read = rows(write_csv(face.trace, face.labels, stretches, tmp_path / "b")[2])
     found = [(float(row["start_s"]), float(row["duration_s"]), row["part"]) for row in read]
     assert found == [(0.0, 1.5, "LE"), (1.55, 0.4, "N"), (2.0, 0.3, "N")]
-
-
-# --- pymovements judges

@@ -24,4 +24,3 @@ def test_e67_a_judge_finds_our_saccades_and_hardly_any_other(name: str, run: Exp
     mark = marks(run, JUDGES[name](run))
     assert mark.ours.mean() >= 0.95
     assert np.mean(~mark.theirs) <= 0.03
-    assert run.fast.mean() < 0.1

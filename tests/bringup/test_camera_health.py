@@ -8,7 +8,6 @@ import pytest
 from seeing.material import background, noisy, paste, portrait
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.health import CameraHealth
 from gazerig.drivers.camera.orientation import FrameOrientation, Rotation
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Detections
@@ -16,7 +15,6 @@ from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 WIDTH, HEIGHT = 640, 480
-FAST = {"faces": 0.01}
 PERIOD_S = 0.25
 
 
@@ -109,19 +107,3 @@ def test_a_turned_film_is_turned_upright_and_is_another_scene(deg):
     assert t_s < 5.0 and line.startswith(f"the film is turned by {deg} deg")
     assert found.image is not None and np.array_equal(found.image, room())
     assert len(found.faces) == 2 and found.conditions == () and found.scene >= 1
-
-
-def test_frames_that_come_too_fast_are_told_with_the_stage():
-    health, told = CameraHealth(), list[str]()
-    for k in range(60):  # 60 a second, of which 8 are looked at
-        shot = Shot(k / 8.0, 1 + round(7.5 * k), np.asarray(room()))
-        health.assess(shot, {"faces": 0.01, "motion": 0.1})
-        told += health.events()
-    assert told == [
-        "camera: 8 of 60 frames a second are analysed; motion takes 100 of 125 ms a frame: "
-        "lower motion.work_px, or set motion.enabled: false"
-    ]
-    for k in range(60, 200):
-        health.assess(Shot(k / 8.0, 391 + k, np.asarray(room())), FAST)
-        told += health.events()
-    assert told[1:] == ["camera: frames are analysed in time again"]

@@ -39,32 +39,6 @@ def test_scan_lists_every_servo():
     assert found["servos"][6]["model"] == "xc330-m288"
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("scan", "--bauds", "123"), "--bauds 123: not all or some of 9600"),
-        (("scan",), "no serial port on USB"),
-        (("scan", "--port", "/dev/ttyNONE"), "no serial port /dev/ttyNONE"),
-        (("scan", "--kind", "pca9685"), "--kind pca9685: not one of maestro, dynamixel"),
-        (("scan", "--kind", "feetech", "--bauds", "9600", "--port", "/dev/x"), "none of them is"),
-        (("doctor", "dsk"), "nothing named 'dsk'"),
-        (("setup", "--joint", "neck"), "--joint neck: unknown; joints are left_eye_pan"),
-    ],
-)
-def test_what_is_asked_wrongly(words, says):
-    code, _, err = invoked(*words)
-    assert code == 2 and says in err
-
-
-def test_scan_asks_which_port_where_there_are_several(monkeypatch):
-    two = [SerialPort(f"/dev/ttyACM{i}", "board", "1:2", None) for i in range(2)]
-    monkeypatch.setattr(ports, "serial_ports", lambda: two)
-    code, _, err = invoked("scan")
-    assert code == 2 and "which port?" in err and "/dev/ttyACM1 (board)" in err
-    monkeypatch.setattr(ports, "serial_ports", lambda: two[:1])
-    assert "no serial port /dev/ttyACM0" in invoked("scan").err
-
-
 # --- doctor
 
 

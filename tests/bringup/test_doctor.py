@@ -24,12 +24,10 @@ from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.bus_search import (
     ORDER,
-    SearchRound,
     found_servos,
     plan_search,
     search_bus,
 )
-from gazerig.features.bringup.cli.scan import scan_remarks
 from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685
 from gazerig.features.bringup.doctor.diagnostics import Diagnostic, Fix, worst_level
 from gazerig.features.bringup.doctor.servo_checks import CHECKS
@@ -139,31 +137,6 @@ def test_what_can_be_wrong(kind, values, level, words, remedy):
     assert bool(found.fixes) == ("--fix" in found.remedy)
     for fix in found.fixes:
         assert fix.was == {**servo_state(kind).values, **values}[fix.register]
-
-
-@pytest.mark.parametrize(
-    ("kind", "values", "edge"),
-    [
-        *(
-            (kind, values, "ok")
-            for kind in (DYNAMIXEL, FEETECH)
-            for values in (
-                {"present_temperature": 59},
-                {"present_position": 1650},
-                {"present_position": 2446},
-            )
-        ),
-        (DYNAMIXEL, {"present_input_voltage": 35, "torque_enable": 0}, "warn"),
-        (DYNAMIXEL, {"present_input_voltage": 45}, "ok"),
-        (DYNAMIXEL, {"secondary_id": 253}, "ok"),
-        (DYNAMIXEL, {"shutdown": 52}, "ok"),
-        (FEETECH, {"present_input_voltage": 67}, "ok"),
-        (FEETECH, {"unloading_condition": 47}, "ok"),
-        (FEETECH, {"temperature_limit": 60}, "ok"),
-    ],
-)
-def test_at_the_edge(kind, values, edge):
-    assert worst_level(apply_rules(servo_state(kind, **values))) == edge
 
 
 @each
@@ -278,17 +251,6 @@ def test_a_servo_that_does_not_take_it_is_said(kind, value, fault, says):
     rig.command(fault)
     (done,) = rig.fix([fix])
     assert "not done" in done and says in done
-
-
-# --- words
-
-
-def test_remarks_of_a_scan():
-    two = (FoundServo(1, 1190, 53, BAUD, "xl330-m077"), FoundServo(1, 1190, 53, BAUD, "xl330-m077"))
-    said = " ".join(scan_remarks([SearchRound("dynamixel", BAUD, True, two)], "/dev/x"))
-    assert "2 servos on /dev/x" in said and "two or more servos have id 1 at 1000000" in said
-    rounds = [SearchRound("dynamixel", 9600, unknown_bytes=40)]
-    assert "only pieces came" in " ".join(scan_remarks(rounds, "/dev/x"))
 
 
 # --- Findings about boards of hobby servos and their channels, and fixes

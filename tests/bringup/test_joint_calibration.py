@@ -34,7 +34,6 @@ from gazerig.features.bringup.calibration.joint_procedure import (
 from gazerig.features.bringup.calibration.linkage_calibration import (
     HobbyMarker,
     calibrate_by_marks,
-    fit_linkage,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
@@ -185,25 +184,6 @@ def test_what_is_found_is_what_is_there_or_it_is_refused(
         assert short_steps / (ratio * STEPS_PER_DEG) < margin + 0.1 + 0.2 / ratio
 
 
-@pytest.mark.parametrize(
-    ("marks", "says"),
-    [
-        (Marks(2070, 2030, 2050), "only 3.5 deg are between the two ends"),
-        (Marks(2300, 1800, 2400), "is not between the ends"),
-        (Marks(2085, 2011, 2048), "with 2 deg of margin at each end only"),
-        (Marks(2000 + 5000, 2000, 4000), "counts only one turn"),
-        (Marks(4500, 3900, 4200), "seam .* by 171 deg towards more steps"),
-        (Marks(4300, 3700, 4000), "seam .* by 172 deg towards fewer steps"),
-    ],
-)
-def test_marks_that_make_no_calibration_are_refused_in_words(marks: Marks, says: str) -> None:
-    with pytest.raises(CalibrationRefused, match=says):
-        joint_calibration("left_eye_pan", marks, EYE, 2.0)
-
-
-# --- finding a stop
-
-
 # --- Calibrating one emulated joint by hand or by motion; refused joints
 
 
@@ -310,24 +290,6 @@ def test_a_servo_that_restarts_on_the_way_has_met_no_stop() -> None:
 
 
 @pytest.mark.parametrize(
-    ("joint", "register", "value", "says"),
-    [
-        (EYE, "homing_offset", 300, r"Homing Offset is 300 steps.*--clear-offset"),
-        (EYE, "operating_mode", 4, r"operating_mode is 4, not 3: gazerig doctor --fix"),
-        (STS, "operating_mode", 1, r"operating_mode is 1, not 0: gazerig doctor --fix"),
-        (STS, "phase", 0x1C, r"phase is 28, not 12: gazerig doctor --fix"),
-    ],
-)
-def test_a_servo_set_up_in_another_way_is_refused(
-    joint: JointParams, register: str, value: int, says: str
-) -> None:
-    bench = Bench(joint)
-    bench.put(register, value)
-    with pytest.raises(ServoMissing, match=says):
-        bench.joint.check()
-
-
-@pytest.mark.parametrize(
     ("joint", "fault", "says"),
     [
         (EYE, "overload {id}", "overload: .*switch its power off and on"),
@@ -354,24 +316,6 @@ def test_a_joint_that_a_hand_took_over_the_seam_is_not_driven() -> None:
     with pytest.raises(ServoMissing, match="turned over the seam"):
         bench.joint.enable_torque(GENTLY)
     assert bench.get("torque_enable") == 0
-
-
-# --- A joint behind a push rod: places marked by eye over an emulated board, and their linkage
-
-
-@pytest.mark.parametrize(
-    ("name", "marked", "says"),
-    [
-        ("eyes_pan", [(0.0, 1500.0), (1.5, 1600.0), (-20.0, 1300.0)], "0 deg must be within"),
-        ("eyes_pan", [(0.0, 1500.0), (20.0, 1450.0), (-20.0, 1300.0)], "all increase or all"),
-        ("eyes_pan", [(0.0, 1500.0), (20.0, 2900.0), (-20.0, 1300.0)], "outside the servo's"),
-    ],
-)
-def test_what_makes_no_linkage_is_refused_with_the_rule(
-    maker_rig: Rig, name: str, marked: list[tuple[float, float]], says: str
-) -> None:
-    with pytest.raises(CalibrationRefused, match=says):
-        fit_linkage(name, marked, maker_rig.joints[name], 2.0)
 
 
 # --- measured by eye

@@ -7,7 +7,7 @@ columns, in memory, once for each process. ``tests/human/row_*.py`` measure on i
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import nan
 from typing import Any, cast
 
@@ -30,7 +30,8 @@ from gazerig.features.lab.report.gaze_trace import GazeTrace  # noqa: E402
 from gazerig.features.lab.simulated_run import simulate  # noqa: E402
 
 BEGIN_S = 3.0
-"""So long the head straightens up slowly: rows of a measured run begin after it."""
+"""So long the guard lets the joints start slowly: rows of what a joint does at its best speed,
+or at rest, begin after it."""
 
 _EYES = ("left_eye_pan", "left_eye_tilt"), ("right_eye_pan", "right_eye_tilt")
 _NECK = ("neck_yaw", "neck_pitch", "neck_roll")
@@ -41,8 +42,9 @@ _LONGEST_EXTRAPOLATED_S = 0.3
 class MeasuredRun:
     """One run as columns of n ticks; degrees, yaw + left, pitch + up, roll + right ear down.
 
-    t_s: (n,) seconds since the run's beginning; the first ``BEGIN_S`` are left out
+    t_s: (n,) seconds since the run's beginning
     gaze_deg: (n, 2) measured gaze in space, the mean of both eyes on the head
+    eyes_deg: (n, 2) measured mean of both eyes in the head
     eyes_goal_deg: (n, 2, 2) left and right eye in the head, as commanded, after the guard
     head_deg, head_goal_deg: (n, 3) yaw, pitch, roll of the neck, measured; as commanded
     plan_deg: (n, 2) direction of the planned gaze point from the head
@@ -55,11 +57,15 @@ class MeasuredRun:
     truth: positions that the scene held, (n, 3) by "face 0", "hand 0" (of person 0), "thing 7";
         nan where there is none
     head_m: (n, 3) position of the midpoint of the eyes in the world
+    clock_s: (n,) time of the scene; turn: (n,) reported state of conversation
     angles: what exports are made of; trace: what the report is made of (both of the whole run)
     """
 
     t_s: np.ndarray
+    clock_s: np.ndarray
+    turn: np.ndarray
     gaze_deg: np.ndarray
+    eyes_deg: np.ndarray
     head_deg: np.ndarray
     eyes_goal_deg: np.ndarray
     head_goal_deg: np.ndarray
@@ -84,6 +90,15 @@ class MeasuredRun:
         x, y, z = (self.truth[name] - self.head_m).T
         return np.degrees(np.column_stack((np.arctan2(y, x), np.arctan2(z, np.hypot(x, y)))))
 
+    def later(self, begin_s: float) -> "MeasuredRun":
+        """Return the run with the columns from a time on."""
+        first = int(np.searchsorted(self.t_s, begin_s))
+        columns = {name: value[first:] for name, value in vars(self).items() if name in _COLUMNS}
+        truth = {name: place[first:] for name, place in self.truth.items()}
+        return replace(self, truth=truth, **columns)
+
+
+_COLUMNS = {field.name for field in fields(MeasuredRun)} - {"truth", "angles", "trace"}
 
 Runner = Callable[..., MeasuredRun]
 """``measured_run``, which rows get as an argument."""
@@ -97,6 +112,7 @@ def measured_run(
     seed: int = 0,
     seconds: float = 60.0,
     overrides: Mapping[str, Value] | None = None,
+    begin_s: float = 0.0,
     **options: Any,
 ) -> MeasuredRun:
     """Return a run's columns; the same arguments are run once for each process.
@@ -105,8 +121,9 @@ def measured_run(
         scene: a shipped scene's name, or a scene of the test's own with a name that no other has.
         profile: style of gaze.
         seed: of all random generators.
-        seconds: length of the run, ``BEGIN_S`` included.
+        seconds: length of the run.
         overrides: values of the rig's keys by dotted name, e.g. {"gaze.pursuit.gain": 0.9}.
+        begin_s: so much is left out of the columns.
         options: further fields of RunOptions, e.g. conversation="talk".
     """
     name = scene if isinstance(scene, str) else scene.name
@@ -116,7 +133,7 @@ def measured_run(
     if key not in _kept:
         with _scenes(scene):
             _kept[key] = _run(name, profile, seed, seconds, overrides or {}, options)
-    return _kept[key]
+    return _kept[key].later(begin_s) if begin_s else _kept[key]
 
 
 def half_rate_run(scene: str, profile: str, seconds: float) -> MeasuredRun:
@@ -174,17 +191,16 @@ class _Columns:
         self._angles.update(tick)
         if self._start_s is None:
             self._start_s = tick.t_s
-        t_s = tick.t_s - self._start_s
-        if t_s < BEGIN_S:
-            return
         pose, target, gaze = tick.pose, tick.target, tick.gaze
         at = tick.guard_result.joints.index
         measured, commanded = tick.joints.position_rad, tick.guard_result.command_rad
         since_s = min(max(0.0, tick.t_s - target.at_s), _LONGEST_EXTRAPOLATED_S)
         point = add(target.p_world_m, scale(target.v_world_m_s, since_s))
         row = {
-            "t_s": t_s,
+            "t_s": tick.t_s - self._start_s,
             "clock_s": tick.t_s,
+            "turn": tick.conversation.state,
+            "eyes_deg": np.mean((pose.eye_left_rad, pose.eye_right_rad), axis=0),
             "eyes_goal_deg": [[commanded[at(name)] for name in eye] for eye in _EYES],
             "head_deg": [measured[at(name)] for name in _NECK],
             "head_goal_deg": [commanded[at(name)] for name in _NECK],
@@ -211,8 +227,8 @@ class _Columns:
         for name in [name for name in columns if name.endswith("_deg")]:
             columns[name] = np.degrees(columns[name])
         return MeasuredRun(
-            gaze_deg=angles.cyclopean_deg[-len(columns["t_s"]) :],
-            truth=_truth(scene, columns.pop("clock_s").tolist()),
+            gaze_deg=angles.cyclopean_deg,
+            truth=_truth(scene, columns["clock_s"].tolist()),
             angles=angles,
             trace=trace,
             **columns,

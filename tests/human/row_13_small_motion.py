@@ -9,7 +9,7 @@ and stop as much short, so nothing moves there.
 from collections.abc import Sequence
 
 import numpy as np
-from human.measured_run import Runner
+from human.measured_run import BEGIN_S, Runner
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.model.commands import Value
@@ -34,7 +34,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     """Return the figures over all seeds."""
     sizes, off, lasted_s = [], [], 0.0
     for seed in seeds:
-        one = run(SCENE, seed=seed, seconds=seconds, overrides=ONE_POINT)
+        one = run(SCENE, seed=seed, seconds=seconds, begin_s=BEGIN_S, overrides=ONE_POINT)
         after = one.t_s > one.t_s[0] + 1.0
         flight = (one.phase == "saccade") & after
         begins = np.flatnonzero(flight[1:] & ~flight[:-1]) + 1

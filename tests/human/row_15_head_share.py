@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from human.lights import Lights
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import BEGIN_S, MeasuredRun, Runner
 
 _YAWS = (0, 25, 0, -35, -25, 45, 30, -20, -55, -45, 0, 14, 5, -30, 55, 40, -40, -10, 20, 50)
 _EACH_S = 2.5
@@ -57,6 +57,7 @@ def _of(run: Runner, seed: int, seconds: float) -> MeasuredRun:
         SCENE,
         seed=seed,
         seconds=seconds,
+        begin_s=BEGIN_S,
         overrides={
             "gaze.top_down.rules.wait.look_at": "light",
             "camera.horizontal_field_deg": 140.0,  # so that far ones are seen

@@ -7,7 +7,7 @@ more than a step of the encoder in a tick.
 from collections.abc import Sequence
 
 import numpy as np
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import BEGIN_S, MeasuredRun, Runner
 from human.row_13_small_motion import ONE_POINT, SCENE
 
 _RESTS_S, _WINDOW_S = 2.0, 10.0
@@ -25,7 +25,8 @@ WANTED = {
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return the figures over all seeds, those of the plan without saccades."""
-    runs = [run(SCENE, seed=n, seconds=seconds, overrides=ONE_POINT) for n in seeds]
+    still = {"overrides": ONE_POINT, "begin_s": BEGIN_S}
+    runs = [run(SCENE, seed=n, seconds=seconds, **still) for n in seeds]
     rests = [rest for one in runs for axis in (0, 2) for rest in unmoved_s(one, axis)]
     lasted_s = sum(float(np.ptp(one.t_s)) for one in runs)
     goals = np.concatenate([np.abs(np.diff(one.head_goal_deg, axis=0)) for one in runs])

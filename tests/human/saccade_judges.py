@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
-from human.measured_run import BEGIN_S, MeasuredRun
+from human.measured_run import MeasuredRun
 
 from gazerig.robot.recording.export_csv import write_csv
 from gazerig.robot.recording.gaze_angles import find_intervals, label_samples
@@ -24,28 +24,22 @@ THRESHOLD_DEG_S = 30.0
 """Of Engbert & Kliegl's ellipse. They take six times the noise of a recording at rest, which here
 would be less than a person's walk; this is the usual one of velocity-based detection (I-VT)."""
 
-FAST_DEG_S, _AROUND_S = 25.0, 0.1
-"""What is followed faster than this, and what is that near to it in time, is no judge's case: both
-take smooth motion for saccades there, a person's too."""
-
-_SHORTEST_MS, _FACTOR, _EDGE_S = 15, 6.0, 0.2
+_SHORTEST_MS, _FACTOR = 15, 6.0
 _SMOOTHED_S = 0.026
 """Five samples at 200 Hz. REMoDNaV's own 19 ms would be three, which smooth nothing."""
 
 
 class Exported(NamedTuple):
-    """The columns of an exported run that judges and their marks rest on.
+    """The columns of an exported run, all of its time, that judges and their marks rest on.
 
     time_s: (n,); gaze_deg: (n, 2), yaw and pitch in space
-    commanded: (m, 2) onset and end of each commanded saccade by the export's events;
-    fast: (n,) whether what the robot followed moved faster than ``FAST_DEG_S``
+    commanded: (m, 2) onset and end of each commanded saccade by the export's events
     blinks: (b, 2) onset and end of each blink, in which the eyes turn down and back
     """
 
     time_s: np.ndarray
     gaze_deg: np.ndarray
     commanded: np.ndarray
-    fast: np.ndarray
     blinks: np.ndarray
 
 
@@ -80,22 +74,12 @@ def exported(run: MeasuredRun) -> Exported:
     onset, length = _column(saccades, "onset_s"), _column(saccades, "duration_s")
     blinks = [row for row in events if row["event"] == "blink"]
     shut, shut_s = _column(blinks, "onset_s"), _column(blinks, "duration_s")
-    late = time_s >= BEGIN_S
-    kept = (onset >= BEGIN_S + _EDGE_S) & (onset + length <= time_s[-1] - _EDGE_S)
-    commanded = np.column_stack([onset, onset + length])[kept]
     return Exported(
-        time_s[late], gaze[late], commanded, _fast(run)[late],
+        time_s,
+        gaze,
+        np.column_stack([onset, onset + length]),
         np.column_stack([shut, shut + shut_s]),
-    )  # fmt: skip
-
-
-def _fast(run: MeasuredRun) -> np.ndarray:
-    """Return (n,) whether the target moves fast about that time, seen from the head."""
-    trace = run.trace
-    speed = np.hypot(trace.column("target_yaw_rate"), trace.column("target_pitch_rate"))
-    around = 2 * round(_AROUND_S * trace.rate_hz) + 1
-    spread = np.convolve(speed > FAST_DEG_S, np.ones(around), mode="same") > 0.5
-    return np.interp(run.angles.time_s, trace.column("t") - trace.column("t")[0], spread) > 0.5
+    )
 
 
 def pymovements_saccades(run: Exported) -> np.ndarray:
@@ -143,20 +127,12 @@ def marks(run: Exported, seen: np.ndarray) -> Marks:
         run: what was judged.
         seen: (k, 2) onset and end of the judge's saccades.
     """
-    seen = seen[(seen[:, 0] >= run.time_s[0] + _EDGE_S) & (seen[:, 1] <= run.time_s[-1] - _EDGE_S)]
     over, blink = (
         (seen[None, :, 0] <= spans[:, None, 1]) & (seen[None, :, 1] >= spans[:, None, 0])
         for spans in (run.commanded, run.blinks)
     )
     known = np.asarray(over.any(axis=0) | blink.any(axis=0))
-    ours, theirs = _judged(run, run.commanded), _judged(run, seen)
-    return Marks(np.asarray(over.any(axis=1))[ours], known[theirs])
-
-
-def _judged(run: Exported, spans: np.ndarray) -> np.ndarray:
-    """Return (k,) whether each of these spans counts."""
-    at = np.searchsorted(run.time_s, 0.5 * (spans[:, 0] + spans[:, 1]))
-    return ~run.fast[np.minimum(at, len(run.fast) - 1)]
+    return Marks(np.asarray(over.any(axis=1)), known)
 
 
 def _rate_hz(run: Exported) -> float:

@@ -6,21 +6,16 @@ from dataclasses import replace
 from html import unescape
 from math import cos, radians, sin
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 from command_line import invoked, typed
-from described_rigs import shipped
-from desk import GAZE_JOINTS
 from fakes.runs import play, simulated
 from msgspec import structs
-from recorded_rigs import Run, recorded
-from six_joints import SIX
 
-from gazerig.config.schema import Rig, load_rig, load_walk
+from gazerig.config.schema import Rig, load_walk
 from gazerig.features.lab.analysis import human_norms as bands
 from gazerig.features.lab.analysis import human_norms as human
 from gazerig.features.lab.analysis.blink_finder import BlinkEvent, BlinkFinder
@@ -37,16 +32,13 @@ from gazerig.features.lab.report.face import published_walk
 from gazerig.features.lab.report.gaze_trace import (
     GazeTrace,
     GazeTraceBuilder,
-    ReactionFinder,
     TraceRow,
 )
-from gazerig.features.lab.report.joint_basis import JointBasis
 from gazerig.features.lab.report.measures import judge_run
 from gazerig.features.lab.report.page import (
     RunHeader,
     band_text,
 )
-from gazerig.features.lab.report.servo_saccades import eye_joint, eye_servo_text, saccade_times
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
     MeasureResult,
@@ -57,7 +49,7 @@ from gazerig.features.lab.report.statistics import (
 from gazerig.gaze.lids.blink import closure
 from gazerig.gaze.oculomotor.saccade import SaccadeModel as Jumps
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
-from gazerig.gaze.types import PARTS, Bodies, Percept, Vec3
+from gazerig.gaze.types import PARTS, Vec3
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
@@ -390,7 +382,7 @@ def test_what_is_not_measured_or_stopped_makes_no_events(ticks: list[Tick]) -> N
     assert [event for tick in stopped for event in events.update(tick)] == []
 
 
-# --- Measures of landings, rests, gains, blinks and reactions, from synthetic traces
+# --- Measures of landings, rests, gains and blinks, from synthetic traces
 
 
 def flown(jumps: list[tuple[float, float, float]], over: float = 0.0) -> GazeTrace:
@@ -435,31 +427,6 @@ def test_a_floor_under_rests_is_a_spike_and_a_smooth_law_is_none() -> None:
     assert all(rests.largest_slot_excess(np.maximum(each, 0.2)) > 0.2 for each in smooth)
 
 
-def test_reactions_begin_with_the_first_frame_and_are_told_from_choices() -> None:
-    def tick(t_s: float, ids: tuple[int, ...], on: int, saccades: int) -> Tick:
-        n = len(ids)
-        zero = np.zeros((n, 3))
-        seen = Bodies(ids, ("hand",) * n, zero, zero, zero, np.zeros(n))
-        return cast(
-            Tick,
-            SimpleNamespace(
-                t_s=t_s, percept=Percept(t_s - 0.06, seen), stopped="",
-                target=SimpleNamespace(kind="hand", id=on),
-                gaze=SimpleNamespace(saccades=saccades),
-            ),
-        )  # fmt: skip
-
-    finder = ReactionFinder()
-    assert finder.update(tick(1.0, (1,), 1, 0)) is None
-    assert finder.update(tick(1.1, (1,), 1, 1)) is None  # was there from the beginning
-    assert finder.update(tick(2.0, (1, 2), 1, 1)) is None
-    found = finder.update(tick(2.2, (1, 2), 2, 2))
-    assert found is not None and found.latency_s == pytest.approx(0.26)
-    assert finder.update(tick(2.5, (1, 2), 2, 3)) is None  # no longer new
-    assert finder.update(tick(3.0, (1, 2, 3), 2, 3)) is None
-    assert finder.update(tick(4.5, (1, 2, 3), 3, 4)) is None  # a choice
-
-
 def test_density_keeps_the_time_and_lies_where_it_was_looked() -> None:
     """Figures 8 and 9 of Nakamoto & Tsuruno: a look at the right eye, and one beside the face."""
     y_m, z_m = PARTS_FACE_M["RE"][1:]
@@ -469,87 +436,3 @@ def test_density_keeps_the_time_and_lies_where_it_was_looked() -> None:
     assert places_z_m[row] == pytest.approx(z_m, abs=0.005)
     assert places_y_m[column] == pytest.approx(y_m, abs=0.005)
     assert density == pytest.approx(2.0 * face.gaze_density(np.array([[y_m, z_m, 1.0]])))
-
-
-# ---- Reports of a rig of six hobby servos without a neck mark estimated results.
-
-
-@pytest.fixture(scope="module")
-def maker(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return recorded(tmp_path_factory.mktemp("six") / "maker.mcap", load_rig("maker"), 4.2)
-
-
-def quiet(words: str, share: float) -> None:
-    """Ignore progress."""
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("unlaid_figures")
-def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
-    from gazerig.features.lab.report.report import make_report, read_run
-
-    out = tmp_path / "six.html"
-    about = RunHeader("six")
-    made = make_report(read_run(maker.ticks, about, quiet), about, out, quiet)
-    rows = {row["key"]: row for row in json.loads(made.data.read_text())}
-    assert {row["basis"] for row in rows.values()} == {"estimated"}
-    page = unescape(out.read_text())
-    assert "Nothing here is measured: the servos of this rig have no feedback" in page
-    assert "not measured" in page.partition("Saccades <span")[2][:120]
-    assert "measured from the servos" not in page
-    for key in ("head_slope", "head_share", "head_after", "head_peak", "vor", "vergence",
-                "vergence_ok", "unasked"):  # fmt: skip
-        assert key not in rows, key
-    drawn = {path.stem for path in (tmp_path / "six_figures").iterdir()}
-    assert "blink_shape" in drawn and drawn.isdisjoint(("head_part", "vor", "vergence"))
-    assert "This rig has no neck" in page and "they stay parallel" in page
-
-
-@pytest.mark.parametrize(
-    ("names", "key", "words"),
-    [
-        (SIX, "vor", "no neck"),
-        (("left_eye_pan", "neck_yaw"), "vor", ""),
-        (("left_eye_pan", "neck_pitch"), "head_part", "turns the head sideways"),
-    ],
-)
-def test_what_cannot_be_told_says_why(names: tuple[str, ...], key: str, words: str) -> None:
-    why = JointBasis(names).left_out(key)
-    assert (words in why) if words else why == ""
-
-
-def test_a_rig_of_both_kinds_of_servos_is_measured_in_parts() -> None:
-    eyes = JointBasis(GAZE_JOINTS, tuple(name for name in GAZE_JOINTS if "eye" in name))
-    assert eyes.basis("Saccades") == "partly estimated" and eyes.basis("Lids") == "measured"
-    assert eyes.whole_basis == "partly estimated" and eyes.left_out("unasked")
-    lids = JointBasis(GAZE_JOINTS, ("left_upper_lid", "right_upper_lid"))
-    assert lids.basis("Lids") == "estimated" and lids.basis("On the face") == "measured"
-    assert not lids.left_out("unasked")
-
-
-# ---- Saccades that the eye servo of a rig can make.
-
-
-def test_an_xl330_makes_saccades_of_human_speed_and_a_slow_servo_none() -> None:
-    rig = shipped("desk")
-    assert eye_joint(rig) == "left_eye_pan"
-    for times in saccade_times(rig, "left_eye_pan"):
-        assert times.servo_ms is not None
-        assert times.model_ms < times.servo_ms < times.model_ms + 20
-    slow = replace(rig.joints["left_eye_pan"], model="xm430-w350", gains=None)
-    slow_rig = replace(rig, joints={**rig.joints, "left_eye_pan": slow})
-    *_, large = saccade_times(slow_rig, "left_eye_pan")
-    assert large.servo_ms is not None and large.servo_ms > 3 * large.model_ms
-
-
-@pytest.mark.parametrize("name", ["desk", "maker", "minimal"])
-def test_the_text_names_the_servo_and_both_times(name: str) -> None:
-    rig = shipped(name)
-    joint = eye_joint(rig)
-    assert joint is not None
-    text = eye_servo_text(rig) or ""
-    assert text.startswith(
-        f"{rig.joints[joint].model}, emulated: within 1 deg of 5, 10, 20 deg after"
-    )
-    assert "; the model after " in text
-    assert eye_servo_text(replace(rig, joints={"neck_yaw": rig.joints[joint]})) is None

@@ -6,14 +6,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
-import numpy as np
 import pytest
 from command_line import Invoked, invoked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.load import ConfigError
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
@@ -21,7 +18,6 @@ from gazerig.features.lab.analysis.human_norms import BY_KEY
 from gazerig.features.lab.sweep.axes import (
     Axis,
     Point,
-    grid,
     latin_hypercube,
     make_axes,
 )
@@ -82,13 +78,6 @@ def test_a_run_that_fails_is_a_row_with_its_reason(finished: Path) -> None:
     assert "wall_seconds" not in rows[0]  # no two runs take the same
 
 
-def test_the_responses_are_drawn_and_a_second_sweep_needs_another_folder(finished: Path) -> None:
-    image = cv2.imdecode(np.frombuffer((finished / "response.png").read_bytes(), np.uint8), 1)
-    assert image is not None and image.shape[0] > 200 and image.std() > 5.0
-    done = swept(finished, "--set", f"{LOW}=-25.0,0.0", "--seeds", "1")
-    assert done.code == 2 and "holds other files: give an empty folder with --out" in done.err
-
-
 def test_ctrl_c_leaves_the_table_of_what_is_finished(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -121,22 +110,6 @@ def test_two_processes_make_the_table_of_one(desk_rig: Rig, tmp_path: Path) -> N
 # ---- what is refused
 
 
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        ((), "nothing to vary: give --set KEY=VALUES"),
-        (("--set", f"{EYES_ALONE}=4,8", "--show", "blink_rat"), "did you mean 'blink_rate'?"),
-        (("--set", f"{EYES_ALONE}=4,8", "--bus", "real"), "--bus real: unknown"),
-    ],
-)
-def test_what_cannot_be_run_is_refused_before_a_folder_is_made(
-    tmp_path: Path, words: tuple[str, ...], text: str
-) -> None:
-    done = swept(tmp_path / "out", *words)
-    assert done.code == 2 and text in done.err
-    assert not (tmp_path / "out").exists()
-
-
 BLINKING = "gaze.lids.blinks_per_min"
 
 
@@ -158,37 +131,6 @@ def test_steps_lists_and_ranges_are_read() -> None:
     assert words.values == ("min_jerk", "human") and flags.values == (True, False)
     assert reach.is_range and (reach.low, reach.high, reach.whole) == (8.0, 30.5, False)
     assert reach.label == f"{BLINKING}, 1/min" and words.label == "gaze.saccade.profile"
-
-
-@pytest.mark.parametrize(
-    ("setting", "error", "text"),
-    [
-        (
-            "gaze.head.eye_only_rnge_deg=4:16:7",
-            ConfigError,
-            "no key 'eye_only_rnge_deg'; did you mean",
-        ),
-        (f"{EYES_ALONE}=4:200", ConfigError, "is 200.0, wanted a number, 0 to 180 deg"),
-        (f"{EYES_ALONE}", SetupError, "not KEY=VALUES; values are LOW:HIGH:STEPS"),
-        (f"{EYES_ALONE}=9:4:3", SetupError, "9 is not below 4"),
-        (f"{EYES_ALONE}=4:9:1", SetupError, "1 steps; wanted 2 to"),
-        (f"{EYES_ALONE}=4,5,4", SetupError, "a value is given twice"),
-        ("profile=robot,mitake", SetupError, "it acts while files are read; give --profile"),
-    ],
-)
-def test_what_cannot_be_a_setting_is_refused(
-    setting: str, error: type[Exception], text: str
-) -> None:
-    with pytest.raises(error) as refused:
-        read(setting)
-    assert text in str(refused.value)
-
-
-def test_a_range_and_too_many_points_make_no_grid() -> None:
-    with pytest.raises(SetupError, match="needs --samples N or --fit; for a grid write .*:STEPS"):
-        grid(read(f"{EYES_ALONE}=4:16"))
-    with pytest.raises(SetupError, match="at most 100000"):
-        grid(read(f"{EYES_ALONE}=4:16:1000", f"{BLINKING}=1:60:1000"))
 
 
 OTHER_AXES = (
@@ -262,25 +204,3 @@ def test_measures_count_if_half_of_the_runs_can_judge_them() -> None:
         counted_measures([outcome(START, 0, (None, None, None))])
     with pytest.raises(SetupError, match="own values cannot be run: it failed"):
         counted_measures([Outcome(START, 0, {}, "it failed")])
-
-
-def test_a_small_fit_writes_what_it_found(tmp_path: Path) -> None:
-    out, key, jerky = tmp_path / "fit", "gaze.saccade.profile", tmp_path / "jerky.yaml"
-    jerky.write_text(  # and so many shifts that a few seconds judge most measures
-        "gaze: {saccade: {profile: literal_frame}, lids: {hold_ms: 50},\n"
-        "  scanpath: {rate_scale: 4, law: literal}, looks_away: none}\n"
-    )
-    words = (
-        *("sweep", "--fit", "--out", str(out), "--seconds", "7", "--bus", "ideal", "--jobs", "1"),
-        *("--set", f"{key}=literal_frame,min_jerk", "--seeds", "1", "--samples", "16"),
-        *("--character", str(jerky)),
-    )
-    done = invoked(*words)
-    assert done.code == 0, done.err
-    assert "measures count, 2 points tried; outside: " in done.err
-    assert f"{key}: literal_frame -> min_jerk" in done.err
-    assert f"to run it: gazerig run desk --character {out}/best.yaml" in done.err
-    best = load_rig("desk", str(out / "best.yaml")).gaze
-    assert (best.saccade.profile, best.lids.hold_ms) == ("min_jerk", 50.0)
-    rows = (out / "table.csv").read_text().splitlines()
-    assert [row.split(",")[0] for row in rows] == [key, "literal_frame", "min_jerk"]

@@ -3,7 +3,6 @@
 import pickle
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,19 +25,6 @@ WORLDS = sorted(
 )
 HEAD_TRIANGLES = 31_000  # of the expressive rig's
 MOST_TRIANGLES, MOST_BYTES = 150_000, 3_000_000
-
-MJCF = """<mujoco>
-  <asset><material name="blue" rgba="0 0 1 1"/></asset>
-  <worldbody>
-    <geom name="floor" type="plane" size="2 2 .1" pos="0 0 -1" rgba=".5 .4 .3 1"/>
-    <body pos="1 0 0"><geom type="sphere" size=".1" material="blue"/></body>
-    <body pos="1 .5 0"><geom type="capsule" size=".05 .2" euler="90 0 0"/></body>
-    <body pos="1 -.5 0"><geom type="cylinder" size=".05 .2"/><geom size=".3" group="3"/></body>
-    <body pos="0 1 0"><geom type="box" size=".1 .2 .3"/><geom size=".4" rgba="1 1 1 0"/></body>
-    <body pos="0 0 .1"><joint name="neck_yaw" axis="0 0 1"/><geom size=".5"/>
-      <body><geom size=".6"/></body></body>
-  </worldbody>
-</mujoco>"""
 
 
 @cache
@@ -95,25 +81,3 @@ def test_everybody_is_where_mujoco_has_them(mujoco: Any) -> None:
             body = model.body(name).id
             assert np.allclose(turn, data.xquat[body], atol=1e-9), name
             assert np.allclose(p_world_m, data.xpos[body], atol=1e-9), name
-
-
-def test_a_users_world_is_shown_without_the_rig_and_what_mujoco_hides(tmp_path: Path) -> None:
-    (tmp_path / "mine.xml").write_text(MJCF)
-    parts = shapes_of(WorldSpec(None, (desk(),), tmp_path / "mine.xml")).parts()
-    sizes = np.array([np.ptp(_vertices(part), axis=0) for part in parts])
-    wanted = ((4, 4, 0), (0.2, 0.2, 0.2), (0.1, 0.5, 0.1), (0.1, 0.1, 0.4), (0.2, 0.4, 0.6))
-    assert sizes == pytest.approx(np.array(wanted), abs=0.002)
-    middles = [np.mean([_vertices(p).min(axis=0), _vertices(p).max(axis=0)], axis=0) for p in parts]
-    assert np.array(middles[1:]) == pytest.approx(
-        np.array(((1, 0, 0), (1, 0.5, 0), (1, -0.5, 0), (0, 1, 0))), abs=0.01
-    )
-    ball = parts[1].shape
-    assert isinstance(ball, Painted) and ball.colours[0].tolist() == [0.0, 0.0, 255.0]
-    for part in parts:  # faces are turned outwards, for their backs are not drawn
-        assert isinstance(part.shape, Painted)
-        (vertices, faces), _, normals = part.shape
-        assert normals is not None
-        a, b, c = (vertices[faces[:, i]] for i in range(3))
-        flat = np.cross(b - a, c - a)
-        seen = np.linalg.norm(flat, axis=1) > 1e-9
-        assert ((flat * normals[faces[:, 0]]).sum(axis=1)[seen] > 0.0).mean() > 0.95
