@@ -21,10 +21,10 @@ Equal shifts differ: slope, onset and duration scatter within bounds. The head c
 face than to a thing, as people face each other, and at once to an urgent target: a speaker, an
 addressed partner, a person who has just come. Eyes in their corners strain: the strain grows faster
 the more eccentric they are, whatever they look at, while the head rests, and when it is large the
-head turns slowly to recentre them. So a glance elsewhere does not end it. A target in sustained motion is
-pursued by the head too: each tick plans a minimum-jerk movement of .6 s to where the target will be
-soon. On a ramp this lags by .6 of that time, .36 s, less the .2 s of foresight; people's heads lag
-by .1 to .2 s. When the motion ends, the last plan brings the head to rest.
+head turns slowly to recentre them. So a glance elsewhere does not end it. A target in sustained
+motion is pursued by the head too: each tick plans a minimum-jerk movement of .6 s to where the
+target will be soon. On a ramp this lags by .6 of that time, .36 s, less the .2 s of foresight;
+people's heads lag by .1 to .2 s. When the motion ends, the last plan brings the head to rest.
 During a look away the head goes on with the person, and takes the share in it that the centre of
 its target has in the way from the face; it returns to where it was.
 """

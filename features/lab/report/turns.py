@@ -105,8 +105,7 @@ class TurnLooks:
         return np.array([row for row in rows if row[1] > 0.0]).reshape(-1, 3)
 
     def directions(self, role: Role) -> list[str]:
-        """Return the direction of each look away that begins in a role, but for those of a thought,
-        which go up."""
+        """Return the direction of each look away that begins in a role and not in a thought."""
         within = [(a, b) for a, b in self._stretches(role) if self.run.state[a] != _THINKS]
         return [one.direction for one in self.looks if any(a <= one.first < b for a, b in within)]
 
