@@ -37,6 +37,13 @@ class LevelRange(NamedTuple):
         low, high = self.low.to_flat(), self.high.to_flat()
         return tuple([a + value * (b - a) for a, b in zip(low, high, strict=True)])
 
+    def value_of(self, offset: PoseOffset) -> float:
+        """Return the value, 0..1, whose offset is nearest to one."""
+        low, high = self.low.to_flat(), self.high.to_flat()
+        rows = [(b - a, c - a) for a, b, c in zip(low, high, offset.to_flat(), strict=True)]
+        length = sum([way * way for way, _ in rows])
+        return min(max(sum([way * done for way, done in rows]) / max(length, 1e-12), 0.0), 1.0)
+
 
 class _Level:
     """Motion of one level to its value."""
