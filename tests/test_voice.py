@@ -102,24 +102,6 @@ def test_the_jaw_follows_the_speech_and_is_shut_at_its_end(folder: Path, what: s
             assert 4 <= shut <= 7  # once in each of six syllables
 
 
-def test_the_same_speech_gives_the_same_bytes(folder: Path) -> None:
-    digests = []
-    for _ in range(2):
-        with opened(folder, fast=True) as head:
-            head.say("short.wav").wait(10.0)
-            digests.append(head._composed.assembly.sent_bytes_digest())
-    assert digests[0] == digests[1]
-
-
-def test_a_rig_without_a_mouth_plays_the_sound(folder: Path) -> None:
-    with gazerig.open("desk", fast=True) as head:
-        order = head.say(folder / "short.wav")
-        assert order.wait(10.0) == "arrived"
-        assert order.reply.track is not None and order.reply.track.duration_s == pytest.approx(
-            1.5, abs=0.05
-        )
-
-
 @pytest.mark.parametrize(
     ("what", "message"),
     [

@@ -62,7 +62,7 @@ class Drift:
     """
 
     def __init__(self, law: DriftLaw, rng: np.random.Generator) -> None:
-        self._rng, (self._speech_rng,) = rng, rng.spawn(1)
+        self._rng = rng
         self._law = law
         self.reset(0.0)
 
@@ -72,7 +72,8 @@ class Drift:
         self._share = MinimumJerkBlend((float(self._law == "people"),), _GLIDE_S)
         self._wander = _Wander(_SWAY_RAD, _PERIODS_S, self._rng, t_s)
         self._speech_share = MinimumJerkBlend((0.0,), _SPEECH_GLIDE_S)
-        self._speech: _Wander | None = None
+        (speech_rng,) = self._rng.spawn(1)
+        self._speech = _Wander(_SPEECH_RAD, _SPEECH_PERIODS_S, speech_rng, t_s)
 
     def retune(self, law: DriftLaw) -> None:
         """Begin or end gradually."""
@@ -96,11 +97,6 @@ class Drift:
         breath_rad = min_jerk(breaths) * _BREATH_RAD * sin(2.0 * pi * breaths)
         yaw, pitch, roll = self._wander.step(t_s)
         drift = share * yaw, share * (breath_rad + pitch), share * roll
-        if speech_share == 0.0:
-            self._speech = None
-            return drift
-        if self._speech is None:
-            self._speech = _Wander(_SPEECH_RAD, _SPEECH_PERIODS_S, self._speech_rng, t_s)
         return add(drift, scale(self._speech.step(t_s), share * speech_share))
 
 

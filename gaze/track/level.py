@@ -38,11 +38,10 @@ class LevelRange(NamedTuple):
         return tuple([a + value * (b - a) for a, b in zip(low, high, strict=True)])
 
     def value_of(self, offset: PoseOffset) -> float:
-        """Return the value, 0..1, whose offset is nearest to one."""
-        low, high = self.low.to_flat(), self.high.to_flat()
-        rows = [(b - a, c - a) for a, b, c in zip(low, high, offset.to_flat(), strict=True)]
-        length = sum([way * way for way, _ in rows])
-        return min(max(sum([way * done for way, done in rows]) / max(length, 1e-12), 0.0), 1.0)
+        """Return the value, 0..1, of an offset, by what the level moves most."""
+        rows = zip(self.low.to_flat(), self.high.to_flat(), offset.to_flat(), strict=True)
+        low, high, now = max(rows, key=lambda row: abs(row[1] - row[0]))
+        return min(max((now - low) / (high - low or 1.0), 0.0), 1.0)
 
 
 class _Level:
