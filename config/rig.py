@@ -128,7 +128,7 @@ class GazeConfig(PluginSections):
     saccade: Annotated[SaccadeParams, "saccades of the eyes"] = SaccadeParams()
     pursuit: Annotated[PursuitParams, "smooth pursuit of the eyes"] = PursuitParams()
     head: Annotated[HeadParams, "head movements in gaze shifts"] = HeadParams()
-    drift: Annotated[DriftLaw, "breathing, and small random sway of a head at rest"] = "people"
+    drift: Annotated[DriftLaw, "breathing, small random sway of a head at rest, and the motion of a speaker's"] = "people"
     lids: Annotated[LidParams, "blinks"] = LidParams()
     mouth: Annotated[MouthParams, "motion while the head speaks"] = MouthParams()
     oculomotor: Annotated[OculomotorParams, "coordination of saccades, pursuit and head"] = OculomotorParams()

@@ -338,7 +338,7 @@ class Head(ABC):
 
     def say(
         self, what: str | Path | Iterable[bytes], *, rate_hz: int = 16000, channels: int = 1,
-        volume: float = 1.0, sway: bool = True,
+        volume: float = 1.0,
     ) -> Order:  # fmt: skip
         """Say a sound file, a text, or a stream, with the mouth of a rig that has one.
 
@@ -351,7 +351,6 @@ class Head(ABC):
             rate_hz: rate of a stream.
             channels: number of channels of a stream, 1 or 2.
             volume: factor 0..1; with 0, only the mouth moves, to a stream that is heard elsewhere.
-            sway: whether the head sways slightly; for a file or a text.
 
         Raises:
             Refused: it cannot be said; the message names the file or program and the remedy.
@@ -361,7 +360,7 @@ class Head(ABC):
         text = str(what)
         if Path(text).suffix.lower() in KINDS and Path(text).is_file():
             text = str(Path(text).absolute())
-        return self._send(Say(text, volume, sway))
+        return self._send(Say(text, volume))
 
     def _say_stream(
         self, pieces: Iterable[bytes], rate_hz: int, channels: int, volume: float

@@ -13,6 +13,7 @@ from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import CommandReply
 
 YAW = GAZE_JOINTS.index("neck_yaw")
+NECK = slice(YAW, YAW + 3)
 
 
 @dataclass

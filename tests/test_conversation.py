@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from commanded_robot import Running
+from commanded_robot import NECK, Running
 from fakes.runs import simulated
 from gaze_targets import target
 
@@ -22,7 +22,7 @@ from gazerig.gaze.attention.conversation import (
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.control.head_state import HeadState, head_state
 from gazerig.robot.dashboard.door.programs import ProgramSocket
-from gazerig.robot.model.commands import LookAt, Renew, Talk, TalkOrder
+from gazerig.robot.model.commands import LookAt, Renew, Speak, Talk, TalkOrder
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.reply import CommandReply
 
@@ -161,7 +161,8 @@ def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
     assert len(shifts) > 5 and sorted(shifts)[len(shifts) // 2] < 0.4
     # The partner who interrupts is looked at, whoever's mouth has moved before.
     running.do(Talk("speaking", addressee, seconds=60.0, stay=True))
-    for tick in running.go(30.0):
+    for _ in range(300):
+        tick = running.go(0.1)[-1]
         assert tick.percept is not None
         seen = {face.id: face.speaks for face in tick.percept.faces}
         if tick.target.id not in (-1, addressee) and addressee in seen and any(seen.values()):
@@ -174,9 +175,17 @@ def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
 
 def test_a_listener_nods_on_the_robot() -> None:
     with gazerig.open("desk", fast=True, scene="face-to-face") as head:
-        head.set({"gaze.conversation.nods_per_min": 30.0})
         head.listening()
-        assert head.run_until(lambda state: any(one.name == NOD for one in state.tracks), 20.0)
+        assert head.run_until(lambda state: any(one.name == NOD for one in state.tracks), 40.0)
+
+
+def test_a_speakers_head_moves_more_than_a_silent_one(running: Running) -> None:
+    moved = []
+    for one in (Talk("idle"), Talk("speaking", stay=True), Talk("idle"), Speak("", 6.0)):
+        running.do(one, 1.0)
+        goals = np.array([tick.guard_result.command_rad[NECK] for tick in running.go(4.0)])
+        moved.append(np.median(np.abs(np.diff(goals, axis=0))))
+    assert min(moved[1::2]) > 2.0 * max(moved[::2])
 
 
 def test_a_websocket_renews_what_its_program_controls() -> None:

@@ -10,9 +10,10 @@ DT = 0.005
 STEP_DEG = 360.0 / 4096.0
 
 
-def trace(seconds: float, seed: int = 0, dt_s: float = DT) -> Floats:
+def trace(seconds: float, seed: int = 0, dt_s: float = DT, loudness: float | None = None) -> Floats:
     """Return yaw, pitch and roll of a drift from rest, (n, 3) degrees."""
     model = Drift("people", np.random.default_rng(seed))
+    model.speak(loudness)
     return np.degrees([model.step(k * dt_s) for k in range(round(seconds / dt_s))])
 
 
@@ -41,6 +42,13 @@ def test_it_starts_in_the_middle_smoothly_and_whatever_the_rate() -> None:
     assert speed.max() < 4.0 and np.abs(np.diff(angles, 2, axis=0)).max() / DT**2 < 40.0
     coarse = trace(20.0, dt_s=0.02)
     assert np.abs(coarse - angles[::4]).max() < 0.6, "the same draws"
+
+
+def test_a_speaker_moves_faster_but_quietly_for_servos() -> None:
+    silent, low, loud = (
+        np.abs(np.diff(trace(60.0, loudness=one), axis=0)) for one in (None, 0.05, 1.0)
+    )
+    assert loud.mean() > 1.5 * low.mean() > 2.0 * silent.mean() and loud.max() < 2.0 * STEP_DEG
 
 
 def test_it_begins_and_ends_gradually_and_none_draws_nothing() -> None:

@@ -1,7 +1,6 @@
 """Blinks, winks and lids that follow the gaze; numbered checks: docs/checks.md."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import cos, radians, sin
 from typing import NamedTuple
 
@@ -399,26 +398,6 @@ def test_lids_glide_to_what_they_are_retuned_to() -> None:
     trace = [before, *(model.step(1.0 + k * DT, radians(-20.0), None) for k in range(70))]
     assert np.abs(np.diff(np.array(trace), axis=0)).max() <= 1.875 * 0.5 * DT / 0.3 + 1e-9
     assert trace[-1][0] == pytest.approx(0.3) and trace[-1][3] == pytest.approx(LOWER_AWAKE)
-
-
-def test_a_wink_that_is_over_does_not_come_back_when_blinks_are_made_longer() -> None:
-    model = still_lids()
-    winked(model, 1.0)
-    model.step(1.6, 0.0, None)
-    model.retune(LidParams(blinks_per_min=0.0, close_ms=500.0, hold_ms=1000.0, open_ms=1500.0))
-    for k in range(1, 400):
-        assert model.step(1.6 + k * DT, 0.0, None) == (0.75, 0.75, False, LOWER_AWAKE, LOWER_AWAKE)
-
-
-def test_a_higher_rate_begins_no_blink_within_a_blink() -> None:
-    slow = LidParams(0.0, 500.0, 1000.0, 1500.0, law="nakamoto")
-    model = Lids(slow, np.random.default_rng(0))
-    assert not model.step(0.0, 0.0, radians(90.0)).blink and model.blinks == 1
-    assert model.step(0.6, 0.0, None).lower_left == 0.0
-    model.retune(replace(slow, blinks_per_min=60.0))
-    trace = [model.step(0.6 + k * DT, 0.0, None)[3] for k in range(round(2.39 / DT))]
-    assert np.abs(np.diff(trace)).max() <= 2.2 / 1.5 * DT and model.blinks == 1
-    assert model.step(3.02, 0.0, None) and model.blinks == 2
 
 
 # ---- Whatever the parameters and whatever happens, lids stay between shut and open and never jump.

@@ -15,13 +15,11 @@ from gazerig.gaze.mouth.loudness import (
 from gazerig.gaze.mouth.mouth_keys import (
     Closure,
     JawLimits,
-    MouthKey,
     estimated_closures,
     frame_s,
     mouth_keys,
     phoneme_closures,
 )
-from gazerig.gaze.mouth.speech_track import sway_keys
 from gazerig.gaze.mouth.stream_mouth import StreamMouth
 from gazerig.gaze.types import Floats
 
@@ -125,13 +123,3 @@ def test_a_stream_opens_the_mouth_as_the_whole_sound_does() -> None:
     found = np.array([mouth.opening_at(at_s) for at_s in times])
     assert np.corrcoef(found, whole[100 : 100 + len(found)])[0, 1] > 0.95
     assert mouth.opening_at(-1.0) == mouth.opening_at(4.0) == 0.0
-
-
-def test_the_sway_is_bounded_larger_in_loud_parts_and_the_same_each_time() -> None:
-    small, large = (
-        sway_keys([MouthKey(0.0, value), MouthKey(9.0, value)], 9.0, 2.0) for value in (0.0, 1.0)
-    )
-    assert max(abs(key.offset_deg) for key in large) == pytest.approx(2.0)
-    assert max(abs(key.offset_deg) for key in small) == pytest.approx(0.6)
-    assert sway_keys((), 9.0, 2.0) == large
-    assert [key.time_s for key in large] == sorted(key.time_s for key in large)

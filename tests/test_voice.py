@@ -100,26 +100,6 @@ def test_the_jaw_follows_the_speech_and_is_shut_at_its_end(folder: Path, what: s
         if what != "text":
             shut = sum(1 for a, b, c in zip(jaw, jaw[1:], jaw[2:], strict=False) if a > b <= c)
             assert 4 <= shut <= 7  # once in each of six syllables
-        sway = [one for one in head.state.tracks if one.name == "speech_sway"]
-        assert len(sway) == 1
-
-
-def test_the_same_speech_gives_the_same_bytes(folder: Path) -> None:
-    digests = []
-    for _ in range(2):
-        with opened(folder, fast=True) as head:
-            head.say("short.wav").wait(10.0)
-            digests.append(head._composed.assembly.sent_bytes_digest())
-    assert digests[0] == digests[1]
-
-
-def test_a_rig_without_a_mouth_plays_the_sound_and_sways(folder: Path) -> None:
-    with gazerig.open("desk", fast=True) as head:
-        order = head.say(folder / "short.wav")
-        assert order.wait(10.0) == "arrived"
-        assert order.reply.track is not None and order.reply.track.duration_s == pytest.approx(
-            1.5, abs=0.05
-        )
 
 
 @pytest.mark.parametrize(
@@ -156,7 +136,6 @@ def test_clients_of_the_network_may_name_sounds_of_the_folders_only(
 BAD: list[Any] = [
     Say("a", volume=1.5), Say(3),  # type: ignore[arg-type]
     Speak("", 1e9), Speak("", float("nan")), Speak("", 1.0, "mouth", ((0.1, 2.0),)),
-    Speak("", 1.0, sway_deg=90.0),
 ]  # fmt: skip
 
 

@@ -78,7 +78,7 @@ class AttentionParams:
     habituation: Annotated[HabituationParams | Literal["none"],
         "habituation to what is looked at, and inhibition of return; none: neither"] = field(default_factory=HabituationParams)
     reaction: Annotated[Literal["people", "none"],
-        "people: a change of target takes their reaction time; none: it is immediate"] = "people"
+        "people: a change of target takes their reaction time, and they flinch from what flies at the face; none: neither"] = "people"
     social: Annotated[Literal["people", "none"],
         "people: who looks, speaks, gestures or is near counts for more, and faces out of view are remembered; none: all "
         "bodies count for their motion and by the rules alone"] = "people"
@@ -129,6 +129,7 @@ class Attention:
         self._params = params
         self._habituation.params = params.habituation
         self._reaction.immediate = params.reaction == "none"
+        self.top_down.startles = params.reaction == "people"
         self._social = params.social == "people"
 
     def reset(self, t_s: float) -> None:

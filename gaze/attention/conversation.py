@@ -7,8 +7,8 @@ table ``ROLES``:
 none       Without a conversation two people who face each other prefer periods of mutual gaze of
            3.3 s (Binetti et al. 2016, n = 498, a median); no measurement of the looks away between
            them is known, a listener's short ones are used.
-talk       Talking and listening people (Lee, Badler & Badler 2002, Eyes Alive).
-listen
+talk       Talking and listening people (Lee, Badler & Badler 2002, Eyes Alive; of their eight
+listen     directions half of each diagonal counts as aside).
 think      Thinking people look mostly up, for longer (Andrist et al. 2014: 70 % up, 20 down).
 thinking
 speaking   In reported turns the numbers are those of 19 people in remote talk (Dembinsky et
@@ -31,7 +31,8 @@ Of several people a listener looks most at the one who speaks, a speaker at the 
 et al. 2001: 88 and 77 %). A side participant, whom the present speaker does not look at, is a
 listener too: when another person begins to speak, the gaze shifts there (Holler & Kendrick 2015).
 
-Nods and brow flashes of a listener are individual (Blomsma 2024): each head has its own rate.
+Nods of a listener are individual (Blomsma 2024): each head has its own rate. With
+words, American listeners respond 7 times a minute, Japanese ones 15 times (Maynard 1990).
 """
 
 from dataclasses import dataclass
@@ -59,7 +60,7 @@ class Role(NamedTuple):
     face_s, face_sd_s: mean and standard deviation of the time on the face; 0: an exponential time
     away_s, away_sd_s: of the time away
     least_deg, most_deg: smallest and largest angle of a look away
-    ways: shares of looks that go aside, and up, the rest down; None: by the sectors of Eyes Alive
+    ways: shares of looks that go aside, and up, the rest down
     head: share of the head in a look away
     """
 
@@ -69,15 +70,16 @@ class Role(NamedTuple):
     away_sd_s: float
     least_deg: float
     most_deg: float
-    ways: tuple[float, float] | None = None
+    ways: tuple[float, float]
     head: float = 0.0
 
 
-_THINKS_UP, _SIDEWAYS, _HEAD = (0.10, 0.70), (0.78, 0.15), 0.4
+_ANYWHERE, _THINKS_UP, _SIDEWAYS = (0.47, 0.25), (0.10, 0.70), (0.78, 0.15)
+_HEAD = 0.4
 ROLES = {
-    "none": Role(3.62, 1.63, 0.60, 0.30, 5.0, 22.7),
-    "talk": Role(3.13, 3.16, 0.93, 0.80, 5.0, 27.5, head=_HEAD),
-    "listen": Role(7.92, 1.57, 0.43, 0.24, 5.0, 22.7),
+    "none": Role(3.62, 1.63, 0.60, 0.30, 5.0, 22.7, _ANYWHERE),
+    "talk": Role(3.13, 3.16, 0.93, 0.80, 5.0, 27.5, _ANYWHERE, _HEAD),
+    "listen": Role(7.92, 1.57, 0.43, 0.24, 5.0, 22.7, _ANYWHERE),
     "think": Role(1.50, 0.80, 3.54, 1.26, 5.0, 27.5, _THINKS_UP, _HEAD),
     "speaking": Role(3.00, 0.0, 2.00, 0.90, 7.5, 27.5, _SIDEWAYS, _HEAD),
     "listening": Role(25.0, 0.0, 0.65, 0.30, 7.5, 22.7, _SIDEWAYS),
@@ -99,11 +101,8 @@ _DRIFT_DEG = 0.75
 _SCALE_DEG = 6.9
 """Mean angle of a look away beyond the smallest: A = -6.9 ln(P / 15.7) deg, P uniform (Eyes Alive).
 """
-# Share of gaze shifts, percent, to 0, 45, ... 315 deg; 0 is right, 90 up (Eyes Alive).
-DIRECTIONS_PERCENT = (15.54, 6.46, 17.69, 7.44, 16.80, 7.89, 20.38, 7.79)
-_ENDS = np.cumsum(DIRECTIONS_PERCENT)
 _SPREAD_DEG = 35.0
-"""Largest angle of a look between it and level, or straight up or down, in roles with ``ways``."""
+"""Largest angle of a look between it and level, or straight up or down."""
 _PLACE_S, _PLACE_SPREAD = 0.45, 0.5
 """Mean duration of a rest within a look away, and its standard deviation / mean. A speaker's rests
 last 0.19 s (median of Dembinsky et al. 2024), which sounds hectic on servos."""
@@ -116,8 +115,10 @@ _MOVES = 1.0
 _HALF_WIDE_M, _HALF_HIGH_M = 0.085, 0.125
 """Half axes of the oval of a face, a little larger than an adult's."""
 
-NOD, BROW_FLASH = "listening_nod", "listening_brows"
-"""Tracks of a listener."""
+NOD = "listening_nod"
+"""Track of a listener."""
+_SIGN_S = 0.7
+"""Their length, in which no other one begins."""
 _INDIVIDUAL = 0.5
 """Standard deviation of the logarithm of a head's own rate of nods."""
 _LONG_TURN_S, _STARTS_AVERTED = 3.5, 0.95
@@ -153,8 +154,7 @@ class ConversationParams:
     """Signs of listening."""
 
     # fmt: off
-    nods_per_min: Annotated[float, Bounds(0, 30), "nods of a listener, mean over heads; 0: none"] = 0.0
-    brow_flashes_per_min: Annotated[float, Bounds(0, 30), "brow flashes of a listener, mean over heads; 0: none"] = 0.0
+    nods_per_min: Annotated[float, Bounds(0, 30), "nods of a listener, mean over heads; 0: none"] = 6.0
     # fmt: on
 
 
@@ -180,7 +180,7 @@ class ConversationGaze:
         turn_rng: np.random.Generator,
     ) -> None:
         self._attention, self._rng, self._turn_rng = attention, rng, turn_rng
-        self._own = turn_rng.standard_normal(2).tolist()
+        self._own = exp(_INDIVIDUAL * float(turn_rng.standard_normal()))
         self._followed = FollowedLook(turn_rng)
         self.retune(looks_away, aversion, signs)
         self._state: TurnState = "idle"
@@ -264,10 +264,8 @@ class ConversationGaze:
                 self._until_s = max(self._ends_s + _LATE_S, t_s)
         if self._state != "listening" or t_s < self._next_sign_s:
             return ""
-        self._next_sign_s = t_s + self._draw_wait_s()
-        nods, brows = self._rates()
-        brow = float(self._turn_rng.random()) * (nods + brows) >= nods
-        return BROW_FLASH if brow else NOD
+        self._next_sign_s = t_s + _SIGN_S + self._draw_wait_s()
+        return NOD
 
     def look(
         self,
@@ -464,9 +462,6 @@ class ConversationGaze:
         """Draw the direction, 0 right and 90 up, uniform within a sector of the role."""
         rng, ways = self._rng, self._role.ways
         draw = float(rng.random())
-        if ways is None:
-            sector = int(np.searchsorted(_ENDS, draw * _ENDS[-1], side="right"))
-            return 45.0 * sector + float(rng.uniform(-22.5, 22.5))
         aside, up = ways
         spread_deg = float(rng.uniform(-_SPREAD_DEG, _SPREAD_DEG))
         if draw < aside:
@@ -501,15 +496,10 @@ class ConversationGaze:
             away_s = max(0.3, self._draw_normal(_START_AWAY_S, _START_AWAY_SD_S))
             self._take_role(role, t_s, averts, away_s)
 
-    def _rates(self) -> tuple[float, float]:
-        """Return this head's own rates of nods and brow flashes, per minute."""
-        nods, brows = (exp(_INDIVIDUAL * one) for one in self._own)
-        return self._signs.nods_per_min * nods, self._signs.brow_flashes_per_min * brows
-
     def _draw_wait_s(self) -> float:
-        """Draw the time to the next sign of listening; inf without signs."""
-        rate = sum(self._rates())
-        return float(self._turn_rng.exponential(60.0 / rate)) + 1.0 if rate > 0.0 else inf
+        """Draw the time to the next nod by this head's own rate; inf without nods."""
+        rate = self._signs.nods_per_min * self._own
+        return float(self._turn_rng.exponential(60.0 / rate)) if rate > 0.0 else inf
 
     def _draw_normal(self, mean_s: float, sd_s: float) -> float:
         return mean_s + sd_s * float(self._turn_rng.standard_normal())

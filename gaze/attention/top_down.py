@@ -135,6 +135,7 @@ class TopDown:
     """Top-down attention: the rules, and the present behaviour.
 
     behaviour: the present one
+    startles: whether the head flinches from what flies at the face
     named_ids: the people with the trait in the present rule, if it has one; set by the caller
         before each step
     """
@@ -143,6 +144,7 @@ class TopDown:
         self._params = params
         self._planner = ActionPlanner()
         self.behaviour = params.behaviour
+        self.startles = False
         self.reset(0.0)
 
     def retune(self, params: TopDownParams) -> None:

@@ -231,6 +231,11 @@ class Oculomotor:
         """Return ((yaw low, high), (pitch low, high)) of left eye, right eye and head."""
         return (*self._eye_limits, self._head.range_rad)
 
+    def speak(self, loudness: float | None) -> None:
+        """Move the head as a speaker does, by a loudness 0..1, or, for None, as a silent person."""
+        if self._drift is not None:
+            self._drift.speak(loudness)
+
     def _both_eyes_rad(self, distance_m: float) -> float:
         """Return the eccentricity up to which both eyes converge on a point at a distance."""
         return self._yaw_limit_rad - _NEARER * self._geometry.convergence_rad(distance_m)

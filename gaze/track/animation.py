@@ -7,6 +7,7 @@ vestibulo-ocular reflex of ``gazerig.gaze.oculomotor.oculomotor``).
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from gazerig.gaze.mouth.speech_track import SPEECH
 from gazerig.gaze.track.expression import Expressions
 from gazerig.gaze.track.level import LevelRange, Levels
 from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
@@ -20,11 +21,13 @@ class AnimationTables(NamedTuple):
     """Tables of a rig's animations.
 
     expressions: offset of each at full strength; blend_s: time from one to another
+    mouth: the level that opens the mouth, None without one
     """
 
     expressions: Mapping[str, PoseOffset]
     blend_s: float
     levels: Mapping[str, LevelRange]
+    mouth: LevelRange | None = None
 
 
 NO_TABLES = AnimationTables({}, 0.5, {})
@@ -47,6 +50,7 @@ class Animation:
         self.levels = Levels(tables.levels, len(joints))
         self.tracks = TrackPlayer(len(joints), self.expressions)
         self._sum = NO_OFFSET
+        self._mouth = tables.mouth
 
     def reset(self, t_s: float) -> None:
         """Begin at rest at a time."""
@@ -67,3 +71,10 @@ class Animation:
                 ]
                 self._sum = self._sum._replace(joints_rad=tuple(joints), owned=tracks.owned)
         return self._sum
+
+    @property
+    def loudness(self) -> float | None:
+        """Return the loudness 0..1 of a speech by its mouth, 1 without one; None: no speech."""
+        if not any([one.played.name == SPEECH for one in self.tracks.voices]):
+            return None
+        return 1.0 if self._mouth is None else self._mouth.value_of(self._sum)

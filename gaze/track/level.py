@@ -37,6 +37,12 @@ class LevelRange(NamedTuple):
         low, high = self.low.to_flat(), self.high.to_flat()
         return tuple([a + value * (b - a) for a, b in zip(low, high, strict=True)])
 
+    def value_of(self, offset: PoseOffset) -> float:
+        """Return the value, 0..1, of an offset, by what the level moves most."""
+        rows = zip(self.low.to_flat(), self.high.to_flat(), offset.to_flat(), strict=True)
+        low, high, now = max(rows, key=lambda row: abs(row[1] - row[0]))
+        return min(max((now - low) / (high - low or 1.0), 0.0), 1.0)
+
 
 class _Level:
     """Motion of one level to its value."""

@@ -93,7 +93,8 @@ def animation_tables(rig: Rig) -> AnimationTables:
     """Return the pose offsets of expressions and levels."""
     expressions = {name: pose_offset(rig, angles) for name, angles in rig.expressions.items()}
     levels = {name: _level_range(rig, level) for name, level in rig.levels.items()}
-    return AnimationTables(expressions, rig.expression_blend_s, levels)
+    mouth = levels.get(rig.gaze.mouth.level)
+    return AnimationTables(expressions, rig.expression_blend_s, levels, mouth)
 
 
 def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:

@@ -35,7 +35,7 @@ from gazerig.gaze.mouth.mouth_keys import (
     mouth_keys,
     phoneme_closures,
 )
-from gazerig.gaze.mouth.speech_track import SPEECH, SWAY_DEG
+from gazerig.gaze.mouth.speech_track import SPEECH
 from gazerig.gaze.mouth.stream_mouth import StreamMouth
 from gazerig.gaze.track.track import LIMIT_SHARE
 from gazerig.gaze.types import Floats
@@ -150,8 +150,6 @@ class RunVoice:
             phonemes = [(name, t_s + silent_s) for name, t_s in said.phonemes]
             speech = self._from_pcm(silence + said.pcm, said.rate_hz, 1, phonemes)
         self._open_loudspeaker()
-        if not command.sway:
-            speech = structs.replace(speech, sway_deg=0.0)
         return structs.replace(speech, volume=command.volume, who=command.who)
 
     def prepare_stream(
@@ -180,7 +178,7 @@ class RunVoice:
     def _speak(self, path: str, duration_s: float, keys: tuple[MouthKey, ...] = ()) -> Speak:
         rig = self._rig()
         level = rig.gaze.mouth.level if rig.gaze.mouth.level in rig.levels else ""
-        return Speak(path, duration_s, level, keys, SWAY_DEG)
+        return Speak(path, duration_s, level, keys)
 
     def _mouth(
         self, samples: Floats, rate_hz: float, spoken: Sequence[tuple[str, float]] = ()

@@ -130,7 +130,6 @@ def say_aloud(
         ),
     ],
     volume: Annotated[float, typer.Option(min=0.0, max=1.0, help="Factor on the volume.")] = 1.0,
-    sway: Annotated[bool, typer.Option(help="Let the head sway slightly.")] = True,
     rate: Annotated[int, typer.Option(help="Rate of the samples from standard input, Hz.")] = 16000,
     pid: PidOption = None,
 ) -> None:
@@ -145,7 +144,7 @@ def say_aloud(
             return
         if Path(what).suffix.lower() in KINDS and Path(what).is_file():
             what = str(Path(what).absolute())
-        say(rig.send(Say(what, volume, sway)).text())
+        say(rig.send(Say(what, volume)).text())
 
 
 def _track_line(track: Mapping[str, Any]) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from msgspec import structs
 
 from gazerig.gaze.attention.conversation import ConversationGaze
+from gazerig.gaze.attention.startle import FLINCH, Startle
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.track.track import KEEP
@@ -93,13 +94,14 @@ class CommandExecutor:
         self._guard, self._tune, self._messages, self._looks = guard, tune, messages, looks
         self._conversation = conversation
         self._taken_over = False
-        self._trigger = TrackTrigger()
+        self._trigger, self._startle = TrackTrigger(), Startle()
         self.commanded_rad: JointAngles = ()
         self.opponent: TickClockOpponent | None = None
 
     def reset(self) -> None:
         """Forget the tracks that rules have played."""
         self._trigger.reset()
+        self._startle = Startle()
 
     def models_took_over(self) -> bool:
         """Return once whether the gaze models take control again, from the present pose."""
@@ -246,7 +248,8 @@ class CommandExecutor:
     ) -> Target:
         """Return the gaze target of a track, or else attention's.
 
-        The track of the present rule is played when the gaze reaches the rule's target.
+        The track of the present rule is played when the gaze reaches the rule's target, and that
+        of the startle when something flies at the face.
 
         Args:
             target: Target that attention has chosen.
@@ -260,6 +263,9 @@ class CommandExecutor:
         )
         if name:
             self._play_by_itself(Play(name, who=f"rule {top_down.behaviour}"), t_s)
+        startles = top_down.startles and not top_down.plans  # a boxer watches the fists
+        if startles and self._startle.step(percept, pose.p_world_head_m, t_s):
+            self._play_by_itself(Play(FLINCH, who="startle"), t_s)
         if self._animation.tracks.look is KEEP:
             return target
         return self._tracks.target(target, percept, pose.p_world_head_m, t_s)

@@ -295,6 +295,10 @@ class Robot:
             target, percept, t_s, self._oculomotor.has_arrived, pose.p_world_head_m, self._gaze_m
         )
         offset = self._animation.step(t_s)
+        loudness = self._animation.loudness
+        if loudness is None and self._conversation.state.state == "speaking":
+            loudness = 1.0
+        self._oculomotor.speak(loudness)
         gaze = self._oculomotor.step(target, pose, t_s, dt_s, offset)
         self._gaze_m = gaze.gaze_point_world_m
         desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)

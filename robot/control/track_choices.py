@@ -7,7 +7,7 @@ from msgspec import Struct, structs
 
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.mouth.mouth_keys import MouthKey
-from gazerig.gaze.mouth.speech_track import SPEECH, SPEECH_SWAY, speech_track, sway_track
+from gazerig.gaze.mouth.speech_track import SPEECH, speech_track
 from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
 from gazerig.gaze.track.track import BLEND_OUT_S, KEEP, MAX_TRACKS, Track
 from gazerig.gaze.track.track_player import TrackPlayer, Voice
@@ -29,7 +29,6 @@ from gazerig.robot.model.types import JointAngles
 _MOST_KEPT = 64
 """Number of tracks with a non-default count whose curves are cached."""
 _MOST_SPEECHES = 8
-_SPEECHES = (SPEECH, SPEECH_SWAY)
 
 
 class TrackInfo(Struct, frozen=True):
@@ -100,7 +99,7 @@ class TrackChoices:
         self._sounds: dict[str, float] = {}
         self._nearest: int | None = None
         self._cache: dict[tuple[str, int], TrackMotions | TrackRefused] = {}
-        self._speeches: dict[Speak, dict[str, TrackMotions]] = {}
+        self._speeches: dict[Speak, TrackMotions] = {}
         self.retune(lid_spans_rad, latency_s)
         for name in tracks:
             self._motions(name, 0)
@@ -116,7 +115,7 @@ class TrackChoices:
         return tuple(
             name
             for name in self._tracks
-            if name not in _SPEECHES and not isinstance(self._motions(name, 0), Exception)
+            if name != SPEECH and not isinstance(self._motions(name, 0), Exception)
         )
 
     @property
@@ -170,8 +169,8 @@ class TrackChoices:
         if self._start_s(command) > length_s:
             raise ValueError(f"{command.track} lasts {length_s:.2f} s: from_s must be less")
 
-    def prepare(self, command: Speak) -> dict[str, TrackMotions]:
-        """Return the tracks of a speech by name, which takes time. Thread-safe.
+    def prepare(self, command: Speak) -> TrackMotions:
+        """Return the track of a speech, which takes time. Thread-safe.
 
         Raises:
             ValueError: The rig has no such level.
@@ -180,27 +179,21 @@ class TrackChoices:
         if key not in self._speeches:
             if command.level and command.level not in self._tables.levels:
                 raise ValueError(f"no level {command.level!r} for the mouth")
-            duration_s, sway_deg = command.duration_s, command.sway_deg
             mouth = [MouthKey(*pair) for pair in command.mouth]
-            speech = speech_track(command.sound, duration_s, command.level, mouth, command.volume)
-            tracks = {SPEECH: speech}
-            if sway_deg > 0.0 and any(name.startswith("neck_") for name in self._joints):
-                tracks[SPEECH_SWAY] = sway_track(duration_s, mouth, sway_deg)
+            track = speech_track(
+                command.sound, command.duration_s, command.level, mouth, command.volume
+            )
             for old in tuple(self._speeches)[: 1 - _MOST_SPEECHES]:
                 self._speeches.pop(old, None)
-            self._speeches[key] = {
-                name: track_motions(track, self._joints, 0, self._tables)
-                for name, track in tracks.items()
-            }
+            self._speeches[key] = track_motions(track, self._joints, 0, self._tables)
         return self._speeches[key]
 
     def speak(
         self, command: Speak, t_s: float, commanded_rad: JointAngles, limits: Sequence[JointLimit]
     ) -> CommandReply:
         """Start a speech; the arguments are those of ``play``."""
-        replies = []
-        tracks = self.prepare(command)
-        replaced = self._player.overlapping(tracks[SPEECH].motion)
+        made = self.prepare(command)
+        replaced = self._player.overlapping(made.motion)
         # A stream sets its level itself, so that its track does not overlap another speech.
         others = [
             voice
@@ -209,14 +202,9 @@ class TrackChoices:
         ]
         if others:
             self._end(others, t_s, limits, command.who)
-        for name, made in tracks.items():
-            moved = self._player.overlapping(made.motion)
-            if name == SPEECH_SWAY and any(voice.played.name != name for voice in moved):
-                continue  # another track moves the head
-            self._tracks[name], self._cache[name, 0] = made.track, made
-            played = Play(name, who=command.who, lead_s=command.lead_s, sound_s=command.duration_s)
-            replies.append(self.play(played, t_s, commanded_rad, limits))
-        return replies[0]
+        self._tracks[SPEECH], self._cache[SPEECH, 0] = made.track, made
+        played = Play(SPEECH, who=command.who, lead_s=command.lead_s, sound_s=command.duration_s)
+        return self.play(played, t_s, commanded_rad, limits)
 
     def measure_sound(self, command: Play | Speak) -> Play | Speak:
         """Return a command with lead and duration of a sound, which a recording needs."""
@@ -243,7 +231,7 @@ class TrackChoices:
         return tuple(
             self._info(name, track, limits)
             for name, track in self._tracks.items()
-            if name not in _SPEECHES
+            if name != SPEECH
         )
 
     def _info(self, name: str, track: Track, limits: Sequence[JointLimit]) -> TrackInfo:
@@ -348,18 +336,11 @@ class TrackChoices:
         self, voices: Sequence[Voice], t_s: float, limits: Sequence[JointLimit], who: str
     ) -> CommandReply:
         """End tracks early, with a blend."""
-        ended = list(voices)
-        if any(voice.played.name == SPEECH for voice in ended):
-            ended = [
-                voice
-                for voice in self._player.voices
-                if voice in ended or voice.played.name == SPEECH_SWAY
-            ]
-        least_s = max([voice.played.blend_s[1] for voice in ended], default=0.0)
-        fade_s = self._fit.fade_s(self._player.state(t_s, ended), limits, least_s or BLEND_OUT_S)
-        for voice in ended:
+        least_s = max([voice.played.blend_s[1] for voice in voices], default=0.0)
+        fade_s = self._fit.fade_s(self._player.state(t_s, voices), limits, least_s or BLEND_OUT_S)
+        for voice in voices:
             self._end_state(voice.number, f"{who or 'a user'} has ended it", t_s)
-        self._player.end(ended, t_s, fade_s)
+        self._player.end(voices, t_s, fade_s)
         return CommandReply(track=TrackReply("", fade_s))
 
     def _end_state(self, number: int, reason: str, t_s: float) -> None:

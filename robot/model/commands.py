@@ -275,23 +275,20 @@ class Say(ClientCommand, frozen=True):
     Attributes:
         what: A file, by its ending (.wav, .flac, .mp3, .ogg), or a text.
         volume: Factor 0..1.
-        sway: Whether the head sways.
     """
 
     what: str
     volume: _Share = 1.0
-    sway: bool = True
 
 
 class Speak(ClientCommand, frozen=True):
-    """Speak: a track with a sound, its mouth and a sway.
+    """Speak: a track with a sound and its mouth.
 
     Attributes:
         sound: Path of the sound, "" without one.
         duration_s: Duration in s.
         level: Level of the rig's table that opens the mouth, "" without one.
         mouth: (time in s, opening 0..1) pairs; the mouth shuts at the end.
-        sway_deg: Largest yaw of the sway.
         volume: Factor 0..1.
         lead_s: As in Play.
     """
@@ -300,7 +297,6 @@ class Speak(ClientCommand, frozen=True):
     duration_s: Annotated[float, Meta(gt=0.0, le=MAX_SPEECH_S)]
     level: str = ""
     mouth: Annotated[tuple[tuple[_SpeechTime, _Share], ...], Meta(max_length=40_000)] = ()
-    sway_deg: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.0
     volume: _Share = 1.0
     lead_s: _Lead | None = None
 
