@@ -2,8 +2,6 @@
 
 Rests run from landing to departure, visits from shift to shift. Table 1 of Nakamoto & Tsuruno has
 standard deviations of .14 to .38 s; its mean visits alone, .27 s, would make 3.7 shifts a second.
-A rest tells little of the next one: neighbours correlate by about .1 in people, also where somebody
-walks, waves and leaves.
 """
 
 from collections.abc import Sequence
@@ -35,7 +33,6 @@ WANTED = {
     "rests above 0.5 s, %": (7.0, 13.0),
     "rests above 1 s on an eye, %": (0.3, 4.0),
     "saccades, 1/s": (2.0, 3.0),
-    "visitor: correlation of neighbouring rests": (-0.1, 0.12),
 }
 
 
@@ -88,12 +85,6 @@ def beyond_the_law(rests_s: np.ndarray, parts: Sequence[str]) -> float:
     return float((shares[0] - shares[1]).max())
 
 
-def neighbours(runs: Sequence[MeasuredRun]) -> np.ndarray:
-    """Return (n, 2) the lengths of measured fixations and of those after them, all kinds."""
-    each = [np.array([f.duration_s for f in one.trace.fixations]) for one in runs]
-    return np.concatenate([np.column_stack((s[:-1], s[1:])) for s in each])
-
-
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return the figures over all seeds."""
     runs = [run(SCENE, seed=seed, seconds=seconds) for seed in seeds]
@@ -123,10 +114,5 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "saccades, 1/s": float(
             sum(one.saccades[-1] - one.saccades[0] for one in runs)
             / sum(one.t_s[-1] - one.t_s[0] for one in runs)
-        ),
-        "visitor: correlation of neighbouring rests": float(
-            np.corrcoef(
-                neighbours([run("visitor", seed=seed, seconds=seconds) for seed in seeds]).T
-            )[0, 1]
         ),
     }

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 from human.measured_run import MeasuredRun, Runner
+from human.row_45_talk import faces_deg
 from human.spells import apart_deg, spells
 
 from gazerig.robot.app.scene_files import load_scene
@@ -72,9 +73,8 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
 
 def looked_at(one: MeasuredRun) -> np.ndarray:
     """Return (n,) the number of the person whose face the measured gaze is on, -1 for none."""
-    places = [one.truth[name] for name in sorted(one.truth) if name.startswith("face")]
-    far_m = np.linalg.norm(np.stack(places) - one.head_m, axis=2)
-    ways = np.stack([one.truth_deg(f"face {number}") for number in range(len(places))])
+    places = np.stack([one.truth[name] for name in sorted(one.truth) if "face" in name])
+    far_m, ways = np.linalg.norm(places - one.head_m, axis=2), faces_deg(one)
     off = apart_deg(ways, one.gaze_deg) / np.degrees(np.arctan(_FACE_M / far_m))
     off = np.where(np.isnan(off), np.inf, off)
     who = np.where(off.min(axis=0) < 1.0, off.argmin(axis=0), -1)

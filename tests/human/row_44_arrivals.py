@@ -3,6 +3,9 @@
 People orient to someone who arrives with eyes and head, and leave the eyes near the middle of the
 head (Stahl 1999). The time begins when the face comes into the camera's field, for who is there at
 the beginning with the run; who is never in the field, or never reached, counts as late.
+
+A rest tells little of the next one, also while somebody comes, stays and goes: neighbours correlate
+by about .1 in people.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,7 +13,7 @@ from math import atan2, copysign, cos, inf, pi, radians, sin
 
 import numpy as np
 from fakes.scenes import EmptyScene
-from human.measured_run import Runner
+from human.measured_run import MeasuredRun, Runner
 from human.spells import apart_deg, spells
 from human.swinging_face import HEAD_M
 
@@ -20,6 +23,7 @@ WANTED = {
     "head within 7 deg in 2 s, % of arrivals": (95.0, 100.0),
     "there at the start: median, s": (0.0, 2.0),
     "coming or returning: median, s": (0.0, 2.0),
+    "correlation of neighbouring rests": (-0.1, 0.12),
 }
 
 _STAYS_S, _AWAY_S, _WALKS_S = 8.0, 8.0, 2.0
@@ -65,7 +69,8 @@ class Arrivals(EmptyScene):
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return the share in time and the medians, over several places and all seeds."""
     numbers = range(_SCENES * len(seeds))
-    found = [(at_start, s) for n in numbers for at_start, s in arrivals(run, n)]
+    runs = [_run(run, n) for n in numbers]
+    found = [each for n, one in zip(numbers, runs, strict=True) for each in arrivals(one, n)]
     taken_s = np.array([s for _, s in found])
     first = np.array([at_start for at_start, _ in found])
     return {
@@ -73,13 +78,26 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "there at the start: median, s": float(np.median(taken_s[first])),
         "coming or returning: median, s": float(np.median(taken_s[~first])),
         "number of arrivals": len(found),
+        "correlation of neighbouring rests": float(
+            np.corrcoef(np.concatenate([_neighbours(one) for one in runs]).T)[0, 1]
+        ),
     }
 
 
-def arrivals(run: Runner, number: int) -> Iterator[tuple[bool, float]]:
+def _run(run: Runner, number: int) -> MeasuredRun:
+    scene = Arrivals(number)
+    return run(scene, seed=number, seconds=scene.came_s(_VISITS - 1) + _STAYS_S)
+
+
+def _neighbours(one: MeasuredRun) -> np.ndarray:
+    """Return (n, 2) the lengths of measured fixations and of those after them, of all kinds."""
+    rests_s = np.array([fixation.duration_s for fixation in one.trace.fixations])
+    return np.column_stack((rests_s[:-1], rests_s[1:]))
+
+
+def arrivals(one: MeasuredRun, number: int) -> Iterator[tuple[bool, float]]:
     """Yield whether the person was there at the start, and the time that the head has taken."""
     scene = Arrivals(number)
-    one = run(scene, seed=number, seconds=scene.came_s(_VISITS - 1) + _STAYS_S)
     head, face = one.head_deg[:, :2], one.truth_deg("face 0")
     seen = (np.abs(face - head) < _FIELD_DEG).all(axis=1)
     kept = round(_KEPT_S / float(np.median(np.diff(one.t_s))))

@@ -76,6 +76,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "thoughts of an answer to another: looks away lost": sum(
             not averted for state, averted in others if state == "thinking"
         ),
+        "answers to another": len(others),
         "speech to another that begins averted, share": float(
             np.mean([averted for state, averted in others if state == "speaking"])
         ),
@@ -89,8 +90,13 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
 
 def averted(one: MeasuredRun) -> np.ndarray:
     """Return (n,) whether the gaze is off all faces."""
-    off = [apart_deg(one.gaze_deg, one.truth_deg(name)) for name in one.truth]
+    off = [apart_deg(one.gaze_deg, each) for each in faces_deg(one)]
     return np.asarray(np.min(off, axis=0) > _AVERTED_DEG)
+
+
+def faces_deg(one: MeasuredRun) -> np.ndarray:
+    """Return (people, n, 2) the directions of the faces in the order of their numbers."""
+    return np.stack([one.truth_deg(name) for name in sorted(one.truth) if "face" in name])
 
 
 def _seconds(one: MeasuredRun, state: np.ndarray) -> float:
@@ -123,7 +129,7 @@ def _thoughts(one: MeasuredRun) -> Iterator[np.ndarray]:
     away = averted(one)
     for begin, _ in spells(one.turn == "thinking"):
         end = int(np.searchsorted(one.t_s, one.t_s[begin] + _THOUGHT_S))
-        faces = np.array([one.truth_deg(name)[begin] for name in one.truth])
+        faces = faces_deg(one)[:, begin]
         looks = lasting(one, away[begin:end], _SHORTEST_S)
         if looks:
             place = np.median(one.gaze_deg[begin:end][slice(*looks[-1])], axis=0)
@@ -144,8 +150,7 @@ def _shifts(one: MeasuredRun) -> np.ndarray:
 def _answers_to_another(scene: Talk, one: MeasuredRun) -> Iterator[tuple[str, bool]]:
     """Yield state and success of what begins, with a look away, towards another than looked at."""
     away, states = averted(one), np.isin(one.turn, ("thinking", "speaking"))
-    faces = np.stack([one.truth_deg(name) for name in one.truth])
-    looked_at = apart_deg(faces, one.gaze_deg).argmin(axis=0)
+    looked_at = apart_deg(faces_deg(one), one.gaze_deg).argmin(axis=0)
     for begin, _ in spells(states):
         end = int(np.searchsorted(one.t_s, one.t_s[begin] + _SOON_S))
         if scene.partner(float(one.clock_s[begin])) != looked_at[begin]:

@@ -10,7 +10,7 @@ from gazerig.gaze.types import Vec3
 from gazerig.sim_mock.scenes.scene import ScenePerson
 from gazerig.sim_mock.scenes.script import AgentAct
 
-_FIRST_S, _UNTIL_S, _THINKS_S = 2.0, 400.0, 0.8
+_FIRST_S, _THINKS_S, _CYCLES = 2.0, 0.8, 60
 _LEAST_S, _MOST_S, _CHARACTERS_PER_S = 3.0, 9.0, 15
 _PLACES: dict[int, tuple[Vec3, ...]] = {
     1: ((1.15, 0.02, 0.24),),
@@ -30,7 +30,7 @@ class Talk(EmptyScene):
     def __init__(self, people: int, number: int) -> None:
         self.name, self._places = f"talk of {people}, {number}", _PLACES[people]
         rng, t_s, partner, acts = np.random.default_rng(number), _FIRST_S, 0, list[AgentAct]()
-        for cycle in range(int(_UNTIL_S / _LEAST_S)):
+        for cycle in range(_CYCLES):
             hears_s, speaks_s = rng.uniform(_LEAST_S, _MOST_S, 2).tolist()
             answered = (partner + (cycle % 3 > 0)) % people
             acts.append(AgentAct(t_s, "listening", str(partner)))
