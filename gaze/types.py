@@ -204,6 +204,8 @@ class Target(Struct, frozen=True, gc=False):
         "" without one
     saliences: saliences of the winner and of the next three, highest first
     is_lost:  whether it is not visible and the gaze is on its last position
+    urgent:   whether the head comes along at once: a speaker, an addressed partner, a person who
+        has just appeared, or a body cut off by the picture's edge
     """
 
     p_world_m: Vec3
@@ -220,6 +222,7 @@ class Target(Struct, frozen=True, gc=False):
     plan: str = ""
     saliences: tuple[Salience, ...] = ()
     is_lost: bool = False
+    urgent: bool = False
 
 
 class GazeState(Struct, frozen=True, gc=False):
