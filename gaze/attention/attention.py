@@ -49,7 +49,7 @@ _LISTED = 3
 _SPEED_OVER_S = 0.2  # longest interval between two positions for a speed of the head
 _DECIDED_S = 0.2
 """Time within which a camera may show the target of a new behaviour after the change."""
-_TURNS_S = 1.5
+_TURNS_S = 2.0
 """Time after a change of speaker or addressee in which only they are looked at."""
 _IN_CONVERSATION = 0.8
 """Least salience of faces during a conversation."""
@@ -227,7 +227,9 @@ class Attention:
         rows, speaking = percept.bodies.rows(), self._persons.speaking
         if self._social:
             rows = self._memory.step(rows, self._identity[1], captured_s)
-            speaking |= self._persons.may_speak(rows)
+            if not speaking:
+                guesses = t_s - self._turned_s > _TURNS_S
+                speaking = self._persons.may_speak(rows) if guesses else self._speakers
             if begun := speaking - self._speakers:
                 self._turned_s, self._begun = t_s, begun
         self._speakers = speaking

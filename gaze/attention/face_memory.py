@@ -7,13 +7,14 @@ searches for it (gazerig.gaze.attention.idle).
 """
 
 from dataclasses import dataclass
-from math import inf
+from math import dist, inf
 
 from gazerig.gaze.types import BodyRows, Vec3
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _LASTS_S = 60.0
 """Time for which a face is remembered."""
+_SAME_M = 0.25
 _FOUND_WITHIN_S = 1.0
 """Time from the change of target: movement of eyes and head, and delay of the camera."""
 
@@ -55,7 +56,8 @@ class FaceMemory:
             face.sought_s = min(face.sought_s, captured_s) if attended else inf
             lost = attended and alone and face.seen_s == before
             not_found = captured_s - face.sought_s > _FOUND_WITHIN_S
-            if lost or not_found or captured_s - face.seen_s > _LASTS_S:
+            another = any(dist(face.p_world_m, p) < _SAME_M for p in rows.p_world_m)
+            if lost or another or not_found or captured_s - face.seen_s > _LASTS_S:
                 del self._faces[id]
         for id, kind, p in zip(rows.ids, rows.kinds, rows.p_world_m, strict=True):
             if kind == "face":

@@ -43,9 +43,6 @@ constant with which that salience recovers.
 _TOGETHER_S = 0.5
 """People who appear within this time of each other came together."""
 _CLEARLY_NEARER = 1.1
-_TALKS_S, _BEGINS_S = 6.0, 2.0
-"""Silence after which a talk has ended; time after which a silent person may have begun to speak.
-"""
 _AWAY_S, _NEW_S = 3.0, 2.0
 """Absence after which a person returns; time after that, or an appearance, for which one is new."""
 _GONE_S = 120.0
@@ -171,13 +168,11 @@ class Persons:
     def may_speak(self, rows: BodyRows) -> frozenset[int]:
         """Return the people who may speak, as nobody is seen to speak.
 
-        They are those at whom others look, also out of view, but not the last speaker; after a turn
-        of talk otherwise anyone out of view who has not been observed to be silent since then.
+        They are those at whom others look, also out of view, but not the last speaker; otherwise
+        those out of view who have not been observed to be silent since the last turn of talk.
 
         rows: the bodies in view and the remembered ones
         """
-        if self.speaking:
-            return frozenset()
         places, watched = _face_places(rows), set()
         for face in self._faces:
             ahead = face.gaze_world or transpose(face.R_world_face)[0]
@@ -189,9 +184,7 @@ class Persons:
             off_rad, id = min(others, default=(inf, -1))
             if off_rad < (face.off_head_rad or 0.0):
                 watched.add(id)
-        talks = self._at_s - self._spoke_s <= _TALKS_S
-        before_s = max(self._spoke_s, self._at_s - _BEGINS_S) if talks else -inf
-        unseen = (id for id in places if self._people[id].seen_s < before_s)
+        unseen = (id for id in places if self._people[id].seen_s < self._spoke_s)
         return frozenset(watched - self._spoke) or frozenset(unseen)
 
     def _update_hand(
