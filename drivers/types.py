@@ -238,7 +238,7 @@ class Located(NamedTuple):
     compact: for a moving thing, whether its patch is solid and about as wide as high, as a fist's
         or a hand's is and an arm's is not
     thickness_m: for a moving thing, diameter of the largest disc within its patch, at its distance;
-        from_side: the patch extends beyond the left or right edge of the image
+        from_side: it extends beyond the left or right edge of the image
     clothing: for a person, colours of the clothes, None if they are not visible
     """
 

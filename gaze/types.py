@@ -68,6 +68,7 @@ class Bodies(Struct, frozen=True, gc=False):
     w_world_rad_s: (n, 3) angular velocities
     radius_m:  (n,) half the size
     pv_cov:    (n, 6, 6) covariance of position and velocity, None where unknown
+    cut_off:   ids of those at the edge of the picture or outside it
     """
 
     ids: tuple[int, ...] = ()
@@ -77,6 +78,7 @@ class Bodies(Struct, frozen=True, gc=False):
     w_world_rad_s: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     radius_m: Floats = field(default_factory=lambda: np.zeros(0))
     pv_cov: Floats | None = None
+    cut_off: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         """Give arrays without rows their columns, which a recording does not have."""

@@ -98,7 +98,7 @@ def test_a_hand_that_has_come_to_rest_is_still_there_and_one_that_went_is_not(
         there.append([(one.kind, one.v_m_s) for one in hands.label(seen, [FACE], EYE, k / 30)])
     assert there[11][0][0] == HAND
     assert there[12:71] == [[(HAND, (0.0, 0.0, 0.0))] if stays else []] * 59
-    assert there[-1] == [] and not hands.has_resting
+    assert there[-1] == [] and not hands.resting
 
 
 def test_a_hand_is_as_far_as_the_person_unless_its_distance_is_measured() -> None:

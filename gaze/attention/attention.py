@@ -26,14 +26,13 @@ from gazerig.gaze.attention.reaction import Reaction
 from gazerig.gaze.attention.top_down import RuleTarget, TopDown
 from gazerig.gaze.field_of_view import line_of_sight, visible_bodies
 from gazerig.gaze.types import (
-    Bodies,
+    BodyRows,
     GazeState,
     Percept,
     Salience,
     Target,
     Vec3,
     body_name,
-    vec,
 )
 from gazerig.params import Bounds
 
@@ -50,7 +49,7 @@ _LISTED = 3
 _SPEED_OVER_S = 0.2  # longest interval between two positions for a speed of the head
 _DECIDED_S = 0.2
 """Time within which a camera may show the target of a new behaviour after the change."""
-_TURNS_S = 1.5
+_TURNS_S = 2.0
 """Time after a change of speaker or addressee in which only they are looked at."""
 _IN_CONVERSATION = 0.8
 """Least salience of faces during a conversation."""
@@ -63,8 +62,10 @@ _SPEAKERS = 0.88
 """Share of the looks at several people that speaking people get (Vertegaal et al. 2001)."""
 _NEARNESS = 0.5
 """Exponent with which the weight of several people decreases with distance."""
-_STAY = 1.25**_NEARNESS
-"""The person looked at last counts as 1.25 times nearer."""
+_EDGE, _EDGE_S, _EDGE_AGAIN_S = 3.0, 2.0, 20.0
+"""Factor of what moves at the edge of the picture, as its person may be outside it; time for which
+it holds, and after which it holds again.
+"""
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class AttentionParams:
 class _Decision(NamedTuple):
     """Saliences of one decision: those of the bodies, then of a point that the rule names."""
 
-    bodies: Bodies
+    rows: BodyRows
     saliences: list[Salience]
     rule_target: RuleTarget | None
 
@@ -152,13 +153,14 @@ class Attention:
         self._since_s = -inf
         self._identity = _NO_TARGET
         self._place = _STILL
-        self._speakers = _NO_ONE
+        self._speakers = self._begun = _NO_ONE
+        self._cut_off: tuple[int, ...] = ()
         self._behaviour = self.top_down.behaviour
         self._changed_s = -inf
         self._eye: tuple[Vec3, float] | None = None
         self._share: float | None = None
         self._partner: int | None = None
-        self._turned_s = self._reported_s = -inf
+        self._turned_s = self._reported_s = self._edge_s = -inf
 
     def converse(self, share: float | None, partner: int | None, t_s: float) -> None:
         """Let the choice among people follow a conversation.
@@ -171,7 +173,7 @@ class Attention:
         """
         if (share, partner) != (self._share, self._partner) and share is not None:
             self._turned_s = self._reported_s = self._changed_s = t_s
-        self._share, self._partner = share, partner
+        self._share, self._partner = share, None if share is None else partner
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the target at ``t_s``."""
@@ -223,26 +225,26 @@ class Attention:
             self._idle.forget_places()
         eye, captured_s = state.p_world_head_m, percept.captured_s
         self._persons.update(percept, eye)
-        bodies, speaking = percept.bodies, self._persons.speaking
+        rows, speaking = percept.bodies.rows(), self._persons.speaking
         if self._social:
-            unseen_s = self._persons.may_speak_unseen_s
-            bodies = self._memory.step(bodies, self._identity[1], captured_s, unseen_s)
-        if self._share is not None and speaking.difference(self._speakers):
-            self._turned_s = t_s
-        self._speakers = speaking.union(bodies.ids[len(percept.bodies) :])
+            rows = self._memory.step(rows, self._identity[1], captured_s)
+            if not speaking:
+                guesses = t_s - self._turned_s > _TURNS_S
+                speaking = self._persons.may_speak(rows) if guesses else self._speakers
+            if begun := speaking - self._speakers:
+                self._turned_s, self._begun = t_s, begun
+        self._speakers = speaking
         if self.top_down.plans:
             self.top_down.plan(percept, eye, t_s)
         trait = self.top_down.rule.person
         self.top_down.named_ids = self._persons.ids_with_trait(trait) if trait else _NO_ONE
-        made = self._compare(percept, bodies, state, t_s)
+        made = self._compare(percept, rows, state, t_s)
         total = [one.total for one in made.saliences]
         best = max(range(len(total)), key=total.__getitem__, default=-1)
         if best < 0 or self._is_faint(made.saliences[best]):
             self._reaction.next = None
-            seen = [row for row in range(len(bodies)) if total[row] > -inf]
-            self._idle.record_seen(
-                {bodies.ids[row]: vec(bodies.p_world_m[row]) for row in seen}, t_s
-            )
+            seen = zip(rows.ids, rows.p_world_m, total, strict=False)  # without a rule's point
+            self._idle.record_seen({id: p for id, p, one in seen if one > -inf}, t_s)
             return None
         changed = self._behaviour != self.top_down.behaviour
         if changed:
@@ -253,11 +255,13 @@ class Attention:
             row = present if total[best] < favoured else best
         id = made.saliences[row].id
         named = made.rule_target is not None and id in made.rule_target.ids
-        if named:
-            self._habituation.start_stay(id)
+        if named and (id in self._speakers or not self._speakers):
+            self._habituation.start_stay(id)  # a glance at a listener has no additional time
         winner = self._make_target(made, row, captured_s)
-        # A change of behaviour waits neither for a reaction nor for the end of a fixation.
-        if row == present or changed or (named and t_s - self._changed_s <= _DECIDED_S):
+        # A change of behaviour waits neither for a reaction nor for the end of a fixation. Nor does
+        # a new speaker, whose mouth has moved for longer than a reaction takes.
+        decided_s = self._turned_s if id in self._begun else self._changed_s
+        if row == present or changed or (named and t_s - decided_s <= _DECIDED_S):
             self._reaction.next = None
             return winner
         dwelt_s = -inf if present is None else self._since_s + self._params.min_dwell_ms / 1e3
@@ -278,12 +282,14 @@ class Attention:
         if rule_target is not None and rule_target.p_world_m is not None and first.id == NO_BODY:
             p, v = rule_target.p_world_m, rule_target.v_world_m_s
         else:
-            p, v = vec(made.bodies.p_world_m[row]), vec(made.bodies.v_world_m_s[row])
+            p, v = made.rows.p_world_m[row], made.rows.v_world_m_s[row]
+        urgent = (*self._speakers, self._partner, *self._persons.new, *self._cut_off)
         # The head's amplitude follows from the unfactored amount: habituation does not turn the
         # head.
         return Target(
             p, v, captured_s, first.kind, first.id, max(first.rule, moving), by_rule, None, 0, why,
             plan=self.top_down.plan_text, saliences=(first, *others[:_LISTED]),
+            urgent=self._social and first.id in urgent,
         )  # fmt: skip
 
     def _is_faint(self, best: Salience) -> bool:
@@ -291,25 +297,34 @@ class Attention:
         faint = best.total < self._bottom_up.least_salience
         return best.total == -inf or (faint and best.kind != "face" and best.id != NO_BODY)
 
-    def _compare(self, percept: Percept, bodies: Bodies, state: GazeState, t_s: float) -> _Decision:
+    def _compare(self, percept: Percept, rows: BodyRows, state: GazeState, t_s: float) -> _Decision:
         """Return the saliences that the decision compares."""
-        eye, rows, attended = state.p_world_head_m, bodies.rows(), self._identity[1]
+        eye, attended = state.p_world_head_m, self._identity[1]
         seen = visible_bodies(rows, state)
         gaze = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
         v_eye = self._eye_velocity(eye, t_s)
         raised, own = self._persons.raised, self._persons.parts if self._social else {}
         head_rad_s = norm(state.head_rate_rad_s)
         motion = self._bottom_up.step(rows, eye, t_s, v_eye, gaze, seen, raised, own, head_rad_s)
-        elsewhere = {
-            face.id
-            for face in percept.faces
-            if self._social and face.looks_at_head is False and not face.speaks
-        }
-        worth = {id: _LOOKS_ELSEWHERE if id in elsewhere else 1.0 for id in rows.ids}
+        worth = dict.fromkeys(rows.ids, 1.0)
+        for face in percept.faces if self._social else ():
+            if face.looks_at_head is False and not face.speaks:
+                worth[face.id] = _LOOKS_ELSEWHERE
+        unseen = rows.ids[len(percept.bodies) :]
+        self._cut_off = (*percept.bodies.cut_off, *unseen)
+        edge = set(percept.bodies.cut_off).difference(own) if self._social else _NO_ONE
+        since_s = t_s - self._edge_s
+        if attended in edge and since_s > _EDGE_AGAIN_S:
+            self._edge_s = t_s
+        if not _EDGE_S < since_s < _EDGE_AGAIN_S:
+            worth |= dict.fromkeys(edge, _EDGE)
+        for id in unseen:
+            if self._speakers and id not in self._speakers:
+                worth[id] = 0.0  # the head does not turn from a speaker to a listener out of view
         left = self._habituation.step(rows, eye, attended, t_s)
         factors = {id: one * worth[id] for id, one in left.items()}
         if not self.top_down.plans:  # fists must be watched
-            self._persons.weaken_known(factors, self._habituation.is_on, self._social)
+            self._persons.weaken_known(factors, self._params.habituation != "none", self._social)
         rule_target, rule = self.top_down.step(seen), 0.0
         shares: dict[int, float] = {}
         point = []
@@ -339,7 +354,7 @@ class Attention:
                 wanted = rule
             total = max(one.total, wanted) * factor if one.id in seen else -inf
             saliences.append(replace(one, rule=wanted, habituation=factor, total=total))
-        return _Decision(bodies, saliences + point, rule_target)
+        return _Decision(rows, saliences + point, rule_target)
 
     def _favoured(self, ids: Iterable[int], t_s: float) -> tuple[frozenset[int], float]:
         """Return the people who have a share of the looks together, and that share.
@@ -348,9 +363,11 @@ class Attention:
         """
         share = _SPEAKERS if self._social else 0.0
         found = self._speakers.intersection(ids)
+        if t_s - self._turned_s < _TURNS_S:
+            found = found & self._begun or found
         partner = frozenset(id for id in ids if id == self._partner)
         reported = t_s - self._reported_s < _TURNS_S
-        if self._share is not None and partner and (self._share > 0.0 or reported or not found):
+        if partner and (self._share or reported or not found):
             return partner, self._share or share
         return found, share
 
@@ -362,10 +379,9 @@ class Attention:
         away_m: their distances by id
         worth: further factor of each body
         """
-        mine = {id: worth[id] * (1.0 + self._gestures.get(id, 0.0)) for id in away_m}
-        weights, stay = mine, 1.0
+        weights = mine = {id: worth[id] * (1.0 + self._gestures.get(id, 0.0)) for id in away_m}
         if self._social:
-            nearest, stay = min(away_m.values()), _STAY
+            nearest = min(away_m.values())
             weights = {id: (nearest / away_m[id]) ** _NEARNESS * one for id, one in mine.items()}
         # Those who may speak have their share.
         favoured, share = self._favoured(mine, t_s)
@@ -375,10 +391,7 @@ class Attention:
             ratio = max(1.0, share / (1.0 - share) * mute / spoken)
             weights = {id: one * ratio if id in favoured else one for id, one in weights.items()}
         factors = self._habituation.share(weights, self._identity[1], t_s)
-        stays_at = self._habituation.stays_at
-        shares = {
-            id: factors[id] * one * (stay if id == stays_at else 1.0) for id, one in mine.items()
-        }
+        shares = {id: factors[id] * one for id, one in mine.items()}
         if favoured and t_s - self._turned_s < _TURNS_S:
             shares = {id: one if id in favoured else 0.0 for id, one in shares.items()}
         most = max(*shares.values(), 1e-9)

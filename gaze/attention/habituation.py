@@ -39,8 +39,9 @@ _STAY_S, _STAY_SPREAD = 2.0, 1.2
 deviation / mean: many short looks and some long ones.
 """
 _LONGEST_STAY_S = 6.0  # beyond 15 s on one face a look is a stare
-_FEW = 3
-"""Number of people up to which looks have an additional time; in a larger group everyone gets one.
+_STAYS_S, _FEW = 0.6, 3
+"""Additional time of every look, and number of people up to which it has a random one as well; in a
+larger group everyone gets a look.
 """
 
 _FADES_S = 10.0
@@ -92,11 +93,6 @@ class Habituation:
         self._rng = rng
         self.reset(0.0)
 
-    @property
-    def is_on(self) -> bool:
-        """Return whether there is habituation."""
-        return self.params != "none"
-
     def reset(self, t_s: float) -> None:
         """Forget all habituation and the points left."""
         # Only factors below 1 are stored: those of bodies attended in the last second, which are
@@ -109,7 +105,7 @@ class Habituation:
 
     def record_left(self, p_world_m: Vec3, t_s: float) -> None:
         """Record a point that the gaze has left."""
-        if self.is_on:
+        if self.params != "none":
             self._left.append(_LeftPoint(p_world_m, t_s))
 
     def start_stay(self, id: int) -> None:
@@ -158,8 +154,8 @@ class Habituation:
         if isinstance(par, str):
             return dict.fromkeys(weights, 1.0)
         surpluses = self.surpluses(weights, attended_id, t_s)
-        if len(weights) <= _FEW and self.stays_at in weights:
-            surpluses[self.stays_at] -= self._stay_s
+        if self.stays_at in weights:
+            surpluses[self.stays_at] -= _STAYS_S + (self._stay_s if len(weights) <= _FEW else 0.0)
         return {
             id: par.rule_floor + (1.0 - par.rule_floor) * exp(-par.decay_rate_1_s * max(0.0, one))
             for id, one in surpluses.items()

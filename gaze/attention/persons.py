@@ -13,9 +13,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import dist, exp, hypot, inf
 
-from gazerig.gaze.angles import add, norm, scale, sub
+from gazerig.gaze.angles import add, angle_between, norm, scale, sub, transpose
 from gazerig.gaze.field_of_view import OWN
-from gazerig.gaze.types import Percept, Vec3
+from gazerig.gaze.types import BodyRows, Face, Percept, Vec3
 
 NEAREST, WAVING, LOOKING, NEWEST = "nearest", "waving", "looking", "newest"
 TRAITS = (NEAREST, WAVING, LOOKING, NEWEST)
@@ -43,18 +43,18 @@ constant with which that salience recovers.
 _TOGETHER_S = 0.5
 """People who appear within this time of each other came together."""
 _CLEARLY_NEARER = 1.1
-_TALKS_S, _BEGINS_S = 6.0, 2.0
-"""Silence after which a talk has ended; time after which a silent person may have begun to speak.
-"""
+_AWAY_S, _NEW_S = 3.0, 2.0
+"""Absence after which a person returns; time after that, or an appearance, for which one is new."""
 _GONE_S = 120.0
 
 
 @dataclass(slots=True)
 class _SeenPerson:
-    """A person: times of appearance, last sight and last wave; share of time with gestures."""
+    """A person: times of appearance, return, last sight and wave; share of time with gestures."""
 
     came_s: float
-    seen_s: float
+    back_s: float = -inf
+    seen_s: float = -inf
     waved_s: float = -inf
     gestures: float = 0.0
 
@@ -83,6 +83,7 @@ class Persons:
         raised: ids of bodies that move within a person's reach at the height of the face; without
             hands of a person who gestures and does not wave, as signs also reach the face.
         speaking: ids of the people in view who speak.
+        new: ids of those who have just appeared or returned.
     """
 
     def __init__(self) -> None:
@@ -94,9 +95,10 @@ class Persons:
         self._hands: dict[int, _Hand] = {}
         self.parts: dict[int, int] = {}
         self.raised: set[int] = set()
+        self.new: set[int] = set()
         self.speaking: frozenset[int] = frozenset()
-        self._spoke_s = -inf
-        self._looking: frozenset[int] = frozenset()
+        self._spoke, self._spoke_s = self.speaking, -inf
+        self._faces: tuple[Face, ...] = ()
         self._nearest = -1
         self._at_s = -inf
 
@@ -109,17 +111,17 @@ class Persons:
         """
         rows, dt_s = percept.bodies.rows(), percept.captured_s - self._at_s
         self._at_s = percept.captured_s
-        faces = {
-            id: p
-            for id, kind, p in zip(rows.ids, rows.kinds, rows.p_world_m, strict=True)
-            if kind == "face"
-        }
+        faces = _face_places(rows)
         for id in faces:
-            self._people.setdefault(id, _SeenPerson(self._at_s, self._at_s)).seen_s = self._at_s
-        self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
+            person = self._people.setdefault(id, _SeenPerson(self._at_s))
+            if self._at_s - person.seen_s > _AWAY_S:
+                person.back_s = self._at_s
+            person.seen_s = self._at_s
+        self.new = {id for id in faces if self._at_s - self._people[id].back_s < _NEW_S}
+        self._faces = percept.faces
         self.speaking = frozenset(face.id for face in percept.faces if face.speaks)
         if self.speaking:
-            self._spoke_s = self._at_s
+            self._spoke, self._spoke_s = self.speaking, self._at_s
         for hand in self._hands.values():
             hand.repeats *= exp(-max(0.0, dt_s) / _KNOWN_S)
         away = {id: dist(p, p_world_eye_m) for id, p in faces.items()}
@@ -131,7 +133,8 @@ class Persons:
         for row, id in enumerate(rows.ids):
             if faces and id not in faces and rows.kinds[row] != OWN:
                 p, v = rows.p_world_m[row], rows.v_world_m_s[row]
-                low_of = self._update_part(id, p, faces, p_world_eye_m)
+                reach_m = _ARM_M / 2.0 if id in percept.bodies.cut_off else _ARM_M
+                low_of = self._update_part(id, p, faces, p_world_eye_m, reach_m)
                 hand = self._update_hand(id, p, v, faces, p_world_eye_m)
                 if rows.kinds[row] == "hand" and norm(v) > _GESTURES_M_S:
                     moving.add(low_of)
@@ -151,7 +154,7 @@ class Persons:
         """
         people = self._people
         if trait == LOOKING:
-            return self._looking
+            return frozenset(face.id for face in self._faces if face.looks_at_head)
         if trait == WAVING:
             return frozenset(id for id in people if self._waves(id))
         if trait == NEAREST:
@@ -162,16 +165,27 @@ class Persons:
     def _waves(self, id: int) -> bool:
         return self._at_s - self._people[id].waved_s <= _WAVED_S
 
-    @property
-    def may_speak_unseen_s(self) -> float:
-        """Return the time before which a possible speaker was last visible; -inf without one.
+    def may_speak(self, rows: BodyRows) -> frozenset[int]:
+        """Return the people who may speak, as nobody is seen to speak.
 
-        After a turn of talk, anyone who has not been observed to be silent since then may speak
-        next.
+        They are those at whom others look, also out of view, but not the last speaker; otherwise
+        those out of view who have not been observed to be silent since the last turn of talk.
+
+        rows: the bodies in view and the remembered ones
         """
-        if self.speaking or self._at_s - self._spoke_s > _TALKS_S:
-            return -inf
-        return max(self._spoke_s, self._at_s - _BEGINS_S)
+        places, watched = _face_places(rows), set()
+        for face in self._faces:
+            ahead = face.gaze_world or transpose(face.R_world_face)[0]
+            others = [
+                (angle_between(ahead, sub(p, face.p_world_m)), id)
+                for id, p in places.items()
+                if id != face.id
+            ]
+            off_rad, id = min(others, default=(inf, -1))
+            if off_rad < (face.off_head_rad or 0.0):
+                watched.add(id)
+        unseen = (id for id in places if self._people[id].seen_s < self._spoke_s)
+        return frozenset(watched - self._spoke) or frozenset(unseen)
 
     def _update_hand(
         self, id: int, place: Vec3, v_m_s: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3
@@ -198,10 +212,13 @@ class Persons:
                 self._people[owner].waved_s = self._at_s
         return hand
 
-    def _update_part(self, id: int, place: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3) -> int:
+    def _update_part(
+        self, id: int, place: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3, reach_m: float
+    ) -> int:
         """Update the owner of a body part: the person nearest to its line of sight.
 
         The distance of a moving body is often only assumed: it is compared at the face's distance.
+        What is cut off by the picture's edge may belong to somebody outside it.
 
         Returns:
             The id of that person if it is lower than the face and does not reach out, otherwise -1.
@@ -212,7 +229,7 @@ class Persons:
             for face, p in faces.items()
         }
         owner = min(beside, key=lambda face: beside[face])
-        if beside[owner] >= _ARM_M:
+        if beside[owner] >= reach_m:
             return -1
         high = _is_raised(place, faces[owner])
         if high and (self._people[owner].gestures <= _GESTURES or self._waves(owner)):
@@ -254,3 +271,12 @@ class Persons:
 def _is_raised(place: Vec3, face: Vec3) -> bool:
     """Return whether something is at the height of a face."""
     return place[2] > face[2] - _RAISED_M
+
+
+def _face_places(rows: BodyRows) -> dict[int, Vec3]:
+    """Return the positions of the faces among some bodies by their ids."""
+    return {
+        id: p
+        for id, kind, p in zip(rows.ids, rows.kinds, rows.p_world_m, strict=True)
+        if kind == "face"
+    }

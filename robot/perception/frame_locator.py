@@ -143,6 +143,8 @@ def _face(face: DetectedFace, found: Detections, lens: Intrinsics) -> Located | 
     pose = pose or face_pose(face.landmarks_px, lens)
     if pose is None:
         return None
+    x, _, width, _ = face.box_px
+    edge_px = _EDGE * found.width_px
     focal_px = sqrt(lens.fx_px * lens.fy_px)
     eyes_px = focal_px * PUPIL_DISTANCE_M / pose.p_camera_m[2]
     measured = _depth_ratio(face, pose, found)
@@ -161,6 +163,7 @@ def _face(face: DetectedFace, found: Detections, lens: Intrinsics) -> Located | 
         size_depth=None if measured is None else 1.0 / share,
         turn_sd_rad=pose.turn_sd_rad,
         gaze=pose.gaze_camera or face.gaze_camera,
+        from_side=x < edge_px or x + width > found.width_px - edge_px,
         signs=pose.signs or face.signs,
         clothing=face.clothing,
     )
@@ -173,35 +176,26 @@ def _person(person: DetectedPerson, found: Detections, lens: Intrinsics) -> Loca
         min(max(x, edge), found.width_px - edge),
         min(max(y, edge), found.height_px - edge),
     )
-    head = Located(
-        "face",
-        (0.0, 0.0, 0.0),
-        None,
-        _FACE_RADIUS_M,
+    half_px = person.trunk_px * _FACE_RADIUS_M / _TRUNK_M
+    head = _by_length("face", at_px, _TRUNK_M / person.trunk_px, half_px, found, lens)
+    return head._replace(
+        radius_m=_FACE_RADIUS_M,
         confidence=person.confidence,
         across_sd_m=_HEAD_SD_M,
+        from_side=at_px != (x, y),
         clothing=person.clothing,
     )
-    half_px = person.trunk_px * _FACE_RADIUS_M / _TRUNK_M
-    return _by_length(head, at_px, _TRUNK_M / person.trunk_px, half_px, found, lens)
 
 
 def _palm(palm: DetectedPalm, found: Detections, lens: Intrinsics) -> Located:
     """Locate a palm."""
-    hand = Located(
-        "hand",
-        (0.0, 0.0, 0.0),
-        None,
-        _HAND_RADIUS_M,
-        confidence=palm.confidence,
-        across_sd_m=_PALM_SD_M,
-    )
     half_px = 0.25 * palm.size_px
-    return _by_length(hand, palm.centre_px, _PALM_M / palm.size_px, half_px, found, lens)
+    hand = _by_length("hand", palm.centre_px, _PALM_M / palm.size_px, half_px, found, lens)
+    return hand._replace(confidence=palm.confidence, across_sd_m=_PALM_SD_M)
 
 
 def _by_length(
-    part: Located,
+    kind: str,
     at_px: tuple[float, float],
     m_per_px: float,
     half_px: float,
@@ -211,7 +205,7 @@ def _by_length(
     """Return a part of a body at its depth, measured or by its length.
 
     Args:
-        part: the part.
+        kind: kind of the part.
         at_px: its centre.
         m_per_px: usual length of the part over its length in the image.
         half_px: half side of the square around the centre whose depth is read.
@@ -223,9 +217,10 @@ def _by_length(
     z, sd = sqrt(lens.fx_px * lens.fy_px) * m_per_px, _LENGTH_SPREAD
     if depth is not None:
         z, sd = depth[0], hypot(_LEAST_SD, 0.5 * depth[1] / depth[0])
-        z += _FACE_RADIUS_M if part.kind == "face" else 0.0  # the middle of a head
+        z += _FACE_RADIUS_M if kind == "face" else 0.0  # the middle of a head
     p_m = scale(vec(rays([at_px], lens)[0]), z)
-    return part._replace(p_m=p_m, depth_measured=depth is not None, along_sd_m=norm(p_m) * sd)
+    along_sd_m, measured = norm(p_m) * sd, depth is not None
+    return Located(kind, p_m, None, _HAND_RADIUS_M, depth_measured=measured, along_sd_m=along_sd_m)
 
 
 def _depth(found: Detections, box: tuple[float, float, float, float]) -> tuple[float, float] | None:

@@ -43,6 +43,7 @@ from gazerig.robot.model.kinematics import Capsule
 from gazerig.robot.perception.track import UNNAMED
 
 HAND, OWN = "hand", "own"
+_STILL: Vec3 = (0.0, 0.0, 0.0)
 Known = tuple[Vec3, Vec3 | None]
 """Position of a face in the world, and its velocity, None if unknown."""
 
@@ -161,11 +162,14 @@ class _RestingHand(NamedTuple):
 
 
 class Hands:
-    """Recognition of moving patches as hands of the people in view."""
+    """Recognition of moving patches as hands of the people in view.
+
+    resting: the hands at rest by the number of the patch or palm
+    """
 
     def __init__(self) -> None:
         self._moving: dict[int, _MovingPatch] = {}
-        self._resting: dict[int, _RestingHand] = {}
+        self.resting: dict[int, _RestingHand] = {}
         self._palm_mark, self._searched_s = 0, -inf
 
     def label(
@@ -196,23 +200,18 @@ class Hands:
         found = [self._label(thing, faces, p_camera, t_s, free) for thing in things]
         for palm in free:
             self._keep_palm(palm, found, p_camera, t_s)
-        if not self._resting:
+        if not self.resting:
             return found
         # Only hands at rest without motion; the detector finds moving hands again itself.
         marks = {thing.detector_id for thing in found}
         moving = [thing for thing in found if thing.detector_id in self._moving]
-        self._resting = {
+        self.resting = {
             mark: one
-            for mark, one in self._resting.items()
+            for mark, one in self.resting.items()
             if mark in marks
             or (t_s <= one.until_s and not _moves_again(one.hand, moving, p_camera))
         }
-        return found + [one.hand for mark, one in self._resting.items() if mark not in marks]
-
-    @property
-    def has_resting(self) -> bool:
-        """Return whether any hand is at rest."""
-        return bool(self._resting)
+        return found + [one.hand for mark, one in self.resting.items() if mark not in marks]
 
     def _accept_palms(
         self, palms: Sequence[Located], faces: list[Known], p_camera: Vec3
@@ -240,19 +239,19 @@ class Hands:
     def _is_recent(self, thing: Located, p_camera: Vec3) -> bool:
         """Return whether something is at the position of a recent hand."""
         hands = [one.hand for one in self._moving.values() if one.frames >= _FRAMES]
-        hands += [one.hand for one in self._resting.values()]
+        hands += [one.hand for one in self.resting.values()]
         return any(_distance_from_hand(thing, hand, p_camera) < _AGAIN_M for hand in hands)
 
     def _keep_palm(self, palm: Located, found: list[Located], p_camera: Vec3, t_s: float) -> None:
         """Keep a palm without a patch until the next search, under the number of its hand."""
         if any(_is_at(palm, thing, p_camera) for thing in found if thing.kind == HAND):
             return
-        mark = next((m for m, o in self._resting.items() if _is_at(palm, o.hand, p_camera)), None)
+        mark = next((m for m, o in self.resting.items() if _is_at(palm, o.hand, p_camera)), None)
         if mark is None:
             self._palm_mark -= 1
             mark = self._palm_mark
-        hand = palm._replace(detector_id=mark, v_m_s=(0.0, 0.0, 0.0))
-        self._resting[mark] = _RestingHand(hand, t_s + _PALM_S)
+        hand = palm._replace(detector_id=mark, v_m_s=_STILL)
+        self.resting[mark] = _RestingHand(hand, t_s + _PALM_S)
 
     def _label(
         self,
@@ -269,7 +268,7 @@ class Hands:
         arm = _arm_of(thing, faces, p_camera, None if known is None else known.p_face)
         if arm is None:
             return thing
-        p_face, v_face = arm.face[0], arm.face[1] or (0.0, 0.0, 0.0)
+        p_face, v_face = arm.face[0], arm.face[1] or _STILL
         speed = norm(perpendicular(sub(arm.tip_m_s, v_face), unit(sub(arm.tip_m, p_camera))))
         named = known is not None and known.frames >= _FRAMES
         begins = (
@@ -301,7 +300,7 @@ class Hands:
                 hand = hand._replace(p_m=palm.p_m, along_sd_m=palm.along_sd_m)
             elif t_s - known.palm_s <= _PALM_S:
                 # The palm that was seen is more certain than the end of the arm.
-                way = scale(hand.v_m_s or (0.0, 0.0, 0.0), t_s - before_s)
+                way = scale(hand.v_m_s or _STILL, t_s - before_s)
                 hand = hand._replace(p_m=add(known.hand.p_m, way))
             known.hand = hand
             if comes or palm is not None:
@@ -311,7 +310,7 @@ class Hands:
         if known is None or known.frames < _FRAMES:
             return thing
         if speed >= _AT_REST_M_S:
-            self._resting.pop(thing.detector_id, None)
+            self.resting.pop(thing.detector_id, None)
             return known.hand
         # A patch that hardly moves may be the whole person: the hand stays at its last motion, and
         # is kept no longer than a palm if palms are searched.
@@ -319,10 +318,10 @@ class Hands:
         if t_s - self._searched_s < _HELD_S:
             until_s = max(known.at_s, known.palm_s) + _PALM_S
         if t_s > until_s:
-            self._resting.pop(thing.detector_id, None)
+            self.resting.pop(thing.detector_id, None)
             return thing
-        still = known.hand._replace(v_m_s=(0.0, 0.0, 0.0))
-        self._resting[thing.detector_id] = _RestingHand(still, until_s)
+        still = known.hand._replace(v_m_s=_STILL)
+        self.resting[thing.detector_id] = _RestingHand(still, until_s)
         return known.hand if known.at_s == t_s else still
 
     def _is_arm(self, thing: Located, arm: "_Arm", p_camera: Vec3) -> bool:
@@ -331,7 +330,7 @@ class Hands:
             return True
         small = arm.ratio * thing.radius_m <= _TOO_LARGE * _ALONE_M
         return (small and self._is_recent(thing, p_camera)) or any(
-            _is_at(one.hand, thing, p_camera) for mark, one in self._resting.items() if mark < 0
+            _is_at(one.hand, thing, p_camera) for mark, one in self.resting.items() if mark < 0
         )
 
 
@@ -408,8 +407,8 @@ def _arm_of(thing: Located, faces: list[Known], p_camera: Vec3, last: Vec3 | Non
         if last is not None and norm(sub(last, face[0])) < _SAME_M:
             off_m -= _REACH_M
         if off_m < least:
-            v = (0.0, 0.0, 0.0) if v_tip is None else scale(v_tip, ratio)
-            slower_m_s = _AS_FAST * ratio * norm(thing.v_m_s or (0.0, 0.0, 0.0))
+            v = _STILL if v_tip is None else scale(v_tip, ratio)
+            slower_m_s = _AS_FAST * ratio * norm(thing.v_m_s or _STILL)
             attached = (
                 shoulder_m < _ATTACHED_M
                 and ratio * thing.radius_m > _SMALLEST_M

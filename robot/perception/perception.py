@@ -103,7 +103,7 @@ class Perception:
         palms = (
             None if located.palms is None else [place_in_world(one, R, p) for one in located.palms]
         )
-        if things or palms or self._hands.has_resting:
+        if things or palms or self._hands.resting:
             if self._own_parts is not None:
                 things = label_own_body(things, self._own_parts(R_head, self._p_head), p)
             tracked = [
@@ -116,9 +116,7 @@ class Perception:
             faces, things = without_own_motion(faces, things, known, p)
             # A patch that may be a walking person is at the position of the head, not at the feet.
             things = [
-                thing._replace(p_m=thing.upper_m)
-                if thing.kind == UNNAMED and thing.upper_m is not None
-                else thing
+                thing._replace(p_m=thing.upper_m or thing.p_m) if thing.kind == UNNAMED else thing
                 for thing in things
             ]
         in_sight = self._tracker.step([*faces, *things], p, t_s)
@@ -235,6 +233,7 @@ def _bodies(tracks: tuple[BodyTrack, ...]) -> Bodies:
         np.array([scale(track.filter.view, track.detection.spin_rad_s) for track in tracks]),
         np.array([one.radius_m for one in found]),
         np.array([covariance(one) for one in filters]),
+        tuple([track.id for track in tracks if track.detection.from_side]),
     )
 
 

@@ -63,7 +63,7 @@ def looks_at_head(
 
 # Time constant of the mean; least distance from it that counts; crossings within a window that make
 # speech; time without a crossing that ends it.
-_MEAN_S, _LEAST_M, _WINDOW_S, _CROSSINGS = 0.6, 0.0012, 1.5, 4
+_MEAN_S, _LEAST_M, _WINDOW_S, _CROSSINGS = 0.3, 0.0012, 1.0, 3
 
 
 class Speech(NamedTuple):
