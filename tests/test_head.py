@@ -42,11 +42,6 @@ def test_e11_more_attention_turns_the_head_further() -> None:
     assert all(b > a for a, b in zip(goals, goals[1:], strict=False))
 
 
-@pytest.mark.parametrize(("x", "offset"), [(0.25, 29.121), (0.5, 15.000), (0.75, 0.879)])
-def test_e12_offset_values(x: float, offset: float) -> None:
-    assert degrees(head().share.offset_rad(x)) == pytest.approx(offset, abs=0.01)
-
-
 def test_other_side_mirrors_and_near_targets_give_straight_ahead() -> None:
     assert goal_deg(head(), -50.0, 0.5)[0] == pytest.approx(-goal_deg(head(), 50.0, 0.5)[0])
     assert goal_deg(head(), 10.0, 0.0) == (0.0, 0.0)

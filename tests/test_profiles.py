@@ -1,15 +1,16 @@
 """Each paper's profile is its paper and nothing else, proved by running it (docs/profiles.md)."""
 
-from math import atan2, radians
+from math import degrees, radians
 
 import numpy as np
 import pytest
-from human.measured_run import MeasuredRun, half_rate_run
+from fakes.scenes import EmptyScene
+from human.measured_run import MeasuredRun, half_rate_run, measured_run
 from human.profile_trace import PAGE, PROFILES, as_told, claims, ran
 from human.row_03_rests import visits
 
-from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.pinhole import intrinsics_of_view
+from gazerig.gaze.angles import angle_between, direction
+from gazerig.sim_mock.scenes.scene import ScenePerson
 
 CLAIMS = list(claims())
 """Nothing here is asked of single ticks."""
@@ -77,9 +78,19 @@ def test_e68_mitake_never_blinks_nor_leaves_a_face_that_stands() -> None:
     assert not any("away" in name for name in run.target_name)
 
 
-def test_the_head_of_mitake_joins_in_before_the_camera_loses_a_face() -> None:
-    rig = load_rig("desk", profile="mitake")
-    lens = intrinsics_of_view(radians(rig.camera.horizontal_field_deg), 640, 400)
-    half_face_rad, lag_rad = atan2(0.11, 1.0), radians(4.0)  # a stroll of 10 deg/s for .4 s
-    seen_rad = atan2(200.0, lens.fy_px) - half_face_rad
-    assert radians(rig.gaze.head.max_offset_deg) < seen_rad - lag_rad
+class Aside(EmptyScene):
+    """A person 30 deg to the left, who does not move, as high as the robot's eyes."""
+
+    name = "aside"
+
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+        return (ScenePerson((0.866, 0.5, 0.125), (radians(-150.0), 0.0), None),)
+
+
+@pytest.mark.parametrize(("salience", "short"), [(0.4, 29.121), (0.6, 15.0), (0.8, 0.879)])
+def test_e12_offset_values_of_the_running_head(salience: float, short: float) -> None:
+    rules = {"gaze.top_down.rules.wait.salience": salience}
+    run = measured_run(Aside(), "mitake", seconds=4.0, overrides=rules, bus="ideal")
+    yaw, pitch = np.radians(run.head_goal_deg[-1, :2])
+    rest = angle_between(direction((yaw, pitch)), direction((radians(30.0), 0.0)))
+    assert degrees(rest) == pytest.approx(short, abs=0.1)

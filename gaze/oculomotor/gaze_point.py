@@ -44,9 +44,11 @@ from gazerig.params import Bounds
 MOVING_M_S = 0.05
 """A target slower than this is fixated, not pursued."""
 _MIDDLE = (0.0, 0.0)
-_CORRECT_S, _CORRECT_SPREAD_S = 0.155, 0.045
+_CORRECT_S = 0.155, 0.045
 """Mean delay from landing to a corrective saccade, people's is 100 to 200 ms, and its largest
 random deviation."""
+_CATCH_UP_S = 0.25, 0.1
+"""The same for a saccade that catches up with a moving target."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +173,7 @@ class GazePoint:
         Returns:
             The amplitude of the saccade that starts now, radians; None without one.
         """
-        shift_rad = None
+        shift_rad, known = None, self._prediction.sine is not None
         trigger, trajectory = self._trigger, self._trajectory
         if self._refixations.offset_rad != _MIDDLE:
             point = _offset_point(point, p_head, self._refixations.offset_rad)
@@ -180,7 +182,7 @@ class GazePoint:
             x, y, z = there[0] - gaze[0], there[1] - gaze[1], there[2] - gaze[2]
             if not trigger.is_error_small(sqrt(x * x + y * y + z * z)):
                 self._refixations.interrupt()
-                slip = self._pursuit.slip(self.point_m, point, velocity, p_head)
+                slip = self._pursuit.slip(self.point_m, point, velocity, p_head, known)
                 if trigger.is_due(slip, t_s, self._pursuit.refractory_s):
                     shift_rad = self._start_saccade(point, p_head, t_s)
             elif (
@@ -192,7 +194,6 @@ class GazePoint:
             if shift_rad is None:
                 if dt_s > 0.0 and self._pursuit.controller is None:
                     closing = not (trigger.is_correction_due or trigger.is_saccade_due)
-                    known = self._prediction.sine is not None
                     self.point_m = self._pursuit.follow(
                         gaze, there, point, velocity, p_head, dt_s, closing, known
                     )
@@ -206,7 +207,7 @@ class GazePoint:
         self.point_m = trajectory.point_at(p_head, t_s)
         if t_s >= trajectory.ends_s - 1e-9:
             self._trajectory = None
-            trigger.record_landing(t_s, self._correction_delay_s())
+            trigger.record_landing(t_s, self._correction_delay_s(norm(velocity) > MOVING_M_S))
             self.fixations += 1
         return shift_rad
 
@@ -222,10 +223,12 @@ class GazePoint:
         self.saccades += 1
         return error
 
-    def _correction_delay_s(self) -> float:
-        """Draw the delay of a correction of this landing's error."""
-        spread = float(self._rng.uniform(-1.0, 1.0)) if self._people else 0.0
-        return _CORRECT_S + _CORRECT_SPREAD_S * spread
+    def _correction_delay_s(self, moves: bool) -> float:
+        """Draw the delay of a correction of this landing's error; ``moves``: the target does."""
+        if not self._people:
+            return 0.0
+        mean_s, spread_s = _CATCH_UP_S if moves else _CORRECT_S
+        return mean_s + spread_s * float(self._rng.uniform(-1.0, 1.0))
 
 
 def _offset_point(point: Vec3, eye: Vec3, offset: Angles2) -> Vec3:

@@ -543,9 +543,11 @@ class HeadModel:
         """
         way = self._goal_direction
         to_gaze = there if gaze is facing else direction(gaze)
-        near_enough = angle_between(way, there) <= short_rad + _ROUNDING_RAD
-        in_reach = angle_between(way, to_gaze) <= self._share.reach_rad + _ROUNDING_RAD
         moving, start = t_s < self._ends_s, self._start
+        # A movement under way is not planned again for noise: that would end it where it can stop.
+        near_rad = short_rad + (_REPLAN_RAD if moving else _ROUNDING_RAD)
+        near_enough = angle_between(way, there) <= near_rad
+        in_reach = angle_between(way, to_gaze) <= self._share.reach_rad + _ROUNDING_RAD
         arc_rad = angle_between(start, there)
         if near_enough and in_reach and not (moving and angle_between(start, way) > arc_rad):
             return

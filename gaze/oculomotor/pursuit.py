@@ -44,6 +44,9 @@ its middle.
 _REFRACTORY_S = 0.15
 """Shortest time after a saccade before a position error alone triggers the next."""
 _NEAREST_M = 1.0 / _NEAREST_1_M
+_FASTEST_RAD_S = radians(28.0), MAX_RAD_S
+"""Fastest pursuit of motion whose course is not known: people's gain is .9 at 30 deg/s, and above
+that saccades catch up (Robinson, Gordon & Gordon 1986); and of one that is known."""
 _SLOW_RAD_S = radians(5.0)
 """Up to this speed of the target, the gaze may exceed its speed less and less to catch up."""
 
@@ -95,14 +98,14 @@ class Pursuit:
         elif params.model == "opposite_angles":
             self.controller, self.refractory_s = OppositeAngles(), 0.0
 
-    def slip(self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3) -> Slip:
-        """Return error and retinal slip; all points in the world, metres."""
+    def slip(self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3, known: bool = True) -> Slip:
+        """Return error and retinal slip; arguments as those of ``follow``."""
         (x, y, z, _), (to_x, to_y, to_z, near) = (
             line_of_sight_to(gaze, eye),
             line_of_sight_to(target, eye),
         )
         across = perpendicular(scale(v_target, near), (to_x, to_y, to_z))
-        return Slip((to_x - x, to_y - y, to_z - z), sub(across, _adopted_speed(across)))
+        return Slip((to_x - x, to_y - y, to_z - z), sub(across, _adopted_speed(across, known)))
 
     def follow(
         self,
@@ -113,7 +116,7 @@ class Pursuit:
         eye: Vec3,
         dt_s: float,
         closing: bool,
-        outruns: bool = True,
+        known: bool = True,
     ) -> Vec3:
         """Return the gaze point ``dt_s`` later; all points in the world, metres.
 
@@ -122,8 +125,8 @@ class Pursuit:
         eye: midpoint between the eyes, the origin of directions and nearness
         dt_s: above 0
         closing: whether the error of direction is closed; False leaves it to a saccade
-        outruns: whether a gaze that is behind may be faster than the target; False leaves the rest
-            to catch-up saccades, as people do unless the motion is predictable
+        known: whether the motion is predictable; if it is not, a gaze that is behind is no faster
+            than the target, nor than people's is then, and leaves the rest to catch-up saccades
         """
         (x, y, z, near), (to_x, to_y, to_z, near_now) = gaze, now
         vx, vy, vz = v_target
@@ -133,7 +136,7 @@ class Pursuit:
         )
         rate = 1.0 / dt_s
         move_x, move_y, move_z = _adopted_speed(
-            ((to_x - was_x) * rate, (to_y - was_y) * rate, (to_z - was_z) * rate)
+            ((to_x - was_x) * rate, (to_y - was_y) * rate, (to_z - was_z) * rate), known
         )
         move_x, move_y, move_z = move_x * dt_s, move_y * dt_s, move_z * dt_s
         if closing:
@@ -143,12 +146,12 @@ class Pursuit:
                 off_x, off_y, off_z = scale((off_x, off_y, off_z), most / size)
             share = 1.0 - exp(-GAIN_1_S * dt_s)
             close = off_x * share, off_y * share, off_z * share
-            if not outruns:
+            if not known:
                 way = to_x - was_x, to_y - was_y, to_z - was_z
                 close = _limit_speed(close, way, 1.0 - VELOCITY_GAIN, dt_s)
             move_x, move_y, move_z = move_x + close[0], move_y + close[1], move_z + close[2]
             size = sqrt(move_x * move_x + move_y * move_y + move_z * move_z)
-            most = MAX_RAD_S * dt_s
+            most = _FASTEST_RAD_S[known] * dt_s
             if size > most:
                 move_x, move_y, move_z = scale((move_x, move_y, move_z), most / size)
         gain = VERGENCE_GAIN_1_S if near_before > near else DIVERGENCE_GAIN_1_S
@@ -166,16 +169,14 @@ class Pursuit:
         )
 
 
-def _adopted_speed(speed_rad_s: Vec3) -> Vec3:
+def _adopted_speed(speed_rad_s: Vec3, known: bool) -> Vec3:
     """Return the angular velocity that is adopted from a target's."""
     x, y, z = speed_rad_s
     size = sqrt(x * x + y * y + z * z)
     if size > REJECT_RAD_S:
         return (0.0, 0.0, 0.0)
-    if size > MAX_RAD_S:
-        share = MAX_RAD_S / size
-        x, y, z = x * share, y * share, z * share
-    return (x * VELOCITY_GAIN, y * VELOCITY_GAIN, z * VELOCITY_GAIN)
+    gain = VELOCITY_GAIN * min(1.0, _FASTEST_RAD_S[known] / max(size, 1e-9))
+    return (x * gain, y * gain, z * gain)
 
 
 def _limit_speed(close: Vec3, way: Vec3, least: float, dt_s: float) -> Vec3:

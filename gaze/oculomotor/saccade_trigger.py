@@ -4,11 +4,12 @@ A new object or part of it (the target's event flag) triggers a saccade at once.
 error beyond 2 deg does, unless the eye is about to cross the target anyway: with the error PE and
 the retinal slip RV the crossing is T = -PE / RV away, and between 40 and 180 ms smooth pursuit
 closes it (de Brouwer et al. 2002). If landings scatter, another saccade some 150 ms later corrects
-an error beyond 1.2 deg; an exact landing has an error only if the target was misjudged, and pursuit
-closes that. No error triggers a saccade within the refractory time after the last, and no event
-within ``_INTERVAL_S`` after its landing. A new target early in a saccade redirects it; a later one
-is delayed by that interval. The papers' saccades have none of these: they go on to their ends, and
-the next may follow at once.
+an error beyond 1.2 deg, or some 250 ms later one of a target that moves, unless it is beyond 5 deg;
+an exact landing has an error only if the target was misjudged, and pursuit closes that. No error
+triggers a saccade within the refractory time after the last, and no event within ``_INTERVAL_S``
+after its landing. A new target early in a saccade redirects it; a later one is delayed by that
+interval. The papers' saccades have none of these: they go on to their ends, and the next may follow
+at once.
 """
 
 from math import inf, radians
@@ -20,6 +21,8 @@ _SMALLEST_RAD = radians(0.3)
 """A new target closer to the gaze than this gets no saccade."""
 _SACCADE_RAD = radians(2.0)
 _CORRECT_RAD = radians(1.2)
+_FAR_RAD = radians(5.0)
+"""An error beyond this waits for the refractory time alone."""
 _INTERVAL_S = 0.1
 _REDIRECT_S = 0.07
 """A new target bends the saccade in flight if it appears at least this long before its end."""
@@ -90,7 +93,7 @@ class SaccadeTrigger:
             self._due_s = t_s
 
     def record_landing(self, t_s: float, correct_after_s: float) -> None:
-        """Record the end of a saccade, and the delay of a correction of its error."""
+        """Record the end of a saccade, and the delay until its error may be corrected."""
         self._landed_s, self._correct_s = t_s, correct_after_s
         self._erred = None if self._people else False
 
@@ -118,6 +121,8 @@ class SaccadeTrigger:
                 self._erred = False
             elif rested_s >= self._correct_s - 1e-9:
                 return self._go(t_s)
+        if error <= _FAR_RAD:
+            refractory_s = max(refractory_s, self._correct_s)
         if error <= _SACCADE_RAD or rested_s < refractory_s:
             return False
         return not (self._people and _crosses(slip, error)) and self._go(t_s)

@@ -56,6 +56,9 @@ class ScanpathModel(Protocol):
         ...
 
 
+SHORTEST_S = 0.14
+"""Shortest rest on a part, from landing to departure; longer ones are distributed above it. Also
+shortest rest after a saccade that catches up with the part."""
 _SPOT_WIDTH_M = 0.06
 """Standard deviation of looks about an observer's preferred spot."""
 _SPEECH_MOUTH = 6.0
@@ -119,6 +122,8 @@ class MarkovWalk:
         if until_s is None:
             if settled:
                 self.until_s = t_s + self.dwell_s(before)
+        elif not settled and self._spot_m is not None:
+            self.until_s = max(until_s, t_s + SHORTEST_S)
         elif t_s >= until_s:
             self._walk(until_s, t_s, face, p_world_head_m)
         point = face.parts_world_m[self._columns[self._part]]

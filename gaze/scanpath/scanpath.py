@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from gazerig.gaze.angles import add, angle_between, sub
 from gazerig.gaze.scanpath.dwell import Draw, lognormal_dwell, rest_dwell
 from gazerig.gaze.scanpath.models import (
+    SHORTEST_S,
     FaceTracking,
     MarkovWalk,
     RandomAngles,
@@ -35,8 +36,6 @@ from gazerig.params import Bounds, Choices
 
 # A measured and rounded row may differ from a sum of 1 by this much.
 _ROUNDING = 0.005
-_SHORTEST_S = 0.14
-"""Shortest rest on a part, from landing to departure; longer ones are distributed above it."""
 
 
 @dataclass(frozen=True)
@@ -266,5 +265,5 @@ def steps_and_dwells(params: ScanpathParams, walk: Walk) -> tuple[Floats, list[D
     pairs = zip(mean_s, sd_s, strict=True)
     if params.law == "literal":
         return normalise(walk.matrix), [lognormal_dwell(mean, sd) for mean, sd in pairs]
-    rests = [rest_dwell(mean, sd, _SHORTEST_S) for mean, sd in pairs]
+    rests = [rest_dwell(mean, sd, SHORTEST_S) for mean, sd in pairs]
     return merge_refixations(walk.matrix), rests
