@@ -79,23 +79,6 @@ def stays(model: ConversationGaze, seconds: float, dt: float = DT) -> list[Stay]
     return found
 
 
-@pytest.mark.parametrize(
-    ("mode", "bout", "bout_band", "share", "share_band"),
-    [("talk", 3.1, 0.8, 0.77, 0.08), ("listen", 7.9, 1.5, 0.95, 0.04)],
-)
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_e54_mutual_gaze(
-    mode: str, bout: float, bout_band: float, share: float, share_band: float, seed: int
-) -> None:
-    model = aversion(seed, mode=mode)
-    found = stays(model, 600.0)
-    mutual = [s.seconds for s in found if s.kind == "face"]
-    away = [s.seconds for s in found if s.kind == "away"]
-    assert np.mean(mutual) == pytest.approx(bout, abs=bout_band)
-    assert sum(mutual) / (sum(mutual) + sum(away)) == pytest.approx(share, abs=share_band)
-    assert max(mutual) <= 15.0
-
-
 def test_who_never_looks_away_passes_targets_untouched() -> None:
     model, seen = aversion(looks_away="none"), face()
     for k in range(5000):

@@ -7,13 +7,10 @@ table ``ROLES``:
 none       Without a conversation two people who face each other prefer periods of mutual gaze of
            3.3 s (Binetti et al. 2016, n = 498, a median); no measurement of the looks away between
            them is known, a listener's short ones are used.
-talk       Talking and listening people (Lee, Badler & Badler 2002, Eyes Alive; of their eight
-listen     directions half of each diagonal counts as aside).
-think      Thinking people look mostly up, for longer (Andrist et al. 2014: 70 % up, 20 down).
-thinking
-speaking   In reported turns the numbers are those of 19 people in remote talk (Dembinsky et
-listening  al. 2024, medians): speaking .45 of the time averted, 13.5 times a minute; listening .04,
-           3.2 times; three quarters of the looks go aside, most others up. Turns last some seconds,
+thinking   Thinking people look mostly up, for longer (Andrist et al. 2014: 70 % up, 20 down).
+speaking   The numbers are those of 19 people in remote talk (Dembinsky et al. 2024, medians):
+listening  speaking .45 of the time averted, 13.5 times a minute; listening .04, 3.2 times; three
+           quarters of the looks go aside, most others up. Turns last some seconds,
            so times on the face are exponential: they are as likely to end early in a turn as late.
 
 A look away starts when the rest on a part of the face is over, instead of the next shift between
@@ -51,7 +48,7 @@ from gazerig.params import Bounds
 
 LooksAway = Literal["people", "none"]
 MODES = ("none", "talk", "listen", "think")
-"""Roles that a user can choose; the others are those of reported turns."""
+"""Roles that a user can choose while no turns are reported."""
 
 
 class Role(NamedTuple):
@@ -59,7 +56,7 @@ class Role(NamedTuple):
 
     face_s, face_sd_s: mean and standard deviation of the time on the face; 0: an exponential time
     away_s, away_sd_s: of the time away
-    least_deg, most_deg: smallest and largest angle of a look away
+    most_deg: largest angle of a look away
     ways: shares of looks that go aside, and up, the rest down
     head: share of the head in a look away
     """
@@ -68,26 +65,25 @@ class Role(NamedTuple):
     face_sd_s: float
     away_s: float
     away_sd_s: float
-    least_deg: float
     most_deg: float
     ways: tuple[float, float]
     head: float = 0.0
 
 
-_ANYWHERE, _THINKS_UP, _SIDEWAYS = (0.47, 0.25), (0.10, 0.70), (0.78, 0.15)
-_HEAD = 0.4
+_THINKS_UP, _SIDEWAYS, _HEAD = (0.10, 0.70), (0.78, 0.15), 0.4
 ROLES = {
-    "none": Role(3.62, 1.63, 0.60, 0.30, 5.0, 22.7, _ANYWHERE),
-    "talk": Role(3.13, 3.16, 0.93, 0.80, 5.0, 27.5, _ANYWHERE, _HEAD),
-    "listen": Role(7.92, 1.57, 0.43, 0.24, 5.0, 22.7, _ANYWHERE),
-    "think": Role(1.50, 0.80, 3.54, 1.26, 5.0, 27.5, _THINKS_UP, _HEAD),
-    "speaking": Role(3.00, 0.0, 2.00, 0.90, 7.5, 27.5, _SIDEWAYS, _HEAD),
-    "listening": Role(25.0, 0.0, 0.65, 0.30, 7.5, 22.7, _SIDEWAYS),
-    "thinking": Role(1.50, 0.80, 3.54, 1.26, 7.5, 27.5, _THINKS_UP, _HEAD),
+    "none": Role(3.62, 1.63, 0.60, 0.30, 22.7, _SIDEWAYS),
+    "speaking": Role(3.00, 0.0, 2.00, 0.90, 27.5, _SIDEWAYS, _HEAD),
+    "listening": Role(25.0, 0.0, 0.65, 0.30, 22.7, _SIDEWAYS),
+    "thinking": Role(1.50, 0.80, 3.54, 1.26, 27.5, _THINKS_UP, _HEAD),
 }
-"""With a smallest angle of 0, as in the published distribution, half of the looks away would still
-be on the face.
-"""
+_ROLE_OF = {
+    "talk": "speaking",
+    "listen": "listening",
+    "think": "thinking",
+    "interrupted": "listening",
+}
+"""Chosen mode or reported state -> role; the others have its name."""
 
 _LONGEST_S = 14.5
 """Longest time on the face; beyond 15 s it is a stare."""
@@ -98,8 +94,10 @@ _BESIDE_DEG = 2.0
 _DRIFT_DEG = 0.75
 """Motion of a person during a look away of a reported turn, which must stay beside the face."""
 
-_SCALE_DEG = 6.9
-"""Mean angle of a look away beyond the smallest: A = -6.9 ln(P / 15.7) deg, P uniform (Eyes Alive).
+_LEAST_DEG, _SCALE_DEG = 7.5, 6.9
+"""Smallest angle of a look away, and mean angle beyond the smallest: A = -6.9 ln(P / 15.7) deg with
+a uniform P (Lee, Badler & Badler 2002, Eyes Alive). With a smallest angle of 0, as there, half of
+the looks away would still be on the face.
 """
 _SPREAD_DEG = 35.0
 """Largest angle of a look between it and level, or straight up or down."""
@@ -247,11 +245,10 @@ class ConversationGaze:
         if state == "idle":
             self._take_role(self.chosen_mode, t_s)
             return
-        role = "listening" if state == "interrupted" else str(state)
         if state == "speaking":
-            self._plan_speech(role, confidence, before != state, t_s)
+            self._plan_speech(confidence, before != state, t_s)
         elif state != before:
-            self._take_role(role, t_s, averts=state == "thinking")
+            self._take_role(state, t_s)
             self._next_sign_s = t_s + self._draw_wait_s() if state == "listening" else inf
 
     def step(self, t_s: float) -> str:
@@ -350,15 +347,17 @@ class ConversationGaze:
 
         A change returns the gaze to the face. Thinking averts it immediately, as in people.
 
-        mode: name of the role
+        mode: a chosen mode or a reported state
         t_s: present time
         averts: the gaze is averted now, without waiting for the end of a rest on the face; a look
             away in progress continues
         away_s: duration of that look away; None: as drawn from the role's distribution
         """
-        if mode == self._mode and not averts:
+        role = _ROLE_OF.get(mode, mode)
+        if role == self._mode and not averts:
             return
-        self._mode, self._averts_s = mode, None
+        self._mode, self._averts_s = role, None
+        averts = averts or role == "thinking"
         if averts:
             duration_s = self._draw_away_s() if away_s is None else away_s
             if self._away is None:
@@ -368,9 +367,9 @@ class ConversationGaze:
             return
         self._return()
         if self._face is not None:
-            self._until_s = t_s if mode == "think" else t_s + self._draw_face_s()
-            if mode not in MODES:  # the look began in an earlier turn: both are no stare
-                self._until_s = min(self._until_s, max(t_s, self._away_s + _LONGEST_S))
+            # The look began in an earlier turn: both together are no stare.
+            longest_s = max(t_s, self._away_s + _LONGEST_S)
+            self._until_s = min(t_s + self._draw_face_s(), longest_s)
 
     def _turn(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
         """Switch between face and look away when the drawn duration is over."""
@@ -456,7 +455,7 @@ class ConversationGaze:
     def _least_deg(self, way_rad: float, face: Vec3, p_world_head_m: Vec3) -> float:
         """Return the least angle of a look away in a direction, 0 right and pi/2 up."""
         edge_deg = face_extent_deg(way_rad, norm(sub(face, p_world_head_m)))
-        return max(self._role.least_deg, edge_deg + _BESIDE_DEG + _DRIFT_DEG)
+        return max(_LEAST_DEG, edge_deg + _BESIDE_DEG + _DRIFT_DEG)
 
     def _draw_direction_deg(self) -> float:
         """Draw the direction, 0 right and 90 up, uniform within a sector of the role."""
@@ -483,7 +482,7 @@ class ConversationGaze:
         """Draw from the log-normal distribution with a given mean and standard deviation."""
         return max(draw_lognormal(self._rng, mean_s, sd_s / mean_s), _SHORTEST_S)
 
-    def _plan_speech(self, role: str, confidence: float, begins: bool, t_s: float) -> None:
+    def _plan_speech(self, confidence: float, begins: bool, t_s: float) -> None:
         """Plan the look away at the beginning of a turn, and the return before its end."""
         left_s = self._ends_s - t_s
         if self._ends_s < inf:
@@ -494,7 +493,7 @@ class ConversationGaze:
         if begins:
             averts = left_s >= _LONG_TURN_S and self._turn_rng.random() < _STARTS_AVERTED
             away_s = max(0.3, self._draw_normal(_START_AWAY_S, _START_AWAY_SD_S))
-            self._take_role(role, t_s, averts, away_s)
+            self._take_role("speaking", t_s, averts, away_s)
 
     def _draw_wait_s(self) -> float:
         """Draw the time to the next nod by this head's own rate; inf without nods."""

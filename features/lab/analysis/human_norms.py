@@ -317,16 +317,6 @@ BANDS: tuple[NormBand, ...] = (
          0.0, 0.15, 15, "Evinger et al. 1994: with gaze shifts, some 40 ms before or after; 4 % by chance"),
     NormBand("bout_none", SOCIAL, "median look at a face without a conversation", "s", 1.5, 6.0, 10,
          "Binetti et al. 2016: 3.3 s is what people like; Rogers et al. 2018: 2.2 s", "none"),
-    NormBand("bout_talk", SOCIAL, "mean look at the face while talking", "s", 2.3, 3.9, 15,
-         "Lee, Badler & Badler 2002: 3.1 s", "talk"),
-    NormBand("share_talk", SOCIAL, "share of the time on the face while talking", "share", 0.69, 0.85,
-         15, "Lee, Badler & Badler 2002: .77; Argyle & Cook: .41", "talk"),
-    NormBand("bout_listen", SOCIAL, "mean look at the face while listening", "s", 6.4, 9.4, 10,
-         "Lee, Badler & Badler 2002: 7.9 s", "listen"),
-    NormBand("share_listen", SOCIAL, "share of the time on the face while listening", "share",
-         0.91, 0.99, 10, "Lee, Badler & Badler 2002: .95; Argyle & Cook: .75", "listen"),
-    NormBand("bout_think", SOCIAL, "mean look away while thinking", "s", 2.3, 4.8, 10,
-         "Andrist et al. 2014: 3.54 +- 1.26 s", "think"),
     *(
         NormBand(f"{key}_{role}", SOCIAL, f"{title} in {text}", unit, low, high, least,
              f"Dembinsky et al. 2024, 19 people in remote talk: {people}")

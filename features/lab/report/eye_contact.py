@@ -54,15 +54,8 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     seen = face_looks(run)
     whole = _lengths(seen[seen[:, 2] == 0.0])
     both = mutual_looks(run)
-    away = seen[1:, 0] - seen[:-1, 1]
-    pairs = np.column_stack([_lengths(seen)[:-1], away])
     return [
         MeasuredValue("bout_none", whole, median),
-        MeasuredValue("bout_talk", whole, mean),
-        MeasuredValue("share_talk", pairs, _share),
-        MeasuredValue("bout_listen", whole, mean),
-        MeasuredValue("share_listen", pairs, _share),
-        MeasuredValue("bout_think", away, mean),
         MeasuredValue("longest_look", _lengths(seen), longest),
         MeasuredValue("mutual", _lengths(both), mean),
     ]
@@ -70,7 +63,3 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
 
 def _lengths(rows: Floats) -> Floats:
     return np.asarray(rows[:, 1] - rows[:, 0])
-
-
-def _share(rows: Floats) -> float:
-    return float(rows[:, 0].sum() / rows.sum())
