@@ -14,7 +14,7 @@ from gazerig.gaze.types import BodyRows, Vec3
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _LASTS_S = 60.0
 """Time for which a face is remembered."""
-_SAME_M = 0.25
+_SAME_M = 0.2
 _FOUND_WITHIN_S = 1.0
 """Time from the change of target: movement of eyes and head, and delay of the camera."""
 

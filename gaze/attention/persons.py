@@ -43,6 +43,8 @@ constant with which that salience recovers.
 _TOGETHER_S = 0.5
 """People who appear within this time of each other came together."""
 _CLEARLY_NEARER = 1.1
+_TALKS_S = 6.0
+"""Silence after which a talk has ended."""
 _AWAY_S, _NEW_S = 3.0, 2.0
 """Absence after which a person returns; time after that, or an appearance, for which one is new."""
 _GONE_S = 120.0
@@ -168,13 +170,13 @@ class Persons:
     def may_speak(self, rows: BodyRows) -> frozenset[int]:
         """Return the people who may speak, as nobody is seen to speak.
 
-        They are those at whom others look, also out of view, but not the last speaker; otherwise
-        those out of view who have not been observed to be silent since the last turn of talk.
+        They are those at whom others look in a talk, also out of view, but not the last speaker;
+        otherwise those out of view who have not been observed to be silent since the last turn.
 
         rows: the bodies in view and the remembered ones
         """
         places, watched = _face_places(rows), set()
-        for face in self._faces:
+        for face in self._faces if self._at_s - self._spoke_s < _TALKS_S else ():
             ahead = face.gaze_world or transpose(face.R_world_face)[0]
             others = [
                 (angle_between(ahead, sub(p, face.p_world_m)), id)
