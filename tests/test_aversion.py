@@ -175,7 +175,7 @@ def test_the_head_takes_its_share_in_a_thinkers_look_away() -> None:
     between = [f + 0.4 * (p - f) for f, p in zip(FACE, away.p_world_m, strict=True)]
     assert away.centre_world_m == pytest.approx(between)
     assert away.v_world_m_s == (0.0, 0.0, 0.0)
-    assert away.why == "looking away from face 4 (think)"
+    assert away.why == "looking away from face 4 (thinking)"
     distance = [float(np.linalg.norm(sub(p, HEAD))) for p in (away.p_world_m, FACE)]
     assert distance[0] == pytest.approx(distance[1])
 
@@ -203,7 +203,7 @@ def test_every_place_and_return_is_one_new_shift_and_the_count_never_falls() -> 
 
 
 def test_another_face_is_looked_at_before_it_is_looked_away_from() -> None:
-    model = aversion(13, mode="think")
+    model = aversion(13, mode="talk")
     t = leaves_at(model)
     other = model.look(face(2, name=5), HEAD, t + DT)
     assert (other.kind, other.id) == ("face", 5)

@@ -104,9 +104,6 @@ _SPREAD_DEG = 35.0
 _PLACE_S, _PLACE_SPREAD = 0.45, 0.5
 """Mean duration of a rest within a look away, and its standard deviation / mean. A speaker's rests
 last 0.19 s (median of Dembinsky et al. 2024), which sounds hectic on servos."""
-_STEP_DEG = 7.0, 4.0
-"""Standard deviation of the steps between places of a look away, to the side and up or down."""
-_TRIES = 8
 _MOVES = 1.0
 """Motion of another body that ends a look away: translation, looming and onset of eq 1."""
 
@@ -119,7 +116,7 @@ _SIGN_S = 0.7
 """Their length, in which no other one begins."""
 _INDIVIDUAL = 0.5
 """Standard deviation of the logarithm of a head's own rate of nods."""
-_LONG_TURN_S, _STARTS_AVERTED = 3.5, 0.95
+_LONG_TURN_S, _STARTS_AVERTED = 3.5, 0.85
 """Shortest planned turn that begins averted; share of the long turns that do."""
 _START_AWAY_S, _START_AWAY_SD_S = 1.2, 0.25
 """Time into a turn until the gaze returns to the face."""
@@ -387,29 +384,22 @@ class ConversationGaze:
     def _avert(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
         """Look at a place next to the face."""
         self._why = ""
-        self._offset_deg = self._draw_offset_deg(_centre_of_target(target), p_world_head_m)
-        self._go_to_offset(target, p_world_head_m, t_s)
+        self._go_towards(radians(self._draw_direction_deg()), target, p_world_head_m, t_s)
 
     def _move_on(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
         """Look at the next place of a look away."""
-        centre, (right_deg, up_deg) = _centre_of_target(target), self._offset_deg
-        for _ in range(_TRIES):
-            step = self._rng.standard_normal(2) * _STEP_DEG
-            x, y = right_deg + float(step[0]), up_deg + float(step[1])
-            least_deg = self._least_deg(atan2(y, x), centre, p_world_head_m)
-            if least_deg <= hypot(x, y) <= max(least_deg, self._role.most_deg):
-                self._offset_deg = x, y
-                break
-        else:
-            self._offset_deg = self._draw_offset_deg(centre, p_world_head_m)
-        self._go_to_offset(target, p_world_head_m, t_s)
+        way = self._way + radians(_SPREAD_DEG) * float(self._rng.uniform(-1.0, 1.0))
+        self._go_towards(way, target, p_world_head_m, t_s)
 
-    def _go_to_offset(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
-        """Look at the place at the present offset from the face, at its distance."""
+    def _go_towards(self, way: float, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
+        """Look past the edge of the face in a direction, 0 right and pi/2 up, at its distance."""
         rel = sub(_centre_of_target(target), p_world_head_m)
         ahead, right, up = _axes_to(rel)
-        x, y = self._offset_deg
-        way, angle = atan2(y, x), radians(hypot(x, y))
+        edge_deg = face_extent_deg(way, norm(rel))
+        least_deg = max(_LEAST_DEG, edge_deg + _BESIDE_DEG + _DRIFT_DEG)
+        beyond_deg = _SCALE_DEG * float(self._rng.standard_exponential())
+        angle = radians(min(max(least_deg, self._role.most_deg), least_deg + beyond_deg))
+        self._way = way
         aside = add(scale(right, cos(way)), scale(up, sin(way)))
         looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
         self._go_to(target, add(p_world_head_m, scale(looking, norm(rel))))
@@ -443,19 +433,6 @@ class ConversationGaze:
             why=self._why or f"looking away from face {target.id} ({role})",
             centre_world_m=add(centre, scale(sub(away, centre), self._role.head)),
         )
-
-    def _draw_offset_deg(self, face: Vec3, p_world_head_m: Vec3) -> tuple[float, float]:
-        """Draw angles to the right and up from a face, past its edge."""
-        way = radians(self._draw_direction_deg())
-        least_deg = self._least_deg(way, face, p_world_head_m)
-        beyond_deg = _SCALE_DEG * float(self._rng.standard_exponential())
-        angle_deg = min(max(least_deg, self._role.most_deg), least_deg + beyond_deg)
-        return angle_deg * cos(way), angle_deg * sin(way)
-
-    def _least_deg(self, way_rad: float, face: Vec3, p_world_head_m: Vec3) -> float:
-        """Return the least angle of a look away in a direction, 0 right and pi/2 up."""
-        edge_deg = face_extent_deg(way_rad, norm(sub(face, p_world_head_m)))
-        return max(_LEAST_DEG, edge_deg + _BESIDE_DEG + _DRIFT_DEG)
 
     def _draw_direction_deg(self) -> float:
         """Draw the direction, 0 right and 90 up, uniform within a sector of the role."""
