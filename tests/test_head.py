@@ -139,7 +139,7 @@ def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
 
 
 @pytest.mark.parametrize(
-    ("size", "peak"), [(20.0, 65.0), (30.0, 84.0), (40.0, 103.0), (60.0, 140.0)]
+    ("size", "peak"), [(20.0, 74.7), (30.0, 96.0), (40.0, 117.3), (60.0, 160.0)]
 )
 def test_larger_head_movements_are_faster(size: float, peak: float) -> None:
     model = HeadModel(HeadParams(goal_model="align"), radians(5.0), NECK)

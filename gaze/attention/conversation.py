@@ -16,7 +16,7 @@ listening  speaking .45 of the time averted, 13.5 times a minute; listening .04,
 A look away starts when the rest on a part of the face is over, instead of the next shift between
 parts, and goes beyond the outline of the face: a near face is wider than the published angles. The
 eyes do not rest in it: they move from place to place, a speaker's or thinker's head takes a share
-of .4 in it (Andrist et al. 2014), and something that moves near by ends it. A look to where the
+of .4 in it and others' .1 (Andrist et al. 2014), and something that moves near by ends it. A look to where the
 person looks (gazerig.gaze.attention.followed_look) is a look away with a goal.
 
 A voice agent reports its state. A thinker looks away immediately; most long turns begin averted
@@ -67,14 +67,15 @@ class Role(NamedTuple):
     away_sd_s: float
     most_deg: float
     ways: tuple[float, float]
-    head: float = 0.0
+    head: float
 
 
-_THINKS_UP, _SIDEWAYS, _HEAD = (0.10, 0.70), (0.78, 0.15), 0.4
+_THINKS_UP, _SIDEWAYS = (0.10, 0.70), (0.78, 0.15)
+_HEAD, _LESS_HEAD = 0.4, 0.1
 ROLES = {
-    "none": Role(3.62, 1.63, 0.60, 0.30, 22.7, _SIDEWAYS),
+    "none": Role(3.62, 1.63, 0.60, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
     "speaking": Role(3.00, 0.0, 2.00, 0.90, 27.5, _SIDEWAYS, _HEAD),
-    "listening": Role(25.0, 0.0, 0.65, 0.30, 22.7, _SIDEWAYS),
+    "listening": Role(25.0, 0.0, 0.65, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
     "thinking": Role(1.50, 0.80, 3.54, 1.26, 27.5, _THINKS_UP, _HEAD),
 }
 _ROLE_OF = {

@@ -61,6 +61,8 @@ _REST_S, _GLANCE_S = 1.5, 0.9
 """Mean time of a rest straight ahead between series of glances, and of a glance."""
 _ASIDE_S, _STAYS_ASIDE_S = (3.0, 5.0), (1.4, 1.8)
 """Range of the time between looks as far to one side as the reach, and of their duration."""
+_FIRST_REST_S = 0.6
+"""Time at the start after which the head looks about, as nobody is ahead."""
 _AGAIN = 0.9
 """Share of glances that are followed by another one without a rest."""
 _GLANCE_DEG, _LEAST_DEG = 13.0, 2.0
@@ -115,7 +117,7 @@ class Idle:
         self._now = _idle_target("rest", -1, REST_M, t_s, "no one in sight")
         self._until_s = self._search_until_s = t_s
         self._count = 0
-        self._side, self._aside_s = 1.0, t_s + _ASIDE_S[0]
+        self._side, self._aside_s = -1.0, t_s
         self._gone: Target | None = None
         self._seen: dict[int, tuple[Vec3, float]] = {}
         self._in_view: frozenset[int] = frozenset()
@@ -192,7 +194,7 @@ class Idle:
             self._search(self._gone, t_s)
         elif self._is_far_aside():
             self._look_back(t_s)
-        elif t_s >= self._aside_s and self._now.kind != "rest":
+        elif t_s >= self._aside_s:
             self._look_aside(t_s)
         elif self._now.kind == "rest" or (
             self._now.kind == "glance" and self._rng.random() < _AGAIN
@@ -205,7 +207,8 @@ class Idle:
         """Start a rest: look straight ahead."""
         self._gone = None
         self._now = _idle_target("rest", -1, REST_M, t_s, "no one in sight")
-        self._until_s = t_s + self._draw_s(_REST_S) if self._params.explores else inf
+        rest_s = self._draw_s(_REST_S) if self._count else _FIRST_REST_S
+        self._until_s = t_s + rest_s if self._params.explores else inf
 
     def _search(self, gone: Target, t_s: float) -> None:
         """Start a search fixation: first a step in the direction of the loss, then around."""

@@ -83,7 +83,7 @@ class HeadParams:
         "with goal_model attention: angle by which the head stops short of the target at min_salience; with this and align: "
         "eccentricity beyond which it starts to move"] = 30.0
     min_salience: Annotated[float, Bounds(0, 0.9), "salience A1 of the least interest: the head turns and rolls least"] = 0.2
-    base_speed_deg_s: Annotated[float, Bounds(5, 500), "V0: the peak speed of a head movement of A degrees is (4/3 A/50 + 0.4) V0"] = 70.0
+    base_speed_deg_s: Annotated[float, Bounds(5, 500), "V0: the peak speed of a head movement of A degrees is (4/3 A/50 + 0.4) V0"] = 80.0
     # fmt: on
 
 
@@ -200,9 +200,9 @@ _RELIEF_RAD = radians(2.0), radians(4.5)
 _RECENTRE_DEG_S = 20.0
 _AT_ONCE_ABOVE = 0.85
 """Salience of a rule's target, other than a face, that is urgent."""
-_FACE, _SEARCHED, _URGENT = 0.4, 0.33, 0.22
-"""Eye-only range for faces, for the places where a lost person is searched, and for urgent targets,
-as shares of that for things: 7, 6 and 4 deg to a side."""
+_FACE, _LOOKED_FOR, _URGENT = 0.4, 0.33, 0.15
+"""Eye-only range for faces, for looks in search of people, and for urgent targets and rests straight
+ahead, as shares of that for things: 7, 6 and 3 deg to a side."""
 _FARTHEST_AWAY_RAD = radians(22.0)
 """Eccentricity of a look away from a walker up to which the head goes on with the walker."""
 _SWINGS = 2.5
@@ -470,15 +470,16 @@ class HeadModel:
         """Return the eye-only range for a target, as a share of that for things."""
         is_face = target.kind in _FACES
         is_rule = target.top_down and target.kind != ORDERED and not is_face
-        if target.urgent or (is_rule and target.salience > _AT_ONCE_ABOVE):
+        if target.urgent or target.kind == "rest" or (is_rule and target.salience > _AT_ONCE_ABOVE):
             return _URGENT
-        return _FACE if is_face else _SEARCHED if target.kind == SEARCH else 1.0
+        return _FACE if is_face else _LOOKED_FOR if target.kind == SEARCH else 1.0
 
     def _trigger_rad(self, target: Target) -> float:
         """Return the eccentricity of a target from which the head takes part."""
         if not self._people:
             return self._share.trigger_rad
-        return min(self._range_share(target) * self.share.half_range_rad, self._share.trigger_rad)
+        range_rad = self._range_share(target) * self.share.half_range_rad
+        return min(max(range_rad, _RELAXED_RAD), self._share.trigger_rad)
 
     def _draw_variation(self) -> None:
         """Draw the deviations of this shift from others, and the start and amount of recentring.
