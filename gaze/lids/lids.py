@@ -12,7 +12,7 @@ the preceding text describes. Opening 0 is shut, with upper and lower lid in con
 open. A blink moves both lids from their present openings to 0, so they meet at any gaze direction.
 """
 
-from math import degrees, inf, radians, tanh
+from math import degrees, inf, tanh
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -29,7 +29,6 @@ from gazerig.gaze.lids.blink import (
     evokes_blink,
 )
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
-from gazerig.gaze.types import Angles2
 
 Side = Literal["left", "right"]
 
@@ -188,14 +187,6 @@ class Lids:
             for blink, wink in zip(blinks, self._winks.values(), strict=True)
         )
         return LidOpenings(upper * left, upper * right, any(blinks), lower * left, lower * right)
-
-    def eye_turn_rad(self, t_s: float) -> tuple[Angles2, Angles2] | None:
-        """Return the turns of left and right eye, (yaw, pitch), with a blink; None without any."""
-        share = 0.0 if self._blink is None else self._blink.eye_turn(t_s)
-        if share == 0.0:
-            return None
-        down, nasal = (radians(share * angle) for angle in self._law.eye_turn_deg)
-        return (-nasal, -down), (nasal, -down)
 
     def _is_blink_due(self, t_s: float, shift_rad: float | None) -> bool:
         """Return whether a blink begins now; each gaze shift has one draw."""
