@@ -83,14 +83,6 @@ def test_a_head_may_react_at_once() -> None:
     assert viewer.reaction_s([FACE, REACHES], "hand") == pytest.approx(DELAY_S, abs=TICK_S)
 
 
-def test_a_face_that_was_just_left_is_returned_to_sooner() -> None:
-    viewer = Viewer(attention())
-    assert viewer.reaction_s([FACE], "face") == pytest.approx(0.15, abs=0.006)
-    viewer.show([FACE, REACHES], 0.7)
-    # The hand is gone and its amount with it; the face was there all the time.
-    assert viewer.reaction_s([FACE], "face") == pytest.approx(0.8 * 0.15, abs=0.006)
-
-
 def test_what_has_gone_before_its_time_is_not_looked_at() -> None:
     viewer = Viewer(attention())
     viewer.show([FACE], 0.5)

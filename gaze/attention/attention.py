@@ -206,7 +206,6 @@ class Attention:
         if identity != self._identity:
             if self._identity != _NO_TARGET:
                 self._habituation.record_left(place, t_s)
-                self._reaction.record_left(*self._identity, t_s)
             self._identity = identity
             self._shift += 1
             self._since_s = t_s

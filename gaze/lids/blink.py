@@ -7,9 +7,8 @@ blink (Evinger 1994: 97 % of those beyond 33 deg), once for each shift, about wh
 start; the published rates include these.
 
 No two blinks of a person are equal: durations differ by tens of ms, half of the blinks stop between
-a quarter and nearly all of the path (Ousler 2014), and the lids of both eyes differ a little. The
-eyes turn 1 to 5 deg down and towards the nose in a blink (Collewijn 1985; 1 to 2 deg, Riggs 1987),
-faster than the lids: they turn back before these are shut.
+a quarter and nearly all of the path (Ousler 2014). Two small things that nobody sees are left out:
+the eyes' turn in a blink (1 to 2 deg, Riggs 1987) and the difference between left and right lids.
 
 People's lower lids hardly rise in a blink: they move towards the nose (Doane 1980), and the upper
 lid moves down to them. A mechanism cannot do this: the shut points of its lids are calibrated to
@@ -53,9 +52,6 @@ class LidLaw:
     interval_cv: standard deviation over mean of log-normal intervals; None: exponential ones
     incomplete_share: share of blinks that do not shut the lid
     duration_sd: standard deviation of the logarithm of a blink's closing, shut and opening time
-    asymmetry_sd: standard deviation of the relative difference between both eyes' lids in a blink:
-        of the opening time, and of the depth of an incomplete one
-    eye_turn_deg: turn of the eyes down and towards the nose in a complete blink
     evoked_beyond_deg: size of the gaze shifts that all evoke a blink; None: by chance
     evoked_sd_s: standard deviation of the time from the onset of a shift to that of its blink
     evoked_replaces: a gaze-evoked blink replaces the next spontaneous one
@@ -68,8 +64,6 @@ class LidLaw:
     interval_cv: float | None = 0.8
     incomplete_share: float = 0.5
     duration_sd: float = 0.2
-    asymmetry_sd: float = 0.06
-    eye_turn_deg: tuple[float, float] = (1.3, 0.7)
     evoked_beyond_deg: float | None = None
     evoked_sd_s: float = 0.03
     evoked_replaces: bool = True
@@ -86,8 +80,6 @@ NAKAMOTO = LidLaw(
     interval_cv=None,
     incomplete_share=0.0,
     duration_sd=0.0,
-    asymmetry_sd=0.0,
-    eye_turn_deg=(0.0, 0.0),
     evoked_beyond_deg=20.0,
     evoked_sd_s=0.0,
     evoked_replaces=False,
@@ -104,8 +96,6 @@ _MIDDLE_DEG, _STEEPNESS_1_DEG = 17.0, 0.217
 """Size of a gaze shift that evokes a blink in half of the cases, and steepness of that chance."""
 _LEAST_DEPTH, _NEARLY_SHUT = 0.6, 0.95
 """Depths of incomplete blinks."""
-_EYES_OUT, _EYES_BACK = 0.9, 0.6
-"""Shares of the lids' closing and opening times: end of the eyes' turn out, and back."""
 
 
 def closure(since_onset_s: float, close_s: float, hold_s: float, open_s: float) -> float:
@@ -149,17 +139,6 @@ class LidClosure(NamedTuple):
         """Return the closure of the lids, 0..1."""
         return self.depth * closure(t_s - self.onset_s, self.close_s, self.hold_s, self.open_s)
 
-    def eye_turn(self, t_s: float) -> float:
-        """Return the turn of the eyes with it, 0..1: it ends before that of the lids."""
-        since_s = t_s - self.onset_s
-        out_s = _EYES_OUT * self.close_s
-        back_s = self.close_s - out_s + self.hold_s + _EYES_BACK * self.open_s
-        if not 0.0 < since_s < out_s + back_s:
-            return 0.0
-        if since_s < out_s:
-            return self.depth * min_jerk(since_s / out_s)
-        return self.depth * (1.0 - min_jerk((since_s - out_s) / back_s))
-
     def vary_durations(self, law: LidLaw, rng: np.random.Generator) -> "LidClosure":
         """Return it with randomly varied durations."""
         if law.duration_sd == 0.0:
@@ -168,24 +147,6 @@ class LidClosure(NamedTuple):
         return self._replace(
             close_s=close * self.close_s, hold_s=hold * self.hold_s, open_s=open * self.open_s
         )
-
-    def left_and_right(
-        self, law: LidLaw, rng: np.random.Generator
-    ) -> "tuple[LidClosure, LidClosure]":
-        """Return it for the left and the right lids, which differ slightly."""
-        if law.asymmetry_sd == 0.0:
-            return self, self
-        open, depth = (0.5 * law.asymmetry_sd * rng.standard_normal(2)).tolist()
-        if self.depth >= 1.0:  # both eyes shut, at the same time
-            depth = 0.0
-        left, right = (
-            self._replace(
-                open_s=self.open_s * max(0.5, 1.0 + sign * open),
-                depth=min(max(self.depth * (1.0 + sign * depth), 0.0), 1.0),
-            )
-            for sign in (1.0, -1.0)
-        )
-        return left, right
 
 
 def blink_pause_s(law: LidLaw, per_min: float, length_s: float, rng: np.random.Generator) -> float:

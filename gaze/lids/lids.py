@@ -12,7 +12,7 @@ the preceding text describes. Opening 0 is shut, with upper and lower lid in con
 open. A blink moves both lids from their present openings to 0, so they meet at any gaze direction.
 """
 
-from math import degrees, inf, radians, tanh
+from math import degrees, inf, tanh
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -29,7 +29,6 @@ from gazerig.gaze.lids.blink import (
     evokes_blink,
 )
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
-from gazerig.gaze.types import Angles2
 
 Side = Literal["left", "right"]
 
@@ -111,7 +110,6 @@ class Lids:
         """Open the lids and draw the first blink; conversation stays."""
         self.blinks = 0
         self._blink: LidClosure | None = None
-        self._sides: tuple[LidClosure, LidClosure] | None = None
         self._winks: dict[Side, LidClosure | None] = {"left": None, "right": None}
         self._t_s, self._shut_until_s = t_s, -inf
         self._evoked_s = inf
@@ -181,21 +179,12 @@ class Lids:
             return tuple.__new__(LidOpenings, (upper, upper, False, lower, lower))
         if self._is_blink_due(t_s, shift_rad):
             self._begin_blink(t_s)
-        blinks = [_closure(side, t_s) for side in self._sides or (None, None)]
+        blink = _closure(self._blink, t_s)
         # Just before their end, closures exceed 1 by a rounding error.
         left, right = (
-            max(0.0, 1.0 - max(blink, _closure(wink, t_s)))
-            for blink, wink in zip(blinks, self._winks.values(), strict=True)
+            max(0.0, 1.0 - max(blink, _closure(wink, t_s))) for wink in self._winks.values()
         )
-        return LidOpenings(upper * left, upper * right, any(blinks), lower * left, lower * right)
-
-    def eye_turn_rad(self, t_s: float) -> tuple[Angles2, Angles2] | None:
-        """Return the turns of left and right eye, (yaw, pitch), with a blink; None without any."""
-        share = 0.0 if self._blink is None else self._blink.eye_turn(t_s)
-        if share == 0.0:
-            return None
-        down, nasal = (radians(share * angle) for angle in self._law.eye_turn_deg)
-        return (-nasal, -down), (nasal, -down)
+        return LidOpenings(upper * left, upper * right, blink > 0.0, lower * left, lower * right)
 
     def _is_blink_due(self, t_s: float, shift_rad: float | None) -> bool:
         """Return whether a blink begins now; each gaze shift has one draw."""
@@ -224,10 +213,7 @@ class Lids:
         blink = self._full_closure(t_s, self._params.hold_ms)
         blink = blink._replace(depth=blink_depth(self._law, self._rng))
         self._blink = blink = blink.vary_durations(self._law, self._rng)
-        self._sides = blink.left_and_right(self._law, self._rng)
-        for side in self._sides:
-            self._record_motion_end(side)
-        self._rng.random()  # unused; without it every later blink of a seed would differ
+        self._record_motion_end(blink)
         after_s, ends_s = blink.length_s + self._pause_s(blink.length_s), t_s + blink.length_s
         if t_s >= self._evoked_s and self._law.evoked_replaces:
             # The next spontaneous blink is skipped, the one after it stays.

@@ -182,13 +182,9 @@ class Oculomotor:
             )
         if (owned := offset.owned) is not None:
             wanted = owned.mix_eye(wanted[0]), owned.mix_eye(wanted[1])
-        left, right = eyes = self._clip_eyes(wanted)
-        limited = () if eyes == wanted else self._limited_angles(wanted, head, facing)
+        left, right = self._clip_eyes(wanted)
+        limited = () if (left, right) == wanted else self._limited_angles(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
-        if lids.blink and owned is None and (turns := self._lids.eye_turn_rad(t_s)) is not None:
-            left, right = self._clip_eyes(
-                (_add_offset(left, turns[0]), _add_offset(right, turns[1]))
-            )
         if offset.lids != NO_OFFSET.lids:
             lids = lids.scale(offset.lids)
         head = self._add_drift(head, offset.head_rad, t_s)

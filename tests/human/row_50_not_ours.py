@@ -15,20 +15,14 @@ WANTED = {
     "the judge's saccades that are not ours, %": (0.0, 3.0),
     "our saccades that the judge finds, %": (95.0, 100.0),
 }
-_NONE = np.empty((0, 2))
 
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return the figures over all seeds."""
     files = [exported(run("visitor", seed=seed, seconds=seconds)) for seed in seeds]
-    seen = [pymovements_saccades(file) for file in files]
-    ours, theirs = (np.concatenate(each) for each in zip(*map(marks, files, seen), strict=True))
-    lids = [
-        marks(file._replace(blinks=_NONE), each) for file, each in zip(files, seen, strict=True)
-    ]
+    found = [marks(file, pymovements_saccades(file)) for file in files]
+    ours, theirs = map(np.concatenate, zip(*found, strict=True))
     return {
         "the judge's saccades that are not ours, %": 100.0 * float((~theirs).mean()),
-        "the same, with the eyes' motion of blinks, %": 100.0
-        * float((~np.concatenate([each.theirs for each in lids])).mean()),
         "our saccades that the judge finds, %": 100.0 * float(ours.mean()),
     }

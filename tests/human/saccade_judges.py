@@ -34,21 +34,18 @@ class Exported(NamedTuple):
 
     time_s: (n,); gaze_deg: (n, 2), yaw and pitch in space
     commanded: (m, 2) onset and end of each commanded saccade by the export's events
-    blinks: (b, 2) onset and end of each blink, in which the eyes turn down and back
     """
 
     time_s: np.ndarray
     gaze_deg: np.ndarray
     commanded: np.ndarray
-    blinks: np.ndarray
 
 
 class Marks(NamedTuple):
     """What a judge found of our saccades.
 
     ours: (m,) whether each commanded one overlaps one of the judge's
-    theirs: (k,) whether each of the judge's overlaps one of ours, or is the eyes' motion of a
-        blink
+    theirs: (k,) whether each of the judge's overlaps one of ours
     """
 
     ours: np.ndarray
@@ -72,14 +69,7 @@ def exported(run: MeasuredRun) -> Exported:
     gaze += np.random.default_rng(0).normal(0.0, NOISE_DEG, gaze.shape)
     saccades = [row for row in events if row["event"] == "saccade"]
     onset, length = _column(saccades, "onset_s"), _column(saccades, "duration_s")
-    blinks = [row for row in events if row["event"] == "blink"]
-    shut, shut_s = _column(blinks, "onset_s"), _column(blinks, "duration_s")
-    return Exported(
-        time_s,
-        gaze,
-        np.column_stack([onset, onset + length]),
-        np.column_stack([shut, shut + shut_s]),
-    )
+    return Exported(time_s, gaze, np.column_stack([onset, onset + length]))
 
 
 def pymovements_saccades(run: Exported) -> np.ndarray:
@@ -127,12 +117,9 @@ def marks(run: Exported, seen: np.ndarray) -> Marks:
         run: what was judged.
         seen: (k, 2) onset and end of the judge's saccades.
     """
-    over, blink = (
-        (seen[None, :, 0] <= spans[:, None, 1]) & (seen[None, :, 1] >= spans[:, None, 0])
-        for spans in (run.commanded, run.blinks)
-    )
-    known = np.asarray(over.any(axis=0) | blink.any(axis=0))
-    return Marks(np.asarray(over.any(axis=1)), known)
+    begin, end = run.commanded.T[:, :, None]
+    over = (seen[:, 0] <= end) & (seen[:, 1] >= begin)
+    return Marks(np.asarray(over.any(axis=1)), np.asarray(over.any(axis=0)))
 
 
 def _rate_hz(run: Exported) -> float:
