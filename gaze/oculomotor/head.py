@@ -142,7 +142,7 @@ class HeadShare:
             return self.offset_rad(salience)
         if self._params.goal_model == "align":
             return 0.0
-        slope = min(1.0, max(0.0, 1.0 - (1.0 - _SLOPE) * range_share + steeper))
+        slope = min(1.0, max(0.0, 1.0 - (1.0 - _SLOPE - steeper) * range_share))
         short = arc_rad - slope * max(0.0, arc_rad - range_share * self.half_range_rad)
         return min(short, self.reach_rad)
 
