@@ -53,6 +53,8 @@ _TURNS_S = 2.0
 """Time after a change of speaker or addressee in which only they are looked at."""
 _IN_CONVERSATION = 0.8
 """Least salience of faces during a conversation."""
+_REACHES_IN = 0.3
+"""Onset of a hand that has just come into view, above which the head turns to it at once."""
 _URGENT = 3.0
 """Factor of their salience in this time, if a voice agent has reported the change."""
 
@@ -288,7 +290,8 @@ class Attention:
         return Target(
             p, v, captured_s, first.kind, first.id, max(first.rule, moving), by_rule, None, 0, why,
             plan=self.top_down.plan_text, saliences=(first, *others[:_LISTED]),
-            urgent=self._social and first.id in urgent,
+            urgent=self._social
+            and (first.id in urgent or (first.kind == "hand" and first.onset > _REACHES_IN)),
         )  # fmt: skip
 
     def _is_faint(self, best: Salience) -> bool:

@@ -201,8 +201,8 @@ _RECENTRE_DEG_S = 20.0
 _AT_ONCE_ABOVE = 0.85
 """Salience of a rule's target, other than a face, that is urgent."""
 _FACE, _LOOKED_FOR, _URGENT = 0.4, 0.33, 0.15
-"""Eye-only range for faces, for looks in search of people, and for urgent targets and rests straight
-ahead, as shares of that for things: 7, 6 and 3 deg to a side."""
+"""Eye-only range for faces, for looks in search of people, and for urgent targets, as shares of that
+for things: 7, 6 and 3 deg to a side; a rest straight ahead is the head's as well."""
 _FARTHEST_AWAY_RAD = radians(22.0)
 """Eccentricity of a look away from a walker up to which the head goes on with the walker."""
 _SWINGS = 2.5
@@ -470,7 +470,9 @@ class HeadModel:
         """Return the eye-only range for a target, as a share of that for things."""
         is_face = target.kind in _FACES
         is_rule = target.top_down and target.kind != ORDERED and not is_face
-        if target.urgent or target.kind == "rest" or (is_rule and target.salience > _AT_ONCE_ABOVE):
+        if target.kind == "rest":
+            return 0.0
+        if target.urgent or (is_rule and target.salience > _AT_ONCE_ABOVE):
             return _URGENT
         return _FACE if is_face else _LOOKED_FOR if target.kind == SEARCH else 1.0
 
