@@ -110,9 +110,9 @@ def test_how_far_away_follows_the_published_law() -> None:
     model = aversion(7, mode="talk")
     far, _ = angles_and_ways(model, 20_000.0)
     beyond = far[far > 9.0] - 9.0
-    assert beyond.mean() == pytest.approx(6.9 * (1.0 - np.exp(-18.5 / 6.9)), abs=0.4)
-    assert np.median(beyond) == pytest.approx(6.9 * np.log(2.0), abs=0.4)
-    assert far.max() == pytest.approx(27.5, abs=0.01)
+    assert beyond.mean() == pytest.approx(8.5 * (1.0 - np.exp(-21.0 / 8.5)), abs=0.4)
+    assert np.median(beyond) == pytest.approx(8.5 * np.log(2.0), abs=0.4)
+    assert far.max() == pytest.approx(30.0, abs=0.01)
 
 
 @pytest.mark.parametrize("distance_m", [0.4, 0.8, 2.5])
@@ -142,7 +142,7 @@ def test_a_look_away_leaves_when_the_rest_on_a_part_is_over() -> None:
     assert later.index("face") > 15
 
 
-@pytest.mark.parametrize(("mode", "most"), [("talk", 27.5), ("listen", 22.7), ("think", 27.5)])
+@pytest.mark.parametrize(("mode", "most"), [("talk", 30.0), ("listen", 22.7), ("think", 30.0)])
 def test_away_is_beside_the_face_and_within_the_cap(mode: str, most: float) -> None:
     model = aversion(8, mode=mode)
     far, _ = angles_and_ways(model, 4000.0)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 LARGEST = {
-    "gaze": 60_240,
+    "gaze": 60_360,
     "drivers": 80_000,
     "sim_mock": 35_870,
     "config": 11_910,

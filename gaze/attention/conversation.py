@@ -16,8 +16,8 @@ listening  speaking .45 of the time averted, 13.5 times a minute; listening .04,
 A look away starts when the rest on a part of the face is over, instead of the next shift between
 parts, and goes beyond the outline of the face: a near face is wider than the published angles. The
 eyes do not rest in it: they move from place to place, a speaker's or thinker's head takes a share
-of .4 in it and others' .1 (Andrist et al. 2014), and something that moves near by ends it. A look to where the
-person looks (gazerig.gaze.attention.followed_look) is a look away with a goal.
+of .4 in it and others' .1 (Andrist et al. 2014), and something that moves near by ends it. A look
+to where the person looks (gazerig.gaze.attention.followed_look) is a look away with a goal.
 
 A voice agent reports its state. A thinker looks away immediately; most long turns begin averted
 (Kendon 1967: more than 70 %), for the cognitive aversion of Andrist et al. 2014, and the gaze is on
@@ -74,9 +74,9 @@ _THINKS_UP, _SIDEWAYS = (0.10, 0.70), (0.78, 0.15)
 _HEAD, _LESS_HEAD = 0.4, 0.1
 ROLES = {
     "none": Role(3.62, 1.63, 0.60, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
-    "speaking": Role(3.00, 0.0, 2.00, 0.90, 27.5, _SIDEWAYS, _HEAD),
-    "listening": Role(25.0, 0.0, 0.65, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
-    "thinking": Role(1.50, 0.80, 3.54, 1.26, 27.5, _THINKS_UP, _HEAD),
+    "speaking": Role(3.20, 0.0, 2.20, 0.90, 30.0, _SIDEWAYS, _HEAD),
+    "listening": Role(24.0, 0.0, 0.65, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
+    "thinking": Role(1.50, 0.80, 3.54, 1.26, 30.0, _THINKS_UP, _HEAD),
 }
 _ROLE_OF = {
     "talk": "speaking",
@@ -88,6 +88,8 @@ _ROLE_OF = {
 
 _LONGEST_S = 14.5
 """Longest time on the face; beyond 15 s it is a stare."""
+_STAYS_S = 0.8
+"""Shortest of the exponential times on the face."""
 _SHORTEST_S = 0.2
 """Shortest time on the face or away, because eyes and servos need time to move."""
 _BESIDE_DEG = 2.0
@@ -95,13 +97,15 @@ _BESIDE_DEG = 2.0
 _DRIFT_DEG = 0.75
 """Motion of a person during a look away of a reported turn, which must stay beside the face."""
 
-_LEAST_DEG, _SCALE_DEG = 7.5, 6.9
-"""Smallest angle of a look away, and mean angle beyond the smallest: A = -6.9 ln(P / 15.7) deg with
-a uniform P (Lee, Badler & Badler 2002, Eyes Alive). With a smallest angle of 0, as there, half of
-the looks away would still be on the face.
+_LEAST_DEG, _SCALE_DEG = 7.5, 8.5
+"""Smallest angle of a look away, and mean angle beyond the smallest of an exponential law, whose
+form is that of Lee, Badler & Badler 2002 (Eyes Alive; 6.9 deg beyond 0). With these a speaker's
+gaze spreads nearly as that of people, 9 x 5 deg (Dembinsky et al. 2024).
 """
-_SPREAD_DEG = 35.0
+_SPREAD_DEG = 30.0
 """Largest angle of a look between it and level, or straight up or down."""
+_WANDERS_DEG = 15.0
+"""Largest change of that angle from one place to the next."""
 _PLACE_S, _PLACE_SPREAD = 0.45, 0.5
 """Mean duration of a rest within a look away, and its standard deviation / mean. A speaker's rests
 last 0.19 s (median of Dembinsky et al. 2024), which sounds hectic on servos."""
@@ -129,8 +133,10 @@ _UNSURE_RATIO = 0.2
 """Share of the remaining time by which the gaze returns earlier if the end is quite uncertain."""
 _LATE_S = 1.5
 """Time after the planned end for which the gaze still waits on the face."""
-_ADDRESSEE = 0.77
-"""Share of a speaker's looks at several people that the addressee gets."""
+_ADDRESSEE = 0.8
+"""Share of a speaker's looks at several people that the addressee gets: people's .77, and a little
+for the time that the gaze takes to be there.
+"""
 
 
 @dataclass(frozen=True)
@@ -139,9 +145,9 @@ class AversionParams:
 
     # fmt: off
     speaking_s: Annotated[tuple[float, float], Bounds(0.1, 60),
-        "reported speech: mean time on the face, and away"] = (3.0, 2.0)
+        "reported speech: mean time on the face, and away"] = (3.2, 2.2)
     listening_s: Annotated[tuple[float, float], Bounds(0.1, 60),
-        "reported listening: mean time on the face, and away"] = (25.0, 0.65)
+        "reported listening: mean time on the face, and away"] = (24.0, 0.65)
     # fmt: on
 
 
@@ -389,7 +395,7 @@ class ConversationGaze:
 
     def _move_on(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
         """Look at the next place of a look away."""
-        way = self._way + radians(_SPREAD_DEG) * float(self._rng.uniform(-1.0, 1.0))
+        way = self._way + radians(_WANDERS_DEG) * float(self._rng.uniform(-1.0, 1.0))
         self._go_towards(way, target, p_world_head_m, t_s)
 
     def _go_towards(self, way: float, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
@@ -449,8 +455,8 @@ class ConversationGaze:
         """Draw a duration on the face."""
         mean_s, sd_s = self._role.face_s, self._role.face_sd_s
         if sd_s == 0.0:
-            drawn_s = mean_s * float(self._rng.standard_exponential())
-            return min(_LONGEST_S, max(drawn_s, _SHORTEST_S))
+            beyond_s = max(0.0, mean_s - _STAYS_S) * float(self._rng.standard_exponential())
+            return min(_LONGEST_S, _STAYS_S + beyond_s)
         return min(_LONGEST_S, self._draw_s(mean_s, sd_s))
 
     def _draw_away_s(self) -> float:

@@ -201,8 +201,9 @@ _RECENTRE_DEG_S = 20.0
 _AT_ONCE_ABOVE = 0.85
 """Salience of a rule's target, other than a face, that is urgent."""
 _FACE, _LOOKED_FOR, _URGENT = 0.4, 0.33, 0.15
-"""Eye-only range for faces, for looks in search of people, and for urgent targets, as shares of that
-for things: 7, 6 and 3 deg to a side; a rest straight ahead is the head's as well."""
+"""Eye-only range for faces, for looks in search of people, and for urgent targets, as shares of
+that for things: 7, 6 and 3 deg to a side; a rest straight ahead is the head's as well.
+"""
 _FARTHEST_AWAY_RAD = radians(22.0)
 """Eccentricity of a look away from a walker up to which the head goes on with the walker."""
 _SWINGS = 2.5

@@ -59,7 +59,8 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     aside, up = np.mean([each.std(axis=0) for each in off], axis=0)
     inside = np.sum([_saccades_inside(one) for one in every], axis=0)
     ways = np.array([way for one in every for way in _thoughts(one)])
-    gaze, head = np.concatenate([_shifts(one) for one in every]).transpose(1, 0, 2)
+    # Of two people the head also turns to the other one meanwhile.
+    gaze, head = np.concatenate([_shifts(one) for one in runs[1]]).transpose(1, 0, 2)
     others = [
         found
         for scene, one in zip(talks[2], runs[2], strict=True)
