@@ -434,6 +434,16 @@ def test_the_head_takes_a_share_in_looks_away_and_returns_from_them() -> None:
     assert averted == pytest.approx(8.0, abs=0.1) and back == pytest.approx(0.0, abs=0.1)
 
 
+def test_the_head_does_not_run_away_while_averted_eyes_change_the_person() -> None:
+    head, yaw = small_head(), 0.0
+    for k in range(600):
+        id = 1 if k < 200 else 2 - k // 20 % 2
+        on = seen(id) if k < 200 else seen(id, "away")
+        centre = radians(-14.0 if id == 1 else 14.0)
+        yaw = head.step(on, (centre, 0.0), (centre, 0.0), abs(centre - yaw), 1.0, k * DT)[0]
+        assert abs(degrees(yaw)) < 18.0
+
+
 @pytest.mark.parametrize("kind", ["face", "thing"])
 def test_the_head_comes_at_once_to_who_is_urgent(kind: str) -> None:
     on = replace(seen(kind=kind), urgent=True)

@@ -460,6 +460,7 @@ class HeadModel:
         """Turn as far as the centre has moved from where it was with the gaze on the face."""
         if self._met is None:
             self._met = self._goal, self._facing
+        self._facing = facing
         (yaw, pitch, roll), before = self._met
         goal = yaw + facing[0] - before[0], pitch + facing[1] - before[1]
         start, reach_rad = direction(goal), self._share.reach_rad
