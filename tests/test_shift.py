@@ -32,8 +32,9 @@ def first_s(rule: SaccadeTrigger, seen: Slip) -> float | None:
 
 
 def test_error_beyond_two_degrees_jumps_after_the_refractory_time() -> None:
-    assert first_s(settled(), slip(2.1)) == pytest.approx(0.150, abs=0.001)
-    assert settled().is_due(slip(2.1), 0.001, 0.0)
+    assert first_s(settled(), slip(2.1)) == pytest.approx(0.155, abs=0.001), "as a correction"
+    assert first_s(settled(), slip(5.0)) == pytest.approx(0.150, abs=0.001)
+    assert settled().is_due(slip(5.0), 0.001, 0.0)
     assert first_s(settled(), slip(1.9)) is None
 
 
@@ -94,7 +95,7 @@ def test_landings_that_err_are_corrected_and_exact_ones_are_not() -> None:
 
 def test_exact_saccades_are_neither_corrected_nor_bent_and_follow_each_other_at_once() -> None:
     rule = SaccadeTrigger(False)
-    rule.record_landing(0.0, 0.155)
+    rule.record_landing(0.0, 0.0)
     assert first_s(rule, slip(1.5)) is None
     assert first_s(rule, slip(3.0, -60.0)) == pytest.approx(0.150, abs=0.001)
     rule.record_landing(1.0, 0.155)

@@ -55,7 +55,7 @@ def test_nothing_in_a_still_room_becomes_a_target(monkeypatch: pytest.MonkeyPatc
     assert np.ptp(yaws) > radians(15.0), f"the head turned {degrees(np.ptp(yaws)):.1f} deg only"
     assert np.abs(rates).max() > radians(25.0)
     assert ticks[-1].percept is not None  # pictures came through
-    assert {tick.target.kind for tick in ticks} <= {"rest", "glance"}
+    assert {tick.target.kind for tick in ticks} <= {"rest", "glance", "search"}
 
 
 def test_what_moves_in_the_same_room_does(monkeypatch: pytest.MonkeyPatch) -> None:

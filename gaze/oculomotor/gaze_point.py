@@ -47,7 +47,7 @@ _MIDDLE = (0.0, 0.0)
 _CORRECT_S = 0.155, 0.045
 """Mean delay from landing to a corrective saccade, people's is 100 to 200 ms, and its largest
 random deviation."""
-_CATCH_UP_S = 0.25, 0.1
+_CATCH_UP_S = 0.2, 0.05
 """The same for a saccade that catches up with a moving target."""
 
 

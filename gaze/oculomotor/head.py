@@ -191,8 +191,6 @@ is e times shorter: 1.7 s at 15 deg, .5 s at 20 and beyond."""
 _MOST_STRAIN_RAD = radians(20.0)
 _STRAIN_SPREAD = 0.4
 """Largest relative deviation of the strain at which the head relieves the eyes."""
-_FIRST_SHIFT_S = 0.3
-"""Time after a change of target in which the head only turns to it."""
 _RELAXED_RAD, _RELAXES_S = radians(5.0), 1.0
 """Eccentricity up to which strain decays, and the time constant of that."""
 _RELIEF_RAD = radians(2.0), radians(4.5)
@@ -264,7 +262,7 @@ class HeadModel:
         self._ends_s = t_s
         self._follows = False
         self._relieves = False
-        self._stepped_s = self._since_s = t_s
+        self._stepped_s = t_s
         self._strain, self._bearable = 0.0, 1.0
         self._facing: Angles2 = head_rad[:2]
         self._met: tuple[Angles3, Angles2] | None = None
@@ -408,7 +406,7 @@ class HeadModel:
         if (target.kind, target.id) != self._target:
             if self._target is None or target.id != self._target[1]:  # not a look past a face
                 self._drift, self._pursues, self._met = _NO_DRIFT, False, None
-            self._target, self._since_s = (target.kind, target.id), t_s
+            self._target = target.kind, target.id
             self._draw_variation()
             self._start = self._extrapolated_direction(t_s) if moving else self._goal_direction
             # The reason for the last movement ends when the eyes return from the target.
@@ -430,21 +428,21 @@ class HeadModel:
         self._facing, aside_rad = facing, eccentricity
         if target.kind in _FACES and self._people:
             aside_rad = angle_between(self._goal_direction, there)
-        strains = self._strain > self._bearable and t_s - self._since_s > _FIRST_SHIFT_S
-        if strains and not moving and aside_rad > _RELAXED_RAD:
+        arc_rad, steeper = angle_between(self._start, there), self._steeper * _SLOPE_SD
+        short_rad = share.undershoot_rad(
+            target.salience, arc_rad, steeper, self._range_share(target)
+        )
+        turns = aside_rad >= trigger_rad
+        due = turns and angle_between(self._goal_direction, there) > short_rad + _REPLAN_RAD
+        if self._strain > self._bearable and not (moving or due) and aside_rad > _RELAXED_RAD:
             self._follows, self._relieves, self._strain = False, True, 0.0
-        elif aside_rad >= trigger_rad and since_onset >= -self._lead_s - 1e-9:
+        elif turns and since_onset >= -self._lead_s - 1e-9:
             self._follows, self._relieves = True, False
         elif not moving:
             self._follows = self._relieves = False
         if self._relieves:
             self._follow(target, facing, there, gaze, self._relief_rad, t_s)
         elif self._follows:
-            arc_rad = angle_between(self._start, there)
-            steeper = self._steeper * _SLOPE_SD
-            short_rad = share.undershoot_rad(
-                target.salience, arc_rad, steeper, self._range_share(target)
-            )
             self._follow(target, facing, there, gaze, short_rad, t_s)
 
     def _update_strain(self, eccentricity: float, dt_s: float) -> None:
