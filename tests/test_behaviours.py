@@ -147,7 +147,7 @@ def test_no_wave_no_feint_and_no_hand_from_aside_is_guarded_against(boxing: Live
 def test_e46_b_the_place_to_be_hit_is_looked_at_before_the_blow(boxing: Lived) -> None:
     figure = boxing.score.figures()["attack"]
     assert figure["of"] == 3
-    assert latency(figure) < 0.6
+    assert latency(figure) < 0.75
     hit = set()
     for event in boxing._scene.events():
         if event.name == "attack":

@@ -49,7 +49,8 @@ PEOPLE = OculomotorParams(refixations=False, eye_lag_ms=5.0)
 
 
 def test_e17_gaze_timeline_of_a_60_degree_shift() -> None:
-    trace = Rig().run(still(60.0), 2.0)
+    head = HeadParams(goal_model="attention", base_speed_deg_s=70.0)
+    trace = Rig(head=head).run(still(60.0), 2.0)
     t = trace.t - 0.1
     arrived = t[np.argmax(trace.error < 1.0)]
     within = t[(trace.error < 1.0) & (t > 0.05)]
