@@ -75,7 +75,7 @@ _HEAD, _LESS_HEAD = 0.4, 0.1
 ROLES = {
     "none": Role(3.62, 1.63, 0.60, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
     "speaking": Role(3.20, 0.0, 2.20, 0.90, 30.0, _SIDEWAYS, _HEAD),
-    "listening": Role(24.0, 0.0, 0.65, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
+    "listening": Role(20.0, 0.0, 0.65, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
     "thinking": Role(1.50, 0.80, 3.54, 1.26, 30.0, _THINKS_UP, _HEAD),
 }
 _ROLE_OF = {
@@ -147,7 +147,7 @@ class AversionParams:
     speaking_s: Annotated[tuple[float, float], Bounds(0.1, 60),
         "reported speech: mean time on the face, and away"] = (3.2, 2.2)
     listening_s: Annotated[tuple[float, float], Bounds(0.1, 60),
-        "reported listening: mean time on the face, and away"] = (24.0, 0.65)
+        "reported listening: mean time on the face, and away"] = (20.0, 0.65)
     # fmt: on
 
 
@@ -368,6 +368,7 @@ class ConversationGaze:
                 self._averts_s, self._until_s = duration_s, t_s
             else:
                 self._until_s = self._kept_until_s = t_s + duration_s
+                self._way = radians(self._draw_direction_deg())
             return
         self._return()
         if self._face is not None:

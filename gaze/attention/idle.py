@@ -70,7 +70,7 @@ _GLANCE_DEG, _LEAST_DEG = 13.0, 2.0
 _TRIES = 12
 _UPRIGHT = 0.5
 """Size of shifts up or down as a share of those to the side."""
-_THING_SHARE = 0.5
+_THING_SHARE = 0.7
 """Share of glances at a thing in view or seen within this time, if there is one."""
 _THING_MEMORY_S = 20.0
 _THING_HOLDS = 1.6

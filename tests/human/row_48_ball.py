@@ -48,7 +48,8 @@ class Balls(EmptyScene):
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return the shares over all throws and seeds."""
     lasts_s = _FIRST_S + _EVERY_S * (_THROWS - 1) + 3.0
-    runs = [run(Balls(), seed=seed, seconds=lasts_s) for seed in seeds]
+    ahead = {"gaze.idle.explores": False}  # it sees the balls
+    runs = [run(Balls(), seed=seed, seconds=lasts_s, overrides=ahead) for seed in seeds]
     found = np.array([answer(one, n) for one in runs for n in range(_THROWS)])
     blinked, withdrawn = 100.0 * found.mean(axis=0)
     return {
