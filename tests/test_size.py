@@ -8,7 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 LARGEST = {
-    "gaze": 60_360,
+    "gaze": 60_280,
     "drivers": 80_000,
     "sim_mock": 35_870,
     "config": 11_910,
@@ -18,7 +18,7 @@ LARGEST = {
     "doors": 10_260,
     "features/animation": 6_790,
     "features/bringup": 51_600,
-    "features/lab": 52_680,
+    "features/lab": 52_480,
     "features/study": 10_170,
     "features/world": 47_970,
     "tests": 439_000,

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 import numpy as np
 from fakes.scenes import EmptyScene
 from human.measured_run import MeasuredRun, Runner
-from human.spells import apart_deg
 from human.swinging_face import HEAD_M
 
 from gazerig.sim_mock.scenes.scene import Thing
@@ -59,11 +58,11 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
 
 
 def answer(one: MeasuredRun, number: int) -> tuple[bool, bool]:
-    """Return whether the lids are shut as a ball arrives, and whether the head turns from it."""
+    """Return whether the lids are shut as a ball arrives, and whether the head is drawn back."""
     ball = one.truth_deg(f"thing {number}")
     there = np.flatnonzero(np.isfinite(ball[:, 0]))
     comes_s = one.t_s[there[-1]]
     lids = one.trace.column("lid")[slice(*np.searchsorted(one.t_s, np.add(comes_s, _BLINKS_S)))]
     first, last = np.searchsorted(one.t_s, np.add(comes_s, _WITHDRAWS_S))
-    off = apart_deg(one.head_deg[first:last, :2], ball[there[0]])
-    return bool(lids.min() < _SHUT), bool(off.max() - off[0] > _WITHDRAWS_DEG)
+    up = one.head_deg[first:last, 1]  # a neck draws the head back by lifting the chin
+    return bool(lids.min() < _SHUT), bool(up.max() - up[0] > _WITHDRAWS_DEG)
