@@ -368,7 +368,7 @@ class ConversationGaze:
                 self._averts_s, self._until_s = duration_s, t_s
             else:
                 self._until_s = self._kept_until_s = t_s + duration_s
-                self._way = radians(self._draw_direction_deg())
+                self._why, self._way = "", radians(self._draw_direction_deg())
             return
         self._return()
         if self._face is not None:

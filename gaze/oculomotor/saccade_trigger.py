@@ -4,7 +4,7 @@ A new object or part of it (the target's event flag) triggers a saccade at once.
 error beyond 2 deg does, unless the eye is about to cross the target anyway: with the error PE and
 the retinal slip RV the crossing is T = -PE / RV away, and between 40 and 180 ms smooth pursuit
 closes it (de Brouwer et al. 2002). If landings scatter, another saccade some 150 ms later corrects
-an error beyond 1.2 deg, or some 250 ms later one of a target that moves, unless it is beyond 4 deg;
+an error beyond 1.2 deg, or some 200 ms later one of a target that moves, unless it is beyond 4 deg;
 an exact landing has an error only if the target was misjudged, and pursuit closes that. No error
 triggers a saccade within the refractory time after the last, and no event within ``_INTERVAL_S``
 after its landing. A new target early in a saccade redirects it; a later one is delayed by that

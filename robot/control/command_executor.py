@@ -231,7 +231,7 @@ class CommandExecutor:
         return reply
 
     def follow_turn(self, gaze: ConversationGaze, t_s: float) -> None:
-        """Let the gaze follow the present turn, and play a listener's nod or brow flash."""
+        """Let the gaze follow the present turn, and play a listener's nod."""
         if name := gaze.step(t_s):
             self._play_by_itself(Play(name, who="conversation"), t_s)
 
