@@ -202,6 +202,10 @@ _FACE, _LOOKED_FOR, _URGENT = 0.4, 0.33, 0.15
 """Eye-only range for faces, for looks in search of people, and for urgent targets, as shares of
 that for things: 7, 6 and 3 deg to a side; a rest straight ahead is the head's as well.
 """
+_COMFORTABLE_RAD = radians(13.0)
+"""Eccentricity of the eyes in looks away beyond which the head goes farther with them; people's are
+seldom beyond 15 deg (Stahl 1999).
+"""
 _FARTHEST_AWAY_RAD = radians(22.0)
 """Eccentricity of a look away from a walker up to which the head goes on with the walker."""
 _SWINGS = 2.5
@@ -461,7 +465,7 @@ class HeadModel:
         self._facing = facing
         (yaw, pitch, roll), before = self._met
         goal = yaw + facing[0] - before[0], pitch + facing[1] - before[1]
-        start, reach_rad = direction(goal), self._share.reach_rad
+        start, reach_rad = direction(goal), min(self._share.reach_rad, _COMFORTABLE_RAD)
         if angle_between(start, direction(gaze)) > reach_rad:
             goal = self.goal_rad(gaze, reach_rad, start)
         self._plan_to(self.clip_to_range((*goal, roll)), t_s)
