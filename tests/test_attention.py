@@ -272,6 +272,11 @@ def test_a_rule_may_name_one_body() -> None:
     assert look(by("id:8"), 0.0, *crowd).top_down is False
 
 
+@pytest.mark.parametrize(("salience", "urgent"), [(0.9, True), (0.8, False)])
+def test_what_a_strong_rule_names_is_urgent(salience: float, urgent: bool) -> None:
+    assert look(by("point", salience, (1.0, 0.5, 0.6)), 0.0, FACE).urgent is urgent
+
+
 def test_a_rule_may_name_a_place_with_or_without_bodies_about() -> None:
     for seen in ((), (FACE,)):
         target = look(by("point", point_world_m=(1.0, 0.5, 0.6)), 0.0, *seen)

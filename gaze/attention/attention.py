@@ -55,6 +55,8 @@ _IN_CONVERSATION = 0.8
 """Least salience of faces during a conversation."""
 _REACHES_IN = 0.3
 """Onset of a hand that has just come into view, above which the head turns to it at once."""
+_AT_ONCE_ABOVE = 0.85
+"""Salience of a rule's target, other than a face, to which it turns at once."""
 _URGENT = 3.0
 """Factor of their salience in this time, if a voice agent has reported the change."""
 
@@ -285,13 +287,14 @@ class Attention:
         else:
             p, v = made.rows.p_world_m[row], made.rows.v_world_m_s[row]
         urgent = (*self._speakers, self._partner, *self._persons.new, *self._cut_off)
+        at_once = by_rule and first.rule > _AT_ONCE_ABOVE and first.kind != "face"
+        reaches_in = first.kind == "hand" and first.onset > _REACHES_IN
         # The head's amplitude follows from the unfactored amount: habituation does not turn the
         # head.
         return Target(
             p, v, captured_s, first.kind, first.id, max(first.rule, moving), by_rule, None, 0, why,
             plan=self.top_down.plan_text, saliences=(first, *others[:_LISTED]),
-            urgent=self._social
-            and (first.id in urgent or (first.kind == "hand" and first.onset > _REACHES_IN)),
+            urgent=self._social and (at_once or reaches_in or first.id in urgent),
         )  # fmt: skip
 
     def _is_faint(self, best: Salience) -> bool:

@@ -196,8 +196,8 @@ _RELAXED_RAD, _RELAXES_S = radians(5.0), 1.0
 _RELIEF_RAD = radians(2.0), radians(4.5)
 """Eccentricity to which the head recentres an eye, at random."""
 _RECENTRE_DEG_S = 20.0
-_AT_ONCE_ABOVE = 0.85
-"""Salience of a rule's target, other than a face, that is urgent."""
+_SETTLES_S = 0.7
+"""Shortest time from the start of a gaze shift to a turn of the head that recentres the eyes."""
 _FACE, _LOOKED_FOR, _URGENT = 0.4, 0.33, 0.15
 """Eye-only range for faces, for looks in search of people, and for urgent targets, as shares of
 that for things: 7, 6 and 3 deg to a side; a rest straight ahead is the head's as well.
@@ -438,7 +438,8 @@ class HeadModel:
         )
         turns = aside_rad >= trigger_rad
         due = turns and angle_between(self._goal_direction, there) > short_rad + _REPLAN_RAD
-        if self._strain > self._bearable and not (moving or due) and aside_rad > _RELAXED_RAD:
+        strains = self._strain > self._bearable and aside_rad > _RELAXED_RAD
+        if strains and not (moving or due) and since_onset > _SETTLES_S:
             self._follows, self._relieves, self._strain = False, True, 0.0
         elif turns and since_onset >= -self._lead_s - 1e-9:
             self._follows, self._relieves = True, False
@@ -472,13 +473,11 @@ class HeadModel:
 
     def _range_share(self, target: Target) -> float:
         """Return the eye-only range for a target, as a share of that for things."""
-        is_face = target.kind in _FACES
-        is_rule = target.top_down and target.kind != ORDERED and not is_face
         if target.kind == "rest":
             return 0.0
-        if target.urgent or (is_rule and target.salience > _AT_ONCE_ABOVE):
+        if target.urgent:
             return _URGENT
-        return _FACE if is_face else _LOOKED_FOR if target.kind == SEARCH else 1.0
+        return _FACE if target.kind in _FACES else _LOOKED_FOR if target.kind == SEARCH else 1.0
 
     def _trigger_rad(self, target: Target) -> float:
         """Return the eccentricity of a target from which the head takes part."""
