@@ -166,6 +166,11 @@ class Attention:
         self._partner: int | None = None
         self._turned_s = self._reported_s = self._edge_s = -inf
 
+    @property
+    def reacts(self) -> bool:
+        """Return whether another target waits for its reaction time."""
+        return self._reaction.next is not None
+
     def converse(self, share: float | None, partner: int | None, t_s: float) -> None:
         """Let the choice among people follow a conversation.
 

@@ -196,10 +196,8 @@ class Idle:
             self._look_back(t_s)
         elif t_s >= self._aside_s:
             self._look_aside(t_s)
-        elif self._now.kind == "rest" or (
-            self._now.kind == "glance" and self._rng.random() < _AGAIN
-        ):
-            self._glance(t_s)
+        elif self._now.kind == "rest" or (self._gone is None and self._rng.random() < _AGAIN):
+            self._glance("glance", self._yaw_pitch_now(), t_s)
         else:
             self._start_rest(t_s)
 
@@ -248,18 +246,18 @@ class Idle:
 
     def _is_far_aside(self) -> bool:
         """Return whether a search or a look at a thing has ended far from straight ahead."""
-        glance_deg = self._params.glance_deg[0] + _ROUNDING_DEG
-        most_deg = {SEARCH: _SEARCH_DEG, "glance": glance_deg}.get(self._now.kind, inf)
-        return abs(degrees(self._yaw_pitch_now()[0])) > most_deg
+        most_deg = _SEARCH_DEG if self._gone else self._params.glance_deg[0] + _ROUNDING_DEG
+        aside_deg = abs(degrees(self._yaw_pitch_now()[0]))
+        return self._now.kind in (SEARCH, "glance") and aside_deg > most_deg
 
     def _look_back(self, t_s: float) -> None:
         """Look back from a far side: in steps after a search, otherwise at once."""
-        yaw, pitch = self._yaw_pitch_now()
         if self._gone is None:
-            place = self._draw_glance_point(_AHEAD)
-        else:
-            back = self._draw_step_rad() * (-1.0 if yaw > 0.0 else 1.0)
-            place = yaw + back, 0.5 * pitch
+            self._glance(SEARCH, _AHEAD, t_s)
+            return
+        yaw, pitch = self._yaw_pitch_now()
+        back = self._draw_step_rad() * (-1.0 if yaw > 0.0 else 1.0)
+        place = yaw + back, 0.5 * pitch
         self._look(SEARCH, place, REST_M[0], t_s, "looking back from the side")
         self._until_s = t_s + self._draw_s(_SEARCH_FIXATION_S)
 
@@ -281,18 +279,17 @@ class Idle:
             return (0.0, 0.0)
         return yaw / size * aside, pitch / size * aside
 
-    def _glance(self, t_s: float) -> None:
-        """Start a glance at something in view, or at a plausible point of the room."""
+    def _glance(self, kind: str, here: Angles2, t_s: float) -> None:
+        """Start a glance from a point at something in view, or at a plausible point of the room."""
         rng, glance_s = self._rng, self._draw_s(_GLANCE_S)
-        here = self._yaw_pitch_now()
         things = self._other_places(here, t_s) if rng.random() < _THING_SHARE else []
         if things:
             rel = sub(things[int(rng.integers(len(things)))], _EYE)
-            self._look("glance", yaw_pitch(rel), norm(rel), t_s, "looking at things in view")
+            self._look(kind, yaw_pitch(rel), norm(rel), t_s, "looking at things in view")
             glance_s *= _THING_HOLDS
         else:
             place = self._draw_glance_point(here)
-            self._look("glance", place, REST_M[0], t_s, "glancing around, no one in sight")
+            self._look(kind, place, REST_M[0], t_s, "glancing around, no one in sight")
         self._until_s = t_s + glance_s
 
     def _other_places(self, here: Angles2, t_s: float) -> list[Vec3]:

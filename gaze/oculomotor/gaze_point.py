@@ -43,6 +43,9 @@ from gazerig.params import Bounds
 
 MOVING_M_S = 0.05
 """A target slower than this is fixated, not pursued."""
+_SLOW_M_S = 0.03
+"""A target faster than this is followed without re-fixations: each would interrupt the following,
+and an eye's friction delays its motion again."""
 _MIDDLE = (0.0, 0.0)
 _CORRECT_S = 0.155, 0.045
 """Mean delay from landing to a corrective saccade, people's is 100 to 200 ms, and its largest
@@ -188,7 +191,7 @@ class GazePoint:
             elif (
                 self._refixates
                 and not self._exact
-                and self._refixations.is_due(t_s, norm(velocity) <= MOVING_M_S)
+                and self._refixations.is_due(t_s, norm(velocity) <= _SLOW_M_S)
             ):
                 trigger.refixate(t_s)
             if shift_rad is None:

@@ -26,6 +26,7 @@ from gazerig.gaze.oculomotor.binocular import (
     BinocularController,
     OppositeAngles,
 )
+from gazerig.gaze.oculomotor.target_prediction import limit_length
 from gazerig.gaze.types import Vec3
 
 Sight = tuple[float, float, float, float]
@@ -140,20 +141,13 @@ class Pursuit:
         )
         move_x, move_y, move_z = move_x * dt_s, move_y * dt_s, move_z * dt_s
         if closing:
-            off_x, off_y, off_z = was_x - x, was_y - y, was_z - z
-            size, most = sqrt(off_x * off_x + off_y * off_y + off_z * off_z), MAX_ERROR_RAD
-            if size > most:
-                off_x, off_y, off_z = scale((off_x, off_y, off_z), most / size)
-            share = 1.0 - exp(-GAIN_1_S * dt_s)
-            close = off_x * share, off_y * share, off_z * share
+            off = limit_length((was_x - x, was_y - y, was_z - z), MAX_ERROR_RAD)
+            close = scale(off, 1.0 - exp(-GAIN_1_S * dt_s))
             if not known:
                 way = to_x - was_x, to_y - was_y, to_z - was_z
                 close = _limit_speed(close, way, 1.0 - VELOCITY_GAIN, dt_s)
-            move_x, move_y, move_z = move_x + close[0], move_y + close[1], move_z + close[2]
-            size = sqrt(move_x * move_x + move_y * move_y + move_z * move_z)
-            most = _FASTEST_RAD_S[known] * dt_s
-            if size > most:
-                move_x, move_y, move_z = scale((move_x, move_y, move_z), most / size)
+            move = move_x + close[0], move_y + close[1], move_z + close[2]
+            move_x, move_y, move_z = limit_length(move, _FASTEST_RAD_S[known] * dt_s)
         gain = VERGENCE_GAIN_1_S if near_before > near else DIVERGENCE_GAIN_1_S
         near += near_now - near_before + (near_before - near) * (1.0 - exp(-gain * dt_s))
         if not _FARTHEST_1_M <= near <= _NEAREST_1_M:

@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.angles import add, norm, scale, sub
+from gazerig.gaze.angles import add, dot, norm, scale, sub
 from gazerig.gaze.types import AWAY, Floats, Target, Vec3
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _HORIZON_S, _FADE_S = 0.12, 0.3
 """Longest time over which motion is extrapolated, and time constant of its decay after that."""
-_SLOPE_FRAMES = 4
+_SLOPE_FRAMES = 6
 """Frames over which a change of velocity is measured."""
 _BENDS_S = 0.12
 """Longest time over which a change of velocity is extrapolated."""
@@ -105,7 +105,7 @@ class TargetPrediction:
         # Times and speeds of the fastest frame, of the fastest one after it, and so on.
         self._fastest_past: deque[tuple[float, float]] = deque()
         self._bend, self._share = _STILL, 1.0
-        self._fastest_m_s = self._most_m_s = 0.0
+        self._most_m_s = 0.0
         self.sine: Sine | None = None
         self._left: dict[tuple[str, int], Sine] = {}
         self._turn = 0
@@ -134,25 +134,27 @@ class TargetPrediction:
         gap_s = at_s - self._at_s
         if (target.kind, target.id) != self._id or not 0.0 < gap_s < _GAP_S:
             self._begin((target.kind, target.id), at_s)
+        past = self._past
+        if past and dot(v, past[-1][4:]) < 0.0:
+            v = limit_length(v, self._most_m_s)  # the estimate overshoots in a reversal
         self._at_s, self._p, self._v = at_s, p, v
         self._share = 1.0
-        self._fastest_m_s = fastest_rad_s * norm(sub(p, eye))
-        self._most_m_s = norm(v)
+        most_m_s, speed_m_s = fastest_rad_s * norm(sub(p, eye)), norm(v)
+        self._most_m_s = min(speed_m_s, most_m_s)
         if not self._predicts or target.id < 0 or target.kind == AWAY:
             self._bend, self.sine = _STILL, None
             return
-        past = self._past
         past.append((at_s, *p, *v))
         while past[0][0] < at_s - _WINDOWS_S[-1]:
             past.popleft()
         self._bend = self._past_slope()
         fastest = self._fastest_past
-        while fastest and fastest[-1][1] <= self._most_m_s:
+        while fastest and fastest[-1][1] <= speed_m_s:
             fastest.pop()
-        fastest.append((at_s, self._most_m_s))
+        fastest.append((at_s, speed_m_s))
         while fastest[0][0] <= at_s - _FASTEST_IN_S:
             fastest.popleft()
-        self._most_m_s = fastest[0][1]
+        self._most_m_s = min(fastest[0][1], most_m_s)
         self.sine = sine = self._recognise(p, at_s)
         if sine is not None:
             most_m_s = fastest_rad_s * norm(sub(sine.middle, eye))
@@ -198,8 +200,8 @@ class TargetPrediction:
         speed = x + a * bent, y + b * bent, z + c * bent
         # No extrapolated change makes the target faster than it has been.
         return (
-            _limit_length(moved, self._fastest_m_s * age_s),
-            _limit_length(speed, self._most_m_s),
+            limit_length(moved, self._most_m_s * age_s),
+            limit_length(speed, self._most_m_s),
         )
 
     def _past_slope(self) -> Vec3:
@@ -244,7 +246,7 @@ class TargetPrediction:
         return bool(max(max(x) - min(x), max(y) - min(y), max(z) - min(z)) >= least_m)
 
 
-def _limit_length(v: Vec3, most: float) -> Vec3:
+def limit_length(v: Vec3, most: float) -> Vec3:
     """Return a vector, shortened if it is longer than a limit."""
     x, y, z = v
     squares = x * x + y * y + z * z

@@ -28,6 +28,11 @@ class TargetChooser(Protocol):
 
     top_down: TopDown
 
+    @property
+    def reacts(self) -> bool:
+        """Return whether another target waits for its reaction time."""
+        ...
+
     def reset(self, t_s: float) -> None:
         """Forget all observations."""
         ...
@@ -70,6 +75,11 @@ class RuleChooser:
         self._identity: tuple[str, int] | None = None
         self._shift = 0
         self._own_shift = 0
+
+    @property
+    def reacts(self) -> bool:
+        """Return whether another target of the rig's attention waits for its reaction time."""
+        return self._own.reacts
 
     def reset(self, t_s: float) -> None:
         """Forget all observations."""

@@ -291,8 +291,10 @@ class Robot:
         target = self._conversation_gaze.look(
             target, pose.p_world_head_m, t_s, self._lead.active, rests_s, percept
         )
+        # What appears delays the saccades under way (Reingold & Stampe 2002), so the gaze stays.
+        settled = self._oculomotor.has_arrived and not self.attention.reacts
         target = self._scanpath.wander(
-            target, percept, t_s, self._oculomotor.has_arrived, pose.p_world_head_m, self._gaze_m
+            target, percept, t_s, settled, pose.p_world_head_m, self._gaze_m
         )
         offset = self._animation.step(t_s)
         loudness = self._animation.loudness

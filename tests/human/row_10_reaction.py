@@ -13,6 +13,8 @@ from gazerig.sim_mock.scenes.scene import ScenePerson, Thing, min_jerk
 
 _FIRST_S, _EVERY_S, _SHOWN_S = 5.0, 3.4, 1.3
 _LATEST_S, _STILL_DEG_S, _EXPRESS_MS = 0.7, 35.0, 120.0
+_LEAST_S = 100.0
+"""Of a run, in which eight hands come nearer: a shift may begin as a hand appears."""
 
 WANTED = {
     "appears: answered, %": (95.0, 100.0),
@@ -93,6 +95,7 @@ def reaction_ms(run: MeasuredRun, hand: int, start_s: float) -> float | None:
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return medians and shares over all hands and seeds."""
+    seconds = max(seconds, _LEAST_S)
     found: dict[bool, list[float]] = {False: [], True: []}
     count = {False: 0, True: 0}
     for seed in seeds:

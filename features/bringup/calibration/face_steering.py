@@ -205,6 +205,8 @@ class FaceSteering:
         converges: whether each eye has its own yaw joint.
     """
 
+    reacts = False
+
     def __init__(
         self, state: FaceCalibration, top_down: TopDown, rest_world_m: Vec3, converges: bool = True
     ) -> None:
@@ -232,7 +234,7 @@ class FaceSteering:
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the current part as target, or the rest point while no face is seen."""
-        followed, self.face = self.face.id if self.face is not None else None, None
+        followed, self.face = self.face and self.face.id, None
         if percept is not None and percept.faces and percept.age_s(t_s) <= STALE_S:
             # The present face while it is seen, else the nearest.
             self.face = min(
