@@ -110,8 +110,8 @@ def test_how_far_away_follows_the_published_law() -> None:
     model = aversion(7, mode="talk")
     far, _ = angles_and_ways(model, 20_000.0)
     beyond = far[far > 9.0] - 9.0
-    assert beyond.mean() == pytest.approx(8.5 * (1.0 - np.exp(-21.0 / 8.5)), abs=0.4)
-    assert np.median(beyond) == pytest.approx(8.5 * np.log(2.0), abs=0.4)
+    assert beyond.mean() == pytest.approx(10.0 * (1.0 - np.exp(-21.0 / 10.0)), abs=0.4)
+    assert np.median(beyond) == pytest.approx(10.0 * np.log(2.0), abs=0.4)
     assert far.max() == pytest.approx(30.0, abs=0.01)
 
 

@@ -108,6 +108,8 @@ class Attention:
         idle: gaze without a visible target.
         rng: draws reaction times.
         stay_rng: draws the additional times of looks at one of several people.
+
+    averted: whether the gaze looks away from the target, which is no look at a person
     """
 
     def __init__(
@@ -162,6 +164,7 @@ class Attention:
         self._behaviour = self.top_down.behaviour
         self._changed_s = -inf
         self._eye: tuple[Vec3, float] | None = None
+        self.averted = False
         self._share: float | None = None
         self._partner: int | None = None
         self._turned_s = self._reported_s = self._edge_s = -inf
@@ -393,6 +396,7 @@ class Attention:
         if self._social:
             nearest = min(away_m.values())
             weights = {id: (nearest / away_m[id]) ** _NEARNESS * one for id, one in mine.items()}
+        attended = NO_BODY if self.averted else self._identity[1]
         # Those who may speak have their share.
         favoured, share = self._favoured(mine, t_s)
         spoken = sum(one for id, one in weights.items() if id in favoured)
@@ -400,7 +404,7 @@ class Attention:
         if share > 0.0 and spoken > 0.0 and mute > 0.0:
             ratio = max(1.0, share / (1.0 - share) * mute / spoken)
             weights = {id: one * ratio if id in favoured else one for id, one in weights.items()}
-        factors = self._habituation.share(weights, self._identity[1], t_s)
+        factors = self._habituation.share(weights, attended, t_s)
         shares = {id: factors[id] * one for id, one in mine.items()}
         if favoured and t_s - self._turned_s < _TURNS_S:
             shares = {id: one if id in favoured else 0.0 for id, one in shares.items()}

@@ -6,7 +6,8 @@ table ``ROLES``:
 
 none       Without a conversation two people who face each other prefer periods of mutual gaze of
            3.3 s (Binetti et al. 2016, n = 498, a median); no measurement of the looks away between
-           them is known, a listener's short ones are used.
+           them is known, a listener's short ones are used. While somebody is seen to speak, the
+           head is a listener.
 thinking   Thinking people look mostly up, for longer (Andrist et al. 2014: 70 % up, 20 down).
 speaking   The numbers are those of 19 people in remote talk (Dembinsky et al. 2024, medians):
 listening  speaking .45 of the time averted, 13.5 times a minute; listening .04, 3.2 times; three
@@ -33,17 +34,17 @@ words, American listeners respond 7 times a minute, Japanese ones 15 times (Mayn
 """
 
 from dataclasses import dataclass
-from math import atan2, cos, degrees, exp, hypot, inf, radians, sin
+from math import atan2, cos, degrees, exp, hypot, inf, pi, radians, sin
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
 
-from gazerig.gaze.angles import add, cross, dot, norm, scale, sub, unit
+from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.followed_look import FollowedLook
 from gazerig.gaze.draws import draw_lognormal
-from gazerig.gaze.types import AWAY, Percept, Target, TurnState, Vec3
+from gazerig.gaze.types import AWAY, Face, Percept, Target, TurnState, Vec3
 from gazerig.params import Bounds
 
 LooksAway = Literal["people", "none"]
@@ -97,7 +98,7 @@ _BESIDE_DEG = 2.0
 _DRIFT_DEG = 0.75
 """Motion of a person during a look away of a reported turn, which must stay beside the face."""
 
-_LEAST_DEG, _SCALE_DEG = 7.5, 8.5
+_LEAST_DEG, _SCALE_DEG = 7.5, 10.0
 """Smallest angle of a look away, and mean angle beyond the smallest of an exponential law, whose
 form is that of Lee, Badler & Badler 2002 (Eyes Alive; 6.9 deg beyond 0). With these a speaker's
 gaze spreads nearly as that of people, 9 x 5 deg (Dembinsky et al. 2024).
@@ -133,9 +134,9 @@ _UNSURE_RATIO = 0.2
 """Share of the remaining time by which the gaze returns earlier if the end is quite uncertain."""
 _LATE_S = 1.5
 """Time after the planned end for which the gaze still waits on the face."""
-_ADDRESSEE = 0.8
-"""Share of a speaker's looks at several people that the addressee gets: people's .77, and a little
-for the time that the gaze takes to be there.
+_ADDRESSEE = 0.84
+"""Share of a speaker's looks at several people that the addressee gets: people's .77, and the time
+that the gaze takes to be there and back.
 """
 
 
@@ -207,6 +208,8 @@ class ConversationGaze:
         self._face: int | None = None
         self._until_s = self._away_s = t_s
         self._away: Vec3 | None = None
+        self._attention.averted = False
+        self._faces: tuple[Face, ...] = ()
         self._averts_s: float | None = None
         self._place_until_s = self._kept_until_s = t_s
         self._why = ""
@@ -290,15 +293,23 @@ class ConversationGaze:
             sooner; inf while it is moving there
         percept: the newest percept, with the looks of people
         """
-        kept = (ordered and self._mode == "none") or target.is_lost or self._law == "none"
+        if percept is not None:
+            self._faces = percept.faces
+            if not self.converses:
+                heard = any(one.speaks for one in self._faces)
+                self._take_role("listening" if heard else "none", t_s)
+        kept = (ordered and not self.converses) or target.is_lost or self._law == "none"
         face = target.id if target.kind == "face" and not kept else None
         if face != self._face:
-            self._face = face
+            before, self._face = self._face, face
             if face is None or t_s >= self._kept_until_s:
                 self._away_s = t_s
+                # An exponential time goes on from one face to the next.
+                goes_on = self._away is None and before is not None and not self._role.face_sd_s
                 self._return()
                 if face is not None and self._averts_s is None:
-                    self._until_s = t_s + self._draw_face_s()
+                    until_s = self._until_s if goes_on else t_s + self._draw_face_s()
+                    self._until_s = max(until_s, t_s + _SHORTEST_S)
         if face is None:
             return self._count(target)
         if self._away is not None and self._is_disturbed(target):
@@ -400,27 +411,35 @@ class ConversationGaze:
         self._go_towards(way, target, p_world_head_m, t_s)
 
     def _go_towards(self, way: float, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
-        """Look past the edge of the face in a direction, 0 right and pi/2 up, at its distance."""
+        """Look past the edge of the face in a direction, 0 right and pi/2 up, at its distance.
+
+        On another person's face the gaze would not be averted: it goes to the other side.
+        """
         rel = sub(_centre_of_target(target), p_world_head_m)
         ahead, right, up = _axes_to(rel)
         edge_deg = face_extent_deg(way, norm(rel))
         least_deg = max(_LEAST_DEG, edge_deg + _BESIDE_DEG + _DRIFT_DEG)
         beyond_deg = _SCALE_DEG * float(self._rng.standard_exponential())
         angle = radians(min(max(least_deg, self._role.most_deg), least_deg + beyond_deg))
-        self._way = way
-        aside = add(scale(right, cos(way)), scale(up, sin(way)))
-        looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
+        others = [sub(one.p_world_m, p_world_head_m) for one in self._faces if one.id != target.id]
+        for self._way in (way, pi - way):
+            aside = add(scale(right, cos(self._way)), scale(up, sin(self._way)))
+            looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
+            if all(angle_between(looking, other) > radians(_LEAST_DEG) for other in others):
+                break
         self._go_to(target, add(p_world_head_m, scale(looking, norm(rel))))
         rest_s = draw_lognormal(self._rng, _PLACE_S, _PLACE_SPREAD)
         self._place_until_s = t_s + max(rest_s, _SHORTEST_S)
 
     def _go_to(self, target: Target, place: Vec3) -> None:
         self._away = place
+        self._attention.averted = True
         self._shifts += 1
         self._away_shift = target.shift + self._shifts
 
     def _return(self) -> None:
         self._kept_until_s = -inf
+        self._attention.averted = False
         if self._away is not None:
             self._away = None
             self._shifts += 1

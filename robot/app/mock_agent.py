@@ -44,6 +44,7 @@ class MockAgent:
         self._command, self._scene, self._scene_start_s = command, scene, scene_start_s
         self._start_s: float | None = None
         self._next = 0
+        self._seen: dict[int, Vec3] = {}
 
     def update(self, tick: Tick) -> None:
         """Report what has become due at the newest tick."""
@@ -51,20 +52,21 @@ class MockAgent:
         if self._start_s is None:
             begun_s = self._scene_start_s()
             self._start_s = tick.t_s if begun_s is None else begun_s
+        if tick.percept is not None:
+            self._seen |= {face.id: face.p_world_m for face in tick.percept.faces}
         since_s = tick.t_s - self._start_s
         while self._next < len(scene.agent):
             act = scene.agent[self._next]
             if since_s < act.at_s:
                 return
             self._next += 1
-            person = self._person_id(scene.face(act.person, since_s), tick) if act.person else None
+            person = self._person_id(scene.face(act.person, since_s)) if act.person else None
             self._command(Talk(act.state, person, act.seconds, act.text, who=AGENT, stay=True))
         if scene.round_s and since_s >= scene.round_s:
             self._start_s += scene.round_s
             self._next = 0
 
-    def _person_id(self, place: Vec3, tick: Tick) -> int | None:
-        """Return perception's number of the person at a place, None while nobody is seen there."""
-        faces = tick.percept.faces if tick.percept is not None else ()
-        near = [(dist(face.p_world_m, place), face.id) for face in faces]
+    def _person_id(self, place: Vec3) -> int | None:
+        """Return perception's number of the person last seen at a place, None without one."""
+        near = [(dist(seen, place), number) for number, seen in self._seen.items()]
         return min([one for one in near if one[0] < _NEAR_M], default=(0.0, None))[1]

@@ -206,7 +206,7 @@ class CommandExecutor:
         """Enter the state of conversation that a client reports."""
         try:
             if command.person is not None:
-                self._looks.face(command.person)
+                self._looks.refuse_unknown(command.person)
             message = self._conversation.report(command, t_s)
         except ValueError as error:
             return CommandReply(str(error))

@@ -40,6 +40,22 @@ class LookPoints:
     def __init__(self, pixels: PixelToWorld) -> None:
         self._pixels = pixels
         self.newest: LastObservation | Tick = LastObservation()
+        self._known: set[int] = set()
+
+    def see(self, tick: Tick) -> None:
+        """Take the newest tick."""
+        self.newest = tick
+        if tick.percept is not None:
+            self._known.update(face.id for face in tick.percept.faces)
+
+    def refuse_unknown(self, person: int) -> None:
+        """Refuse the number of a person who was never seen; one may be out of view.
+
+        Raises:
+            ValueError: No person has had that id; the message lists the visible people.
+        """
+        if person not in self._known:
+            self.face(person)
 
     def resolve_pixel(self, command: Command) -> Command:
         """Return a command with the world point of its pixel, which a recording needs."""

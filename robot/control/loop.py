@@ -325,7 +325,7 @@ class Robot:
             stopped, self._lead.controlled_by, lead, self._tracks.states(t_s), False,
             self._conversation.state,
         )  # fmt: skip
-        self._looks.newest = tick
+        self._looks.see(tick)
         return tick
 
     def park(
