@@ -1,7 +1,7 @@
 """Fit of a walk to fixations on a face: transitions and dwell times.
 
 Nakamoto & Tsuruno (3.2.2, 3.2.3) count the transitions from one part to another, and take mean and
-SD of the dwell times. So does this fit, with three choices for sparse cells of a finite recording,
+SD of the dwell times. So does this fit, with two choices for sparse cells of a finite recording,
 and with a confidence interval for each number. Intervals are percentiles over resampled recordings
 (Efron's bootstrap).
 """
@@ -9,15 +9,23 @@ and with a confidence interval for each number. Intervals are percentiles over r
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
-from gazerig.params import Bounds, Choices
 
-SMOOTHINGS = ("none", "laplace", "bootstrap")
-
+SMOOTHINGS = ("none", "laplace")
+"""Plain shares, or shares after adding ``PSEUDO_COUNT`` to every count."""
+PSEUDO_COUNT, CONFIDENCE, RESAMPLES = 0.5, 0.95, 1000
+"""Also the level of the intervals, and the number of resampled recordings."""
+_FEWEST, _FEWEST_DWELLS = 50, 5
+"""Smallest number of fixations on the face for a fit; a part with fewer than the second gets mean
+and SD of all parts together.
+"""
+_ENDS = 0.5 * (1.0 - CONFIDENCE), 0.5 * (1.0 + CONFIDENCE)
+_LONGEST_GAP_S = 0.5
+"""Longest gap between the two fixations of a transition."""
 # Fixations may overlap by this much: times are often written with three digits.
 _OVERLAP_S = 0.005
 
@@ -36,21 +44,6 @@ class Interval(NamedTuple):
     value: float
     low: float
     high: float
-
-
-@dataclass(frozen=True)
-class FitParams:
-    """Parameters of the fit of a walk."""
-
-    # fmt: off
-    smoothing: Annotated[str, Choices(*SMOOTHINGS), "plain shares, shares after adding pseudo_count, or mean over resamples"] = "laplace"
-    pseudo_count: Annotated[float, Bounds(0.001, 10), "number added to every count by laplace smoothing"] = 0.5
-    confidence: Annotated[float, Bounds(0.5, 0.999), "level of the intervals"] = 0.95
-    resamples: Annotated[int, Bounds(100, 100000), "resampled recordings"] = 1000
-    fewest: Annotated[int, Bounds(2, 100000), "smallest number of fixations on the face for a fit"] = 50
-    longest_gap_s: Annotated[float, Bounds(0.01, 60), "longest gap between the two fixations of a transition"] = 0.5
-    fewest_dwells: Annotated[int, Bounds(2, 1000), "a part with fewer fixations gets mean and SD of all parts together"] = 5
-    # fmt: on
 
 
 @dataclass(frozen=True)
@@ -75,24 +68,22 @@ class WalkFit:
 
 
 def fit_walk(
-    fixations: Sequence[PartFixation], params: FitParams, rng: np.random.Generator
+    fixations: Sequence[PartFixation], smoothing: str, rng: np.random.Generator
 ) -> WalkFit:
-    """Fit the walk to fixations in the order of time.
+    """Fit the walk to fixations in the order of time; smoothing: one of SMOOTHINGS.
 
     Raises:
         ValueError: the fixations are implausible; the message contains the reason.
     """
-    _refuse_untrustworthy(fixations, params)
-    counts = _transitions(fixations, params.longest_gap_s)
-    matrix = _matrix(counts, params, rng)
+    _refuse_untrustworthy(fixations)
+    counts = _transitions(fixations)
+    matrix = _matrix(counts, smoothing, rng)
     seconds = {
         part: np.array([f.duration_s for f in fixations if f.part == part]) for part in PARTS
     }
     everywhere = np.concatenate(list(seconds.values()))
-    pooled = tuple(part for part in PARTS if len(seconds[part]) < params.fewest_dwells)
-    dwells = [
-        _dwell(everywhere if part in pooled else seconds[part], params, rng) for part in PARTS
-    ]
+    pooled = tuple(part for part in PARTS if len(seconds[part]) < _FEWEST_DWELLS)
+    dwells = [_dwell(everywhere if part in pooled else seconds[part], rng) for part in PARTS]
     return WalkFit(
         tuple(tuple(row) for row in counts.astype(int).tolist()),
         matrix,
@@ -105,7 +96,7 @@ def fit_walk(
     )
 
 
-def _refuse_untrustworthy(fixations: Sequence[PartFixation], params: FitParams) -> None:
+def _refuse_untrustworthy(fixations: Sequence[PartFixation]) -> None:
     """Raise ValueError for an implausible recording of looks at a face."""
     end_s, start_s = float("-inf"), float("-inf")
     for number, look in enumerate(fixations, 1):
@@ -127,41 +118,37 @@ def _refuse_untrustworthy(fixations: Sequence[PartFixation], params: FitParams) 
     inside = sum(look.part is not None for look in fixations)
     if fixations and inside == 0:
         raise ValueError(f"all {len(fixations)} fixations are outside the parts of the face")
-    if inside < params.fewest:
+    if inside < _FEWEST:
         raise ValueError(
-            f"{inside} fixations on the face are too few, {params.fewest} are needed:"
-            " record for longer"
+            f"{inside} fixations on the face are too few, {_FEWEST} are needed: record for longer"
         )
 
 
-def _transitions(fixations: Sequence[PartFixation], longest_gap_s: float) -> Floats:
+def _transitions(fixations: Sequence[PartFixation]) -> Floats:
     """Count the transitions, (8, 8), rows from; a look outside or a long gap breaks the chain."""
     counts = np.zeros((len(PARTS), len(PARTS)))
     for before, after in zip(fixations, fixations[1:], strict=False):
         gap_s = after.start_s - before.start_s - before.duration_s
-        if before.part is not None and after.part is not None and gap_s <= longest_gap_s:
+        if before.part is not None and after.part is not None and gap_s <= _LONGEST_GAP_S:
             counts[PARTS.index(before.part), PARTS.index(after.part)] += 1.0
     return counts
 
 
 def _matrix(
-    counts: Floats, params: FitParams, rng: np.random.Generator
+    counts: Floats, smoothing: str, rng: np.random.Generator
 ) -> tuple[tuple[Interval, ...], ...]:
     """Estimate the transition probabilities and their intervals."""
-    added = params.pseudo_count if params.smoothing == "laplace" else 0.0
+    added = PSEUDO_COUNT if smoothing == "laplace" else 0.0
     if added == 0.0:
         _refuse_dead_ends(counts)
     total = counts.sum()
     if total == 0.0:
         raise ValueError("no two fixations on the face follow each other: nothing to count")
-    drawn = rng.multinomial(int(total), counts.ravel() / total, size=params.resamples)
+    drawn = rng.multinomial(int(total), counts.ravel() / total, size=RESAMPLES)
     resampled = _shares(np.asarray(drawn.reshape(-1, *counts.shape) + added, dtype=np.float64))
     value = _shares(counts + added)
-    if params.smoothing == "bootstrap":
-        value = _shares(np.asarray(np.nanmean(resampled, axis=0), dtype=np.float64))
-    outer = 0.5 * (1.0 - params.confidence)
-    low, high = np.nanquantile(resampled, (outer, 1.0 - outer), axis=0)
-    low, high = _widen_certain_intervals(counts, low, high, params.confidence)
+    low, high = np.nanquantile(resampled, _ENDS, axis=0)
+    low, high = _widen_certain_intervals(counts, low, high)
     return tuple(
         tuple(Interval(*cell) for cell in zip(*row, strict=True))
         for row in zip(value.tolist(), low.tolist(), high.tolist(), strict=True)
@@ -186,31 +173,25 @@ def _refuse_dead_ends(counts: Floats) -> None:
         )
 
 
-def _widen_certain_intervals(
-    counts: Floats, low: Floats, high: Floats, confidence: float
-) -> tuple[Floats, Floats]:
+def _widen_certain_intervals(counts: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
     """Widen intervals of cells that resampling cannot change: those seen never or always.
 
     For an event not seen in n trials, p <= 1 - (1 - confidence)^(1/n) is certain to that level (the
     "rule of three" for 95 %).
     """
     n = counts.sum(axis=1, keepdims=True)
-    surprise = np.where(n > 0.0, (1.0 - confidence) ** (1.0 / np.maximum(n, 1.0)), 0.0)
+    surprise = np.where(n > 0.0, (1.0 - CONFIDENCE) ** (1.0 / np.maximum(n, 1.0)), 0.0)
     high = np.where(counts == 0.0, np.maximum(high, 1.0 - surprise), high)
     low = np.where(counts == n, np.minimum(low, surprise), low)
     return low, high
 
 
-def _dwell(
-    seconds: Floats, params: FitParams, rng: np.random.Generator
-) -> tuple[Interval, Interval]:
+def _dwell(seconds: Floats, rng: np.random.Generator) -> tuple[Interval, Interval]:
     """Return mean and SD of dwell times with their intervals."""
     n = len(seconds)
-    drawn = [seconds[rng.integers(0, n, n)] for _ in range(params.resamples)]
-    outer = 0.5 * (1.0 - params.confidence)
-    ends = (outer, 1.0 - outer)
-    mean_ends = np.quantile([d.mean() for d in drawn], ends).tolist()
-    sd_ends = np.quantile([d.std(ddof=1) for d in drawn], ends).tolist()
+    drawn = [seconds[rng.integers(0, n, n)] for _ in range(RESAMPLES)]
+    mean_ends = np.quantile([d.mean() for d in drawn], _ENDS).tolist()
+    sd_ends = np.quantile([d.std(ddof=1) for d in drawn], _ENDS).tolist()
     return (
         Interval(float(seconds.mean()), *mean_ends),
         Interval(float(seconds.std(ddof=1)), *sd_ends),

@@ -31,15 +31,12 @@ class TargetChooser(Protocol):
     @property
     def reacts(self) -> bool:
         """Return whether another target waits for its reaction time."""
-        ...
 
     def reset(self, t_s: float) -> None:
         """Forget all observations."""
-        ...
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the target at ``t_s``."""
-        ...
 
 
 class Chooser(Protocol):
@@ -56,7 +53,6 @@ class Chooser(Protocol):
         Returns:
             A target, or a point x, y, z in the world in m.
         """
-        ...
 
 
 class RuleChooser:

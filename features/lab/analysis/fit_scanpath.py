@@ -16,8 +16,10 @@ from gazerig.features.lab.analysis.fixations import (
     usual_side,
 )
 from gazerig.gaze.scanpath.fit import (
+    CONFIDENCE,
+    PSEUDO_COUNT,
+    RESAMPLES,
     SMOOTHINGS,
-    FitParams,
     Interval,
     PartFixation,
     WalkFit,
@@ -38,7 +40,7 @@ def fit_to_recording(
     """Fit a walk to a recording, write it as YAML, and return a report as text.
 
     parts: rectangles of the parts in the recording's coordinates; not needed for labelled parts
-    smoothing: "none", "laplace" or "bootstrap"; seed: seed of the resampling
+    smoothing: "none" or "laplace"; seed: seed of the resampling
     force: replace an existing file
 
     Raises:
@@ -50,9 +52,8 @@ def fit_to_recording(
         raise SetupError(f"{out}: is the recording itself; give another file to write to")
     refuse_existing(out, force=force)
     fixations, notes = _fixations(recording, parts)
-    params = FitParams(smoothing=smoothing)
     try:
-        fitted = fit_walk(fixations, params, np.random.default_rng(seed))
+        fitted = fit_walk(fixations, smoothing, np.random.default_rng(seed))
         means = tuple(mean.value for mean in fitted.dwell_mean_s)
         sds = tuple(sd.value for sd in fitted.dwell_sd_s)
         if min(means) < 0.001 or max((*means, *sds)) > 60.0:
@@ -63,24 +64,24 @@ def fit_to_recording(
         Walk(PARTS, _matrix(fitted), means, sds, fitted.start)
     except ValueError as error:
         raise SetupError(f"{recording}: {error}") from None
-    text = walk_yaml(fitted, params, (_one_line(recording.name), *notes, f"seed {seed}"))
+    text = walk_yaml(fitted, smoothing, (_one_line(recording.name), *notes, f"seed {seed}"))
     write_file(out, text, force)
-    return _report(fitted, params, recording, notes, out)
+    return _report(fitted, smoothing, recording, notes, out)
 
 
-def walk_yaml(fitted: WalkFit, params: FitParams, about: tuple[str, ...]) -> str:
+def walk_yaml(fitted: WalkFit, smoothing: str, about: tuple[str, ...]) -> str:
     """Return a fitted walk as the YAML that a rig's ``walk`` names.
 
     about: lines with the source of the walk
     """
-    level = f"{100.0 * params.confidence:g} %"
+    level = f"{100.0 * CONFIDENCE:g} %"
     lines = ["# Walk over a face, fitted from a recording:"]
     lines += [f"#   {_one_line(line)}" for line in about]
     lines += [
         "#",
         f"# {sum(fitted.visits)} fixations on the face, {fitted.outside_fixations} elsewhere,"
         f" {_transitions(fitted)} transitions between parts.",
-        f"# {_smoothing(params)} Intervals hold {level}, from {params.resamples} resamples.",
+        f"# {_smoothing(smoothing)} Intervals hold {level}, from {RESAMPLES} resamples.",
         "#",
         "# DN chin, FL left side, LE left eye, M mouth, N nose, FR right side, RE right eye,",
         "# UP forehead; left and right are as in the recording's parts, and should be the owner's.",
@@ -150,12 +151,10 @@ def _transitions(fitted: WalkFit) -> int:
     return sum(sum(row) for row in fitted.counts)
 
 
-def _smoothing(params: FitParams) -> str:
-    return {
-        "none": "Probabilities are plain shares.",
-        "laplace": f"Laplace smoothing: {params.pseudo_count:g} is added to every count.",
-        "bootstrap": "Probabilities are means over the resamples.",
-    }[params.smoothing]
+def _smoothing(smoothing: str) -> str:
+    if smoothing == "none":
+        return "Probabilities are plain shares."
+    return f"Laplace smoothing: {PSEUDO_COUNT:g} is added to every count."
 
 
 def _ends(number: Interval) -> str:
@@ -167,14 +166,14 @@ def _one_line(text: str) -> str:
 
 
 def _report(
-    fitted: WalkFit, params: FitParams, recording: Path, notes: tuple[str, ...], out: Path
+    fitted: WalkFit, smoothing: str, recording: Path, notes: tuple[str, ...], out: Path
 ) -> str:
     """Return the results as text, part by part."""
     shares = np.array(fitted.visits) / sum(fitted.visits)
     lines = [f"{recording}: {note}" for note in notes]
     lines.append(
         f"{sum(fitted.visits)} fixations on the face, {fitted.outside_fixations} elsewhere,"
-        f" {_transitions(fitted)} transitions; {params.smoothing} smoothing"
+        f" {_transitions(fitted)} transitions; {smoothing} smoothing"
     )
     rows = zip(PARTS, fitted.visits, shares, fitted.dwell_mean_s, fitted.dwell_sd_s, strict=True)
     for part, n, share, mean, sd in rows:
