@@ -205,11 +205,13 @@ class FaceSigns(NamedTuple):
     """State of the eyes and mouth of a face, at an adult's size.
 
     eye_opening: opening of the lids over the usual opening, 0 is shut; None if lids are not visible
-    mouth_opening_m: gap between the lips
+    mouth_opening_m: gap between the lips, without a mesh up to a constant part; mouth_sd_m:
+        standard deviation of its changes
     """
 
     eye_opening: float | None
     mouth_opening_m: float
+    mouth_sd_m: float = 0.0
 
 
 class Located(NamedTuple):

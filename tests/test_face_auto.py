@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from present import present
 from seeing.material import (
     background,
     eyes_at,
@@ -89,3 +90,12 @@ def test_same_frames_same_numbers() -> None:
     runs = [[detector.find(f) for f in frames] for detector in (auto(), auto())]
     for one, other in zip(*runs, strict=True):
         assert [f.landmarks_px.tobytes() for f in one] == [f.landmarks_px.tobytes() for f in other]
+
+
+def test_an_open_mouth_is_measured_without_a_mesh() -> None:
+    frame, (truth,) = room(("astronaut", 1.0, 300.0, 180.0))
+    shut = present(auto().find(frame)[0].signs)
+    x, y = truth[3:].mean(axis=0).astype(int)
+    frame[y - 1 : y + 2, x - 4 : x + 5] = 0
+    opened = present(auto().find(frame)[0].signs)
+    assert opened.mouth_opening_m > shut.mouth_opening_m + 2.0 * shut.mouth_sd_m

@@ -60,7 +60,7 @@ def add_clothing(
 ) -> tuple[tuple[DetectedFace, ...], tuple[DetectedPerson, ...]]:
     """Return faces and people with the colours of their clothes, if visible."""
     worn = []
-    for heads in ([*map(_face_head, faces)], [*map(_person_head, people)]):
+    for heads in ([*map(face_head, faces)], [*map(_person_head, people)]):
         worn.append([clothing_colours(image, head, heads) if head else None for head in heads])
     return (
         tuple([replace(one, clothing=of) for one, of in zip(faces, worn[0], strict=True)]),
@@ -107,7 +107,7 @@ def _covered_mask(
     return np.asarray(head | ((below > _HEAD_HALF_M)[:, None] & (aside < _BODY_HALF_M)))
 
 
-def _face_head(face: DetectedFace) -> _Head | None:
+def face_head(face: DetectedFace) -> _Head | None:
     """Return the position and scale of a face; turning away shortens one of its lengths."""
     points: list[list[float]] = face.landmarks_px.tolist()
     if len(points) != 5:

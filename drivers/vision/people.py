@@ -58,9 +58,8 @@ class PeopleDetector:
         # Overlapping squares as high as the frame cover it.
         height, width = image.shape[:2]
         count = max(1, ceil((width - height) / (_STEP * height)) + 1)
-        middles = np.array([width / 2.0])
-        if count > 1:
-            middles = np.linspace(height / 2.0, width - height / 2.0, count)
+        end = min(width, height) / 2.0
+        middles = np.linspace(end, width - end, count)
         self._next %= count
         if self._next == 0:
             self._started_s = captured_s

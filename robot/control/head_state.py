@@ -124,7 +124,7 @@ class Person(Struct, frozen=True):
         distance_from: Source of the distance: "camera", "face size", or "" if unknown.
         age_s: Age of the frame.
         looks_at_head: Whether the person looks at the head, None if that is too uncertain.
-        speaks: Whether the mouth moves as in speech, None without a mesh of the mouth.
+        speaks: Whether the mouth moves as in speech, None while it is not seen.
     """
 
     id: int

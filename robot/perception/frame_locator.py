@@ -147,6 +147,10 @@ def _face(face: DetectedFace, found: Detections, lens: Intrinsics) -> Located | 
     edge_px = _EDGE * found.width_px
     focal_px = sqrt(lens.fx_px * lens.fy_px)
     eyes_px = focal_px * PUPIL_DISTANCE_M / pose.p_camera_m[2]
+    signs = face.signs or pose.signs
+    if face.signs is not None and pose.signs is not None:
+        # A picture shows the changes of a mouth better than a mesh does, but not the lids.
+        signs = face.signs._replace(eye_opening=pose.signs.eye_opening)
     measured = _depth_ratio(face, pose, found)
     share, sd = measured or (1.0, hypot(_SIZE_PX / eyes_px, _SIZE_OF_EYES))
     far = share * norm(pose.p_camera_m)
@@ -164,7 +168,7 @@ def _face(face: DetectedFace, found: Detections, lens: Intrinsics) -> Located | 
         turn_sd_rad=pose.turn_sd_rad,
         gaze=pose.gaze_camera or face.gaze_camera,
         from_side=x < edge_px or x + width > found.width_px - edge_px,
-        signs=pose.signs or face.signs,
+        signs=signs,
         clothing=face.clothing,
     )
 

@@ -75,7 +75,10 @@ def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> FacePose | None:
         return None
     R = towards @ turn
     p = _position(R, seen)
-    if p is None or not -float(R[:, 0] @ p) > _MOST_TURNED * float(np.linalg.norm(p)):
+    if p is None:
+        return None
+    facing = -float(R[:, 0] @ p) / float(np.linalg.norm(p))
+    if not facing > _MOST_TURNED:
         return None
     px_m = float(p[2]) / focal_px  # size of a pixel at the face
     tall = float(np.linalg.norm(points[_FOREHEAD] - points[_CHIN]))
@@ -86,7 +89,8 @@ def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> FacePose | None:
     sd = hypot(_TURN_SD_RAD, _POINT_PX * px_m / _DEEP_M)
     opening = None if mesh.lids_px is None else _eye_opening(mesh.lids_px, apart)
     lips = float(np.linalg.norm(points[_LIPS[0]] - points[_LIPS[1]]))
-    signs = FaceSigns(opening, lips / apart * PUPIL_DISTANCE_M)
+    # The network guesses what it does not see of a mouth from its side.
+    signs = FaceSigns(opening, lips / apart * PUPIL_DISTANCE_M, _POINT_PX * px_m / facing**4)
     shut = opening is None or opening < EYES_SHUT
     gaze = None if shut else _gaze(mesh, R, p, intrinsics)
     x, y, z = (vec(row) for row in R)

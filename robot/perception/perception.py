@@ -165,7 +165,7 @@ class Perception:
         signs, t_s = found.signs, track.at_s
         seen = track.seen_s == t_s
         if signs is not None and seen:
-            track.speech = track.speech.advance(signs.mouth_opening_m, t_s)
+            track.speech = track.speech.advance(signs.mouth_opening_m, t_s, signs.mouth_sd_m)
             if signs.eye_opening is not None:
                 track.eyes, track.eyes_s = found, t_s
         eyes = track.eyes if signs is not None and t_s - track.eyes_s <= EYES_HELD_S else None

@@ -64,6 +64,8 @@ def looks_at_head(
 # Time constant of the mean; least distance from it that counts; crossings within a window that make
 # speech; time without a crossing that ends it.
 _MEAN_S, _LEAST_M, _WINDOW_S, _CROSSINGS = 0.3, 0.0012, 1.0, 3
+# A person who was not seen for longer than this was out of sight.
+_GAP_S = 0.12
 
 
 class Speech(NamedTuple):
@@ -82,14 +84,14 @@ class Speech(NamedTuple):
     crossed_s: tuple[float, ...] = ()
     at_s: float = 0.0
 
-    def advance(self, gap_m: float, t_s: float) -> Self:
-        """Return the motion after another frame."""
+    def advance(self, gap_m: float, t_s: float, sd_m: float = 0.0) -> Self:
+        """Return the motion after another frame; sd_m: standard deviation of the gap's changes."""
         if self.mean_m is None:
             return self._replace(mean_m=gap_m, at_s=t_s)
         share = min(1.0, max(0.0, t_s - self.at_s) / _MEAN_S)
         off_m = gap_m - self.mean_m
         mean_m = self.mean_m + share * off_m
-        if abs(off_m) < _LEAST_M or (off_m > 0.0) is self.above:
+        if abs(off_m) < max(_LEAST_M, 2.0 * sd_m) or (off_m > 0.0) is self.above:
             return self._replace(mean_m=mean_m, at_s=t_s)
         crossed = (*self.crossed_s[1 - _CROSSINGS :], t_s)
         return self._replace(mean_m=mean_m, above=not self.above, crossed_s=crossed, at_s=t_s)
@@ -116,8 +118,6 @@ _ENOUGH = 0.4
 _COLOURS_GAIN, _UNFIT_GAIN = 0.15, 0.005
 # Inner product of colours above which they are similar.
 _LIKE = 0.9
-# A person who was not seen for longer than this was out of sight.
-_GAP_S = 0.12
 IN_SIGHT_S = 0.25
 """A track without a detection is still reported for this long."""
 FORGET_S = 1.5

@@ -14,6 +14,7 @@ import numpy as np
 from gazerig.drivers.camera.capture_loop import Locate
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBlob
+from gazerig.drivers.vision.clothing import add_clothing
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.scene_view import PinholeView, SceneView
@@ -95,19 +96,17 @@ class PixelCamera:
         scene_s = self._times.next_frame_s(now_s)
         if scene_s is not None:
             shot = Exposure(now_s, self._expose(scene_s, R, p_m), R)
-            blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
-            faces = self._detector.find(shot.image)
-            found = Detections(
-                now_s, self._times.number, *self._size_px, faces, blobs, image=shot.image
-            )
+            blobs = () if self._find_motion is None else self._find_motion(shot, self.lens)
+            faces, _ = add_clothing(shot.image, self._detector.find(shot.image))
+            found = Detections(now_s, self._times.number, *self._size_px, faces, blobs, shot.image)
             self._times.send(found.locate_in_camera(self._locate))
         return self._times.arrived(now_s)
 
     def _expose(self, scene_s: float, R: Mat3, p_m: Vec3) -> ImageArray:
         light = self._view.draw(PinholeView(scene_s, self.lens, self._size_px, R, p_m))
-        start = int(self._rng.integers(self._values))
+        start = self._rng.integers(self._values)
         noise = self._noise[start : start + self._values].reshape(light.shape)
-        image = cv2.add(light, noise, dtype=cv2.CV_8U).astype(np.uint8, copy=False)
+        image = np.asarray(cv2.add(light, noise, dtype=cv2.CV_8U), np.uint8)
         image.setflags(write=False)  # like the frames of real cameras
         return image
 

@@ -9,15 +9,15 @@ drawn faces better. MTCNN also places landmarks more accurately. Either of them 
 face is there that only YuNet finds, YuNet searches every frame.
 """
 
-from functools import cache
+from functools import cache, partial
 from math import ceil
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.types import DetectedFace, ImageArray
+from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import MIN_CONFIDENCE, MIN_FACE_PX, FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import (
     FoundFace,
@@ -27,10 +27,8 @@ from gazerig.drivers.vision.face.preprocess import (
     sort_by_size,
     whole_image,
 )
-
-if TYPE_CHECKING:
-    from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
-    from gazerig.drivers.vision.face.yunet import YunetDetector
+from gazerig.drivers.vision.face.yunet import YunetDetector
+from gazerig.drivers.vision.mouth import with_mouth
 
 # Ratio of neighbouring scales: a network for 12 pixels also finds faces of 20.
 _SHRINK = 0.6
@@ -107,12 +105,12 @@ class AutoDetector:
         """
         self._params, self._log = params, EventLog()
         self._networks: list[MtcnnDetector | YunetDetector] = []
-        for load, other in ((_mtcnn, "yunet"), (_yunet, "mtcnn")):
+        for load, other in ((partial(MtcnnDetector, params), "yunet"), (YunetDetector, "mtcnn")):
             try:
-                self._networks.append(load(params))
+                self._networks.append(load())
             except FileNotFoundError:
                 pass  # YuNet's file is optional
-            except (ImportError, ModelFileError) as error:
+            except ModelFileError as error:
                 self._log.add(f"{error}; until then {other} finds the faces")
         if not self._networks:
             raise ModelFileError("; ".join(self._log.drain()))
@@ -155,7 +153,7 @@ class AutoDetector:
         for tile in tiles:
             known += self._networks[0].search(frame, tile, known, _FAR_CONFIDENCE)
         self._known = known
-        return sort_by_size([one.face for one in known])
+        return sort_by_size([with_mouth(image, one.face) for one in known])
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
@@ -185,15 +183,3 @@ class AutoDetector:
             frame, np.array([one.box for one in found]), MIN_CONFIDENCE
         )
         return new_faces([now or one for one, now in zip(found, placed, strict=True)], known)
-
-
-def _mtcnn(params: FaceDetectorParams) -> "MtcnnDetector":
-    from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
-
-    return MtcnnDetector(params)
-
-
-def _yunet(params: FaceDetectorParams) -> "YunetDetector":
-    from gazerig.drivers.vision.face.yunet import YunetDetector
-
-    return YunetDetector()

@@ -46,40 +46,26 @@ class YunetDetector:
     ) -> list[FoundFace]:
         """Search a tile of a frame; return the faces that are not among the known ones."""
         part, scaled = tile.cut(frame)
-        stretch = part.shape[1] / scaled.shape[1], part.shape[0] / scaled.shape[0]
-        rows = self._rows(scaled, stretch, (tile.left, tile.top), least)
-        return new_faces([_found(row) for row in rows], known)
-
-    def place(self, frame: ImageArray, boxes: Boxes, least: float) -> list[FoundFace | None]:
-        """Return None for each box: this network only searches."""
-        return [None] * len(boxes)
-
-    def _rows(
-        self,
-        scaled: ImageArray,
-        stretch: tuple[float, float],
-        corner: tuple[float, float],
-        least: float,
-    ) -> NDArray[np.float64]:
-        """Return one row per face with at least this confidence, in pixel edges of the frame.
-
-        The fifteen numbers are box, right eye, left eye, nose, right and left mouth corner,
-        confidence.
-        """
         height, width = scaled.shape[:2]
         if min(height, width) < _LEAST_PX:
-            return np.zeros((0, 15))
+            return []
         self._net.setInputSize((width, height))
         self._net.setScoreThreshold(least)
         rows = self._net.detect(np.ascontiguousarray(scaled))[1]
         if rows is None:  # OpenCV's value for no face
-            return np.zeros((0, 15))
+            return []
+        # Box, right eye, left eye, nose, right and left mouth corner, confidence.
         found = np.asarray(rows, dtype=np.float64)
         found = found[np.isfinite(found).all(axis=1)]
-        found[:, :14] *= np.tile(stretch, 7)
+        corner = tile.left, tile.top
+        found[:, :14] *= np.tile((part.shape[1] / width, part.shape[0] / height), 7)
         found[:, :2] += corner
         found[:, 4:14] += np.tile(corner, 5)
-        return found
+        return new_faces([_found(row) for row in found], known)
+
+    def place(self, frame: ImageArray, boxes: Boxes, least: float) -> list[FoundFace | None]:
+        """Return None for each box: this network only searches."""
+        return [None] * len(boxes)
 
 
 def _found(row: NDArray[np.float64]) -> FoundFace:

@@ -93,8 +93,8 @@ def shrink_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane 
     if depth_m is None or depth_m.size == 0:
         return None
     # Nearest neighbour, as the mean of two surfaces is on neither.
-    size, depth = (shape[1], shape[0]), depth_m.astype(np.float32)
-    return np.asarray(cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST), np.float32)
+    depth = cv2.resize(depth_m.astype(np.float32), shape[::-1], interpolation=cv2.INTER_NEAREST)
+    return np.asarray(depth, np.float32)
 
 
 def distance(group: PixelGroup, depth: Plane | None) -> Distance:
@@ -303,9 +303,7 @@ def _is_cut(group: PixelGroup, shape: tuple[int, ...]) -> bool:
 
 def relative_rotation(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -> Floats:
     """Return R_now_before of two orientations of the camera in the world, (3, 3) each."""
-    now, before = np.asarray(R_world_now, float), np.asarray(R_world_before, float)
-    out: Floats = now.T @ before
-    return out
+    return np.asarray(np.transpose(R_world_now) @ R_world_before, np.float64)
 
 
 def _shrink_by_noise(value: float, sd: float) -> float:

@@ -122,34 +122,36 @@ class GloveDetector:
         for row, circle in enumerate(circles):
             edge = _BEYOND * circle.radius
             cut = not (edge < circle.x < width - edge and edge < circle.y < height - edge)
-            covered = any(
-                np.hypot(circle.x - one.x, circle.y - one.y)
-                < _TAKEN * one.radius + _BEYOND * circle.radius
-                for one in circles[:row]
-            ) or not (cut or _is_whole(mask, row, circles))
+            hidden = (
+                cut
+                or any(
+                    np.hypot(circle.x - one.x, circle.y - one.y)
+                    < _TAKEN * one.radius + _BEYOND * circle.radius
+                    for one in circles[:row]
+                )
+                or not _is_whole(mask, row, circles)
+            )
             # The number is that of the nearest earlier glove. A partly hidden glove keeps its last
             # size, or that of its visible part; without either it is omitted.
             x, y, radius, sure = circle
             near = [
-                (np.hypot(one.x - x, one.y - y), one)
+                (away, one)
                 for one in self._known
-                if np.hypot(one.x - x, one.y - y) < _MOVES * max(radius, one.radius)
+                if (away := np.hypot(one.x - x, one.y - y)) < _MOVES * max(radius, one.radius)
             ]
+            number, sized_s = self._next_id, captured_s
             if near:
-                before = min(near)[1]
+                _, before = min(near)
                 self._known.remove(before)
-                if (cut or covered) and sure <= before.radius:
-                    glove = _Glove(before.id, x, y, before.radius, captured_s, before.sized_s)
-                else:
-                    radius = sure if cut or covered else radius
-                    glove = _Glove(before.id, x, y, radius, captured_s, captured_s)
-            elif cut or covered:
-                glove = None
+                number = before.id
+                if hidden:
+                    radius = max(sure, before.radius)
+                    sized_s = captured_s if sure > before.radius else before.sized_s
+            elif hidden:
+                continue
             else:
                 self._next_id += 1
-                glove = _Glove(self._next_id - 1, x, y, radius, captured_s, captured_s)
-            if glove is not None:
-                gloves.append(glove)
+            gloves.append(_Glove(number, x, y, radius, captured_s, sized_s))
         found = {glove.id for glove in gloves}
         rest = [
             one for one in self._known if one.id not in found and captured_s - one.seen_s <= _KEPT_S

@@ -87,9 +87,8 @@ class MotionTracks:
             follow.centre, follow.velocity_px_s = centre, velocities_px_s[j]
             follow.size_px, follow.seen_s = sizes_px[j], t_s
             follow.consecutive_images += 1
-        seen_now = {follow.id for follow in found.values()}
         for follow in self._patch_tracks:
-            if follow.id not in seen_now and not self.is_confirmed(follow):
+            if follow.seen_s < t_s and not self.is_confirmed(follow):
                 follow.consecutive_images = 0  # a flicker, not a thing: count again
         return [found[j] for j in range(len(centres))]
 
