@@ -123,6 +123,7 @@ def test_speech_is_a_mouth_that_opens_and_closes_again_and_again() -> None:
     assert not any(spoken(lambda t: 0.02 * (1.0 < t < 2.5)))  # a yawn
     pause = spoken(lambda t: 0.004 + 0.003 * sin(2 * pi * 4.0 * t) * (t < 2.0), 5.0)
     assert pause[55] and not any(pause[110:])
+    assert spoken(lambda t: 0.004 + 0.004 * sin(2 * pi * 4.5 * t), 0.3)[-1]  # a syllable
 
 
 # ---- from mesh to percept -----------------------------------------------------------------

@@ -34,11 +34,9 @@ class NewestHeadPose(Protocol):
     @property
     def first_s(self) -> float:
         """Return the start time of the scene."""
-        ...
 
     def newest(self) -> TimedPose | None:
         """Return the newest pose, None before the first."""
-        ...
 
 
 class DrawnSource:

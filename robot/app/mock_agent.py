@@ -23,7 +23,6 @@ class AgentScene(Protocol):
 
     def face(self, name: str, t_s: float) -> Vec3:
         """Return a person's face, world, m."""
-        ...
 
 
 class MockAgent:
@@ -39,7 +38,7 @@ class MockAgent:
         self,
         command: CommandTaker,
         scene: AgentScene,
-        scene_start_s: Callable[[], float | None] = lambda: None,
+        scene_start_s: Callable[[], float | None],
     ) -> None:
         self._command, self._scene, self._scene_start_s = command, scene, scene_start_s
         self._start_s: float | None = None

@@ -34,17 +34,14 @@ class RunRoom(Protocol):
     @property
     def scene(self) -> "Scene":
         """Return the people and things in it, for scores and the page."""
-        ...
 
     @property
     def clock(self) -> "Clock":
         """Return the clock of the run."""
-        ...
 
     @property
     def run_bus(self) -> "RunBus":
         """Return the bus of the rig's servos; its ``close`` ends the surroundings."""
-        ...
 
     def camera(
         self,
@@ -67,15 +64,12 @@ class RunRoom(Protocol):
             own: Camera and detector of a program.
             say: Receives messages for the user.
         """
-        ...
 
     def start_s(self) -> float | None:
         """Return the start of its script on the clock of the ticks, None before it."""
-        ...
 
     def shapes(self) -> "WorldShapes | None":
         """Return its appearance for the page, None if it is not shown."""
-        ...
 
 
 @runtime_checkable
@@ -85,12 +79,10 @@ class RoomCamera(Protocol):
     @property
     def wrapped_camera(self) -> "Camera | None":
         """Return the wrapped camera, None before it is known."""
-        ...
 
     @property
     def start_s(self) -> float | None:
         """Return the start of the scene in front of it, None before."""
-        ...
 
 
 class Surroundings(ABC):

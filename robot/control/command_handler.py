@@ -36,53 +36,41 @@ class ParamAccess(Protocol):
     @property
     def version(self) -> int:
         """Return the number of changes."""
-        ...
 
     @property
     def path(self) -> Path:
         """Return the rig's file."""
-        ...
 
     @property
     def character_name(self) -> str:
         """Return the present character."""
-        ...
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters."""
-        ...
 
     def values(self) -> Mapping[str, Value]:
         """Return all present values."""
-        ...
 
     def get(self, prefix: str) -> Mapping[str, Value]:
         """Return the present values whose keys start with ``prefix``."""
-        ...
 
     def set(self, changes: Mapping[str, Value]) -> Iterable[str]:
         """Apply values from the next tick on; return notes for the user."""
-        ...
 
     def unsaved(self) -> Sequence[ParamChange]:
         """Return the present values that are not in the file."""
-        ...
 
     def save(self, path: Path | None = None) -> SavedFile:
         """Write the present values to a file."""
-        ...
 
     def revert(self) -> object:
         """Restore the values of the file."""
-        ...
 
     def characters(self) -> Sequence[str]:
         """Return the available characters."""
-        ...
 
     def apply_character(self, name: str) -> object:
         """Apply another character to the rig."""
-        ...
 
 
 class PathGuard(Protocol):
@@ -90,11 +78,9 @@ class PathGuard(Protocol):
 
     def check_file(self, given: str, kind: str = "") -> str:
         """Return a shipped name or an absolute path; raise if it is not allowed."""
-        ...
 
     def check_changes(self, changes: Mapping[str, object]) -> None:
         """Raise if a value names a file that is not allowed."""
-        ...
 
 
 class Speaker(Protocol):
@@ -105,15 +91,12 @@ class Speaker(Protocol):
 
         confined: only files in the folders of sounds
         """
-        ...
 
     def feed(self, pcm: bytes, rate_hz: int, channels: int, volume: float, /) -> float:
         """Say a piece of a stream; return the length that has not been heard, s."""
-        ...
 
     def finish(self) -> None:
         """Mark the end of the stream."""
-        ...
 
 
 def accept_only_stops(command: CommandTaker, reason: str) -> CommandTaker:

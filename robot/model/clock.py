@@ -9,11 +9,9 @@ class Clock(Protocol):
 
     def now_s(self) -> float:
         """Return the time."""
-        ...
 
     def sleep_until(self, t_s: float) -> None:
         """Wait until ``t_s``; return immediately if it is past."""
-        ...
 
 
 class RealClock:

@@ -64,15 +64,12 @@ class Linkage(Protocol):
 
     def steps(self, angle_rad: float) -> float:
         """Return the servo position of a joint angle, not rounded."""
-        ...
 
     def angle_rad(self, steps: float) -> float:
         """Return the joint angle of a servo position."""
-        ...
 
     def rate_rad(self, steps: float) -> float:
         """Return the signed angle in rad per step at a servo position."""
-        ...
 
 
 class ConstantRatio:

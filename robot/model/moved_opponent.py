@@ -12,15 +12,12 @@ class MovableOpponent(Protocol):
     @property
     def spans_s(self) -> Sequence[tuple[float, float]]:
         """Return the times in which a person moved it, (start, end)."""
-        ...
 
     def move(self, p_m: Vec3, t_s: float) -> None:
         """Move the leading fist to a point."""
-        ...
 
     def update(self, t_s: float) -> None:
         """Advance the motion to a time."""
-        ...
 
 
 @runtime_checkable
@@ -30,7 +27,6 @@ class BoxingScene(Protocol):
     @property
     def opponent(self) -> MovableOpponent | None:
         """Return the boxer, None without one."""
-        ...
 
 
 def has_opponent(scene: object) -> bool:

@@ -17,37 +17,30 @@ class ExpectedResponse(Protocol):
     @property
     def name(self) -> str:
         """Return the tested behaviour."""
-        ...
 
     @property
     def response(self) -> Literal["look", "return"]:
         """Return the kind of response."""
-        ...
 
     @property
     def kind(self) -> str:
         """Return the kind of thing."""
-        ...
 
     @property
     def start_s(self) -> float:
         """Return the start."""
-        ...
 
     @property
     def end_s(self) -> float:
         """Return the end."""
-        ...
 
     @property
     def place_world_m(self) -> Vec3:
         """Return the place."""
-        ...
 
     @property
     def within_m(self) -> float:
         """Return the radius around the place."""
-        ...
 
 
 class BoxingEvent(Protocol):
@@ -56,19 +49,15 @@ class BoxingEvent(Protocol):
     @property
     def name(self) -> str:
         """Return "punch", "attack" or another name."""
-        ...
 
     @property
     def start_s(self) -> float:
         """Return the start."""
-        ...
 
     @property
     def end_s(self) -> float:
         """Return the end."""
-        ...
 
     @property
     def due_s(self) -> float | None:
         """Return the time by which a response is due, None: by the end."""
-        ...

@@ -30,8 +30,6 @@ class SceneView(Protocol):
 
     def draw(self, seen_by: PinholeView) -> ImageArray:
         """Return the picture of a camera, (h, w, 3) BGR."""
-        ...
 
     def close(self) -> None:
         """Free the renderer's resources; safe to call twice."""
-        ...

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import inf, radians, sqrt
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,9 +61,9 @@ def looks_at_head(
     return off_rad < cone + edge if before else off_rad < cone - edge
 
 
-# Time constant of the mean; least distance from it that counts; crossings within a window that make
-# speech; time without a crossing that ends it.
-_MEAN_S, _LEAST_M, _WINDOW_S, _CROSSINGS = 0.3, 0.0012, 1.0, 3
+# Smallest swing of the gap that counts; changes of its direction within a window that make speech,
+# or a swing of some times that size and the start of the next within a syllable.
+_SWING_M, _TURNS, _WINDOW_S, _WIDE, _SYLLABLE_S = 0.0024, 3, 1.0, 2.0, 0.2
 # A person who was not seen for longer than this was out of sight.
 _GAP_S = 0.12
 
@@ -72,33 +72,32 @@ class Speech(NamedTuple):
     """Recent motion of the gap between a person's lips; a value.
 
     Speech opens and closes the mouth three to six times a second; a smile, a yawn and a mouth that
-    stays open do not. A person speaks while the gap has recently crossed its own mean several
-    times, each time by more than the usual error of the mesh.
+    stays open do not. A person speaks while the mouth has recently opened and closed several times,
+    each time by more than the usual error of the mesh, or once quickly and far.
 
-    mean_m: running mean of the gap, None before the first; above: whether the last crossing was
-    upwards; crossed_s: times of the last crossings; at_s: time of the last gap
+    start_m, extreme_m: ends of the present swing; opens: its direction; turned_s: times of the last
+    changes of direction
     """
 
-    mean_m: float | None = None
-    above: bool = False
-    crossed_s: tuple[float, ...] = ()
-    at_s: float = 0.0
+    start_m: float = 0.0
+    extreme_m: float = inf
+    opens: bool = False
+    turned_s: tuple[float, ...] = ()
 
-    def advance(self, gap_m: float, t_s: float, sd_m: float = 0.0) -> Self:
+    def advance(self, gap_m: float, t_s: float, sd_m: float = 0.0) -> "Speech":
         """Return the motion after another frame; sd_m: standard deviation of the gap's changes."""
-        if self.mean_m is None:
-            return self._replace(mean_m=gap_m, at_s=t_s)
-        share = min(1.0, max(0.0, t_s - self.at_s) / _MEAN_S)
-        off_m = gap_m - self.mean_m
-        mean_m = self.mean_m + share * off_m
-        if abs(off_m) < max(_LEAST_M, 2.0 * sd_m) or (off_m > 0.0) is self.above:
-            return self._replace(mean_m=mean_m, at_s=t_s)
-        crossed = (*self.crossed_s[1 - _CROSSINGS :], t_s)
-        return self._replace(mean_m=mean_m, above=not self.above, crossed_s=crossed, at_s=t_s)
+        extreme_m = (max if self.opens else min)(self.extreme_m, gap_m)
+        least_m, turned_s = max(_SWING_M, 4.0 * sd_m), self.turned_s
+        if abs(gap_m - extreme_m) < least_m:
+            return self._replace(extreme_m=extreme_m)
+        syllable = t_s - turned_s[-1] <= _SYLLABLE_S if turned_s else False
+        if syllable and abs(extreme_m - self.start_m) > _WIDE * least_m:
+            turned_s = (t_s,) * _TURNS
+        return Speech(extreme_m, gap_m, not self.opens, (*turned_s[1 - _TURNS :], t_s))
 
     def speaks(self, t_s: float) -> bool:
         """Return whether the mouth moves like that of a speaking person."""
-        return len(self.crossed_s) == _CROSSINGS and t_s - self.crossed_s[0] <= _WINDOW_S
+        return len(self.turned_s) == _TURNS and t_s - self.turned_s[0] <= _WINDOW_S
 
 
 NO_SPEECH = Speech()

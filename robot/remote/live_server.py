@@ -133,11 +133,9 @@ class FileTuning(ParamAccess, Protocol):
 
     def files(self) -> Iterable[Path]:
         """Return the files in use: the rig's file and its overlays."""
-        ...
 
     def reload(self, path: Path) -> object:
         """Apply the contents of a file; on errors change nothing and raise with all of them."""
-        ...
 
 
 class LiveServer:

@@ -31,7 +31,6 @@ class WorldShapes(Protocol):
 
     def parts(self) -> Sequence[WorldPart]:
         """Return all visible shapes except the rig itself."""
-        ...
 
     def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
         """Return the orientations and positions of moving parts in the world, by their names.
@@ -42,4 +41,3 @@ class WorldShapes(Protocol):
         Returns:
             The parts that are visible now; the others are hidden.
         """
-        ...
