@@ -251,7 +251,7 @@ def test_the_place_to_be_hit_is_a_target_of_its_own_that_moves_with_the_opponent
     model = planned_attention()
     frames = [guarding(0.0), *(opened((1 + k) * DT_S, parted=True) for k in range(9))]
     last = looks(model, frames)[-1]
-    assert (last.kind, last.id, last.salience, last.top_down) == ("attack_target", -1, 0.9, True)
+    assert (last.kind, last.id, last.salience, last.top_down) == ("attack_target", -1, 1.4, True)
     assert last.p_world_m == pytest.approx((1.0, 0.0, -0.3))
     assert last.plan.startswith("attack: chest is open")
     moved = structs.replace(opened(10 * DT_S, parted=True), faces=(face((0.95, 0.02, 0.0)),))

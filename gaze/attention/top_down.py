@@ -88,7 +88,7 @@ def _shipped_rules() -> dict[str, Rule]:
     return {
         "wait": Rule("face", 0.5),
         "guard": Rule(GUARD_TARGET, 0.8),
-        "attack": Rule(ATTACK_TARGET, 0.9),
+        "attack": Rule(ATTACK_TARGET, 1.4),
     }
 
 
