@@ -122,7 +122,7 @@ _SIGN_S = 0.7
 """Their length, in which no other one begins."""
 _INDIVIDUAL = 0.5
 """Standard deviation of the logarithm of a head's own rate of nods."""
-_LONG_TURN_S, _STARTS_AVERTED = 3.5, 0.85
+_LONG_TURN_S, _STARTS_AVERTED = 3.0, 0.9
 """Shortest planned turn that begins averted; share of the long turns that do."""
 _START_AWAY_S, _START_AWAY_SD_S = 1.2, 0.25
 """Time into a turn until the gaze returns to the face."""
