@@ -37,7 +37,7 @@ _STOPS_WITHIN_S = 1.0
 _UNSEEN_M_S2 = 1.0
 # Errors of a face of which a part is covered, across the view and as a share of the range, if they
 # show: the detector completes the visible part, often to a smaller face.
-_COVERED_M, _COVERED_SHARE = 0.01, 0.25
+_COVERED_M, _COVERED_SHARE = 0.03, 0.5
 NEAREST_M = 0.05
 """Least distance of a thing from the camera."""
 # Largest change of the range's logarithm in one step.
