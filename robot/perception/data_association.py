@@ -89,7 +89,7 @@ def pair_costs(
     places = [view_and_range(found.p_m, p_camera) for found in detections]
     none = [0.0] * len(detections)
     return [
-        _track_costs(track, detections, places, clothing[k] if clothing else none, tracks)
+        _track_costs(track, detections, places, clothing[k] if clothing else none)
         for k, track in enumerate(tracks)
     ]
 
@@ -99,7 +99,6 @@ def _track_costs(
     detections: Sequence[Located],
     places: Sequence[tuple[Vec3, float]],
     clothing: Sequence[float],
-    tracks: Sequence[BodyTrack],
 ) -> list[float]:
     """Return the cost of one track's pair with each detection.
 
@@ -108,7 +107,6 @@ def _track_costs(
         detections: all detections.
         places: direction and distance of each.
         clothing: cost of the clothes of each pair.
-        tracks: all tracks, which may hide this one.
     """
     last, known, unseen_s, person = track.detection, track.filter, track.unseen_s, track.is_person
     range_m, gone_m, in_sight = known.range_m, GATE_SPEED_M_S * unseen_s, unseen_s <= IN_SIGHT_S
@@ -117,7 +115,6 @@ def _track_costs(
     if person:
         upright_m2 = min(upright_m2, _UPRIGHT_M2 + (_STOOPS_M_S * unseen_s) ** 2)
     always = (0.0 if in_sight else _BACK) + (0.0 if track.frames >= _PROVED else _UNPROVED)
-    behind: bool | None = None
     costs = [FORBIDDEN] * len(detections)
     for j, (found, (view, far_m), worn) in enumerate(
         zip(detections, places, clothing, strict=True)
@@ -128,8 +125,8 @@ def _track_costs(
             far_m *= size
         wide_m = GATE_M * max(1.0, far_m)
         numbered = last.detector_id is not None and found.detector_id is not None
-        same = numbered and last.detector_id == found.detector_id
-        if numbered and not same:
+        other = numbered and last.detector_id != found.detector_id
+        if other:
             wide_m = min(wide_m, _OUTLINE * max(last.radius_m, found.radius_m))
         alike = worn < _ALIKE and not in_sight
         if alike:
@@ -148,9 +145,7 @@ def _track_costs(
         surprise = ratio * (wide_m / _GATE_SIGMA) ** 2
         if not aside / (across_sum + surprise) + deep / (along_sum + surprise) <= _GATE_SIGMA**2:
             continue
-        if behind is None:
-            behind = _is_hidden(track, tracks)
-        hidden = behind and not alike and not same
+        hidden = known.is_covered and not alike and (other or not numbered)
         if hidden:
             surprise = min(surprise, ratio * (_HIDDEN_M * _HIDDEN_M))
         bob = min(surprise, ratio * (_BOB_M * _BOB_M)) if person else surprise
@@ -166,28 +161,30 @@ def _track_costs(
             )
         )
         cost = min(expected, surprising + _SURPRISE) + always + _CLOTHES * worn
-        if numbered and not same:
+        if other:
             cost += _OTHER_MARK
         if not ((hidden or worn > 0.0) and cost > UNPAIRED):
             costs[j] = min(cost, UNPAIRED - _SLOWLY / max(cost, _NEARLY_UNPAIRED))
     return costs
 
 
-def _is_hidden(track: BodyTrack, tracks: Sequence[BodyTrack]) -> bool:
-    """Return whether a track is expected behind or right next to a nearer one.
+def note_covered(tracks: Sequence[BodyTrack]) -> None:
+    """Note in the filters which tracks are expected behind or right next to a nearer one.
 
     A person who is about to be hidden does not suddenly appear elsewhere: a detection there is
     another person, unless the detector gave both the same number.
     """
-    view, far_m = track.filter.view, _NEARER * track.filter.range_m
-    return any(
-        other.filter.range_m < far_m
-        and other is not track
-        and other.unseen_s <= IN_SIGHT_S
-        and dist(view, other.filter.view)
-        < (track.detection.radius_m + other.detection.radius_m) / other.filter.range_m
-        for other in tracks
-    )
+    for track in tracks:
+        known, radius_m = track.filter, track.detection.radius_m
+        far_m = _NEARER * known.range_m
+        known.is_covered = any(
+            other.filter.range_m < far_m
+            and other is not track
+            and other.unseen_s <= IN_SIGHT_S
+            and dist(known.view, other.filter.view)
+            < (radius_m + other.detection.radius_m) / other.filter.range_m
+            for other in tracks
+        )
 
 
 def assign(costs: Sequence[Sequence[float]], unpaired: float = FORBIDDEN) -> list[tuple[int, int]]:

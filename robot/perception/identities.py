@@ -62,7 +62,7 @@ def resolve_identities(
     for i, j in column.items():
         track, own = tracks[i], worn[i][j]
         clothing, known = detections[j].clothing, track.clothes
-        if clothing is None or not track.is_person:
+        if clothing is None:  # a thing has none
             continue
         new = max(own, 0.0) if known.frames < _OWN else own  # may be a person who returned
         if new < _FITS:
@@ -77,7 +77,7 @@ def resolve_identities(
             lost = other.unseen_s > IN_SIGHT_S
             if not lost and not (k in column and (known.lost_sight or other.clothes.lost_sight)):
                 continue
-            if k != i and other.clothes.frames >= _CLOTHES_PROVED and other.is_person:
+            if k != i and other.clothes.frames >= _CLOTHES_PROVED:
                 gain = max((new if lost else own) - worn[k][j], -_MOST_OF_FRAME)
                 gain = min(gain, _MOST_OF_FRAME if worn[k][j] < _FITS else 0.0)
                 doubt = _DOUBT_KEPT * before.get(other.id, 0.0) + gain
@@ -85,8 +85,8 @@ def resolve_identities(
                     known.doubts[other.id] = doubt
                     sure = sure and doubt < _SURE
     if not sure:
-        unsure = [tracks[i] for i in column if tracks[i].clothes.confirmed < _CONFIRMED]
-        _renumber(tracks, [track for track in unsure if track.is_person])
+        seen = [tracks[i] for i in column if tracks[i].is_person]
+        _renumber(tracks, [one for one in seen if one.clothes.confirmed < _CONFIRMED])
 
 
 def _renumber(tracks: list[BodyTrack], seen: list[BodyTrack]) -> None:

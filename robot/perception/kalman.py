@@ -35,6 +35,9 @@ _CHANGES_FOR_S = 0.5
 _STOPS_WITHIN_S = 1.0
 # Noise of the acceleration while unseen: people also turn and hurry.
 _UNSEEN_M_S2 = 1.0
+# Errors of a face of which a part is covered, across the view and as a share of the range, if they
+# show: the detector completes the visible part, often to a smaller face.
+_COVERED_M, _COVERED_SHARE = 0.03, 0.5
 NEAREST_M = 0.05
 """Least distance of a thing from the camera."""
 # Largest change of the range's logarithm in one step.
@@ -96,11 +99,12 @@ class TrackFilter:
     p_m, v_m_s: position and velocity
     view, range_m: unit vector from the camera to it, and its distance
     across, along: covariances across the view (each direction) and along it
+    is_covered: whether a nearer thing may cover a part of it
     """
 
     __slots__ = (
-        "_accel_m_s2", "_camera", "_noise", "_unseen_s", "across", "along", "p_m", "range_m",
-        "v_m_s", "view",
+        "_accel_m_s2", "_camera", "_noise", "_unseen_s", "across", "along", "is_covered", "p_m",
+        "range_m", "v_m_s", "view",
     )  # fmt: skip
 
     def __init__(
@@ -113,6 +117,7 @@ class TrackFilter:
     ) -> None:
         self._noise = noise
         self._unseen_s = self._accel_m_s2 = 0.0
+        self.is_covered = False
         self._camera = p_camera_m
         self.p_m: Vec3 = p_m
         self.v_m_s: Vec3 = (0.0, 0.0, 0.0)
@@ -159,10 +164,9 @@ class TrackFilter:
         self._place(self.p_m)
         ahead = dot(before, self.view)
         turned = 1.0 - ahead * ahead
-        if turned > 0.0:
-            a, b = self.across, self.along
-            self.across = a.towards(b, 0.5 * turned)
-            self.along = b.towards(a, turned)
+        a, b = self.across, self.along
+        self.across = a.towards(b, 0.5 * turned)
+        self.along = b.towards(a, turned)
 
     def correct(self, p_m: Vec3, across_sd_m: float, along_sd_m: float) -> None:
         """Update with a measured position and its standard deviations."""
@@ -177,19 +181,29 @@ class TrackFilter:
         arc = atan2(away, ahead) / away if away > _TINY_RAD else 1.0
         aside_m, deep_m = scale(aside_m, self.range_m * arc), -self.range_m * log(at)
         aside, deep = dot(aside_m, aside_m), deep_m * deep_m
-        if aside / (self.across.p + across) + deep / (self.along.p + along) > _SURPRISING:
-            self._adapt(aside, deep, across, along)
+        if self.is_covered and self._distance(aside, deep, across, along) > _SURPRISING:
+            across += _COVERED_M * _COVERED_M
+            along += (_COVERED_SHARE * self.range_m) ** 2
+        if self._distance(aside, deep, across, along) > _SURPRISING:
+            # Raise the noise until the innovation is plausible, and no further: with the full noise
+            # a small change of speed would count as a large one, and the velocity would overshoot
+            # by as much as it had lagged behind. The change may have happened at any time since the
+            # last detection: after a long gap, an offset says less about the present velocity.
+            accel, most = max(self._accel_m_s2, self._noise.quiet_m_s2), self._noise.lively_m_s2
+            while accel < most and self._distance(aside, deep, across, along) > _EXPECTED:
+                before, accel = accel, min(2.0 * accel, most)
+                more = sqrt(accel * accel - before * before)
+                self.across = self.across.with_noise(more, self._unseen_s)
+                self.along = self.along.with_noise(more, self._unseen_s)
+            self._accel_m_s2 = accel
         self._unseen_s = 0.0
         of_p, of_v, self.across = self.across.measured(0, across)
         along_p, along_v, self.along = self.along.measured(0, along)
         self.v_m_s = add(self.v_m_s, add(scale(aside_m, of_v), scale(self.view, along_v * deep_m)))
         self._move(scale(aside_m, of_p), along_p * deep_m)
 
-    def _adapt(self, aside: float, deep: float, across: float, along: float) -> None:
-        """Raise the noise until an innovation is plausible.
-
-        The noise is not raised further: with the full noise a small change of speed would count as
-        a large one, and the velocity would overshoot by as much as it had lagged behind.
+    def _distance(self, aside: float, deep: float, across: float, along: float) -> float:
+        """Return the squared Mahalanobis distance of an innovation.
 
         Args:
             aside: squared innovation across the view.
@@ -197,19 +211,7 @@ class TrackFilter:
             across: variance of the measurement across the view.
             along: variance of the measurement along the view.
         """
-        # The change may have happened at any time since the last detection: after a long gap, an
-        # offset says less about the present velocity.
-        accel, most = max(self._accel_m_s2, self._noise.quiet_m_s2), self._noise.lively_m_s2
-        while True:
-            before, accel = accel, min(2.0 * accel, most)
-            if accel > before:
-                more = sqrt(accel * accel - before * before)
-                self.across = self.across.with_noise(more, self._unseen_s)
-                self.along = self.along.with_noise(more, self._unseen_s)
-            far = aside / (self.across.p + across) + deep / (self.along.p + along)
-            if accel >= most or far < _EXPECTED:
-                self._accel_m_s2 = accel
-                return
+        return aside / (self.across.p + across) + deep / (self.along.p + along)
 
     def correct_velocity(
         self, p_m: Vec3, v_m_s: Vec3, across_sd_m_s: float, along_sd_m_s: float

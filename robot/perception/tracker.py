@@ -20,6 +20,7 @@ from gazerig.robot.perception.data_association import (
     FASTEST_M_S,
     UNPAIRED,
     assign,
+    note_covered,
     pair_costs,
 )
 from gazerig.robot.perception.identities import find_returned, resolve_identities
@@ -88,6 +89,7 @@ class Tracker:
             [track.clothes.colours for track in self._tracks],
             [found.clothing for found in detections],
         )
+        note_covered(self._tracks)
         costs = pair_costs(self._tracks, detections, p_world_camera_m, worn)
         pairs = assign(costs, UNPAIRED)
         for i, j in pairs:
