@@ -121,9 +121,9 @@ class CameraHealth:
         spent_ms["reading"] = each_ms - sum(spent_ms.values())
         stage = max(spent_ms, key=lambda name: spent_ms[name])
         return (
-            f"{self._analysed / past_s:.0f} of {delivered / past_s:.0f} frames a second are "
-            f"analysed; {stage} take{'s' * (stage in ('motion', 'reading'))} "
-            f"{spent_ms[stage]:.0f} of {each_ms:.0f} ms a frame: {_REMEDIES[stage]}"
+            f"{self._analysed / past_s:.0f} of {delivered / past_s:.0f} frames a second are analysed; "
+            f"one takes {each_ms:.0f} ms ({stage} {spent_ms[stage]:.0f} ms), and the camera "
+            f"delivers one every {1e3 * past_s / max(delivered, 1):.0f} ms: {_REMEDIES[stage]}"
         )
 
 

@@ -6,8 +6,9 @@ A camera without a hand detector shows a moving arm as one patch of flow. The qu
 moves fastest is taken as the hand, at the distance of the person's face unless the distance was
 measured. Any of these is evidence of a hand: the patch points to the person's shoulder and is
 fastest at the other end, it reaches in from the side in front of all people, it approaches the
-camera, or the palm detector found a palm there. Curtains, trunks and other people's sleeves remain
-moving things.
+camera, or the palm detector found a palm there. Where palms are searched, the shape of a patch is
+no evidence: coats, hair and sleeves of a crowd have that of an arm. Curtains, trunks and other
+people's sleeves remain moving things. If many patches approach, they are people who walk.
 
 A patch remains a hand while the detector keeps its number and it moves occasionally. So a track
 does not break when a hand turns or passes in front of the face. The remainder of an arm that was a
@@ -61,15 +62,19 @@ _SAME_M = 0.3
 # The line of an arm passes the shoulder within this distance, and an arm is no smaller than this
 # (as _LARGEST_M). For rendered people who wave, point and box 98 % of the arms pass within .26 m.
 _ATTACHED_M, _SMALLEST_M = 0.27, 0.04
-# Its end is at least as fast as the whole patch, within rounding, and hardly nearer to the shoulder
-# than its centre.
-_AS_FAST, _AS_FAR_M = 0.95, 0.1
+# Its end is at least as fast as the whole patch, within rounding.
+_AS_FAST = 0.95
 # Distance of a patch's end or, plus its radius, of its centre to its palm; time for which a palm
 # follows the patch's flow between two searches; confidence of a certain palm.
 _AT_PALM_M, _PALM_S, _SURE = 0.1, 0.3, 0.7
+# Where palms are searched, a moving patch remains a hand for this time after its last evidence: the
+# searches miss palms that are blurred or turned aside.
+_MISSED_S = 0.7
 # A patch of a hand's size that certainly grows in the image at this rate approaches the camera. It
 # is a hand from the first frame on, because no other visible part of a person approaches so fast.
 _COMES_1_S, _SURE_SD = 2.5, 2.0
+# A person has two hands; more patches that approach in one frame are people who walk.
+_MOST_COMING = 2
 # Number of frames with such a motion that make a hand, and the longest rest between them.
 _FRAMES, _RESTS_S = 2, 0.4
 # A hand that was last slower than this is at rest, and is kept for this time; a motion within this
@@ -81,10 +86,8 @@ _HAND_RADIUS_M = 0.07
 # not so large.
 _ALONE_M, _TOO_LARGE, _LARGE_FRAMES = 0.065, 1.6, 2
 # Width of a hand; least width of an arm that enters at the side, in such widths; number of frames
-# in which it is measured; and least distance of its line from the person's shoulder. If its fastest
-# part is this near to its centre, its direction is uncertain, and a smaller distance suffices.
+# in which it is measured; and least distance of its line from the person's shoulder.
 _WIDE_M, _TOO_WIDE, _WIDE_FRAMES, _ANOTHERS_M = 0.085, 1.4, 3, 0.165
-_SHORT_M, _ANOTHERS_SHORT_M = 0.1, 0.11
 # Gain per frame with which a change of this distance is adopted.
 _NEARER_GAIN = 0.5
 _ACROSS_SD_M, _ALONG_SD_M = 0.04, 0.25
@@ -113,6 +116,7 @@ class _MovingPatch:
     wide_frames: number of frames in which it entered at the side and was too wide for that
     distance_share: its distance relative to the person's, from its size or that of the palm
     palm_s: last time at which a palm was found there
+    sure_s: last time at which there was evidence of a hand
     """
 
     at_s: float
@@ -124,6 +128,7 @@ class _MovingPatch:
     wide_frames: int = 0
     distance_share: float = 1.0
     palm_s: float = -inf
+    sure_s: float = -inf
 
     def update_distance(self, thing: Located, arm: "_Arm") -> None:
         """Update the distance from the size.
@@ -174,7 +179,7 @@ class Hands:
 
     def label(
         self,
-        things: Iterable[Located],
+        things: Sequence[Located],
         faces: list[Known],
         p_camera: Vec3,
         t_s: float,
@@ -196,12 +201,12 @@ class Hands:
         }
         if palms is not None:
             self._searched_s = t_s
+        self._searched = t_s - self._searched_s < _HELD_S
         free = self._accept_palms(palms or (), faces, p_camera)
+        self._walkers = sum(_approaches(one, p_camera) for one in things) > _MOST_COMING
         found = [self._label(thing, faces, p_camera, t_s, free) for thing in things]
         for palm in free:
             self._keep_palm(palm, found, p_camera, t_s)
-        if not self.resting:
-            return found
         # Only hands at rest without motion; the detector finds moving hands again itself.
         marks = {thing.detector_id for thing in found}
         moving = [thing for thing in found if thing.detector_id in self._moving]
@@ -277,7 +282,9 @@ class Hands:
             else _BEGINS_M_S
         )
         # Relative to a walking person, legs and parts of the trunk are not faster than this.
-        comes = arm.ratio * thing.radius_m >= _ALONE_M and _approaches(thing, p_camera)
+        comes = not self._walkers and (
+            arm.ratio * thing.radius_m >= _ALONE_M and _approaches(thing, p_camera)
+        )
         palm = next((one for one in palms if _is_at(one, thing, p_camera)), None)
         if (
             palm is not None
@@ -303,10 +310,12 @@ class Hands:
                 way = scale(hand.v_m_s or _STILL, t_s - before_s)
                 hand = hand._replace(p_m=add(known.hand.p_m, way))
             known.hand = hand
-            if comes or palm is not None:
-                known.frames += _FRAMES
-            elif named or self._is_arm(thing, arm, p_camera):
-                known.frames += 1
+            sure = comes or palm is not None
+            if sure or self._is_arm(thing, arm, p_camera):
+                known.frames += _FRAMES if sure else 1
+                known.sure_s = t_s
+            elif self._searched and t_s - known.sure_s > _MISSED_S:
+                known.frames = 0
         if known is None or known.frames < _FRAMES:
             return thing
         if speed >= _AT_REST_M_S:
@@ -315,8 +324,8 @@ class Hands:
         # A patch that hardly moves may be the whole person: the hand stays at its last motion, and
         # is kept no longer than a palm if palms are searched.
         until_s = t_s + _HELD_S
-        if t_s - self._searched_s < _HELD_S:
-            until_s = max(known.at_s, known.palm_s) + _PALM_S
+        if self._searched:
+            until_s = known.at_s + _PALM_S
         if t_s > until_s:
             self.resting.pop(thing.detector_id, None)
             return thing
@@ -325,11 +334,15 @@ class Hands:
         return known.hand if known.at_s == t_s else still
 
     def _is_arm(self, thing: Located, arm: "_Arm", p_camera: Vec3) -> bool:
-        """Return whether a patch is an arm, at a palm, or the remainder of a recent hand."""
-        if arm.attached or arm.comes_in:
-            return True
-        small = arm.ratio * thing.radius_m <= _TOO_LARGE * _ALONE_M
-        return (small and self._is_recent(thing, p_camera)) or any(
+        """Return whether a patch is an arm, at a palm, or the remainder of a recent hand.
+
+        Where palms are searched, only a palm is evidence.
+        """
+        if not self._searched:
+            small = arm.ratio * thing.radius_m <= _TOO_LARGE * _ALONE_M
+            if arm.attached or arm.comes_in or (small and self._is_recent(thing, p_camera)):
+                return True
+        return any(
             _is_at(one.hand, thing, p_camera) for mark, one in self.resting.items() if mark < 0
         )
 
@@ -413,12 +426,9 @@ def _arm_of(thing: Located, faces: list[Known], p_camera: Vec3, last: Vec3 | Non
                 shoulder_m < _ATTACHED_M
                 and ratio * thing.radius_m > _SMALLEST_M
                 and norm(v) >= slower_m_s
-                and _off_shoulder(tip, face[0]) > _off_shoulder(middle, face[0]) - _AS_FAR_M
             )
             wide = ratio * thing.thickness_m > _TOO_WIDE * _WIDE_M
-            short = norm(sub(tip, middle)) < _SHORT_M
-            anothers = shoulder_m > (_ANOTHERS_SHORT_M if short else _ANOTHERS_M)
-            comes_in = thing.from_side and anothers and wide
+            comes_in = thing.from_side and shoulder_m > _ANOTHERS_M and wide
             best, least = _Arm(face, tip, v, ratio, attached, comes_in), off_m
     return best
 
