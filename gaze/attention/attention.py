@@ -64,6 +64,8 @@ _LOOKS_ELSEWHERE = 0.6
 """Share of its salience that a face keeps while the person neither looks at the head nor speaks."""
 _SPEAKERS = 0.88
 """Share of the looks at several people that speaking people get (Vertegaal et al. 2001)."""
+_FEW, _FIRST_LOOK_S = 4, 0.65
+"""Number of people up to which each new one gets a look at once, and its shortest time."""
 _NEARNESS = 0.5
 """Exponent with which the weight of several people decreases with distance."""
 _EDGE, _EDGE_S, _EDGE_AGAIN_S = 3.0, 2.0, 20.0
@@ -165,6 +167,7 @@ class Attention:
         self._changed_s = -inf
         self._eye: tuple[Vec3, float] | None = None
         self.averted = False
+        self._met: set[int] = set()
         self._share: float | None = None
         self._partner: int | None = None
         self._turned_s = self._reported_s = self._edge_s = -inf
@@ -313,12 +316,16 @@ class Attention:
     def _compare(self, percept: Percept, rows: BodyRows, state: GazeState, t_s: float) -> _Decision:
         """Return the saliences that the decision compares."""
         eye, attended = state.p_world_head_m, self._identity[1]
+        self._met = {attended, *self._met}.intersection(rows.ids)
         seen = visible_bodies(rows, state)
         gaze = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
         v_eye = self._eye_velocity(eye, t_s)
         raised, own = self._persons.raised, self._persons.parts if self._social else {}
         head_rad_s = norm(state.head_rate_rad_s)
-        motion = self._bottom_up.step(rows, eye, t_s, v_eye, gaze, seen, raised, own, head_rad_s)
+        settles = self._social and bool(self._persons.new)
+        motion = self._bottom_up.step(
+            rows, eye, t_s, v_eye, gaze, seen, raised, own, head_rad_s, settles
+        )
         worth = dict.fromkeys(rows.ids, 1.0)
         for face in percept.faces if self._social else ():
             if face.looks_at_head is False and not face.speaks:
@@ -406,8 +413,13 @@ class Attention:
             weights = {id: one * ratio if id in favoured else one for id, one in weights.items()}
         factors = self._habituation.share(weights, attended, t_s)
         shares = {id: factors[id] * one for id, one in mine.items()}
-        if favoured and t_s - self._turned_s < _TURNS_S:
-            shares = {id: one if id in favoured else 0.0 for id, one in shares.items()}
+        only = favoured if t_s - self._turned_s < _TURNS_S else _NO_ONE
+        if self._social and not favoured and len(mine) <= _FEW:
+            only = frozenset(mine) - self._met
+            if only and t_s - self._since_s < _FIRST_LOOK_S:
+                only |= {attended}
+        if only:
+            shares = {id: one if id in only else 0.0 for id, one in shares.items()}
         most = max(*shares.values(), 1e-9)
         return {id: one / most for id, one in shares.items()}
 

@@ -166,6 +166,7 @@ class BottomUp:
         raised: Collection[int] = (),
         own: Collection[int] = (),
         head_rad_s: float = 0.0,
+        settles: bool = False,
     ) -> list[Salience]:
         """Return the smoothed salience of all bodies, in their order; 0 for those not in view.
 
@@ -181,6 +182,7 @@ class BottomUp:
             raised: ids of raised hands.
             own: ids of people's own hands and clothes, of whose motion only a share counts.
             head_rad_s: speed at which the head turns; only the retinal form needs it.
+            settles: whether somebody has just come: only faces have an onset.
         """
         par, states = self._params, self._states
         if par.form == "none":
@@ -226,6 +228,8 @@ class BottomUp:
             ):
                 state.entered_s = self._onset_s = t_s
                 state.onset = fresh
+            if settles and rows.kinds[i] != "face":
+                state.onset = 0.0
             state.moves = moved > (_STILL_BELOW if state.moves else _MOVES)
             onset = state.onset * new * exp((state.entered_s - t_s) / _ONSET_S)
             worth = OWN_MOTION if id in own else 1.0

@@ -55,7 +55,7 @@ MODES = ("none", "talk", "listen", "think")
 class Role(NamedTuple):
     """Numbers of one role.
 
-    face_s, face_sd_s: mean and standard deviation of the time on the face; 0: an exponential time
+    face_s, face_sd_s: mean and standard deviation of the time on the face; None: exponential
     away_s, away_sd_s: of the time away
     most_deg: largest angle of a look away
     ways: shares of looks that go aside, and up, the rest down
@@ -63,7 +63,7 @@ class Role(NamedTuple):
     """
 
     face_s: float
-    face_sd_s: float
+    face_sd_s: float | None
     away_s: float
     away_sd_s: float
     most_deg: float
@@ -75,8 +75,8 @@ _THINKS_UP, _SIDEWAYS = (0.10, 0.70), (0.78, 0.15)
 _HEAD, _LESS_HEAD = 0.4, 0.1
 ROLES = {
     "none": Role(3.62, 1.63, 0.60, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
-    "speaking": Role(3.20, 0.0, 2.20, 0.90, 30.0, _SIDEWAYS, _HEAD),
-    "listening": Role(20.0, 0.0, 0.65, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
+    "speaking": Role(3.20, None, 2.20, 0.90, 30.0, _SIDEWAYS, _HEAD),
+    "listening": Role(20.0, None, 0.65, 0.30, 22.7, _SIDEWAYS, _LESS_HEAD),
     "thinking": Role(1.50, 0.80, 3.54, 1.26, 30.0, _THINKS_UP, _HEAD),
 }
 _ROLE_OF = {
@@ -305,10 +305,10 @@ class ConversationGaze:
             if face is None or t_s >= self._kept_until_s:
                 self._away_s = t_s
                 # An exponential time goes on from one face to the next.
-                goes_on = self._away is None and before is not None and not self._role.face_sd_s
+                keeps = self._away is None and before is not None and self._role.face_sd_s is None
                 self._return()
                 if face is not None and self._averts_s is None:
-                    until_s = self._until_s if goes_on else t_s + self._draw_face_s()
+                    until_s = self._until_s if keeps else t_s + self._draw_face_s()
                     self._until_s = max(until_s, t_s + _SHORTEST_S)
         if face is None:
             return self._count(target)
@@ -473,11 +473,13 @@ class ConversationGaze:
 
     def _draw_face_s(self) -> float:
         """Draw a duration on the face."""
-        mean_s, sd_s = self._role.face_s, self._role.face_sd_s
-        if sd_s == 0.0:
+        mean_s, sd_s, *_ = self._role
+        if sd_s is None:
             beyond_s = max(0.0, mean_s - _STAYS_S) * float(self._rng.standard_exponential())
-            return min(_LONGEST_S, _STAYS_S + beyond_s)
-        return min(_LONGEST_S, self._draw_s(mean_s, sd_s))
+            drawn_s = _STAYS_S + beyond_s
+        else:
+            drawn_s = self._draw_s(mean_s, sd_s)
+        return min(_LONGEST_S, drawn_s)
 
     def _draw_away_s(self) -> float:
         return self._draw_s(self._role.away_s, self._role.away_sd_s)

@@ -2,10 +2,10 @@
 
 A person who leaves the frame often returns immediately, and a detector has gaps. So the gaze first
 stays. Then it searches in steps: towards the side to which the person left, and around the place of
-the loss. From a far side it also returns in such steps. If no person is found it explores: one to
-two shifts of gaze per second, as people make in front of a scene, with an occasional rest straight
-ahead. A camera sees a part of the room: every few seconds the head turns far to one side, to the
-left and to the right in turn.
+the loss. If no person is found it looks back from a far side and explores: one to two shifts of
+gaze per second, as people make in front of a scene, with an occasional rest straight ahead. A
+camera sees a part of the room: every few seconds the head turns far to one side, to the left and to
+the right in turn.
 
 A glance goes to a thing in view, or to a recently seen one, or otherwise to a plausible point.
 Shifts are mostly small (Malinov 2000: half below 5 deg, 83 % below 15) and more sideways than up or
@@ -50,9 +50,7 @@ SEARCH_S = 3.0
 """Duration of the search for a lost target."""
 _SEARCH_FIXATION_S = 0.6
 _SEARCH_DEG = 15.0
-"""Mean size of the shifts of a search, and of those back from a far side; each varies by up to a
-third.
-"""
+"""Mean size of the shifts of a search, which varies by up to a third."""
 _SEARCH_SPREAD_DEG = 8.0
 _LEAVING_DEG_S = 4.0
 """A target slower than this is not considered to have left to a side."""
@@ -193,7 +191,7 @@ class Idle:
         elif self._gone is not None and t_s < self._search_until_s:
             self._search(self._gone, t_s)
         elif self._is_far_aside():
-            self._look_back(t_s)
+            self._glance(SEARCH, _AHEAD, t_s)
         elif t_s >= self._aside_s:
             self._look_aside(t_s)
         elif self._now.kind == "rest" or (self._gone is None and self._rng.random() < _AGAIN):
@@ -221,7 +219,8 @@ class Idle:
         to_pitch = pitch + share * out[1] + 0.3 * spread * float(rng.standard_normal())
         limit = radians(self._params.reach_deg)
         here = self._yaw_pitch_now()[0]
-        step = self._draw_step_rad() * (1.0 if to_yaw >= here else -1.0)
+        size = radians(_SEARCH_DEG) * float(rng.uniform(2.0, 4.0)) / 3.0
+        step = size if to_yaw >= here else -size
         if abs(here + step) > max(limit, abs(here)):
             step = -step
         place = here + step, min(radians(45.0), max(-radians(45.0), to_pitch))
@@ -240,26 +239,11 @@ class Idle:
     def _yaw_pitch_now(self) -> Angles2:
         return yaw_pitch(sub(self._now.p_world_m, _EYE))
 
-    def _draw_step_rad(self) -> float:
-        """Draw the size of a step of the search, or of one back."""
-        return radians(_SEARCH_DEG) * float(self._rng.uniform(2.0, 4.0)) / 3.0
-
     def _is_far_aside(self) -> bool:
         """Return whether a search or a look at a thing has ended far from straight ahead."""
         most_deg = _SEARCH_DEG if self._gone else self._params.glance_deg[0] + _ROUNDING_DEG
         aside_deg = abs(degrees(self._yaw_pitch_now()[0]))
         return self._now.kind in (SEARCH, "glance") and aside_deg > most_deg
-
-    def _look_back(self, t_s: float) -> None:
-        """Look back from a far side: in steps after a search, otherwise at once."""
-        if self._gone is None:
-            self._glance(SEARCH, _AHEAD, t_s)
-            return
-        yaw, pitch = self._yaw_pitch_now()
-        back = self._draw_step_rad() * (-1.0 if yaw > 0.0 else 1.0)
-        place = yaw + back, 0.5 * pitch
-        self._look(SEARCH, place, REST_M[0], t_s, "looking back from the side")
-        self._until_s = t_s + self._draw_s(_SEARCH_FIXATION_S)
 
     def _look_aside(self, t_s: float) -> None:
         """Look far to the other side."""
