@@ -24,7 +24,6 @@ _LIVE = (
     "character.",
     "ranges.",
     "guard.",
-    "tracker.",
     "sound.device.",
     # A package's rule is created with its section, and so is the chooser.
     *(f"gaze.{name}." for name in declarations(GazeConfig) if name != "chooser"),

@@ -40,7 +40,6 @@ from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.mass_params import MassParams
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.model.types import order_joints
 
 
@@ -166,7 +165,6 @@ class Rig(PluginSections):
     face_parts_mm: Annotated[Mapping[str, tuple[_Millimetres, _Millimetres, _Millimetres]],
         "measured positions of one person's face parts (DN FL LE M N FR RE UP) relative to the nose tip: "
         "out of the face, to that person's left, up; omitted parts have an average adult's position"] = field(default_factory=dict)
-    tracker: Annotated[TrackerParams, "tracking of identities"] = TrackerParams()
     loop: Annotated[LoopParams, "control loop"] = LoopParams()
     guard: Annotated[GuardParams, "safety"] = GuardParams()
     gaze: Annotated[GazeConfig, "gaze models"] = GazeConfig()

@@ -7,9 +7,10 @@ their sources.
 import sys
 from collections.abc import Callable
 from functools import partial
-from math import degrees, pi, radians, sin
+from math import degrees, inf, pi, radians, sin
 from pathlib import Path
 from typing import Literal
+from unittest.mock import patch
 
 import matplotlib as mpl
 import numpy as np
@@ -30,6 +31,7 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions  # noqa: E402
 from gazerig.robot.control.loop import Tick, run  # noqa: E402
+from gazerig.robot.model.frames import PoseHistory  # noqa: E402
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from true_gaze import (  # noqa: E402
@@ -243,7 +245,7 @@ def scanpath() -> None:
 def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"]) -> np.ndarray:
     """Run a drawn scene; give rows of time and degrees: person, gaze, facing, head, gaze off."""
     rig = load_rig("desk")
-    made = assemble(rig, RunOptions(True, True, 0, scene, pixels=True, placed_by=placed_by))
+    made = assemble(rig, RunOptions(True, True, 0, scene, pixels=True))
     assert made.scene is not None
     people = made.scene.people
     rows: list[tuple[float, ...]] = []
@@ -260,9 +262,14 @@ def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"])
         )
         rows.append((tick.t_s, *yaws, pose.head_rad[0], gaze_error_rad(part, pose)))
 
-    made.robot.start(made.clock)
-    run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, watch)
-    made.robot.stop()
+    angles = PoseHistory.angles
+    newest = placed_by == "newest"
+    with patch.object(
+        PoseHistory, "angles", lambda poses, t_s: angles(poses, inf if newest else t_s)
+    ):
+        made.robot.start(made.clock)
+        run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, watch)
+        made.robot.stop()
     made.close()
     table = np.array(rows)
     table[:, 0] -= table[0, 0]

@@ -67,7 +67,7 @@ class Bodies(Struct, frozen=True, gc=False):
     v_world_m_s: (n, 3) velocities
     w_world_rad_s: (n, 3) angular velocities
     radius_m:  (n,) half the size
-    pv_cov:    (n, 6, 6) covariance of position and velocity, None where unknown
+    v_cov:     (n, 3, 3) covariance of the velocity, None where unknown
     cut_off:   ids of those at the edge of the picture or outside it
     """
 
@@ -77,7 +77,7 @@ class Bodies(Struct, frozen=True, gc=False):
     v_world_m_s: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     w_world_rad_s: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     radius_m: Floats = field(default_factory=lambda: np.zeros(0))
-    pv_cov: Floats | None = None
+    v_cov: Floats | None = None
     cut_off: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
@@ -117,7 +117,7 @@ class Face(Struct, frozen=True, gc=False):
     confidence:    0..1 of the detector
     distance_from: source of the distance: "camera", its depth; "face size", an adult's or the
         learned one of this person; "" if unknown
-    across_sd_m, along_sd_m: standard deviations of the position, across and along the view
+    along_sd_m:    standard deviation of the position along the view
     off_head_rad:  angle between the person's gaze and the direction to the robot's head; None in
         recordings without it
     looks_at_head: whether the person looks at the robot's head (gaze at robot: one side of mutual
@@ -126,6 +126,7 @@ class Face(Struct, frozen=True, gc=False):
     eye_opening: opening of the lids divided by the usual one, 0 is shut; None if not found
     mouth_opening_m: gap between the lips, at an adult's size; None if not found
     speaks:        whether the mouth moves like that of a speaking person; None if not found
+    is_alive:      whether it has moved in the last seconds, and not on a screen
     """
 
     id: int
@@ -135,7 +136,6 @@ class Face(Struct, frozen=True, gc=False):
     parts_world_m: tuple[Vec3, ...]
     confidence: float
     distance_from: str = ""
-    across_sd_m: float = 0.0
     along_sd_m: float = 0.0
     off_head_rad: float | None = None
     looks_at_head: bool | None = None
@@ -143,6 +143,7 @@ class Face(Struct, frozen=True, gc=False):
     eye_opening: float | None = None
     mouth_opening_m: float | None = None
     speaks: bool | None = None
+    is_alive: bool = True
 
 
 class Percept(Struct, frozen=True, gc=False):

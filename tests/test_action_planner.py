@@ -95,9 +95,8 @@ def test_a_punch_is_guarded_against_after_the_reaction_time_and_its_fist_is_name
 def test_a_punch_whose_speed_is_certain_is_guarded_against_at_once() -> None:
     for sd_m_s, action in ((0.3, "guard"), (1.2, "wait")):
         one = punch(0.0)
-        cov = np.zeros((len(one.bodies.ids), 6, 6))
-        cov[:, 3:, 3:] = np.eye(3) * sd_m_s**2
-        sure = structs.replace(one, bodies=structs.replace(one.bodies, pv_cov=cov))
+        cov = np.array([np.eye(3) * sd_m_s**2] * len(one.bodies.ids))
+        sure = structs.replace(one, bodies=structs.replace(one.bodies, v_cov=cov))
         assert ActionPlanner().step(sure, EYE, 0.0).action == action
 
 

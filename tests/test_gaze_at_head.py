@@ -19,7 +19,6 @@ from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.track import looks_at_head
-from gazerig.robot.perception.tracker import Tracker
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import ScenePerson
@@ -63,7 +62,7 @@ def found(scene: Turning, seconds: float = 10.0, seed: int = 0) -> list[Face]:
         np.random.default_rng(seed),
     )
     camera.open()
-    perception = Perception(AT_EYES, 69.0, Tracker())
+    perception = Perception(AT_EYES, 69.0)
     out, number = [], 0
     for k in range(round(30 * seconds)):
         seen = camera.latest(k / 30 + 0.001)
@@ -137,7 +136,7 @@ def detection(gaze: Vec3 | None) -> Detections:
     ("gaze", "looks"), [(None, False), ((0.0, 0.0, -1.0), True), ((0.3, 0.0, -0.95), False)]
 )
 def test_the_eyes_go_before_the_face(gaze: Vec3 | None, looks: bool) -> None:
-    percept = Perception(AT_EYES, 65.0, Tracker()).see(detection(gaze), standing())
+    percept = Perception(AT_EYES, 65.0).see(detection(gaze), standing())
     assert percept is not None
     (face,) = percept.faces
     assert face.looks_at_head is looks
@@ -149,7 +148,7 @@ def test_the_eyes_go_before_the_face(gaze: Vec3 | None, looks: bool) -> None:
 
 def face_at(id: int, p: Vec3, looks: bool | None) -> Face:
     R = rotation((pi, 0.0, 0.0))
-    return Face(id, p, (0.0, 0.0, 0.0), R, (p,) * len(PARTS), 0.9, "", 0.0, 0.0, 0.2, looks)
+    return Face(id, p, (0.0, 0.0, 0.0), R, (p,) * len(PARTS), 0.9, "", 0.0, 0.2, looks)
 
 
 def percept_of(t_s: float, *rows: Face) -> Percept:
@@ -215,7 +214,7 @@ def test_one_point_far_outside_is_no_face() -> None:
 
 
 def test_the_others_are_looked_at() -> None:
-    perception = Perception(AT_EYES, 65.0, Tracker())
+    perception = Perception(AT_EYES, 65.0)
     percept = perception.see(Detections(1.0, 1, 640, 480, (OFF, FACE), lens=CAMERA), standing())
     assert percept is not None and len(percept.faces) == 1
     none = perception.see(Detections(9.0, 2, 640, 480, (OFF,), lens=CAMERA), standing())

@@ -155,7 +155,7 @@ def seen_from(head_yaw: float, t_s: float, number: int) -> Detections:
 
 
 def test_a_picture_is_placed_where_the_head_was_when_it_was_taken() -> None:
-    perception = Perception(MOUNT, 69.0, Tracker())
+    perception = Perception(MOUNT, 69.0)
     poses = PoseHistory(KINEMATICS)
     errors, speeds = [], []
     for k in range(200):
@@ -181,7 +181,7 @@ def test_a_picture_is_placed_where_the_head_was_when_it_was_taken() -> None:
 @pytest.mark.parametrize("aside_m", [-0.25, 0.25])
 def test_e56_own_parts_move_and_turn_with_the_face(turn_deg: float, aside_m: float) -> None:
     own = {code: (-0.03, 0.02 * i - 0.07, 0.05 - 0.015 * i) for i, code in enumerate(PARTS)}
-    perception = Perception(MOUNT, 69.0, Tracker(), own)
+    perception = Perception(MOUNT, 69.0, own)
     nose, R = (1.0, aside_m, 0.25), rotation((radians(180.0 + turn_deg), 0.0, 0.0))
     detection = Located("face", nose, R, 0.1, 0.0, 0.9)
     (track,) = Tracker().step([detection], (0.0, 0.0, 0.2), 0.0)
@@ -199,7 +199,7 @@ def test_e56_own_parts_move_and_turn_with_the_face(turn_deg: float, aside_m: flo
 
 
 def test_the_same_picture_is_seen_once() -> None:
-    perception = Perception(MOUNT, 69.0, Tracker())
+    perception = Perception(MOUNT, 69.0)
     poses = PoseHistory(KINEMATICS)
     poses.remember(0.0, (0.0, 0.0, 0.0))
     assert perception.see(None, poses) is None

@@ -11,7 +11,6 @@ from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 
 BEHIND: Vec3 = (-0.5, 0.0, 0.12)
 """A camera on the base, behind the head, that sees it from the back."""
@@ -30,7 +29,7 @@ def kind_of(
     mm = tuple(1e3 * x for x in camera_m)
     placed = CameraMount(CameraParams(mount=mount, position_mm=mm))  # type: ignore[arg-type]
     own = neck().body_volumes
-    perception = Perception(placed, 69.0, Tracker(), own_parts=own)
+    perception = Perception(placed, 69.0, own_parts=own)
     poses = PoseHistory(neck())
     poses.remember(0.0, (radians(yaw_deg), 0.0, 0.0))
     R, p = placed.pose(*poses.head_pose(0.0))

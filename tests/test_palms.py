@@ -26,7 +26,6 @@ from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 
 MODELS = Path(sys.prefix) / "models"
 FILM = Path(__file__).parents[2] / "shared" / "media" / "webcam_sign_3.mkv"
@@ -133,7 +132,7 @@ P_PALM: Vec3 = (0.35, 0.2, 1.1)
 
 def hands(*palms: DetectedPalm, frames: int = 30, depth_m: float | None = None) -> list[Percept]:
     """See a face, and palms in every sixth frame."""
-    perception = Perception(STILL, 69.0, Tracker())
+    perception = Perception(STILL, 69.0)
     more = {} if depth_m is None else {"depth_m": np.full((HEIGHT, WIDTH), depth_m, np.float32)}
     return [
         percept_at(
@@ -175,7 +174,7 @@ def test_what_is_hardly_a_palm_or_on_the_head_is_no_hand(palm: DetectedPalm) -> 
 
 
 def test_a_hand_that_the_searches_no_longer_show_is_gone_soon() -> None:
-    perception = Perception(STILL, 69.0, Tracker())
+    perception = Perception(STILL, 69.0)
     there = []
     for number in range(1, 60):
         palms = None if number % 6 != 1 else (palm_at(P_PALM),) * (number < 30)

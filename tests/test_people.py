@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from present import present
 from skimage.data import astronaut, cat
-from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at
+from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at, still_people_count  # noqa: F401
 from test_perception import seen as percept_at
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
@@ -33,7 +33,6 @@ from gazerig.robot.dashboard.feed.camera_overlay import draw_detections
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 
 MODELS = Path(sys.prefix) / "models"
 NEEDS_NETWORK = pytest.mark.skipif(
@@ -220,7 +219,7 @@ def person_at(p_camera_m: Vec3) -> DetectedPerson:
 
 
 def seeing() -> Perception:
-    return Perception(STILL, 69.0, Tracker())
+    return Perception(STILL, 69.0)
 
 
 def at_30_hz(perception: Perception, first: int, count: int, **found: object) -> Percept:

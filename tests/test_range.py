@@ -16,7 +16,6 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 
 ASSUMED_M, ASSUMED_SD_M = 2.0, 1.0
 
@@ -41,7 +40,7 @@ def still_thing(noise_deg: float, swings: bool, pictures: int, seed: int) -> NDA
         seed: of the noise.
     """
     mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
-    perception = Perception(mount, FIELD_DEG, Tracker())
+    perception = Perception(mount, FIELD_DEG)
     poses, rng, found = PoseHistory(_Neck()), np.random.default_rng(seed), []
     true = np.array([ASSUMED_M, 0.0, 0.1])
     for k in range(1, pictures + 1):

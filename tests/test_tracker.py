@@ -7,8 +7,6 @@ from hypothesis import strategies as st
 
 from gazerig.drivers.types import Clothing, Located
 from gazerig.gaze.types import FIRST_THING, body_name
-from gazerig.robot.model.tracker_params import TrackerParams
-from gazerig.robot.perception.perception import covariance
 from gazerig.robot.perception.track import BodyTrack
 from gazerig.robot.perception.tracker import Tracker
 
@@ -54,9 +52,9 @@ def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity(tracker:
     ("y", "after_s", "same"), [(0.05, 10.0, True), (0.5, 10.0, False), (0.05, 25.0, False)]
 )
 def test_a_face_that_stays_where_it_was_is_known_again_after_long(
-    y: float, after_s: float, same: bool
+    tracker: Tracker, monkeypatch: pytest.MonkeyPatch, y: float, after_s: float, same: bool
 ) -> None:
-    tracker = Tracker(TrackerParams(remember_person_s=0.0))
+    monkeypatch.setattr("gazerig.robot.perception.tracker._REMEMBER_PERSON_S", 0.0)
     for k in range(10):
         (seen,) = tracker.step([face(1.0, 0.0)], CAMERA, k / 30)
     for k in range(10, round(30 * after_s)):
@@ -171,25 +169,6 @@ def test_a_sudden_step_is_followed_at_once_and_standing_stays_smooth() -> None:
     assert max(lag) < 0.02
 
 
-def cov_of(track: BodyTrack) -> np.ndarray:
-    f = track.filter
-    return np.array(covariance(f))
-
-
-def test_the_covariance_tells_how_far_off_the_track_is() -> None:
-    """Normalised errors squared of a still person average to about the 3 dimensions."""
-    errors = []
-    for seed in range(40):
-        rng, tracker = np.random.default_rng(seed), Tracker()
-        for k in range(40):
-            noisy = across(rng.normal(0.0, 2e-3), 1.0 + rng.normal(0.0, 0.1))
-            noisy = noisy._replace(p_m=(*noisy.p_m[:2], 0.2 + rng.normal(0.0, 2e-3)))
-            (track,) = tracker.step([noisy], CAMERA, k / 30)
-        off = np.subtract(track.p_world_m, (1.0, 0.0, 0.2))
-        errors.append(off @ np.linalg.solve(cov_of(track)[:3, :3], off))
-    assert 1.0 < np.mean(errors) < 5.0
-
-
 def test_a_velocity_that_was_measured_is_taken_over_at_once() -> None:
     blob = across(0.0, 2.0, "thing")
     blob = blob._replace(v_m_s=(0.0, 1.0, 0.0), across_sd_m_s=0.05, along_sd_m_s=0.3)
@@ -232,7 +211,8 @@ def test_nothing_makes_it_give_what_is_no_number(
         assert len({track.id for track in tracks}) == len(tracks) >= len(picture)
         for track in tracks:
             assert np.isfinite((track.p_world_m, track.v_world_m_s)).all()
-            assert np.linalg.eigvalsh(cov_of(track)).min() > -1e-9
+            for known in track.filter.across, track.filter.along:
+                assert known.p * known.v > known.pv * known.pv
 
 
 def dressed(found: Located, *bins: int) -> Located:
@@ -252,12 +232,11 @@ def test_who_returns_elsewhere_in_the_same_clothes_is_known_again(
     assert (back.id == gone.id) is same
 
 
-def test_who_returns_after_the_time_of_memory_is_somebody_new() -> None:
-    tracker = Tracker(TrackerParams(remember_person_s=60.0))
+def test_who_returns_after_the_time_of_memory_is_somebody_new(tracker: Tracker) -> None:
     for k in range(15):
         (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
     tracker.step([], CAMERA, 30.0)
-    for t_s, same in ((50.0, True), (150.0, False)):
+    for t_s, same in ((50.0, True), (400.0, False)):
         (back,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, t_s)
         assert (back.id == gone.id) is same
         tracker.step([], CAMERA, t_s + 25.0)

@@ -286,9 +286,9 @@ def approaches(bodies: Bodies, p_eye: Vec3, late_s: float = 0.0) -> list[Approac
         if closing_m_s > 0.0:
             contact_s = max(0.0, max(0.0, away_m - _CONTACT_M) / closing_m_s - late_s)
             miss_m = norm(cross(rel, v)) / speed_m_s
-        if bodies.pv_cov is not None:
+        if bodies.v_cov is not None:
             sight = np.array(scale(rel, 1.0 / max(away_m, 1e-6)))
-            variance = float(sight @ bodies.pv_cov[row][3:, 3:] @ sight)
+            variance = float(sight @ bodies.v_cov[row] @ sight)
             closing_sd_m_s = sqrt(max(0.0, variance))
         found.append(
             Approach(bodies.ids[row], kind, away_m, contact_s, miss_m, closing_m_s, closing_sd_m_s)

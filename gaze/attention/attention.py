@@ -62,6 +62,8 @@ _URGENT = 3.0
 
 _LOOKS_ELSEWHERE = 0.6
 """Share of its salience that a face keeps while the person neither looks at the head nor speaks."""
+_LIFELESS = 0.05
+"""Share of a face that shows no life: a photo, a statue, a film on a screen."""
 _SPEAKERS = 0.88
 """Share of the looks at several people that speaking people get (Vertegaal et al. 2001)."""
 _FEW, _FIRST_LOOK_S = 4, 0.65
@@ -328,7 +330,9 @@ class Attention:
         )
         worth = dict.fromkeys(rows.ids, 1.0)
         for face in percept.faces if self._social else ():
-            if face.looks_at_head is False and not face.speaks:
+            if not face.is_alive:
+                worth[face.id] = _LIFELESS
+            elif face.looks_at_head is False and not face.speaks:
                 worth[face.id] = _LOOKS_ELSEWHERE
         unseen = rows.ids[len(percept.bodies) :]
         self._cut_off = (*percept.bodies.cut_off, *unseen)

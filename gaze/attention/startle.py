@@ -48,10 +48,10 @@ class Startle:
         for row, kind in enumerate(bodies.kinds):
             v = vec(bodies.v_world_m_s[row])
             speed_m_s = norm(v)
-            if kind == "face" or speed_m_s < _LEAST_M_S or bodies.pv_cov is None:
+            if kind == "face" or speed_m_s < _LEAST_M_S or bodies.v_cov is None:
                 continue
             ahead, way = unit(v), sub(p_world_head_m, vec(bodies.p_world_m[row]))
-            sd_m_s = sqrt(np.array(ahead) @ bodies.pv_cov[row, 3:, 3:] @ np.array(ahead))
+            sd_m_s = sqrt(np.array(ahead) @ bodies.v_cov[row] @ np.array(ahead))
             arrives_s = dot(way, ahead) / speed_m_s - percept.age_s(t_s)
             comes = speed_m_s - sd_m_s > _LEAST_M_S and 0.0 < arrives_s < _CONTACT_S
             if comes and norm(perpendicular(way, ahead)) < _PASSES_M:

@@ -57,7 +57,6 @@ from gazerig.robot.model.track_fit import TrackRefused
 from gazerig.robot.model.types import JointAngles, further_joints
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
-from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.scenes.scene import Scene
 
@@ -174,7 +173,7 @@ def assemble(
     try:
         drawn = options.pixels or (room is not None and not options.no_pictures)
         in_process = scene is None or (drawn and not options.fast)
-        sight = camera_poses(kinematics, camera, options, in_process)
+        sight = camera_poses(kinematics, camera, in_process)
         program = substitutes.program
         if room is not None:
             seen = room.camera(rig, options, sight, camera, random.camera, program, messages.append)
@@ -265,7 +264,6 @@ def _build_components(
 ) -> Components:
     """Build all components that have parameters."""
     lids = Lids(rig.gaze.lids, random.lids)
-    tracker = Tracker(rig.tracker)
     moves = motion_models(rig, random.head, random.drift)
     gaze, bottom_up = rig.gaze, BottomUp(rig.gaze.bottom_up)
     top_down, idle = TopDown(gaze.top_down), Idle(gaze.idle, random.idle)
@@ -287,12 +285,10 @@ def _build_components(
         perception=Perception(
             mount,
             placed.horizontal_field_deg,
-            tracker,
             face_parts_m(rig),
             placed.lens,
             kinematics.body_volumes,
         ),
-        tracker=tracker,
         attention=attention,
         bottom_up=bottom_up,
         top_down=top_down,

@@ -33,7 +33,6 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import (
     CameraMount,
     CameraParams,
-    NewestPose,
     PoseHistory,
     fixed_mount,
 )
@@ -48,27 +47,26 @@ from gazerig.sim_mock.scenes.scene import Scene
 if TYPE_CHECKING:
     from gazerig.drivers.camera.file_player import FilePlayer
 
+_FILM_DELAY_S = 0.05
+"""Age of a film's frames in simulated time."""
 
-def camera_poses(
-    kinematics: Kinematics, camera: CameraParams, options: RunOptions, real: bool
-) -> CameraPoses:
+
+def camera_poses(kinematics: Kinematics, camera: CameraParams, real: bool) -> CameraPoses:
     """Return the placement of a run's camera.
 
     Args:
         kinematics: Kinematics of the head.
         camera: Present parameters of the camera.
-        options: Define the head pose used to locate detections.
         real: Whether another process reads the camera and needs its rotation.
     """
     mount = CameraMount(camera)
     turns = PoseBuffer() if real and mount.on_head else None
-    history = PoseHistory if options.placed_by == "capture" else NewestPose
 
     def send(t_s: float, R_world_head: Mat3) -> None:
         if turns is not None:
             turns.record(t_s, mount.rotation(R_world_head))
 
-    return CameraPoses(mount, history(kinematics, tell=send if turns is not None else None), turns)
+    return CameraPoses(mount, PoseHistory(kinematics, tell=send), turns)
 
 
 def run_camera(
@@ -279,8 +277,15 @@ def real_camera(
     elif options.fast:
         from gazerig.sim_mock.cameras.video import FilmCamera
 
-        film, delay_s = cast("FilePlayer", _source_factory(rig, options)()), options.film_delay_s
-        return FilmCamera(film, detector(), delay_s, 0.0, motion(), locate, orientation)
+        return FilmCamera(
+            cast("FilePlayer", _source_factory(rig, options)()),
+            detector(),
+            _FILM_DELAY_S,
+            0.0,
+            motion(),
+            locate,
+            orientation,
+        )
     elif name is None or is_ours(CAMERA, name):
         source = _source_factory(rig, options)
     else:

@@ -41,7 +41,6 @@ from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.safety.guard import Guard
 
 
@@ -54,7 +53,6 @@ class Components(NamedTuple):
     camera: Camera
     mount: CameraMount
     perception: Perception
-    tracker: Tracker
     attention: Attention
     bottom_up: BottomUp
     top_down: TopDown
@@ -102,7 +100,6 @@ def rig_in_effect(running: Rig, wanted: Rig) -> Rig:
         ranges=wanted.ranges,
         gaze=replace(wanted.gaze, chooser=running.gaze.chooser, plugins=running.gaze.plugins),
         guard=wanted.guard,
-        tracker=wanted.tracker,
         sound=replace(running.sound, device=wanted.sound.device),
         joints={**running.joints, **joints},
     )
@@ -192,7 +189,7 @@ class LiveParams:
         parts.tracks.retune(lid_spans(new), now.oculomotor.eye_lag_ms / 1e3)
 
     def _apply_to_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
-        """Apply limits of joints, guard and tracker.
+        """Apply limits of joints and guard.
 
         Returns the changes that are applied at the next setup of the servos.
         """
@@ -205,7 +202,6 @@ class LiveParams:
             parts.guard.retune(new.guard, limits(new.joints))
         if new.ranges != old.ranges:
             parts.guard.start_gently()  # desired angles jump
-        parts.tracker.params = new.tracker
         more = [
             name
             for name, desired, most in zip(

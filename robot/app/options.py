@@ -3,7 +3,6 @@
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.computer import LEVELS, LoadLevel
@@ -31,9 +30,6 @@ class RunOptions:
         pixels: the scene is drawn and analysed by the real detectors.
         scanpath, saccade: models instead of the rig's; rules: a rule set instead of the rig's.
         port: serial port instead of the rig's.
-        film_delay_s: age of a film's frames in simulated time.
-        placed_by: detections are placed by the head's pose at capture, or, only for comparison, by
-            the newest pose, which makes the head overshoot.
         rig, character, profile: names or paths; name: name of this head for other programs.
         behaviour, conversation: initial choices.
         seconds: duration of the run.
@@ -66,8 +62,6 @@ class RunOptions:
     saccade: str | None = None
     rules: str | None = None
     port: str | None = None
-    film_delay_s: float = 0.05
-    placed_by: Literal["capture", "newest"] = "capture"
     rig: str = "desk"
     character: str | None = None
     profile: str | None = None

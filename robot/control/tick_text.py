@@ -28,9 +28,8 @@ def perception_text(tick: Tick) -> str:
     parts = [f"frame {1e3 * tick.percept.age_s(tick.t_s):.0f} ms old", *camera_conditions(tick)]
     head = tick.pose.p_world_head_m
     for face in tick.percept.faces:
-        by = f" by {face.distance_from}" if face.distance_from else ""
         parts.append(
-            f"face {face.id} at {norm(sub(face.p_world_m, head)):.2f} m{by}, "
+            f"face {face.id} at {norm(sub(face.p_world_m, head)):.2f} m by {face.distance_from}, "
             f"+- {100.0 * face.along_sd_m:.0f} cm"
             + (", looks at the head" if face.looks_at_head else "")
             + (", speaks" if face.speaks else "")

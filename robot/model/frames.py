@@ -10,11 +10,11 @@ from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import copysign, degrees, inf, radians, sqrt
+from math import copysign, degrees, radians, sqrt
 from typing import Annotated, Literal
 
 from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
-from gazerig.gaze.angles import add, angles_of, compose, rotate, rotation
+from gazerig.gaze.angles import add, angles_of, compose, rotate, rotation, scale, sub, transpose
 from gazerig.gaze.types import Angles2, Angles3, HeadGeometry, Mat3, Vec3
 from gazerig.params import Bounds
 
@@ -68,26 +68,28 @@ class CameraParams:
     # fmt: on
 
 
+_TICKS = 600
+"""Number of stored poses."""
+
+
 class PoseHistory:
     """A history of the head's angles over the last seconds, with its pose at any time in it."""
 
     def __init__(
         self,
         geometry: HeadGeometry,
-        ticks: int = 600,
         tell: Callable[[float, Mat3], None] | None = None,
     ) -> None:
         """Create an empty history.
 
         Args:
             geometry: Geometry of the head.
-            ticks: Number of stored entries.
             tell: Called with the time and R_world_head of each entry.
         """
         self._geometry = geometry
         self._tell = tell
-        self._times: deque[float] = deque(maxlen=ticks)
-        self._angles: deque[NeckAngles] = deque(maxlen=ticks)
+        self._times: deque[float] = deque(maxlen=_TICKS)
+        self._angles: deque[NeckAngles] = deque(maxlen=_TICKS)
 
     def remember(
         self,
@@ -136,32 +138,9 @@ class PoseHistory:
         t0, t1 = times[after - 1], times[after]
         share = (t_s - t0) / (t1 - t0)
         (a, base), (b, base_next) = angles[after - 1], angles[after]
-        head = (
-            a[0] + share * (b[0] - a[0]),
-            a[1] + share * (b[1] - a[1]),
-            a[2] + share * (b[2] - a[2]),
-        )
-        if base != base_next:
-            base = (
-                base[0] + share * (base_next[0] - base[0]),
-                base[1] + share * (base_next[1] - base[1]),
-            )
-        return head, base
-
-
-class NewestPose(PoseHistory):
-    """A history that always returns the newest pose; for comparison, as heads overshoot with it.
-
-    Frames are then located by the head's present pose instead of its pose at the exposure.
-    """
-
-    def angles(self, t_s: float) -> NeckAngles:
-        """Return the newest angles.
-
-        Raises:
-            LookupError: The history is empty.
-        """
-        return super().angles(inf)
+        head = add(a, scale(sub(b, a), share))
+        yaw, pitch = (a + share * (b - a) for a, b in zip(base, base_next, strict=True))
+        return head, (yaw, pitch)
 
 
 class CameraMount:
@@ -201,12 +180,10 @@ def camera_at_pose(
         R_parent_camera: Orientation in the head, or in the world for a base mount.
         p_parent_camera_m: Position in the same frame.
     """
-    from_optical: Mat3 = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
-    yaw, pitch, roll = map(degrees, angles_of(compose(R_parent_camera, from_optical)))
-    x, y, z = p_parent_camera_m
+    yaw, pitch, roll = map(degrees, angles_of(compose(R_parent_camera, transpose(OPTICAL))))
     return replace(
         params,
-        position_mm=(x * 1e3, y * 1e3, z * 1e3),
+        position_mm=scale(p_parent_camera_m, 1e3),
         yaw_deg=yaw,
         pitch_deg=pitch,
         roll_deg=roll,
@@ -220,9 +197,8 @@ def fixed_mount(params: CameraParams, geometry: HeadGeometry) -> CameraParams:
     """
     if params.mount == "base":
         return params
-    _, (x, y, z) = geometry.head_pose((0.0, 0.0, 0.0))
-    dx, dy, dz = params.position_mm
-    return replace(params, mount="base", position_mm=(x * 1e3 + dx, y * 1e3 + dy, z * 1e3 + dz))
+    _, p_m = geometry.head_pose((0.0, 0.0, 0.0))
+    return replace(params, mount="base", position_mm=add(scale(p_m, 1e3), params.position_mm))
 
 
 Quaternion = tuple[float, float, float, float]

@@ -6,7 +6,6 @@ measures one there; otherwise it is limited by the spread of face sizes.
 """
 
 from dataclasses import dataclass
-from heapq import nlargest
 from math import hypot, isfinite, sqrt
 
 import numpy as np
@@ -45,10 +44,11 @@ _LENGTH_SPREAD = 0.15
 _EDGE = 0.02
 # A face this near to the centre of a person's head, in trunk lengths, is that person's.
 _OWN_FACE = 0.25
-# A face printed on a shirt is rejected: its confidence is below this, and below another's divided
-# by this factor, and its middle is within these distances below and aside of the other's, in
-# heights of that one.
-_DOUBTFUL, _SURER, _ON_CHEST, _ASIDE = 0.9, 10.0, (1.0, 3.0), 1.0
+# A face printed on a shirt, or on a badge, is rejected: its confidence is below this, and below
+# another's divided by this factor, or its width is below this share of the other's, whose body
+# would hide a person who is farther away; and its middle is within these distances below and aside
+# of the other's, in heights of that one.
+_DOUBTFUL, _SURER, _SMALL, _ON_CHEST, _ASIDE = 0.9, 10.0, 0.6, (1.0, 3.0), 1.0
 # Error of a face's centre from five landmarks: fractions of a pixel and of the eye distance.
 _CENTRE_PX, _CENTRE_OF_EYES = 0.4, 0.015
 # Error of its size from frame to frame, in the same units. The eye distance of a person typically
@@ -76,8 +76,6 @@ _SHAPE_1_S = 0.3
 # A patch this many times as high as wide is a walking person; the centre of the head is this
 # fraction of the height below its upper edge.
 _UPRIGHT, _HEAD_DOWN = 1.4, 1.0 / 14.0
-# Largest number of things of a frame that are passed on: the largest and fastest ones.
-_MOST_THINGS = 24
 # A patch is compact if its aspect ratio and the filled share of its box (of a disc's: .79) are
 # above these.
 _LEAST_ASPECT, _LEAST_FILL = 0.87, 0.6
@@ -123,10 +121,7 @@ class FrameLocator:
             for person in found.people
             if not any(_is_face_of(person, face) for face in inside)
         ]
-        blobs = found.blobs
-        if len(blobs) > _MOST_THINGS:
-            blobs = tuple(nlargest(_MOST_THINGS, blobs, key=_swept_m))
-        things = [_thing(blob, intrinsics) for blob in blobs]
+        things = [_thing(blob, intrinsics) for blob in found.blobs]
         return LocatedFrame(
             intrinsics,
             tuple([face for face in faces if face is not None]),
@@ -269,10 +264,11 @@ def _is_face_of(person: DetectedPerson, face: DetectedFace) -> bool:
 
 
 def _is_on_chest(face: DetectedFace, other: DetectedFace) -> bool:
-    """Return whether an uncertain face is on the chest of a more certain one."""
-    if face.confidence > _DOUBTFUL or 1.0 - face.confidence < _SURER * (1.0 - other.confidence):
-        return False
+    """Return whether an uncertain or a small face is on the chest of another one."""
     (x, y, wide, high), (its_x, its_y, its_wide, its_high) = face.box_px, other.box_px
+    sure = face.confidence > _DOUBTFUL or 1.0 - face.confidence < _SURER * (1.0 - other.confidence)
+    if sure and wide > _SMALL * its_wide:
+        return False
     aside = abs(x + 0.5 * wide - its_x - 0.5 * its_wide)
     below = y + 0.5 * high - its_y - 0.5 * its_high
     near, far = _ON_CHEST
@@ -320,11 +316,6 @@ def _upper_end(blob: MovingBlob, lens: Intrinsics, far_m: float) -> Vec3 | None:
         return None
     ray = vec(rays([(x + 0.5 * width, y + _HEAD_DOWN * height)], lens)[0])
     return scale(ray, far_m / norm(ray))
-
-
-def _swept_m(blob: MovingBlob) -> float:
-    """Return the radius of a thing plus its path in a tenth of a second."""
-    return blob.radius_m + (0.1 * norm(blob.v_camera_m_s) if blob.v_camera_m_s else 0.0)
 
 
 def _is_compact(blob: MovingBlob) -> bool:

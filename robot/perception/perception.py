@@ -12,7 +12,7 @@ import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
-from gazerig.gaze.angles import add, dot, rotate, rotate_back, scale, sub
+from gazerig.gaze.angles import add, angle_between, dot, rotate, rotate_back, scale, sub, transpose
 from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
@@ -25,13 +25,11 @@ from gazerig.robot.perception.hands import (
     label_own_body,
     without_own_motion,
 )
-from gazerig.robot.perception.kalman import TrackFilter
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
 from gazerig.robot.perception.track import (
     EYES_HELD_S,
     UNNAMED,
     BodyTrack,
-    angle_off_head_rad,
     looks_at_head,
     place_in_world,
 )
@@ -47,7 +45,6 @@ class Perception:
     Args:
         mount: position and orientation of the camera.
         horizontal_field_deg: field of view of the camera.
-        tracker: tracks people and things.
         parts_face_m: measured positions of one person's face parts in the face frame, instead of
             the average ones (Nakamoto & Tsuruno 3.7).
         lens: calibrated lens, used for frames with the aspect ratio of the calibration.
@@ -58,7 +55,6 @@ class Perception:
         self,
         mount: CameraMount,
         horizontal_field_deg: float,
-        tracker: Tracker,
         parts_face_m: Mapping[str, Vec3] | None = None,
         lens: LensParams | None = None,
         own_parts: OwnParts | None = None,
@@ -68,7 +64,7 @@ class Perception:
         own = parts_face_m or {}
         self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
         self._locator = FrameLocator(lens, radians(horizontal_field_deg))
-        self._tracker = tracker
+        self._tracker = Tracker()
         self._hands = Hands()
         self._tracks: tuple[BodyTrack, ...] = ()
         self._p_head: Vec3 = (0.0, 0.0, 0.0)
@@ -89,7 +85,8 @@ class Perception:
         t_s = detections.captured_s
         R_head, self._p_head = poses.head_pose(t_s)
         R, p = self._mount.pose(R_head, self._p_head)
-        if self._is_cut(detections.scene, (R[0][2], R[1][2], R[2][2])):
+        axis = transpose(R)[2]
+        if self._is_cut(detections.scene, axis):
             self._tracker.forget()
             self._tracks, self._hands = (), Hands()
             self._cuts += 1
@@ -120,19 +117,27 @@ class Perception:
                 for thing in things
             ]
         in_sight = self._tracker.step([*faces, *things], p, t_s)
+        for track in in_sight:
+            if track.seen_s == t_s:
+                track.life.record(track.filter, axis, t_s)
         size_px = detections.width_px, detections.height_px
         self._tracks = tracks = tuple(
             [
                 track
                 for track in in_sight
-                if track.seen_s == t_s
-                or _in_picture(rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, size_px)
+                if track.counts
+                and (
+                    track.seen_s == t_s
+                    or _in_picture(
+                        rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, size_px
+                    )
+                )
             ]
         )
         self._percept = Percept(
             t_s,
             _bodies(tracks),
-            tuple(self._face(track) for track in tracks if self._tracker.shows_face(track)),
+            tuple(self._face(track) for track in tracks if track.shows_face),
             self._cuts,
         )
         return self._percept
@@ -157,10 +162,8 @@ class Perception:
         R = track.R_world_face
         assert R is not None  # visible faces are tracked with their pose
         p = track.p_world_m
-        across, along = track.filter.across.p, track.filter.along.p
         unknown_size = 0.0 if track.face_size else SIZE_SPREAD * track.filter.range_m
         # The filter covers errors that change; the unknown size of this person's face is constant.
-        across_sd, along_sd = sqrt(across), hypot(sqrt(along), unknown_size)
         found = track.detection
         signs, t_s = found.signs, track.at_s
         seen = track.seen_s == t_s
@@ -171,7 +174,7 @@ class Perception:
         eyes = track.eyes if signs is not None and t_s - track.eyes_s <= EYES_HELD_S else None
         gaze = found.gaze if eyes is None else eyes.gaze
         opening = None if eyes is None or eyes.signs is None else eyes.signs.eye_opening
-        off_rad = angle_off_head_rad(R, gaze, sub(self._p_head, p))
+        off_rad = angle_between(gaze or transpose(R)[0], sub(self._p_head, p))
         # A blink does not end a look at the head.
         blinks = opening is not None and opening < EYES_SHUT
         if seen and not blinks:
@@ -189,14 +192,14 @@ class Perception:
             self._face_parts(R, p, track.face_size or 1.0, track.face_length),
             found.confidence,
             track.depth_from,
-            across_sd,
-            along_sd,
+            hypot(sqrt(track.filter.along.p), unknown_size),
             off_rad,
             track.looks_at_head,
             gaze,
             opening,
             None if signs is None else signs.mouth_opening_m,
-            None if signs is None else track.speech.speaks(t_s),
+            None if signs is None else track.is_alive and track.speech.speaks(t_s),
+            track.is_alive,
         )
 
     def _face_parts(self, R: Mat3, p: Vec3, size: float, length: float) -> tuple[Vec3, ...]:
@@ -232,24 +235,17 @@ def _bodies(tracks: tuple[BodyTrack, ...]) -> Bodies:
         np.array([one.v_m_s for one in filters]),
         np.array([scale(track.filter.view, track.detection.spin_rad_s) for track in tracks]),
         np.array([one.radius_m for one in found]),
-        np.array([covariance(one) for one in filters]),
+        np.array([covariance(one.view, one.across.v, one.along.v) for one in filters]),
         tuple([track.id for track in tracks if track.detection.from_side]),
     )
 
 
-def covariance(known: TrackFilter) -> list[list[float]]:
-    """Return the covariance of position and velocity in the world, (6, 6).
+def covariance(view: Vec3, across: float, along: float) -> list[list[float]]:
+    """Return the covariance matrix in the world of variances across and along a view.
 
     Across the view a variance is the same in all directions.
     """
-    view, across, along = known.view, known.across, known.along
-    more = sub(along, across)
+    more = along - across
     return [
-        [
-            (across[i + j] if x == y else 0.0) + more[i + j] * view[x] * view[y]
-            for j in (0, 1)
-            for y in (0, 1, 2)
-        ]
-        for i in (0, 1)
-        for x in (0, 1, 2)
+        [(across if x == y else 0.0) + more * view[x] * view[y] for y in range(3)] for x in range(3)
     ]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.drivers.types import Clothing, Located
-from gazerig.gaze.angles import add, angle_between, compose, rotate
+from gazerig.gaze.angles import add, angle_between, compose, rotate, scale, sub
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.perception.kalman import TrackFilter
 
@@ -24,18 +24,6 @@ _FACE_AT_HEAD_RAD, _EYES_AT_HEAD_RAD = radians(10.0), radians(6.0)
 to the head."""
 _EDGE_OF_CONE, _EDGE_OF_SD = 0.2, 0.5
 """Distance of inner and outer edge from the cone: fractions of the cone and of the uncertainty."""
-
-
-def angle_off_head_rad(R_world_face: Mat3, gaze_world: Vec3 | None, from_face_m: Vec3) -> float:
-    """Return the angle between a person's gaze and the direction to the head.
-
-    Args:
-        R_world_face: face axes, x out of the face.
-        gaze_world: direction of the gaze of the eyes, None if unknown.
-        from_face_m: vector from the face to the head, world.
-    """
-    ahead = R_world_face[0][0], R_world_face[1][0], R_world_face[2][0]
-    return angle_between(ahead if gaze_world is None else gaze_world, from_face_m)
 
 
 def looks_at_head(
@@ -100,7 +88,44 @@ class Speech(NamedTuple):
         return len(self.turned_s) == _TURNS and t_s - self.turned_s[0] <= _WINDOW_S
 
 
-NO_SPEECH = Speech()
+# Deviations beyond which the mean position of a head over a time has moved, and the share of a turn
+# of the camera by which its pose may be wrong; time after which motion is measured anew. A standing
+# person's head sways by millimetres within seconds.
+_SIGMAS, _MEAN_S, _OF_TURN, _ANEW_S = 3.0, 0.33, 0.05, 2.0
+# A face that has moved within this time lives. A person whose face was not visible for longer, and
+# who has not moved within that time, may be a bottle or a coat.
+_LIVES_S, _COUNTS_S = 5.0, 20.0
+# Time for which a face in a film is known as such.
+_FILMED_S = 30.0
+
+
+@dataclass(slots=True)
+class Life:
+    """Motion of a head, which pictures, statues and bottles do not have.
+
+    moved_s: time of the last motion
+    mean, at_s: mean direction to the head, and its time
+    view, axis, since_s: mean from which motion is measured, the camera's axis then, and that time
+    """
+
+    moved_s: float
+    mean: Vec3 = (1.0, 0.0, 0.0)
+    at_s: float = -inf
+    view: Vec3 = mean
+    axis: Vec3 = mean
+    since_s: float = -inf
+
+    def record(self, known: TrackFilter, axis: Vec3, t_s: float) -> None:
+        """Record the position of a head that was seen now, with the camera's present axis."""
+        share, self.at_s = min(1.0, (t_s - self.at_s) / _MEAN_S), t_s
+        self.mean = add(self.mean, scale(sub(known.view, self.mean), share))
+        late = t_s - self.since_s > _ANEW_S
+        least_rad = _SIGMAS * sqrt(known.across.p) / known.range_m
+        least_rad += _OF_TURN * angle_between(axis, self.axis)
+        if late or angle_between(self.mean, self.view) > least_rad:
+            self.moved_s = self.moved_s if late else t_s
+            self.view, self.axis, self.since_s = self.mean, axis, t_s
+
 
 FACE = "face"
 """Kind of people, also while their face is not visible."""
@@ -210,6 +235,8 @@ class BodyTrack:
     seen_s, at_s: capture times of its last detection and of its position
     frames: number of frames in which it was detected
     faced_s: of a person, capture time of the last detection of the face
+    filmed_s: of a person, time at which the face was found to be in a film, on a screen
+    life: motion of a person's head
     face_size: of a face, size relative to an adult's, learned if the camera measures depth; None
         before the first measured distance
     looks_at_head: of a face, whether the person looked at the head in its last frame; None if
@@ -228,12 +255,14 @@ class BodyTrack:
     seen_s: float
     at_s: float
     face_length: float
+    life: Life
     face_size: float | None = None
     looks_at_head: bool | None = None
-    speech: Speech = NO_SPEECH
+    speech: Speech = Speech()
     eyes: Located | None = None
     eyes_s: float = -inf
     faced_s: float = -inf
+    filmed_s: float = -inf
     frames: int = 1
     clothes: KnownClothes = field(default_factory=KnownClothes)
     returned_person: SeenPerson | None = None
@@ -273,6 +302,21 @@ class BodyTrack:
     def is_person(self) -> bool:
         """Return whether it is a person, with or without a visible face."""
         return self.detection.kind == FACE
+
+    @property
+    def shows_face(self) -> bool:
+        """Return whether the face of a person was seen recently."""
+        return self.R_world_face is not None and self.at_s - self.faced_s <= IN_SIGHT_S
+
+    @property
+    def is_alive(self) -> bool:
+        """Return whether a face has recently moved and is not in a film."""
+        return self.at_s - self.life.moved_s <= _LIVES_S and self.at_s - self.filmed_s > _FILMED_S
+
+    @property
+    def counts(self) -> bool:
+        """Return whether it is a thing, or a person who has moved or shown the face."""
+        return not self.is_person or self.at_s - max(self.life.moved_s, self.faced_s) <= _COUNTS_S
 
 
 def place_in_world(found: Located, R: Mat3, p_m: Vec3) -> Located:

@@ -10,12 +10,11 @@ their numbers. People are numbered from 1; a person who returns keeps the number
 Things are numbered separately.
 """
 
-from math import inf
+from math import inf, radians
 
 from gazerig.drivers.types import Located
-from gazerig.gaze.angles import add, cross, scale, sub, transpose, unit
+from gazerig.gaze.angles import add, angle_between, cross, scale, sub, transpose, unit
 from gazerig.gaze.types import FIRST_THING, Mat3, Vec3
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.data_association import (
     FASTEST_M_S,
     UNPAIRED,
@@ -31,6 +30,7 @@ from gazerig.robot.perception.track import (
     IN_SIGHT_S,
     UNNAMED,
     BodyTrack,
+    Life,
     SeenPerson,
     clothing_costs,
 )
@@ -48,24 +48,27 @@ _COAST_PERSON_S = 1.2
 _REMEMBER_FACE_S = 20.0
 """A face that is not visible for longer is remembered for this time: it is recognised within
 ``GATE_M``, and is a target if no face is visible."""
+_REMEMBER_PERSON_S = 300.0
+"""A person who returns within this time keeps the number, if position, height and clothes match."""
+# At a cut of a film on a screen a face is suddenly elsewhere: farther from its expected position
+# than a distance, and than a speed allows, in about two frames. From the second cut within this
+# angle and time on, faces that appear or jump there are in a film.
+_JUMP_M, _JUMP_M_S = 0.1, 2.0
+_FILM_RAD, _FILM_S, _JUMPS = radians(12.0), 30.0, 4
 # A person in fewer frames than this may be a false detection, whose number is reused. Number of
 # frames with clothes after which the number is final. Largest number of stored people who left.
 _KNOWN, _CLOTHED, _MOST_LEFT = 10, 5, 30
 
 
 class Tracker:
-    """Tracker of faces and moving things: identities and velocities.
+    """Tracker of faces and moving things: identities and velocities."""
 
-    Attributes:
-        params: present parameters, which may be replaced at any time.
-    """
-
-    def __init__(self, params: TrackerParams | None = None) -> None:
-        self.params = params or TrackerParams()
+    def __init__(self) -> None:
         self._tracks: list[BodyTrack] = []
         self._next_person, self._next_thing = 1, FIRST_THING
         self._free: set[int] = set()
         self._left: list[SeenPerson] = []
+        self._jumps: list[tuple[Vec3, float]] = []
 
     def forget(self) -> None:
         """End all identities, after a change of the scene. Numbers are not reused."""
@@ -127,10 +130,6 @@ class Tracker:
         self._tracks = kept
         return tuple([t for t in self._tracks if t.unseen_s <= self._coasts_s(t)])
 
-    def shows_face(self, track: BodyTrack) -> bool:
-        """Return whether the face of a person was seen recently."""
-        return track.R_world_face is not None and track.at_s - track.faced_s <= IN_SIGHT_S
-
     def _coasts_s(self, track: BodyTrack) -> float:
         """Return the time for which a track without a detection is still reported."""
         by_body = track.is_person and track.seen_s > track.faced_s and track.frames > 1
@@ -155,6 +154,7 @@ class Tracker:
             t_s,
             t_s,
             detection.face_length,
+            Life(-inf if detection.R_face is None else t_s),
             faced_s=t_s if detection.R_face is not None else -inf,
         )
         self._learn_size(track, detection, 1.0)
@@ -162,9 +162,20 @@ class Tracker:
         _correct_velocity(track, detection)
         if track.is_person:
             self._number(track)
+            self._note_film(track)
         else:
             track.id, self._next_thing = self._next_thing, self._next_thing + 1
         return track
+
+    def _note_film(self, track: BodyTrack) -> None:
+        """Record that a face appeared or jumped where faces often jump: it is in a film."""
+        near = [
+            at_s
+            for view, at_s in self._jumps
+            if track.at_s - at_s < _FILM_S and angle_between(view, track.filter.view) < _FILM_RAD
+        ]
+        if len(near) >= _JUMPS:
+            track.filmed_s = track.at_s
 
     def _number(self, track: BodyTrack) -> None:
         """Give a person's new track the number of the person who has returned, or a free one."""
@@ -174,7 +185,7 @@ class Tracker:
             one for one in self._tracks if one.is_person and one is not track and one.is_remembered
         ]
         before, known = track.returned_person, [*self._left, *map(_person, gone)]
-        recent = [one for one in known if track.at_s - one.seen_s <= self.params.remember_person_s]
+        recent = [one for one in known if track.at_s - one.seen_s <= _REMEMBER_PERSON_S]
         track.returned_person = back = find_returned(recent, _person(track))
         if back is None:
             if before is not None or not track.id:
@@ -206,19 +217,27 @@ class Tracker:
 
     def _update_track(self, track: BodyTrack, detection: Located, p_camera: Vec3) -> None:
         """Update a track with a detection."""
-        place = detection.p_m
-        if track.face_size and detection.R_face is not None and not detection.depth_measured:
+        place, R = detection.p_m, detection.R_face
+        if track.face_size and R is not None and not detection.depth_measured:
             place = add(p_camera, scale(sub(place, p_camera), track.face_size))
-        track.filter.correct(place, detection.across_sd_m, detection.along_sd_m)
+        known = track.filter
+        jump_m = known.range_m * angle_between(sub(place, p_camera), known.view)
+        if (
+            detection.R_face
+            and track.R_world_face
+            and jump_m > max(_JUMP_M, _JUMP_M_S * track.unseen_s)
+        ):
+            self._jumps = [*self._jumps[-_MOST_LEFT:], (known.view, track.at_s)]
+            self._note_film(track)
+        known.correct(place, detection.across_sd_m, detection.along_sd_m)
         _correct_velocity(track, detection)
         if track.is_person:
-            track.filter.slow_to(FASTEST_M_S)
+            known.slow_to(FASTEST_M_S)
         track.clothes.record_absence(track.unseen_s)
         track.seen_s = track.at_s
         track.frames += 1
         track.clothes.learn(detection.clothing)
-        R = detection.R_face
-        if R is None and self.shows_face(track):
+        if R is None and track.shows_face:
             return  # the detector missed the face in this frame
         if R is None:
             track.R_world_face = track.looks_at_head = None

@@ -18,7 +18,6 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.recording.joint_recorder import ForwardingBody
 
 H = TypeVar("H", bound=BodyRecord)
@@ -96,7 +95,7 @@ class PlaybackPerception(Perception):
     """
 
     def __init__(self, mount: CameraMount, horizontal_field_deg: float) -> None:
-        super().__init__(mount, horizontal_field_deg, Tracker())
+        super().__init__(mount, horizontal_field_deg)
         self.percept: Percept | None = None
 
     def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:

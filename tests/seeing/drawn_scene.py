@@ -19,7 +19,6 @@ from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.cameras.frame_times import FrameParams
@@ -101,7 +100,7 @@ def frames(scene: Scene, start_s: float, end_s: float) -> Iterator[Frame]:
     locate = FrameLocator(None, radians(field))
     motion = SyntheticMotionDetector(rig.motion)
     camera = PixelCamera(drawn, DrawnScene(later), mount, still, faces, rng, motion, locate)
-    perception = Perception(mount, field, Tracker(rig.tracker))
+    perception = Perception(mount, field)
     poses = PoseHistory(_Standing())  # type: ignore[arg-type]
     poses.remember(0.0, (0.0, 0.0, 0.0))
     for number in range(round(_HZ * (end_s - start_s))):

@@ -22,7 +22,6 @@ from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 
 SIZE = 640, 400
 FIELD_DEG = 69.0
@@ -229,7 +228,7 @@ def perception() -> tuple[Perception, PoseHistory]:
     poses = PoseHistory(None)  # type: ignore[arg-type]
     poses.head_pose = lambda t_s: (tuple(map(tuple, np.eye(3).tolist())), (0.0, 0.0, 0.0))  # type: ignore
     mount = CameraMount(CameraParams(mount="base", position_mm=(0.0, 0.0, 0.0)))
-    return Perception(mount, FIELD_DEG, Tracker()), poses
+    return Perception(mount, FIELD_DEG), poses
 
 
 def _best_pairs(costs: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
