@@ -129,7 +129,7 @@ def test_behaviours_follow_their_rules_and_do_not_wait_for_the_end_of_a_fixation
     assert look(model, 0.0, *rows).id == 1
     model.top_down.behave("attack")
     chosen = look(model, 0.05, *rows)
-    assert (chosen.id, chosen.salience, chosen.top_down) == (9, 0.9, True)
+    assert (chosen.id, chosen.salience, chosen.top_down) == (9, 1.4, True)
     with pytest.raises(ValueError, match="no rule for behaviour 'dance'; rules: attack"):
         model.top_down.behave("dance")
     with pytest.raises(ValueError, match="has no rule"):

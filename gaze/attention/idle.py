@@ -55,9 +55,9 @@ _SEARCH_SPREAD_DEG = 8.0
 _LEAVING_DEG_S = 4.0
 """A target slower than this is not considered to have left to a side."""
 
-_REST_S, _GLANCE_S = 1.5, 0.9
+_REST_S, _GLANCE_S = 1.0, 0.8
 """Mean time of a rest straight ahead between series of glances, and of a glance."""
-_ASIDE_S, _STAYS_ASIDE_S = (3.0, 5.0), (1.4, 1.8)
+_ASIDE_S, _STAYS_ASIDE_S = (2.5, 4.0), (1.2, 1.6)
 """Range of the time between looks as far to one side as the reach, and of their duration."""
 _FIRST_REST_S = 0.6
 """Time at the start after which the head looks about, as nobody is ahead."""
@@ -123,7 +123,7 @@ class Idle:
     def retune(self, params: IdleParams) -> None:
         """Change the parameters, from the next phase on."""
         changed, self._params = params.explores != self._params.explores, params
-        if changed and self._now.kind in ("rest", "glance"):
+        if changed and not self._now.is_lost:
             self._start_rest(self._t_s)
 
     def remember(self, target: Target) -> None:

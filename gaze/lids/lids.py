@@ -35,8 +35,10 @@ Side = Literal["left", "right"]
 _ROUNDING_S = 1e-6
 _MOST_INTERVALS = 3.0
 """Largest delay of a spontaneous blink by gaze-evoked ones, in mean intervals."""
-_EVOKED_PAUSE_S = 0.6
-"""Shortest time from the onset of a blink to one evoked by a gaze shift."""
+_EVOKED_PAUSE_S = 0.6, 1.5
+"""Shortest time from the onset of a blink to one evoked by a gaze shift; from an evoked one: also a
+head that looks to and fro blinks at the published rate.
+"""
 _WINK_HOLD_MS = 200.0
 _UP_SHARE = 0.85
 """Factor on the upper lids' following above level gaze."""
@@ -112,7 +114,7 @@ class Lids:
         self._blink: LidClosure | None = None
         self._winks: dict[Side, LidClosure | None] = {"left": None, "right": None}
         self._t_s, self._shut_until_s = t_s, -inf
-        self._evoked_s = inf
+        self._evoked_s, self._evokes_from_s = inf, t_s
         self._announced = False
         self._redraw = False
         self._rest.reset(self._rest_values())
@@ -152,11 +154,11 @@ class Lids:
             onset_s: its planned start.
             t_s: present time, seconds.
         """
-        blink, shift_deg = self._blink, degrees(shift_rad)
+        shift_deg = degrees(shift_rad)
         self._announced = shift_deg > EVOKED_BEYOND_DEG
         if not self._announced or not evokes_blink(self._law, shift_deg, self._rng):
             return 0.0
-        if blink is not None and onset_s - blink.onset_s < self._pause_after_s():
+        if onset_s < self._evokes_from_s:
             return 0.0
         blinks_s = onset_s + evoked_offset_s(self._law, self._rng)
         self._evoked_s = min(self._evoked_s, max(blinks_s, t_s))
@@ -200,8 +202,7 @@ class Lids:
             self._next_s = max(self._next_s, t_s + SHORTEST_PAUSE_S)
             return False
         if t_s >= self._evoked_s:
-            since_s = inf if blink is None else t_s - blink.onset_s
-            if since_s >= self._pause_after_s():
+            if t_s >= self._evokes_from_s:
                 return True
             self._evoked_s = inf
         # A higher rate may require the next blink before this one has ended.
@@ -215,7 +216,9 @@ class Lids:
         self._blink = blink = blink.vary_durations(self._law, self._rng)
         self._record_motion_end(blink)
         after_s, ends_s = blink.length_s + self._pause_s(blink.length_s), t_s + blink.length_s
-        if t_s >= self._evoked_s and self._law.evoked_replaces:
+        replaces = t_s >= self._evoked_s and self._law.evoked_replaces
+        self._evokes_from_s = t_s + max(_EVOKED_PAUSE_S[replaces], blink.length_s)
+        if replaces:
             # The next spontaneous blink is skipped, the one after it stays.
             most_s = ends_s + _MOST_INTERVALS * self._mean_s()
             soonest_s = ends_s + SHORTEST_PAUSE_S
@@ -232,10 +235,6 @@ class Lids:
     def _full_closure(self, onset_s: float, hold_ms: float) -> LidClosure:
         par = self._params
         return LidClosure(onset_s, par.close_ms / 1e3, hold_ms / 1e3, par.open_ms / 1e3)
-
-    def _pause_after_s(self) -> float:
-        """Return the shortest time from the onset of a blink to that of a gaze-evoked one."""
-        return max(_EVOKED_PAUSE_S, self._length_s())
 
     def _length_s(self) -> float:
         """Return the length of the last blink, of a full one before the first."""
