@@ -334,7 +334,7 @@ def test_the_eyes_stay_on_their_point_while_the_head_bows(
     assert faults(rig) == []
     made = started(rig)
     made.robot.command(LookAt(TARGET, stay=True))
-    still = error_deg(ticks(made, 600)[-1])
+    still = error_deg(ticks(made, 700)[-1])
     made.robot.command(Express("bow"))
     moving = ticks(made, 300)
     bowed = dict(zip(rig.names, map(degrees, moving[-1].joints.position_rad), strict=True))

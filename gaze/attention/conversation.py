@@ -134,7 +134,7 @@ _UNSURE_RATIO = 0.2
 """Share of the remaining time by which the gaze returns earlier if the end is quite uncertain."""
 _LATE_S = 1.5
 """Time after the planned end for which the gaze still waits on the face."""
-_ADDRESSEE = 0.84
+_ADDRESSEE = 0.9
 """Share of a speaker's looks at several people that the addressee gets: people's .77, and the time
 that the gaze takes to be there and back.
 """

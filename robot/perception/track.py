@@ -78,7 +78,7 @@ class Speech(NamedTuple):
         least_m, turned_s = max(_SWING_M, 4.0 * sd_m), self.turned_s
         if abs(gap_m - extreme_m) < least_m:
             return self._replace(extreme_m=extreme_m)
-        syllable = t_s - turned_s[-1] <= _SYLLABLE_S if turned_s else False
+        syllable = turned_s and t_s - turned_s[-1] <= _SYLLABLE_S
         if syllable and abs(extreme_m - self.start_m) > _WIDE * least_m:
             turned_s = (t_s,) * _TURNS
         return Speech(extreme_m, gap_m, not self.opens, (*turned_s[1 - _TURNS :], t_s))
@@ -89,12 +89,13 @@ class Speech(NamedTuple):
 
 
 # Deviations beyond which the mean position of a head over a time has moved, and the share of a turn
-# of the camera by which its pose may be wrong; time after which motion is measured anew. A standing
-# person's head sways by millimetres within seconds.
-_SIGMAS, _MEAN_S, _OF_TURN, _ANEW_S = 3.0, 0.33, 0.05, 2.0
-# A face that has moved within this time lives. A person whose face was not visible for longer, and
-# who has not moved within that time, may be a bottle or a coat.
-_LIVES_S, _COUNTS_S = 5.0, 20.0
+# of the camera by which its pose may be wrong; time after which motion is measured anew, and the
+# largest turn in it with which rest is certain. A standing person's head sways by millimetres
+# within seconds.
+_SIGMAS, _MEAN_S, _OF_TURN, _ANEW_S, _STEADY_RAD = 3.0, 0.33, 0.05, 1.9, 0.02
+# A face that has rested for no longer than this lives. A person whose face was not visible for
+# longer, and who has rested for so long, may be a bottle or a coat.
+_LIVES_S, _COUNTS_S = 5.0, 18.0
 # Time for which a face in a film is known as such.
 _FILMED_S = 30.0
 
@@ -103,12 +104,12 @@ _FILMED_S = 30.0
 class Life:
     """Motion of a head, which pictures, statues and bottles do not have.
 
-    moved_s: time of the last motion
+    still_s: time without motion while the camera hardly turned, since the last motion
     mean, at_s: mean direction to the head, and its time
     view, axis, since_s: mean from which motion is measured, the camera's axis then, and that time
     """
 
-    moved_s: float
+    still_s: float
     mean: Vec3 = (1.0, 0.0, 0.0)
     at_s: float = -inf
     view: Vec3 = mean
@@ -119,12 +120,15 @@ class Life:
         """Record the position of a head that was seen now, with the camera's present axis."""
         share, self.at_s = min(1.0, (t_s - self.at_s) / _MEAN_S), t_s
         self.mean = add(self.mean, scale(sub(known.view, self.mean), share))
-        late = t_s - self.since_s > _ANEW_S
-        least_rad = _SIGMAS * sqrt(known.across.p) / known.range_m
-        least_rad += _OF_TURN * angle_between(axis, self.axis)
-        if late or angle_between(self.mean, self.view) > least_rad:
-            self.moved_s = self.moved_s if late else t_s
-            self.view, self.axis, self.since_s = self.mean, axis, t_s
+        turned_rad = angle_between(axis, self.axis)
+        least_rad = _SIGMAS * sqrt(known.across.p) / known.range_m + _OF_TURN * turned_rad
+        if angle_between(self.mean, self.view) > least_rad:
+            self.still_s = 0.0
+        elif t_s - self.since_s < _ANEW_S:
+            return
+        elif turned_rad < _STEADY_RAD:
+            self.still_s += _ANEW_S
+        self.view, self.axis, self.since_s = self.mean, axis, t_s
 
 
 FACE = "face"
@@ -311,12 +315,12 @@ class BodyTrack:
     @property
     def is_alive(self) -> bool:
         """Return whether a face has recently moved and is not in a film."""
-        return self.at_s - self.life.moved_s <= _LIVES_S and self.at_s - self.filmed_s > _FILMED_S
+        return self.life.still_s <= _LIVES_S and self.at_s - self.filmed_s > _FILMED_S
 
     @property
     def counts(self) -> bool:
         """Return whether it is a thing, or a person who has moved or shown the face."""
-        return not self.is_person or self.at_s - max(self.life.moved_s, self.faced_s) <= _COUNTS_S
+        return not self.is_person or min(self.life.still_s, self.at_s - self.faced_s) <= _COUNTS_S
 
 
 def place_in_world(found: Located, R: Mat3, p_m: Vec3) -> Located:

@@ -154,7 +154,7 @@ class Tracker:
             t_s,
             t_s,
             detection.face_length,
-            Life(-inf if detection.R_face is None else t_s),
+            Life(inf if detection.R_face is None else 0.0),
             faced_s=t_s if detection.R_face is not None else -inf,
         )
         self._learn_size(track, detection, 1.0)
