@@ -122,10 +122,10 @@ class Life:
         self.mean = add(self.mean, scale(sub(known.view, self.mean), share))
         turned_rad = angle_between(axis, self.axis)
         least_rad = _SIGMAS * sqrt(known.across.p) / known.range_m + _OF_TURN * turned_rad
-        if angle_between(self.mean, self.view) > least_rad:
+        if t_s - self.since_s < _ANEW_S:
+            if angle_between(self.mean, self.view) <= least_rad:
+                return
             self.still_s = 0.0
-        elif t_s - self.since_s < _ANEW_S:
-            return
         elif turned_rad < _STEADY_RAD:
             self.still_s += _ANEW_S
         self.view, self.axis, self.since_s = self.mean, axis, t_s
