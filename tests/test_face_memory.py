@@ -42,10 +42,10 @@ def test_when_a_thing_is_lost_the_gaze_returns_to_the_face_that_was_there(
     social: str, kind: str
 ) -> None:
     model = attention(social=social)
-    looks(model, [FACE], 0.0, 0.5)
-    assert looks(model, [FACE, HAND], 0.5, 0.5)[-1].kind == "hand"
-    looks(model, [HAND], 1.0, 1.0)
-    after = looks(model, [], 2.0, 0.5)[-1]
+    looks(model, [FACE], 0.0, 2.5)
+    assert looks(model, [FACE, HAND], 2.5, 0.5)[-1].kind == "hand"
+    looks(model, [HAND], 3.0, 1.0)
+    after = looks(model, [], 4.0, 0.5)[-1]
     assert after.kind == kind
     if kind == "face":
         assert after.p_world_m == FACE[2]

@@ -146,7 +146,7 @@ def shares(look_at: str, numbers: tuple[int, int, int], *, waves: bool = True) -
     """
     model = attention(TopDownParams(rules={"wait": Rule(look_at, 2.5)}), np.random.default_rng(0))
     people, found = dict(zip(numbers, (LEFT, RIGHT, FAR), strict=True)), []
-    for k in range(600):
+    for k in range(1500):
         t_s = k / 30
         here = {id: p for id, p in people.items() if p != RIGHT or t_s > 5.0}
         phase = 2 * pi * 1.5 * t_s
