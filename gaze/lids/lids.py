@@ -114,7 +114,7 @@ class Lids:
         self._blink: LidClosure | None = None
         self._winks: dict[Side, LidClosure | None] = {"left": None, "right": None}
         self._t_s, self._shut_until_s = t_s, -inf
-        self._evoked_s, self._evokes_from_s = inf, t_s
+        self._evoked_s, self._evoked_pause_s = inf, 0.0
         self._announced = False
         self._redraw = False
         self._rest.reset(self._rest_values())
@@ -154,11 +154,11 @@ class Lids:
             onset_s: its planned start.
             t_s: present time, seconds.
         """
-        shift_deg = degrees(shift_rad)
+        blink, shift_deg = self._blink, degrees(shift_rad)
         self._announced = shift_deg > EVOKED_BEYOND_DEG
         if not self._announced or not evokes_blink(self._law, shift_deg, self._rng):
             return 0.0
-        if onset_s < self._evokes_from_s:
+        if blink is not None and onset_s - blink.onset_s < self._evoked_pause_s:
             return 0.0
         blinks_s = onset_s + evoked_offset_s(self._law, self._rng)
         self._evoked_s = min(self._evoked_s, max(blinks_s, t_s))
@@ -202,7 +202,7 @@ class Lids:
             self._next_s = max(self._next_s, t_s + SHORTEST_PAUSE_S)
             return False
         if t_s >= self._evoked_s:
-            if t_s >= self._evokes_from_s:
+            if blink is None or t_s - blink.onset_s >= self._evoked_pause_s:
                 return True
             self._evoked_s = inf
         # A higher rate may require the next blink before this one has ended.
@@ -217,7 +217,7 @@ class Lids:
         self._record_motion_end(blink)
         after_s, ends_s = blink.length_s + self._pause_s(blink.length_s), t_s + blink.length_s
         replaces = t_s >= self._evoked_s and self._law.evoked_replaces
-        self._evokes_from_s = t_s + max(_EVOKED_PAUSE_S[replaces], blink.length_s)
+        self._evoked_pause_s = max(_EVOKED_PAUSE_S[replaces], blink.length_s)
         if replaces:
             # The next spontaneous blink is skipped, the one after it stays.
             most_s = ends_s + _MOST_INTERVALS * self._mean_s()

@@ -222,11 +222,7 @@ class Tracker:
             place = add(p_camera, scale(sub(place, p_camera), track.face_size))
         known = track.filter
         jump_m = known.range_m * angle_between(sub(place, p_camera), known.view)
-        if (
-            detection.R_face
-            and track.R_world_face
-            and jump_m > max(_JUMP_M, _JUMP_M_S * track.unseen_s)
-        ):
+        if R and track.R_world_face and jump_m > max(_JUMP_M, _JUMP_M_S * track.unseen_s):
             self._jumps = [*self._jumps[-_MOST_LEFT:], (known.view, track.at_s)]
             self._note_film(track)
         known.correct(place, detection.across_sd_m, detection.along_sd_m)
