@@ -185,7 +185,7 @@ def test_e56_own_parts_move_and_turn_with_the_face(turn_deg: float, aside_m: flo
     nose, R = (1.0, aside_m, 0.25), rotation((radians(180.0 + turn_deg), 0.0, 0.0))
     detection = Located("face", nose, R, 0.1, 0.0, 0.9)
     (track,) = Tracker().step([detection], (0.0, 0.0, 0.2), 0.0)
-    face = perception._face(track)
+    face = perception._face(track, (0.0, 0.0, 0.0))
     eye = (0.0, 0.0, 0.2)
     for code, seen in zip(PARTS, face.parts_world_m, strict=True):
         true = add(nose, rotate(R, own[code]))

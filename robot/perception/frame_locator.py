@@ -6,6 +6,7 @@ measures one there; otherwise it is limited by the spread of face sizes.
 """
 
 from dataclasses import dataclass
+from heapq import nlargest
 from math import hypot, isfinite, sqrt
 
 import numpy as np
@@ -76,6 +77,8 @@ _SHAPE_1_S = 0.3
 # A patch this many times as high as wide is a walking person; the centre of the head is this
 # fraction of the height below its upper edge.
 _UPRIGHT, _HEAD_DOWN = 1.4, 1.0 / 14.0
+# Largest number of things of a frame that are passed on: the largest and fastest ones.
+_MOST_THINGS = 24
 # A patch is compact if its aspect ratio and the filled share of its box (of a disc's: .79) are
 # above these.
 _LEAST_ASPECT, _LEAST_FILL = 0.87, 0.6
@@ -121,7 +124,8 @@ class FrameLocator:
             for person in found.people
             if not any(_is_face_of(person, face) for face in inside)
         ]
-        things = [_thing(blob, intrinsics) for blob in found.blobs]
+        largest = nlargest(_MOST_THINGS, found.blobs, _swept_m)
+        things = [_thing(blob, intrinsics) for blob in largest]
         return LocatedFrame(
             intrinsics,
             tuple([face for face in faces if face is not None]),
@@ -316,6 +320,11 @@ def _upper_end(blob: MovingBlob, lens: Intrinsics, far_m: float) -> Vec3 | None:
         return None
     ray = vec(rays([(x + 0.5 * width, y + _HEAD_DOWN * height)], lens)[0])
     return scale(ray, far_m / norm(ray))
+
+
+def _swept_m(blob: MovingBlob) -> float:
+    """Return the radius of a thing plus its path in a tenth of a second."""
+    return blob.radius_m + (0.1 * norm(blob.v_camera_m_s) if blob.v_camera_m_s else 0.0)
 
 
 def _is_compact(blob: MovingBlob) -> bool:

@@ -67,7 +67,6 @@ class Perception:
         self._tracker = Tracker()
         self._hands = Hands()
         self._tracks: tuple[BodyTrack, ...] = ()
-        self._p_head: Vec3 = (0.0, 0.0, 0.0)
         self._percept: Percept | None = None
         self._number = 0
         self._scene: tuple[int, Vec3] | None = None
@@ -83,8 +82,8 @@ class Perception:
         self.frames += 1
         self.frames_with_face += bool(detections.faces)
         t_s = detections.captured_s
-        R_head, self._p_head = poses.head_pose(t_s)
-        R, p = self._mount.pose(R_head, self._p_head)
+        R_head, p_head = poses.head_pose(t_s)
+        R, p = self._mount.pose(R_head, p_head)
         axis = transpose(R)[2]
         if self._is_cut(detections.scene, axis):
             self._tracker.forget()
@@ -97,12 +96,10 @@ class Perception:
             located = self._locator(detections)
         faces = [place_in_world(face, R, p) for face in located.faces]
         things = [place_in_world(thing, R, p) for thing in located.things]
-        palms = (
-            None if located.palms is None else [place_in_world(one, R, p) for one in located.palms]
-        )
+        palms = located.palms and [place_in_world(one, R, p) for one in located.palms]
         if things or palms or self._hands.resting:
             if self._own_parts is not None:
-                things = label_own_body(things, self._own_parts(R_head, self._p_head), p)
+                things = label_own_body(things, self._own_parts(R_head, p_head), p)
             tracked = [
                 (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
                 for t in self._tracks
@@ -137,7 +134,7 @@ class Perception:
         self._percept = Percept(
             t_s,
             _bodies(tracks),
-            tuple(self._face(track) for track in tracks if track.shows_face),
+            tuple(self._face(track, p_head) for track in tracks if track.shows_face),
             self._cuts,
         )
         return self._percept
@@ -157,8 +154,8 @@ class Perception:
         restarted = scene // SCENES_OF_A_PROCESS != before[0] // SCENES_OF_A_PROCESS
         return restarted or dot(before[1], axis) > _COS_SAME_VIEW
 
-    def _face(self, track: BodyTrack) -> Face:
-        """Return a tracked face with its eight parts."""
+    def _face(self, track: BodyTrack, p_head: Vec3) -> Face:
+        """Return a tracked face with its eight parts, seen from the head's position."""
         R = track.R_world_face
         assert R is not None  # visible faces are tracked with their pose
         p = track.p_world_m
@@ -171,18 +168,14 @@ class Perception:
             track.speech = track.speech.advance(signs.mouth_opening_m, t_s, signs.mouth_sd_m)
             if signs.eye_opening is not None:
                 track.eyes, track.eyes_s = found, t_s
-        eyes = track.eyes if signs is not None and t_s - track.eyes_s <= EYES_HELD_S else None
-        gaze = found.gaze if eyes is None else eyes.gaze
-        opening = None if eyes is None or eyes.signs is None else eyes.signs.eye_opening
-        off_rad = angle_between(gaze or transpose(R)[0], sub(self._p_head, p))
+        eyes = track.eyes if track.eyes and t_s - track.eyes_s <= EYES_HELD_S else found
+        gaze, opening = eyes.gaze, eyes.signs and eyes.signs.eye_opening
+        off_rad = angle_between(gaze or transpose(R)[0], sub(p_head, p))
         # A blink does not end a look at the head.
         blinks = opening is not None and opening < EYES_SHUT
         if seen and not blinks:
             track.looks_at_head = looks_at_head(
-                off_rad,
-                found.turn_sd_rad,
-                gaze is not None,
-                track.looks_at_head,
+                off_rad, found.turn_sd_rad, gaze is not None, track.looks_at_head
             )
         return Face(
             track.id,
@@ -197,8 +190,8 @@ class Perception:
             track.looks_at_head,
             gaze,
             opening,
-            None if signs is None else signs.mouth_opening_m,
-            None if signs is None else track.is_alive and track.speech.speaks(t_s),
+            signs and signs.mouth_opening_m,
+            track.is_alive and track.speech.speaks(t_s) if signs else None,
             track.is_alive,
         )
 
