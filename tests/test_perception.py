@@ -218,8 +218,8 @@ def test_the_sway_of_who_stands_is_life_and_the_noise_of_a_photo_is_none(sway_m:
     for k in range(1, 2000):
         face = face_at((sway_m * sin(0.06 * k), 0.0, 1.5))  # 0.3 Hz
         points = face.landmarks_px + rng.normal(0.0, 0.5, (5, 2))
-        (one,) = seen(perception, k, faces=(replace(face, landmarks_px=points),)).faces
-        shown.append(one.is_alive)
+        found = seen(perception, k, faces=(replace(face, landmarks_px=points),))
+        shown.append(not found.bodies.lifeless)
     assert shown[90] and abs(np.mean(shown[180:]) - (sway_m > 0.0)) < 0.1
 
 
@@ -237,5 +237,5 @@ def test_a_face_that_jumps_again_and_again_is_in_a_film() -> None:
     for k in range(1, 300):
         places = 0.1 + k // 60 % 2 / 5, 0.02 * sin(0.2 * k) - 1.0
         faces = tuple(face_at((x, 0.0, 2.0)) for x in places)
-        shown = [face.is_alive for face in seen(perception, k, faces=faces).faces]
-    assert shown == [False, True]
+        found = seen(perception, k, faces=faces)
+    assert found.bodies.lifeless == found.bodies.ids[:1]

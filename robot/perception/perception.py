@@ -13,7 +13,7 @@ import numpy as np
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
 from gazerig.gaze.angles import add, angle_between, dot, rotate, rotate_back, scale, sub, transpose
-from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
+from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
@@ -177,12 +177,22 @@ class Perception:
             track.looks_at_head = looks_at_head(
                 off_rad, found.turn_sd_rad, gaze is not None, track.looks_at_head
             )
+        # A measured part keeps its measured position; a canonical one is stretched with the face.
+        size, length = track.face_size or 1.0, track.face_length
+        parts = tuple(
+            [
+                add(
+                    p, rotate(R, at if own else (size * at[0], size * at[1], size * length * at[2]))
+                )
+                for at, own in self._parts
+            ]
+        )
         return Face(
             track.id,
             p,
             track.v_world_m_s,
             R,
-            self._face_parts(R, p, track.face_size or 1.0, track.face_length),
+            parts,
             found.confidence,
             track.depth_from,
             hypot(sqrt(track.filter.along.p), unknown_size),
@@ -192,21 +202,6 @@ class Perception:
             opening,
             signs and signs.mouth_opening_m,
             track.is_alive and track.speech.speaks(t_s) if signs else None,
-            track.is_alive,
-        )
-
-    def _face_parts(self, R: Mat3, p: Vec3, size: float, length: float) -> tuple[Vec3, ...]:
-        """Return the eight parts of a face in the world.
-
-        A measured part keeps its measured position; a canonical one is stretched with the face.
-        """
-        return tuple(
-            [
-                add(
-                    p, rotate(R, at if own else (size * at[0], size * at[1], size * length * at[2]))
-                )
-                for at, own in self._parts
-            ]
         )
 
 
@@ -230,6 +225,7 @@ def _bodies(tracks: tuple[BodyTrack, ...]) -> Bodies:
         np.array([one.radius_m for one in found]),
         np.array([covariance(one.view, one.across.v, one.along.v) for one in filters]),
         tuple([track.id for track in tracks if track.detection.from_side]),
+        tuple([track.id for track in tracks if track.is_person and not track.is_alive]),
     )
 
 

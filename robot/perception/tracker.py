@@ -225,6 +225,8 @@ class Tracker:
         if R and track.R_world_face and jump_m > max(_JUMP_M, _JUMP_M_S * track.unseen_s):
             self._jumps = [*self._jumps[-_MOST_LEFT:], (known.view, track.at_s)]
             self._note_film(track)
+        elif track.unseen_s > IN_SIGHT_S:
+            self._note_film(track)
         known.correct(place, detection.across_sd_m, detection.along_sd_m)
         _correct_velocity(track, detection)
         if track.is_person:
