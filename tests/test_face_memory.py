@@ -74,9 +74,6 @@ def test_memory_lasts_as_long_as_it_is_told_and_no_longer() -> None:
     assert memory.step(one, 3, 1.0).ids == (3, 2)
     assert memory.step(one, 3, 60.0).ids == (3, 2)
     assert memory.step(one, 3, 60.1) == one
-    memory.step(both, 3, 61.0)
-    memory.reset()
-    assert memory.step(one, 3, 61.1) == one
 
 
 @pytest.mark.parametrize("talked", [False, True])
