@@ -73,7 +73,6 @@ def test_a_bad_picture_is_told_as_it_begins_and_as_it_ends(bad, begins, ends):
         noisy(room() // 4, 4.0, np.random.default_rng(2)),
         np.full((HEIGHT, WIDTH, 3), 200, np.uint8),
     ],
-    ids=["people", "nobody", "dim and noisy", "one colour"],
 )
 def test_good_pictures_are_left_alone(image):
     for turns_film in (False, True):
