@@ -45,8 +45,8 @@ def test_what_moves_within_reach_is_a_hand_from_the_second_frame_on() -> None:
     [patch(v=(0.0, 0.6, 0.0)), patch(p=(2.0, 2.4, 0.0)), patch(p=(2.0, 0.5, -1.9)),
      patch(radius_m=0.6), patch(mark=3, kind="ball"), patch(p=(2.0, 0.1, 0.1)),
      patch(p=(3.4, 0.7, -0.2), depth_measured=True, along_sd_m=0.02)],
-    ids=["hardly moves", "out of reach", "a leg", "a person who passes", "something known",
-         "a head that turns", "measured far behind"],
+    # hardly moves, out of reach, a leg, a person who passes, something known, a head that turns,
+    # measured far behind
 )  # fmt: skip
 def test_what_is_no_hand_is_none(seen: Located) -> None:
     assert HAND not in kinds(Hands(), *[seen] * 5)
@@ -66,7 +66,7 @@ CURTAIN = led((2.0, 1.3, 0.1), (2.0, 1.5, -0.1), radius_m=0.45, thickness_m=0.5)
     "seen",
     [CURTAIN, led((2.0, 1.1, -0.9), (2.0, 0.9, -0.2)), led((2.0, 0.4, -0.4), (2.0, 0.9, -0.9)),
      patch(radius_m=0.08)],
-    ids=["a curtain", "a thing aside", "an elbow", "too small for an arm"],
+    # a curtain, a thing aside, an elbow, too small for an arm
 )  # fmt: skip
 def test_what_moves_within_reach_is_a_thing_without_evidence_of_a_hand(
     seen: Located,

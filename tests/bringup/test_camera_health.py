@@ -106,9 +106,6 @@ def test_frames_analysed_too_slowly_are_told_with_the_slowest_stage() -> None:
         "6 of 30 frames a second are analysed; one takes 167 ms (motion 100 ms), and the camera "
         "delivers one every 33 ms: lower motion.work_px, or set motion.enabled: false",
     )
-    for k in range(300, 600):
-        told = health.assess(Shot(k / 30, k, room()), {})
-    assert told == ()
 
 
 @pytest.mark.parametrize("deg", [90, 180, 270])
