@@ -41,25 +41,18 @@ class _Surface(NamedTuple):
     uv: Floats
 
 
-def fixed_parts(
-    model: Any, moving: Collection[str], rig_joints: Collection[str]
-) -> Iterator[WorldPart]:
+def fixed_parts(model: Any, moving: Collection[str]) -> Iterator[WorldPart]:
     """Yield every static part of a model, in place.
 
     Args:
         model: mujoco.MjModel
         moving: bodies that are shown elsewhere
-        rig_joints: bodies at these joints are also omitted
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    found = {model.jnt_bodyid[i] for i in range(model.njnt) if model.joint(i).name in rig_joints}
-    for body in range(1, model.nbody):  # parents first
-        if model.body(body).name in moving or model.body_parentid[body] in found:
-            found.add(body)
-    left_out = {int(body) for body in found}
     for geom in range(model.ngeom):
-        if model.geom_bodyid[geom] in left_out or (made := _surface(model, geom)) is None:
+        body = model.body(model.geom_bodyid[geom])
+        if body.name in moving or (made := _surface(model, geom)) is None:
             continue
         pose = data.geom_xpos[geom].copy(), data.geom_xmat[geom].reshape(3, 3).copy()
         surface = _move_surface(made, *pose)

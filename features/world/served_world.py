@@ -74,7 +74,7 @@ class ServedWorld:
 
     def joints(self) -> dict[str, int]:
         """Return the indices of the rig's joints in a state."""
-        return self.world.model.rigs[0].qpos
+        return self.world.model.rig.qpos
 
     def device(self, bus: BusSettings) -> Device:
         """Return an emulated device whose servos move the joints of the world's rig."""

@@ -20,12 +20,12 @@ class WorldSpec(NamedTuple):
 
     Attributes:
         figures: the people, whose script defines the room; None for an empty floor.
-        rigs: the rig; () for a room without one.
+        rig: the rig.
         mjcf_file: a user's own world instead of the room.
     """
 
     figures: Figures | None
-    rigs: tuple[RigInWorld, ...]
+    rig: RigInWorld
     mjcf_file: Path | None = None
 
     def compile(self) -> "WorldModel":
@@ -37,7 +37,7 @@ class WorldSpec(NamedTuple):
         import_mujoco()  # independent of MUJOCO_GL
         from gazerig.features.world.model import world_model
 
-        return world_model(self.figures, self.rigs, self.mjcf_file)
+        return world_model(self.figures, self.rig, self.mjcf_file)
 
     def with_shared_file(self, folder: Path) -> "WorldSpec":
         """Return the same world with its people's motion in a file of the folder."""

@@ -180,12 +180,12 @@ def pictures(renders: None) -> list[tuple[ImageArray, Floats]]:
 def pictures_of(look: int) -> Iterator[tuple[ImageArray, Floats]]:
     from gazerig.features.world.figure import Figures
     from gazerig.features.world.figure_model import PeoplePlacer
-    from gazerig.features.world.model import world_model
+    from gazerig.features.world.model import world_spec
     from gazerig.features.world.renderer import WorldPicture
     from gazerig.features.world.world_scene import WorldScene
 
     figures = Figures(SceneScript({"ann": PersonScript("front", look)}, round_s=12.0), 1)
-    model: Any = world_model(figures, ()).mj
+    model: Any = world_spec(figures, None).compile()
     picture = WorldPicture(model, PeoplePlacer(model, figures).place)
     for t_s, away_m, aside in (
         (2.0, 1.0, 0.3),

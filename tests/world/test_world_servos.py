@@ -287,7 +287,7 @@ def test_a_server_passes_a_push_on_to_its_world_and_everything_else_to_its_servo
     tmp_path: Path,
 ) -> None:
     """``gazerig ctl fault`` orders both."""
-    spec = WorldSpec(None, (rig_in_world(load_rig("desk"), looks=False),))
+    spec = WorldSpec(None, rig_in_world(load_rig("desk"), looks=False))
     (line,) = emulated_lines(load_rig("desk")).values()
     around = SentWorld(spec, tmp_path)
     server = Server(ServerSettings((BusSettings(line),), True, around), lambda text: None)

@@ -19,7 +19,7 @@ class WorldBench:
         self.now_s = 0.0
         self.rig = load_rig(rig) if isinstance(rig, str) else rig
         self.world = World(
-            world_model(None, [rig_in_world(self.rig, looks=False)], mjcf_file), lambda: self.now_s
+            world_model(None, rig_in_world(self.rig, looks=False), mjcf_file), lambda: self.now_s
         )
         lines = emulated_lines(self.rig)
         self.devices: dict[str, Any] = {

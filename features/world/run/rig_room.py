@@ -12,7 +12,7 @@ from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPo
 from gazerig.features.world.run.run_world import RunWorld, world_ideal_bus
 from gazerig.features.world.run.sight import RenderedWorld, world_camera
 from gazerig.features.world.serve import SentWorld
-from gazerig.features.world.shapes import shapes_of
+from gazerig.features.world.shapes import SpecShapes
 from gazerig.features.world.world_spec import state_file
 from gazerig.robot.app.bus_wiring import guarded_rig_bus
 from gazerig.robot.app.camera_factory import frame_locator
@@ -81,7 +81,7 @@ class RigRoom:
 
     def shapes(self) -> WorldShapes:
         """Return the shapes of the world."""
-        return shapes_of(self.world.spec)
+        return SpecShapes(self.world.spec.figures, self.world.spec.mjcf_file)
 
 
 def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> RigRoom:
@@ -113,5 +113,5 @@ def simulated_room(
         run_bus = in_process_run_bus(
             rig, {name: computed.device(line, name) for name, line in lines}
         )
-    joints = RigInState(rig_kinematics(rig), computed.model.rigs[0].qpos)
+    joints = RigInState(rig_kinematics(rig), computed.model.rig.qpos)
     return RigRoom(world, clock, run_bus, SimulatedPoses(computed, clock, joints))

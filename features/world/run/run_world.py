@@ -153,7 +153,7 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
     script = scene.figures.script
     # Without pictures the looks of the rig are not needed: the page has its own shapes.
     placed = rig_in_world(rig, looks=not options.no_pictures)
-    spec = WorldSpec(None if mjcf_file else scene.figures, (placed,), mjcf_file)
+    spec = WorldSpec(None if mjcf_file else scene.figures, placed, mjcf_file)
     camera, level = script.camera, options.level
     if level is not None and level.pictures == "coarse":
         camera = replace(camera, rate_hz=min(COARSE_HZ, camera.rate_hz), samples=0)

@@ -114,7 +114,7 @@ def no_pictures_message(error: NoRenderer) -> str:
 
 _LATENCY_MS = 60.0
 """Delay from the exposure of a picture to its arrival in simulated time."""
-HEAD_LINK = "head"
+HEAD_LINK = "rig_head"
 """Link of a rig that carries its camera, and is invisible to it."""
 _LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -206,17 +206,13 @@ def world_view(
         if people is not None:
             people.place(data, t_s)
 
-    rig = model.rigs[0]
-    own = rig.names + HEAD_LINK
-    there = [model.mj.body(i).name for i in range(model.mj.nbody)]
-    hidden = [own] if own in there else []
     return WorldPicture(
         model.mj,
         place,
         RendererParams(samples=params.samples),
-        hidden,
-        rig.R_world_base,
-        rig.p_world_base_m,
+        (HEAD_LINK,),
+        model.rig.R_world_base,
+        model.rig.p_world_base_m,
     )
 
 
