@@ -84,10 +84,7 @@ class PeoplePlacer:
     def __init__(self, model: Any, figures: Figures) -> None:
         self._figures = figures
         rows = [int(model.body_mocapid[model.body(name).id]) for name in figures.names]
-        self._rows: Any = np.array(rows)
-        first = rows[0] if rows else 0
-        if rows == list(range(first, first + len(rows))):  # a slice is quicker
-            self._rows = slice(first, first + len(rows))
+        self._rows = np.array(rows, np.intp)
 
     def place(self, data: Any, t_s: float) -> None:
         """Set all poses for a time of the script."""

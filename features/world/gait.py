@@ -6,7 +6,7 @@ stairs.
 """
 
 from collections.abc import Mapping, Sequence
-from math import atan2, ceil
+from math import atan2, ceil, degrees
 from typing import NamedTuple
 
 import numpy as np
@@ -91,7 +91,7 @@ class _Path:
                 y += act.ahead_m * s + act.left_m * c
         elif one.target is not None:
             facing = _nearest_angle(atan2(one.target[1] - y, one.target[0] - x), facing)
-        self.at = Place(x, y, facing)
+        self.at = Place(x, y, degrees(facing))
         self.way[rows] = self.way[rows] + share[rows, None] * ((x, y) - self.way[rows])
         self.heading[rows] += share[rows] * (facing - self.heading[rows])
         self.stretches.append((start_s, end_s))

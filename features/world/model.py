@@ -53,32 +53,31 @@ class WorldModel(NamedTuple):
     """A compiled world."""
 
     mj: Any
-    figures: Figures | None
+    figures: Figures
     rig: RigIndices
 
 
-def world_spec(figures: Figures | None, mjcf_file: Path | None) -> Any:
+def world_spec(figures: Figures, mjcf_file: Path | None) -> Any:
     """Return a specification of a user's world, or of a room with its people.
 
     Args:
-        figures: the people of a script, and with it their room; None: an empty world.
+        figures: the people of a script, and with it their room; none: only the place of the rig.
         mjcf_file: a user's world instead of the room.
 
     Raises:
         SetupError: a file cannot be used.
     """
-    path = mjcf_file
-    if path is None:
-        if figures is None:
-            spec = mujoco.MjSpec()
-            spec.worldbody.add_site(name=MOUNT)
-            return spec
-        path = HOME / "rooms" / f"{figures.script.room}.xml"
+    room = figures.script.room
+    if mjcf_file is None and room == "none":
+        spec = mujoco.MjSpec()
+        spec.worldbody.add_site(name=MOUNT)
+        return spec
+    path = mjcf_file or HOME / "rooms" / f"{room}.xml"
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, OSError) as error:
         raise SetupError(f"{path}: MuJoCo cannot read this world: {_one_line(error)}") from None
-    if mjcf_file is None and figures is not None:
+    if mjcf_file is None:
         floor_m = -figures.script.neck_height_m
         spec.body("room").pos = [0.0, 0.0, floor_m]
         for geom in spec.geoms:
@@ -88,9 +87,7 @@ def world_spec(figures: Figures | None, mjcf_file: Path | None) -> Any:
     return spec
 
 
-def world_model(
-    figures: Figures | None, rig: RigInWorld, mjcf_file: Path | None = None
-) -> WorldModel:
+def world_model(figures: Figures, rig: RigInWorld, mjcf_file: Path | None = None) -> WorldModel:
     """Return a world with a rig, compiled; arguments as of ``world_spec``.
 
     Raises:

@@ -7,7 +7,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.errors import SetupError
 from gazerig.errors import Error
 from gazerig.features.world.figure_model import PeoplePlacer
 from gazerig.features.world.ideal_bus import IdealShaft
@@ -16,7 +15,7 @@ from gazerig.features.world.model import PREFIX, WorldModel
 from gazerig.features.world.rig_in_world import ServoInWorld
 from gazerig.features.world.shaft import ShaftAxis, WorldHobbyServo, WorldShaft
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import Emulated, PluginLine, ShaftMakers, build
+from gazerig.sim_mock.devices import Emulated, ShaftMakers, build
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
 from gazerig.sim_mock.smart_servo.physics import MS_S, Motor, Physics
 from gazerig.sim_mock.smart_servo.shaft import Shaft, create_shaft, whole_ms
@@ -85,12 +84,10 @@ class World:
         self._shafts: list[WorldShaft | IdealShaft] = []
         self._lead_rad = np.zeros(model.mj.nq)
         self._play: JointPlay | None = None
-        self._actuators: slice | NDArray[np.intp] = slice(0, 0)
+        self._actuators = np.zeros(0, np.intp)
         self._pushes: list[_Push] = []
-        figures = model.figures
-        self._people = None if figures is None else PeoplePlacer(model.mj, figures)
-        if self._people is not None:
-            self._people.place(self._data, 0.0)
+        self._people = PeoplePlacer(model.mj, model.figures)
+        self._people.place(self._data, 0.0)
         for name, angle in model.rig.rig.start_rad.items():
             self._data.qpos[model.rig.qpos[name]] = angle
         mujoco.mj_forward(self._mj, self._data)
@@ -102,12 +99,7 @@ class World:
 
         Raises:
             ValueError: the device is impossible.
-            SetupError: the device comes from a plugin package.
         """
-        if isinstance(line, PluginLine):
-            raise SetupError(
-                f"a bus of kind {line.kind} has no servos that a world could move: leave --world out"
-            )
         own = {one.id: one for one in self.model.rig.rig.servos if one.bus == bus}
 
         def axis(servo_id: int) -> ShaftAxis | None:
@@ -157,11 +149,7 @@ class World:
             play_rad |= one.axis.play_rad
         if play_rad:
             self._play = JointPlay(self._mj, self._data, self._lead_rad, play_rad)
-        numbers = [one.axis.actuator for one in self._shafts]
-        first = min(numbers, default=0)
-        self._actuators = np.array(numbers, dtype=np.intp)
-        if numbers == list(range(first, first + len(numbers))):  # a slice is quicker
-            self._actuators = slice(first, first + len(numbers))
+        self._actuators = np.array([one.axis.actuator for one in self._shafts], dtype=np.intp)
         # Let MuJoCo update the constants that depend on inertias: shafts now have rotors.
         kept = np.array(self._data.qpos), np.array(self._data.qvel)
         mujoco.mj_setConst(self._mj, self._data)
@@ -212,7 +200,7 @@ class World:
                 lever = data.xpos[push.body] - data.xipos[push.body]
                 wrenches[push.body, :3] += push.force_n
                 wrenches[push.body, 3:] += np.cross(lever, push.force_n)
-        if self._people is not None and self._ms % PEOPLE_MS == 0:
+        if self._ms % PEOPLE_MS == 0:
             self._people.place(data, self._script_s())
         play = self._play
         if play is not None:

@@ -66,8 +66,7 @@ class ServedWorld:
         self._clock_s = clock_s
         self.commands = frozenset(COMMANDS.verbs)
         self.world = World(spec.compile(), clock_s)
-        if spec.figures is not None:
-            spec.figures.share()
+        spec.figures.share()
         self._writer = StateWriter(state, self.world.state().qpos.size)
         self._due_ms = 0
         self._begun = False

@@ -23,7 +23,7 @@ class SpecShapes(NamedTuple):
     figures, mjcf_file: as of ``WorldSpec``; they are small to send
     """
 
-    figures: Figures | None
+    figures: Figures
     mjcf_file: Path | None = None
 
     def parts(self) -> Sequence[WorldPart]:
@@ -34,7 +34,7 @@ class SpecShapes(NamedTuple):
         from gazerig.features.world.model import world_spec
 
         model = world_spec(self.figures, self.mjcf_file).compile()
-        moving = {} if self.figures is None else figure_shapes(self.figures)
+        moving = figure_shapes(self.figures)
         return (
             *fixed_parts(model, moving),
             *(
@@ -48,12 +48,10 @@ class SpecShapes(NamedTuple):
     @property
     def opponent(self) -> Opponent | None:
         """Return the boxer that a person can move, None without one."""
-        return None if self.figures is None else self.figures.opponent
+        return self.figures.opponent
 
     def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
         """Return the poses of all moving parts; see ``WorldShapes.poses``."""
-        if self.figures is None:
-            return {}
         now = self.figures.segments(world_s)
         rows = zip(self.figures.names, now.quat.tolist(), now.p_m.tolist(), strict=True)
         return {name: ((w, x, y, z), (p, q, r)) for name, (w, x, y, z), (p, q, r) in rows}

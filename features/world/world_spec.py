@@ -19,12 +19,12 @@ class WorldSpec(NamedTuple):
     """Content of a world: a room, its people and the rig in it.
 
     Attributes:
-        figures: the people, whose script defines the room; None for an empty floor.
+        figures: the people, whose script defines the room.
         rig: the rig.
         mjcf_file: a user's own world instead of the room.
     """
 
-    figures: Figures | None
+    figures: Figures
     rig: RigInWorld
     mjcf_file: Path | None = None
 
@@ -41,8 +41,6 @@ class WorldSpec(NamedTuple):
 
     def with_shared_file(self, folder: Path) -> "WorldSpec":
         """Return the same world with its people's motion in a file of the folder."""
-        if self.figures is None:
-            return self
         return self._replace(figures=self.figures.with_shared_file(folder / _PEOPLE))
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from described_rigs import SHIPPED
+from world_rigs import NOBODY
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
@@ -17,7 +18,7 @@ def model_with(name: str, path: Path | None = None) -> Any:
     """Return a world with a rig in it, of a file or empty."""
     from gazerig.features.world.model import world_model
 
-    return world_model(None, rig_in_world(load_rig(name), looks=False), path)
+    return world_model(NOBODY, rig_in_world(load_rig(name), looks=False), path)
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from present import present
 
 from gazerig.config.load import shipped_path
 from gazerig.features.world.room import HOME
@@ -63,8 +62,7 @@ def test_everybody_is_where_mujoco_has_them(mujoco: Any) -> None:
     from gazerig.features.world.model import world_spec
 
     found = pickle.loads(pickle.dumps(shapes("conversation")))
-    figures = present(found.figures)
-    model = world_spec(figures, None).compile()
+    figures, model = found.figures, world_spec(found.figures, None).compile()
     data = mujoco.MjData(model)
     assert [part.name for part in found.parts() if part.moves] == list(figures.names)
     for world_s in (0.0, 12.34, 100.0):
