@@ -5,7 +5,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from gazerig.features.world.figure import SEGMENTS, Figures
+from gazerig.features.world.body_motion import SEGMENTS
+from gazerig.features.world.figure import Figures
 from gazerig.features.world.measures import ADULT_M, Measures
 from gazerig.gaze.angles import scale
 from gazerig.gaze.types import Floats

@@ -17,7 +17,7 @@ STEP_S = 0.001
 """Time step of physics, which is also that of the control loop of the emulated servos."""
 
 MOUNT = "gazerig"
-"""Name of the site or frame in a MJCF for the neck base of the rig."""
+"""Name of the site in a MJCF for the neck base of the rig."""
 
 BASE_LINK = "base_link"
 """The body of a rig that does not move; its frame is the frame of the neck base."""
@@ -112,12 +112,12 @@ def _one_line(error: Exception) -> str:
 
 
 def _place_rig(spec: Any, rig: RigInWorld, where: str) -> None:
-    """Put a rig's body at the site or frame of its neck base.
+    """Put a rig's body at the site of its neck base.
 
     Raises:
         SetupError: there is none.
     """
-    mount = spec.site(MOUNT) or spec.frame(MOUNT)
+    mount = spec.site(MOUNT)
     if mount is None:
         raise SetupError(
             f'{where}no place for the head: add <site name="{MOUNT}" pos="0 0 1"/> where its neck '
@@ -127,9 +127,7 @@ def _place_rig(spec: Any, rig: RigInWorld, where: str) -> None:
     head = mujoco.MjSpec.from_string(xml, assets=dict(assets))
     for actuator in tuple(head.actuators):
         head.delete(actuator)
-    # A site and a frame have different arguments.
-    kind = "site" if isinstance(mount, mujoco.MjsSite) else "frame"
-    spec.attach(head, prefix=PREFIX, **{kind: mount})
+    spec.attach(head, prefix=PREFIX, site=mount)
 
 
 def _add_servos(spec: Any, rig: RigInWorld) -> None:

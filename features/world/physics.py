@@ -14,6 +14,7 @@ from gazerig.features.world.joint_play import JointPlay
 from gazerig.features.world.model import PREFIX, WorldModel
 from gazerig.features.world.rig_in_world import ServoInWorld
 from gazerig.features.world.shaft import ShaftAxis, WorldHobbyServo, WorldShaft
+from gazerig.features.world.state_file import WorldState
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, ShaftMakers, build
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
@@ -38,17 +39,6 @@ _UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.m
 
 class WorldUnstable(Error):
     """Divergence of the numbers of a world; its joint angles are no longer valid."""
-
-
-class WorldState(NamedTuple):
-    """State of a world; a picture needs only this and the script of the people.
-
-    t_s: time since the start of the script of its people, 0 before
-    qpos: positions of its joints as MuJoCo orders them, shape (nq,)
-    """
-
-    t_s: float
-    qpos: NDArray[np.float64]
 
 
 class _Push(NamedTuple):
@@ -260,7 +250,7 @@ class World:
 
     def state(self) -> WorldState:
         """Return the current state."""
-        return WorldState(self._script_s(), np.array(self._data.qpos))
+        return WorldState(self._ms / 1e3, self._script_s(), np.array(self._data.qpos))
 
     def joints_rad(self) -> dict[str, float]:
         """Return the current true joint angles of the rig."""

@@ -6,8 +6,7 @@ point; gazerig.sim_mock.cameras.rendered adds the effects of the sensor.
 
 import weakref
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -18,7 +17,6 @@ from gazerig.drivers.types import ImageArray
 from gazerig.features.world.gl_context import open_context
 from gazerig.gaze.angles import add, compose, rotate
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.params import Bounds
 from gazerig.robot.description.links import IDENTITY, ORIGIN
 from gazerig.robot.model.scene_view import PinholeView
 
@@ -29,14 +27,18 @@ _UNSEEN = 5  # a group of geoms that is not drawn
 _SHADOWS_REACH_M = 1.5  # behind the camera
 
 
-@dataclass(frozen=True)
-class RendererParams:
-    """Content of the pictures; each item costs time."""
+class RendererParams(NamedTuple):
+    """Quality of the pictures, which costs time.
 
-    # fmt: off
-    shadow_px: Annotated[int, Bounds(0, 8192), "side of the shadow map; 0: no shadows"] = 512
-    samples: Annotated[int, Bounds(0, 16), "samples a pixel against jagged edges; 0: one"] = 4
-    # fmt: on
+    shadow_px: side of the shadow map, 0: no shadows
+    samples: samples per pixel against jagged edges, 0: one
+    """
+
+    shadow_px: int = 512
+    samples: int = 4
+
+
+DEFAULT_QUALITY = RendererParams()
 
 
 class Renderer:
@@ -51,10 +53,9 @@ class Renderer:
         model: mujoco.MjModel,
         width_px: int,
         height_px: int,
-        params: RendererParams | None = None,
+        params: RendererParams = DEFAULT_QUALITY,
         hidden: Collection[str] = (),
     ) -> None:
-        params = params or RendererParams()
         self._model = model
         self._size = width_px, height_px
         model.vis.quality.shadowsize = params.shadow_px
@@ -189,14 +190,14 @@ class WorldPicture:
         self,
         model: mujoco.MjModel,
         place: PlaceBodies,
-        params: RendererParams | None = None,
+        params: RendererParams = DEFAULT_QUALITY,
         hidden: Collection[str] = (),
         R_world_base: Mat3 = IDENTITY,
         p_world_base_m: Vec3 = ORIGIN,
     ) -> None:
         self._base = R_world_base, p_world_base_m
         self._model, self._place, self._hidden = model, place, hidden
-        self._params = params or RendererParams()
+        self._params = params
         self._data = mujoco.MjData(model)
         self._renderer: Renderer | None = None
 

@@ -104,6 +104,5 @@ class ServedWorld:
             return
         self.world.advance(now_ms)
         if self._begun:
-            state = self.world.state()
-            self._writer.write(now_ms / 1e3, state.t_s, state.qpos)
+            self._writer.write(self.world.state())
         self._due_ms = now_ms + PUBLISH_MS

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from gazerig.features.world.model import WorldModel
 
 
-_SPEC, _STATE, _PEOPLE = "world", "state", "people.npy"
-"""Files in the folder of a server: content of the world, newest state, people's motion."""
+_STATE, _PEOPLE = "state", "people.npy"
+"""Files in the folder of a server: newest state, people's motion."""
 
 
 class WorldSpec(NamedTuple):

@@ -62,17 +62,17 @@ def test_a_users_world_without_a_place_for_the_head_is_refused(tmp_path: Path) -
         model_with("desk", path)
 
 
-UNUSABLE = (
-    ("", "read"),
+@pytest.mark.parametrize(
+    ("text", "why"),
     (
-        '<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody>'
-        '<site name="gazerig"/></worldbody></mujoco>',
-        "build",
+        ("", "read"),
+        (
+            '<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody>'
+            '<site name="gazerig"/></worldbody></mujoco>',
+            "build",
+        ),
     ),
 )
-
-
-@pytest.mark.parametrize(("text", "why"), UNUSABLE)
 def test_a_users_world_that_cannot_be_used_is_one_line(tmp_path: Path, text: str, why: str) -> None:
     """MuJoCo's own message follows."""
     path = tmp_path / "own.xml"

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from world_scripts import WORLDS, shipped_world
 
-from gazerig.features.world.figure import SEGMENTS, Figures
+from gazerig.features.world.body_motion import SEGMENTS
+from gazerig.features.world.figure import Figures
 from gazerig.features.world.timeline import HEAD_M
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.gaze.types import Floats

@@ -14,7 +14,7 @@ from gazerig.config.schema import load_rig
 from gazerig.features.world.gl_context import NoRenderer
 from gazerig.features.world.opponent_motion import HOLD_S, MAX_M_S, MAX_M_S2, TAKE_S, OpponentMotion
 from gazerig.features.world.run.poses import RigInState, WorldPoses
-from gazerig.features.world.run.run_world import RunWorld, world_of, world_scene
+from gazerig.features.world.run.run_world import world_of, world_scene
 from gazerig.features.world.run.sight import ComputedCamera
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.gaze.types import Vec3
@@ -96,11 +96,9 @@ class Host:
         from gazerig.features.world.served_world import ServedWorld
 
         self.rig = load_rig("minimal")
-        world = world_of(self.rig, RunOptions(mock=True, world="living-room"))
-        assert world is not None
-        self.world: RunWorld = world
+        self.world = world_of(self.rig, RunOptions(mock=True, world="living-room"))
         self.t_s = 100.0
-        self.served = ServedWorld(world.spec, folder / "state", lambda: self.t_s)
+        self.served = ServedWorld(self.world.spec, folder / "state", lambda: self.t_s)
         for name, line in emulated_lines(self.rig).items():
             self.served.device(BusSettings(line, name))
         joints = RigInState(rig_kinematics(self.rig), self.served.joints())

@@ -13,12 +13,12 @@ from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.types import Camera
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
-from gazerig.features.world.run.run_world import RunWorld, world_ideal_bus
-from gazerig.features.world.run.sight import ComputedCamera, RenderedWorld
+from gazerig.features.world.run.run_world import RunWorld
+from gazerig.features.world.run.sight import LATENCY_MS, ComputedCamera, RenderedWorld
 from gazerig.features.world.serve import SentWorld
 from gazerig.features.world.shapes import SpecShapes
 from gazerig.features.world.world_spec import state_file
-from gazerig.robot.app.bus_wiring import guarded_rig_bus
+from gazerig.robot.app.bus_wiring import guarded_rig_bus, servo_configs
 from gazerig.robot.app.camera_factory import frame_locator
 from gazerig.robot.app.drawn_camera import DrawnSource
 from gazerig.robot.app.gaze_models import rig_kinematics
@@ -76,8 +76,14 @@ class RigRoom:
         if isinstance(poses, SimulatedPoses):
             from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
 
-            finds_motion = SyntheticMotionDetector(rig.motion)
-            return rendered.simulated_pixels(own.make_detector(rig.detector), finds_motion, locate)
+            return rendered.pixels(
+                poses.head,
+                own.make_detector(rig.detector),
+                LATENCY_MS,
+                SyntheticMotionDetector(rig.motion),
+                locate,
+                poses.begin_s,
+            )
         motion = partial(MotionSource, rig.motion, placed.lens, radians(field_deg), sight.turns)
         source = partial(DrawnSource, rendered.served_pixels, poses)
         parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
@@ -109,7 +115,13 @@ def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> R
         return RigRoom(world.served(buses.folder), clock, run_bus, head)
     computed = world.computed(clock.now_s)
     if options.bus == "ideal":
-        run_bus = ideal_run_bus(rig, world_ideal_bus(rig, computed))
+        # Imports MuJoCo, which only runs in a world need.
+        from gazerig.features.world.ideal_bus import WorldIdealBus
+
+        measured = [rig.joints[name].model_facts.measures_position for name in rig.names]
+        shafts = computed.ideal_shafts()
+        ideal = WorldIdealBus(servo_configs(rig), shafts, measured, computed.now_s)
+        run_bus = ideal_run_bus(rig, ideal)
     else:
         devices = {name: computed.device(line, name) for name, line in lines.items()}
         run_bus = in_process_run_bus(rig, devices)

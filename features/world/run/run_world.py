@@ -17,7 +17,7 @@ from gazerig.features.world.room import HOME
 from gazerig.features.world.timeline import CHECKS
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import WorldSpec
-from gazerig.robot.app.bus_wiring import bus_names, servo_configs
+from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import BOARDS, CHAINS, STOP_BEYOND_DEG, start_angles_rad
 from gazerig.robot.app.run_rig import refuse_missing_rules
@@ -26,7 +26,6 @@ from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import SceneScript, WorldCameraParams
 
 if TYPE_CHECKING:
-    from gazerig.features.world.ideal_bus import WorldIdealBus
     from gazerig.features.world.physics import World
 
 
@@ -51,15 +50,6 @@ def _body(rig: Rig, looks: bool) -> tuple[str, Mapping[str, bytes]]:
 
     xml, assets = mjcf(description_of(rig, looks=looks), looks=looks)
     return xml, assets
-
-
-def world_ideal_bus(rig: Rig, world: "World") -> "WorldIdealBus":
-    """Return all servos of a rig in a world without bytes."""
-    # Imports MuJoCo, which only runs in a world need.
-    from gazerig.features.world.ideal_bus import WorldIdealBus
-
-    measured = [rig.joints[name].model_facts.measures_position for name in rig.names]
-    return WorldIdealBus(servo_configs(rig), world.ideal_shafts(), measured, world.now_s)
 
 
 def _servo(rig: Rig, name: str) -> ServoInWorld:
@@ -140,16 +130,8 @@ def world_scene(name_or_path: str, seed: int) -> WorldScene:
     name = Path(name_or_path).stem
     if mjcf_of(name_or_path) is not None:
         return WorldScene(name, Figures(SceneScript(people={}), seed))
-    return WorldScene(name, Figures(world_script(name_or_path), seed))
-
-
-def world_script(name_or_path: str) -> SceneScript:
-    """Return the script of a world.
-
-    Raises:
-        gazerig.config.load.ConfigError: the file has a fault or does not exist.
-    """
-    return _read(*script_file("worlds", name_or_path, HOME))
+    script = _read(*script_file("worlds", name_or_path, HOME))
+    return WorldScene(name, Figures(script, seed))
 
 
 @lru_cache(maxsize=2)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from gazerig.robot.model.scene_view import SceneView
     from gazerig.sim_mock.cameras.rendered import FindMotion, PixelCamera
 
-_LATENCY_MS = 60.0
+LATENCY_MS = 60.0
 """Delay from the exposure of a picture to its arrival in simulated time."""
 HEAD_LINK = "rig_head"
 """Link of a rig that carries its camera, and is invisible to it."""
@@ -115,17 +115,6 @@ class RenderedWorld(NamedTuple):
         )  # fmt: skip
         view.draw(PinholeView(0.0, lens, size_px, _LEVEL, (0.0, 0.0, 0.0)))
         return camera
-
-    def simulated_pixels(
-        self, detector: FaceDetector, find_motion: "FindMotion", locate: Locate
-    ) -> "PixelCamera":
-        """Return the camera that renders a world of this process, on the clock of the run.
-
-        Raises:
-            NoRenderer: nothing on this machine can render.
-        """
-        begins_s = self.poses.begin_s
-        return self.pixels(self.poses.head, detector, _LATENCY_MS, find_motion, locate, begins_s)
 
     def _view(self) -> "SceneView":
         """Return the renderer's view of the world."""
