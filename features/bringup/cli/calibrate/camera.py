@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from enum import StrEnum
-from math import atan, degrees, radians
+from math import degrees, radians
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -14,26 +14,29 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.capture_loop import CameraParts
 from gazerig.drivers.camera.oak.source import OakSource
-from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.errors import SetupError, require_package
 from gazerig.drivers.types import DetectedFace, ImageArray
-from gazerig.features.bringup.calibration.camera_calibration import (
-    CameraCalibrationRefused,
-    lens_params,
-)
+from gazerig.features.bringup.calibration.board_page import RULER_MM, write_page
+from gazerig.features.bringup.calibration.board_views import MOST_VIEWS, ViewCollector
 from gazerig.features.bringup.calibration.camera_procedure import (
-    LensSteps,
-    Neck,
+    JoggedNeck,
     neck_angles,
     neck_steps,
 )
-from gazerig.features.bringup.calibration.charuco_views import RULER_MM, write_page
-from gazerig.features.bringup.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
+from gazerig.features.bringup.calibration.hand_eye import HandEye, camera_on_head
+from gazerig.features.bringup.calibration.lens_calibration import (
+    CameraCalibrationRefused,
+    LensCalibration,
+    calibrate_lens,
+    field_deg,
+    lens_params,
+)
 from gazerig.features.bringup.cli.manual_session import holding_rig
-from gazerig.features.bringup.cli.ports import rig_ports
+from gazerig.features.bringup.cli.ports import MockOption, rig_ports
 from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
 from gazerig.features.bringup.cli.rig_writer import (
     AllYesOption,
@@ -42,8 +45,7 @@ from gazerig.features.bringup.cli.rig_writer import (
     refuse_unwritable,
     show_and_write,
 )
-from gazerig.features.bringup.manual_control import JogParams, ManualControl
-from gazerig.gaze.types import Angles3
+from gazerig.features.bringup.manual_control import JogParams
 from gazerig.robot.app.camera_factory import frame_orientation
 from gazerig.robot.app.rig_limits import lid_ends, neck_span
 from gazerig.robot.cli.terminal import (
@@ -62,6 +64,9 @@ from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import NECK, Kinematics
 from gazerig.sim_mock.cameras.charuco_scene import BOARD_LENS, BoardScene
 
+_GENTLE_DEG_S = 15.0
+_FIRST_FRAME_S = 5.0
+
 
 class Paper(StrEnum):
     """Paper to print on; the keys of PAPERS_MM."""
@@ -78,23 +83,14 @@ class CalibrationTarget(StrEnum):
     mount = "mount"
 
 
-ColumnsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from left to right.")]
-RowsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from top to bottom.")]
-SquareOption = Annotated[float, typer.Option(metavar="MM", help="Side of a square.")]
-_BOARD = BoardParams()
-
-
 def calibrate_board(
     out: Annotated[Path, typer.Argument(help="File to write, .pdf or .png.")] = Path("board.pdf"),
     paper: Annotated[Paper, typer.Option(help="Paper, laid crosswise.")] = Paper.a4,
-    columns: ColumnsOption = _BOARD.columns,
-    rows: RowsOption = _BOARD.rows,
-    square: SquareOption = _BOARD.square_mm,
     force: ForceOption = False,
 ) -> None:
     """Write the ChArUco board as a page to print at true size: gazerig calibrate board."""
     with clear_errors():
-        write_page(CharucoBoard(_board(columns, rows, square, RULER_MM)), paper.value, out, force)
+        write_page(CharucoBoard(), paper.value, out, force)
         say(f"{out}: print it at 100 % on {paper.value}, glue it on something flat and stiff,")
         say(f"and measure the ruler: if it is not {RULER_MM} mm, give --ruler when calibrating")
 
@@ -109,17 +105,13 @@ def calibrate_camera(
         bool, typer.Option("--oak", help="Use an OAK camera, whose frames have their lens.")
     ] = False,
     ruler: Annotated[
-        float, typer.Option(metavar="MM", help="Measured length of the printed 100 mm ruler, mm.")
+        float,
+        typer.Option(metavar="MM", min=20, max=500, help="Length of the printed 100 mm ruler."),
     ] = float(RULER_MM),
-    columns: ColumnsOption = _BOARD.columns,
-    rows: RowsOption = _BOARD.rows,
-    square: SquareOption = _BOARD.square_mm,
     out: OutOption = None,
     dry_run: DryRunOption = False,
     yes: AllYesOption = False,
-    mock: Annotated[
-        bool, typer.Option("--mock", help="Use emulated servos and a simulated board.")
-    ] = False,
+    mock: MockOption = False,
     port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
 ) -> None:
     """Measure the lens and the place of the camera, with the printed board."""
@@ -128,30 +120,36 @@ def calibrate_camera(
             raise SetupError("--oak and --camera name two cameras: leave one away")
         if mock and oak:
             raise SetupError("--mock simulates a webcam: leave --oak away")
-        if what is not CalibrationTarget.lens:
+        loaded, moves = load_rig(rig), what is not CalibrationTarget.lens
+        if moves:
             require_package("scipy", "calibration")
-        loaded = load_rig(rig)
-        board = CharucoBoard(_board(columns, rows, square, ruler))
-        if loaded.camera.mount != "head" and what is not CalibrationTarget.lens:
-            raise SetupError(
-                "camera.mount is base: the camera does not turn with the head, so looking from "
-                "several neck angles shows nothing; use --what lens"
-            )
+            _refuse_fixed(loaded)
         if not dry_run:
             refuse_unwritable(rig, out)
-        job = _Job(
-            loaded, board, stopped, Kinematics(loaded.geometry, loaded.joints, lid_ends(loaded))
-        )
+        board = CharucoBoard(BoardParams().scaled(ruler / RULER_MM))
+        person = TerminalPerson(Lines(None), stopped, yes)
         source = OakSource(loaded.oak) if oak else Webcam(camera or 0, loaded.webcam)
-        with _open_camera(job, None if mock else source) as eye:
-            lens = _find_lens(job, eye, what)
-            changes = lens.changes
-            if what is not CalibrationTarget.lens:
-                with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
-                    found = _measure_mount(job, eye, neck, lens.camera, lens.good)
-                    changes |= mount_changes(found, lens.camera)
-        show_and_write(
-            rig, loaded, changes, out, dry_run, TerminalPerson(Lines(None), stopped, yes)
+        with _open_camera(loaded, board, None if mock else source, stopped) as eye:
+            seen, changes = loaded.camera, dict[str, Any]()
+            if what is not CalibrationTarget.mount:
+                seen, changes = _find_lens(loaded, board, eye)
+            if moves:
+                found = _measure_mount(loaded, board, eye, seen, port, stopped, person)
+                changes |= mount_changes(found, seen)
+        show_and_write(rig, loaded, changes, out, dry_run, person)
+
+
+def _refuse_fixed(rig: Rig) -> None:
+    """Refuse a camera that the neck does not turn."""
+    if rig.camera.mount != "head":
+        raise SetupError(
+            "camera.mount is base: the camera does not turn with the head, so looking from "
+            "several neck angles shows nothing; use --what lens"
+        )
+    if any(name not in rig.joints for name in NECK[:2]):
+        raise CameraCalibrationRefused(
+            "the camera's place is found by turning the neck left, right, up and down, and "
+            "this rig's does not: measure its place and write it into camera.position_mm"
         )
 
 
@@ -168,32 +166,12 @@ def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
     }
 
 
-class _Job(NamedTuple):
-    """Values that all steps need."""
-
-    rig: Rig
-    board: CharucoBoard
-    stopped: Callable[[], str | None]
-    kinematics: Kinematics
-
-
-class _KnownLens(NamedTuple):
-    """The lens, as far as known.
-
-    camera: camera with the lens; changes: values for the rig's file; good: its assumed quality
-    """
-
-    camera: CameraParams
-    changes: dict[str, Any]
-    good: HandEyeParams
-
-
 class _CameraView(NamedTuple):
     """Source of frames, and the simulated camera behind it, if any."""
 
+    next: Callable[[], Shot]
     look: Callable[[], Shot | None]
     now_s: Callable[[], float]
-    rest: Callable[[float], None]
     mock: BoardScene | None
 
 
@@ -206,91 +184,106 @@ class _NullDetector:
 
 
 @contextlib.contextmanager
-def _open_camera(job: _Job, source: FrameSource | None) -> Iterator[_CameraView]:
-    """Open the camera, or a simulated one."""
-    clock = RealClock()
+def _open_camera(
+    rig: Rig, board: CharucoBoard, source: FrameSource | None, stopped: Callable[[], str | None]
+) -> Iterator[_CameraView]:
+    """Open the camera; a simulated one without a source."""
+    clock, last = RealClock(), 0
+    scene: BoardScene | None = None
+    worker: CameraWorker | None = None
     if source is None:
-        simulated = BoardScene(job.rig.camera, job.board, job.kinematics)
-        yield _CameraView(
-            lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated
+        scene = BoardScene(rig.camera, board, _kinematics(rig))
+    else:
+        parts = CameraParts(
+            lambda: source, _NullDetector, orientation=frame_orientation(rig.camera)
         )
-        return
-    orientation = frame_orientation(job.rig.camera)
-    parts = CameraParts(lambda: source, _NullDetector, orientation=orientation)
-    camera = CameraWorker(parts, clock.now_s, in_thread=True)
+        worker = CameraWorker(parts, clock.now_s, in_thread=True)
 
     def look() -> Shot | None:
-        found = camera.latest(clock.now_s())
+        if scene is not None:
+            return scene.look(clock.now_s())
+        found = None if worker is None else worker.latest(clock.now_s())
         if found is None or found.image is None:
             return None
         return Shot(found.captured_s, found.number, found.image, lens=found.lens)
 
-    camera.open()
-    try:
-        yield _CameraView(look, clock.now_s, lambda s: clock.sleep_until(clock.now_s() + s), None)
-    finally:
-        camera.close()
+    def wait_for_next() -> Shot:
+        nonlocal last
+        end_s = clock.now_s() + _FIRST_FRAME_S
+        while (shot := look()) is None or shot.number == last:
+            raise_if_stopped(stopped)
+            if clock.now_s() > end_s:
+                raise SetupError(
+                    "the camera gives no frames: check its cable, or name another (--camera N)"
+                )
+            clock.sleep_until(clock.now_s() + 0.01)
+        raise_if_stopped(stopped)
+        last = shot.number
+        return shot
+
+    with contextlib.ExitStack() as closed:
+        if worker is not None:
+            worker.open()
+            closed.callback(worker.close)
+        yield _CameraView(wait_for_next, look, clock.now_s, scene)
 
 
-def _find_lens(job: _Job, eye: _CameraView, what: CalibrationTarget) -> _KnownLens:
-    """Return the lens of the rig, or that of the camera's own frames, or measure it."""
-    if what is CalibrationTarget.mount:
-        return _KnownLens(job.rig.camera, {}, HandEyeParams())
-    first = _first_frame(job, eye)
-    if first.lens is not None:
-        return _known_lens(job, first.lens, first.image)
-    steps, number = LensSteps(job.board, radians(job.rig.camera.horizontal_field_deg)), 0
-    say("hold the board before the camera and do what the line below says; Ctrl-C gives up")
-    while True:
-        raise_if_stopped(job.stopped)
-        shot = eye.look()
-        if shot is None or shot.number == number:
-            eye.rest(0.01)
-            continue
-        number = shot.number
-        step = steps.take(shot)
-        lens, desired = None, step.coverage.missing[0] if step.coverage.missing else "enough"
-        if step.coverage.enough and step.kept:
-            lens, why = steps.try_result()
-            desired = why or desired
-        note = "kept" if step.kept else step.why
-        status(f"{step.coverage.views} views, {step.corners} corners ({note}): {desired}")
-        if lens is not None:
-            break
-    i = lens.intrinsics
+def _find_lens(
+    rig: Rig, board: CharucoBoard, eye: _CameraView
+) -> tuple[CameraParams, dict[str, Any]]:
+    """Return the camera with its lens, from its own frames or measured, and the keys to write."""
+    first = eye.next()
+    height, width = first.image.shape[:2]
+    if (own := first.lens) is not None:
+        say(
+            f"the camera's own lens: focal length {own.fx_px:.1f}, {own.fy_px:.1f} px, axis at "
+            f"{own.cx_px:.1f}, {own.cy_px:.1f} px of {width} x {height}"
+        )
+        return _with_lens(rig.camera, own, width, height)
+    lens = _measure_lens(rig, board, eye, width, height)
+    i, (fx, fy, cx, cy) = lens.intrinsics, lens.std_px
     say(
-        f"lens: {len(lens.kept)} views, {len(lens.dropped)} dropped, reprojection error "
+        f"lens: {len(lens.view_rms_px)} views, {lens.dropped} dropped, reprojection error "
         f"{lens.rms_px:.2f} px (worst view {max(lens.view_rms_px):.2f})"
     )
     say(
-        f"focal length {i.fx_px:.1f} +-{lens.focal_std_px[0]:.1f}, "
-        f"{i.fy_px:.1f} +-{lens.focal_std_px[1]:.1f} px; axis at {i.cx_px:.1f} "
-        f"+-{lens.centre_std_px[0]:.1f}, {i.cy_px:.1f} +-{lens.centre_std_px[1]:.1f} px"
+        f"focal length {i.fx_px:.1f} +-{fx:.1f}, {i.fy_px:.1f} +-{fy:.1f} px; axis at "
+        f"{i.cx_px:.1f} +-{cx:.1f}, {i.cy_px:.1f} +-{cy:.1f} px"
     )
     if eye.mock is not None:
         t = BOARD_LENS
         say(f"true: {t.fx_px:.1f}, {t.fy_px:.1f} px; axis at {t.cx_px:.1f}, {t.cy_px:.1f} px")
-    camera = replace(job.rig.camera, lens=lens.params())
-    focal = max(lens.focal_std_px) / i.fx_px * 100.0
-    centre = max(lens.centre_std_px) * 640.0 / lens.width_px
-    good = HandEyeParams(lens_error_percent=max(focal, 0.02), centre_error_px=max(centre, 0.1))
-    return _KnownLens(camera, lens_keys(lens.params(), lens.horizontal_field_deg), good)
+    return _with_lens(rig.camera, i, width, height)
 
 
-def _known_lens(job: _Job, lens: Intrinsics, image: ImageArray) -> _KnownLens:
-    """Return the lens that an OAK camera gives with its frames, from its factory calibration."""
-    height, width = image.shape[:2]
-    longer, axis, focal = (
-        (width, lens.cx_px, lens.fx_px) if width >= height else (height, lens.cy_px, lens.fy_px)
-    )
-    left, right = (axis + 0.5) / focal, (longer - 0.5 - axis) / focal
+def _measure_lens(
+    rig: Rig, board: CharucoBoard, eye: _CameraView, width: int, height: int
+) -> LensCalibration:
+    """Collect views of a board in a person's hands until they determine the lens."""
+    guess = intrinsics_of_view(radians(rig.camera.horizontal_field_deg), width, height)
+    collector = ViewCollector(guess, width, height)
+    say("hold the board before the camera and do what the line below says; Ctrl-C gives up")
+    while True:
+        image = eye.next().image
+        if image.shape[:2] != (height, width):
+            raise SetupError("the size of the camera's frames has changed: start again")
+        why = collector.offer(board.find(image))
+        desired = collector.missing
+        if not desired and not why:
+            try:
+                return calibrate_lens(collector.views, width, height)
+            except CameraCalibrationRefused as refused:
+                if len(collector.views) >= MOST_VIEWS:
+                    raise
+                desired = str(refused)
+        status(f"{len(collector.views)} views ({why or 'kept'}): {desired}")
+
+
+def _with_lens(
+    camera: CameraParams, lens: Intrinsics, width: int, height: int
+) -> tuple[CameraParams, dict[str, Any]]:
     params = lens_params(lens, width, height)
-    say(
-        f"the camera's own lens: focal length {lens.fx_px:.1f}, {lens.fy_px:.1f} px, axis at "
-        f"{lens.cx_px:.1f}, {lens.cy_px:.1f} px of {width} x {height}"
-    )
-    changes = lens_keys(params, degrees(atan(left) + atan(right)))
-    return _KnownLens(replace(job.rig.camera, lens=params), changes, HandEyeParams())
+    return replace(camera, lens=params), lens_keys(params, field_deg(lens, width, height))
 
 
 def lens_keys(lens: LensParams, horizontal_field_deg: float) -> dict[str, Any]:
@@ -300,13 +293,18 @@ def lens_keys(lens: LensParams, horizontal_field_deg: float) -> dict[str, Any]:
 
 
 def _measure_mount(
-    job: _Job, eye: _CameraView, neck: Neck, camera: CameraParams, good: HandEyeParams
+    rig: Rig,
+    board: CharucoBoard,
+    eye: _CameraView,
+    camera: CameraParams,
+    port: str | None,
+    stopped: Callable[[], str | None],
+    person: TerminalPerson,
 ) -> HandEye:
     """Observe the hanging board from several neck angles."""
     if camera.lens is None:
         raise SetupError("the lens is not measured yet: calibrate it first (--what lens or all)")
-    shot = _first_frame(job, eye)
-    height, width = shot.image.shape[:2]
+    height, width = eye.next().image.shape[:2]
     if camera.lens.size_px != (width, height):
         wide, high = camera.lens.size_px
         raise SetupError(
@@ -314,100 +312,53 @@ def _measure_mount(
             "again (--what all)"
         )
     lens = intrinsics_of_lens(camera.lens, radians(camera.horizontal_field_deg), width, height)
-    yaw, pitch, roll = (neck_span(job.rig, name) for name in NECK)
-    planned = neck_angles((yaw, pitch, roll), lens, width, height)
+    planned = neck_angles([neck_span(rig, name) for name in NECK], lens, width, height)
     views = []
-    for step in neck_steps(neck, eye.look, eye.now_s, job.board, job.kinematics, planned):
-        yaw_deg, pitch_deg, roll_deg = map(degrees, step.asked_rad)
-        what = f"{step.corners} corners" if step.view is not None else step.why
-        say(
-            f"{step.number}/{step.step_count}: yaw {yaw_deg:+.0f}, pitch {pitch_deg:+.0f}, "
-            f"roll {roll_deg:+.0f}: {what}"
-        )
-        if step.view is not None:
-            views.append(step.view)
-    found = camera_on_head(views, lens, width, good)
+    with _moving_neck(rig, eye.mock, port, stopped, person) as neck:
+        steps = neck_steps(neck, eye.look, eye.now_s, board, _kinematics(rig), planned)
+        for number, step in enumerate(steps, 1):
+            raise_if_stopped(stopped)
+            angles = ", ".join(f"{degrees(angle):+.0f}" for angle in step.asked_rad)
+            found = step.why if step.view is None else f"{len(step.view.seen.ids)} corners"
+            say(f"{number}/{len(planned)}: yaw, pitch, roll {angles}: {found}")
+            if step.view is not None:
+                views.append(step.view)
+    result = camera_on_head(views, lens, width)
+    x, y, z = result.position_std_mm
     say(
-        f"mount: {len(found.kept)} views, {len(found.dropped)} dropped, reprojection error "
-        f"{found.rms_px:.2f} px, {found.corner_px:.2f} px with neck joints off by "
-        f"{found.joint_error_deg:.2f} deg"
+        f"mount: {len(views)} views, reprojection error {result.rms_px:.2f} px, neck joints off by "
+        f"{result.joint_error_deg:.2f} deg; sure to {x:.1f}, {y:.1f}, {z:.1f} mm and "
+        f"{max(result.angle_std_deg):.2f} deg"
     )
-    mm, deg = found.position_std_mm, found.angle_std_deg
-    say(f"sure to {mm[0]:.1f}, {mm[1]:.1f}, {mm[2]:.1f} mm and {max(deg):.2f} deg")
     if eye.mock is not None:
         t = eye.mock.mount
         at = ", ".join(f"{mm:.1f}" for mm in t.position_mm)
         say(f"true: {at} mm, yaw {t.yaw_deg:.2f}, pitch {t.pitch_deg:.2f}, roll {t.roll_deg:.2f}")
-    return found
+    return result
 
 
-def _first_frame(job: _Job, eye: _CameraView) -> Shot:
-    """Wait for a frame."""
-    give_up_s = eye.now_s() + 5.0
-    while eye.now_s() < give_up_s:
-        raise_if_stopped(job.stopped)
-        shot = eye.look()
-        if shot is not None:
-            return shot
-        eye.rest(0.02)
-    raise SetupError("the camera gives no frames: check its cable, or name another (--camera N)")
+def _kinematics(rig: Rig) -> Kinematics:
+    return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
 
 
-def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardParams:
-    """Return the board with its printed size."""
-    marker_mm = square_mm * _BOARD.marker_mm / _BOARD.square_mm
-    try:
-        return BoardParams(columns, rows, square_mm, marker_mm).scaled(ruler_mm / RULER_MM)
-    except ValueError as error:
-        raise SetupError(f"this board cannot be: {error}") from error
+class _SimulatedNeck(JoggedNeck):
+    """Neck of emulated servos, which also turns the simulated camera."""
 
-
-StopReason = Callable[[], str | None]
-"""Returns why to stop, None without a reason."""
-
-_GENTLE_DEG_S = 15.0
-_SETTLE_S = 0.4
-
-
-class JoggedNeck:
-    """``calibration.camera_procedure.Neck`` that moves through the guard, like jogging."""
-
-    def __init__(
-        self, control: ManualControl, mock: BoardScene | None, stopped: StopReason
-    ) -> None:
-        self._control, self._mock, self._stopped = control, mock, stopped
-        self._angles: Angles3 = (0.0, 0.0, 0.0)
-
-    def turn(self, head_rad: Angles3) -> None:
-        """Move gently; if the guard limits the motion, the measured angles are used."""
-        raise_if_stopped(self._stopped)
-        there = self._control.body.names
-        axes = zip(NECK, head_rad, strict=True)
-        goal = {name: degrees(a) for name, a in axes if name in there}
-        moved = self._control.pose(goal)
-        if moved.end_reason == "torque_off":
-            raise SetupError(
-                "the torque went off during the move: see gazerig doctor, then start again"
-            )
-        self.rest(_SETTLE_S)
+    scene: BoardScene
 
     def rest(self, seconds: float) -> None:
-        """Hold still, and measure the head."""
-        moved = self._control.hold(seconds)
-        raise_if_stopped(self._stopped)
-        at = dict(zip(self._control.body.names, moved.last.joints.position_rad, strict=True))
-        self._angles = (at.get(NECK[0], 0.0), at.get(NECK[1], 0.0), at.get(NECK[2], 0.0))
-        if self._mock is not None:
-            self._mock.head_rad = self._angles
-
-    def angles(self) -> Angles3:
-        """Return yaw, pitch and roll as last measured."""
-        return self._angles
+        """Hold still for a time, and measure the head."""
+        super().rest(seconds)
+        self.scene.head_rad = self.angles
 
 
 @contextlib.contextmanager
-def moving_neck(
-    rig: Rig, mock: BoardScene | None, port: str | None, stopped: StopReason, yes: bool
+def _moving_neck(
+    rig: Rig,
+    mock: BoardScene | None,
+    port: str | None,
+    stopped: Callable[[], str | None],
+    person: TerminalPerson,
 ) -> Iterator[JoggedNeck]:
     """Return a neck that moves gently; in all cases it ends with the torque off.
 
@@ -416,30 +367,24 @@ def moving_neck(
     Raises:
         SetupError: port or servos do not match the configuration, or the answer was no.
     """
-    if any(name not in rig.joints for name in NECK[:2]):
-        raise CameraCalibrationRefused(
-            "the camera's place is found by turning the neck left, right, up and down, and "
-            "this rig's does not: measure its place and write it into camera.position_mm"
-        )
     say("hang the board upright, 0.5 to 1 m before the head, where it cannot move; the head")
     say("will look at it from several sides: keep your fingers away; Ctrl-C stops it")
-    if mock is not None:
-        mock.head_rad = (0.0, 0.0, 0.0)
-    elif not TerminalPerson(Lines(None), stopped, yes).agrees(
-        "does the board hang, and is the head free to move?"
-    ):
+    if mock is None and not person.agrees("does the board hang, and is the head free to move?"):
         raise CameraCalibrationRefused("left out as you asked: nothing was written")
     params = JogParams(speed_deg_s=_GENTLE_DEG_S)
     with (
         rig_ports(rig, mock is not None, port) as wire,
         holding_rig(rig, wire.paths, params, stopped, Interrupts.from_stop(stopped)) as control,
     ):
-        neck = JoggedNeck(control, mock, stopped)
+        neck = JoggedNeck(control)
+        if mock is not None:
+            neck = _SimulatedNeck(control)
+            neck.scene = mock
         neck.rest(0.1)
         yield neck
 
 
-def raise_if_stopped(stopped: StopReason) -> None:
+def raise_if_stopped(stopped: Callable[[], str | None]) -> None:
     """Refuse to continue if there is a reason to stop.
 
     Raises:
