@@ -5,6 +5,7 @@ from functools import cache
 
 import pytest
 from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one
+from msgspec import structs
 from present import present
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
@@ -30,7 +31,6 @@ from gazerig.features.bringup.bus_search import (
 )
 from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685
 from gazerig.features.bringup.doctor.diagnostics import Diagnostic, Fix, worst_level
-from gazerig.features.bringup.doctor.servo_checks import CHECKS
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, KINDS
 from gazerig.features.bringup.servo_setup import (
@@ -57,7 +57,7 @@ def healthy(name):
         rig.set(1, shutdown=52)  # as from the factory it is worth a note
     found = ping(rig.port, kind.family, 1, BAUD)
     registers = Transactions(rig.port, kind.family)
-    state = read_state(registers, CHECKS[kind.name], rig.setups[0], present(found), False)
+    state = read_state(registers, kind, rig.setups[0], present(found), False)
     assert None not in state.values.values() and worst_level(apply_rules(state)) == "ok"
     return state
 
@@ -69,7 +69,7 @@ def found_as(kind, **other):
 def servo_state(kind, setup=None, found=None, shares_id=False, **values):
     """Return a healthy servo with some registers otherwise."""
     state = healthy(kind.name)
-    return replace(
+    return structs.replace(
         state,
         setup=setup or state.setup,
         found=found or state.found,
@@ -104,7 +104,7 @@ DYNAMIXEL_RULES = [
     (
         {"shutdown": 1},
         "warn",
-        "does not switch off at overheating, electrical shock, overload",
+        "does not switch off at each of overheating, electrical shock, overload (Shutdown 1)",
         "set Shutdown (63) to 53",
     ),
     ({"status_return_level": 1}, "warn", "does not confirm commands", "--fix"),
@@ -285,7 +285,7 @@ def test_a_good_board_and_what_no_board_tells():
     assert "12 channels" in one(findings, "ok", "the board", "answers").what
     assert one(findings, "note", "the servos", "hobby servos report nothing")
     reported = one(findings, "note", "the board", "serial timeout cannot be read")
-    assert "Pololu's program" in reported.remedy and "gazerig setup" in reported.remedy
+    assert "Timeout to 0.5 s" in reported.remedy and "every channel to Off" in reported.remedy
     wide = one(findings, "note", "left_upper_lid (channel 2)", "goes to 900..1800 us")
     assert "Min to 896" in wide.remedy and "cuts goals silently" in wide.what
     assert not any(f.where == "eyes_pan (channel 0)" for f in findings)

@@ -5,8 +5,9 @@ is off, and moves nothing.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
+
+import msgspec
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import DriverError, PortError, ServoFault, ServoMissing, SetupError
@@ -21,8 +22,7 @@ from gazerig.drivers.servo_bus.discovery import (
 )
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix
-from gazerig.features.bringup.doctor.servo_checks import CHECKS
+from gazerig.features.bringup.doctor.diagnostics import ADVICE, Diagnostic, Fix
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.servo_kinds import ServoKind, Tell
 from gazerig.features.bringup.servo_setup import (
@@ -34,30 +34,6 @@ from gazerig.features.bringup.servo_setup import (
 )
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, describe
-
-# fmt: off
-ADVICE = {
-    "nobody": Advice("error", "no servo answers, at {baud} bit/s or any other rate",
-        "{kind.no_reply} gazerig scan asks other kinds of servos, too"),
-    "elsewhere": Advice("error", "answers at {found.baud} bit/s, the rig's rate is {baud}",
-        "connect it alone and run gazerig setup --joint {setup.name}"),
-    "spare": Advice("error", "does not answer, but a new {setup.model} does (id {found.id} at "
-        "{found.baud} bit/s)", "gazerig doctor --fix gives that one id {setup.id} and {baud} bit/s; "
-        "then gazerig calibrate --joint {setup.name}, as its zero is another"),
-    "pieces": Advice("error", "answers in pieces only: two servos share its id, or a plug is loose",
-        "connect it alone and look with gazerig scan"),
-    "spares": Advice("warn", "at {baud} bit/s answers came in pieces: two new servos with one id?",
-        "connect one of them alone and run gazerig setup"),
-    "silent": Advice("error", "does not answer",
-        "check its two plugs; is its id set? gazerig setup, with it connected alone, reports it"),
-    "new": Advice("warn",
-        "servo {found.id} ({found.model}) answers at {found.baud} bit/s and is none of the missing "
-        "({missing})", "a new one? connect it alone and run gazerig setup"),
-    "stranger": Advice("warn", "servo {found.id} ({found.model}) answers and is not in the YAML",
-        "take it off the bus, or give it the id of a joint with gazerig setup"),
-}
-# fmt: on
-
 
 ADOPT = "id"
 """Register of the fix that gives a new servo the id and the baud rate of a missing one."""
@@ -94,9 +70,9 @@ def examine_port(port: BusPort, examine: Callable[[], list[Diagnostic]]) -> list
     finally:
         port.closePort()
     lasting = persistent_name(device)
-    findings = [PORT_ADVICE["well"].at(device)]
+    findings = [ADVICE.bus["can open"].at(device)]
     if lasting not in (None, device):
-        findings.append(PORT_ADVICE["name"].at(device, name=lasting))
+        findings.append(ADVICE.bus["name"].at(device, name=lasting))
     return [*findings, *behind]
 
 
@@ -118,12 +94,12 @@ def examine_bus(
     """
     presence = find_servos(port, kind, setups, baud, tell)
     if presence.missing and not presence.present and not presence.elsewhere.found:
-        return [ADVICE["nobody"].at("the bus", baud=baud, kind=kind)]
+        return [ADVICE.bus["nobody"].at("the bus", baud=baud, kind=kind)]
     if presence.spare is not None:
         found, setup = presence.spare
         fix = Fix(found.id, ADOPT, setup.id, found.id)
         facts = {"setup": setup, "found": found, "baud": baud}
-        findings = [ADVICE["spare"].at(servo_label(setup), fix, **facts)]
+        findings = [ADVICE.bus["spare"].at(servo_label(setup), fix, **facts)]
     else:
         findings = _absences(presence, kind, baud)
     states, line = [], Transactions(port, kind.family)
@@ -131,10 +107,10 @@ def examine_bus(
         if setup.id in presence.present:
             tell(f"reading {servo_label(setup)}")
             found, is_shared = presence.present[setup.id], setup.id in presence.shared_ids
-            states.append(read_state(line, CHECKS[kind.family.name], setup, found, is_shared))
+            states.append(read_state(line, kind, setup, found, is_shared))
     far = find_far({s.setup.name: s.position for s in states if s.position is not None})
     for state in states:
-        findings += apply_rules(replace(state, far=far.get(state.setup.name, "")))
+        findings += apply_rules(msgspec.structs.replace(state, far=far.get(state.setup.name, "")))
     if presence.present:
         findings += [Diagnostic("note", note, "the bus") for note in kind.notes]
     return findings
@@ -146,12 +122,16 @@ def _absences(presence: Presence, kind: ServoKind, baud: int) -> list[Diagnostic
     for setup in presence.missing:
         other = at.pop(setup.id, None)
         cause = "elsewhere" if other else "pieces" if setup.id in presence.shared_ids else "silent"
-        findings.append(ADVICE[cause].at(servo_label(setup), setup=setup, found=other, baud=baud))
+        findings.append(
+            ADVICE.bus[cause].at(servo_label(setup), setup=setup, found=other, baud=baud)
+        )
     missing = ", ".join(f"{servo_label(setup)}: {setup.model}" for setup in presence.missing)
-    findings += [ADVICE["new"].at("the bus", found=found, missing=missing) for found in at.values()]
+    findings += [
+        ADVICE.bus["new"].at("the bus", found=found, missing=missing) for found in at.values()
+    ]
     if kind.family.factory_baud in presence.elsewhere.spoilt_bauds:
-        findings.append(ADVICE["spares"].at("the bus", baud=kind.family.factory_baud))
-    findings += [ADVICE["stranger"].at("the bus", found=found) for found in presence.unexpected]
+        findings.append(ADVICE.bus["spares"].at("the bus", baud=kind.family.factory_baud))
+    findings += [ADVICE.bus["stranger"].at("the bus", found=found) for found in presence.unexpected]
     return findings
 
 
@@ -232,11 +212,6 @@ def adopt_spare(
     return ""
 
 
-def is_adoption(finding: Diagnostic) -> bool:
-    """Return whether the fix of a finding gives a new servo its id."""
-    return any(fix.register == ADOPT for fix in finding.fixes)
-
-
 # --- the guardian
 
 
@@ -257,15 +232,6 @@ def examine_guardian(plan: ReleasePlan) -> Diagnostic:
     return Diagnostic(
         "ok", f"{describe(plan)} within .5 s if the program dies or hangs", "guardian"
     )
-
-
-# fmt: off
-PORT_ADVICE = {
-    "well": Advice("ok", "can be opened"),
-    "name": Advice("note", "may be called otherwise after replugging",
-        "write {name} into the YAML's bus.port"),
-}
-# fmt: on
 
 
 def name_ports(ports: Sequence[SerialPort]) -> str:
