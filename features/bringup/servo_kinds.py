@@ -55,8 +55,6 @@ class ServoKind(NamedTuple):
 
     title: common name
     family: properties for the engine
-    no_reply: checks if no servo answers
-    notes: notes about all servos of the kind
     calibration: None if this program does not move a single servo of the kind
     set_middle: value of Torque Enable that makes the present position the middle, None if the kind
         does not support it
@@ -65,8 +63,6 @@ class ServoKind(NamedTuple):
     name: BusKind
     title: str
     family: Family
-    no_reply: str
-    notes: tuple[str, ...]
     calibration: CalibrationRegisters | None
     set_middle: int | None = None
 
@@ -100,9 +96,6 @@ DYNAMIXEL = ServoKind(
     name="dynamixel",
     title="Dynamixel",
     family=DYNAMIXEL_FAMILY,
-    no_reply="is the servo supply on? does each servo's LED flash once when it comes on? is the "
-    "adaptor's plug the TTL one (3 pins), and the first cable in?",
-    notes=(),
     calibration=CalibrationRegisters(
         settings=(Setting("operating_mode", 3), Setting("drive_mode", 0)),
         offset="homing_offset",
@@ -118,12 +111,6 @@ FEETECH = ServoKind(
     name="feetech",
     title="Feetech STS",
     family=FEETECH_FAMILY,
-    no_reply="is the servo supply on, and its voltage that of the servos (7.4 or 12 V)? is the "
-    "first cable in, and the adaptor's jumper set to USB?",
-    notes=(
-        "an STS has no bus watchdog: if the cable or the computer dies it holds its last goal; "
-        "keep the switch of the servo supply at hand",
-    ),
     calibration=CalibrationRegisters(
         settings=(
             Setting("operating_mode", 0),
@@ -144,9 +131,6 @@ FEETECH = ServoKind(
 SCS = FEETECH._replace(
     title="Feetech SCS",
     family=FEETECH_SCS,
-    no_reply="is the servo supply on, and its voltage that of the servos (6 V)? is the first "
-    "cable in, and the adaptor's jumper set to USB?",
-    notes=tuple(note.replace("STS", "SCS") for note in FEETECH.notes),
     calibration=None,
     set_middle=None,
 )

@@ -172,74 +172,60 @@ def assign_servo(
         BusLost: the port has disappeared.
     """
     refuse_model(found, kind, setup, port.port_name)
-    return _Assignment(port, kind, found).carry_out(setup.id, baud, tell)
+    line, family, done = Transactions(port, kind.family), kind.family, list[str]()
+    now_id, now_baud = found.id, found.baud
 
-
-class _Assignment:
-    """Assignment of id and baud rate to one servo alone on a line."""
-
-    def __init__(self, port: BusPort, kind: ServoKind, found: FoundServo) -> None:
-        self._port, self._kind, self._found = port, kind, found
-        self._line = Transactions(port, kind.family)
-        self._id, self._baud = found.id, found.baud
-        self._done: list[str] = []
-
-    def carry_out(self, servo_id: int, baud: int, tell: Tell) -> SetupResult:
-        """Write the differences, and verify that the servo answers with them."""
-        line, kind = self._line, self._kind
-        self._open(self._found.baud)
-        # It then replies to every instruction.
-        line.write_all((self._id,), "status_return_level", [kind.family.answer_level])
-        if line.read(self._id, "torque_enable"):
-            if not line.write(self._id, "torque_enable", 0):
-                raise self._refusal("let its torque go")
-            self._done.append("torque 1 -> 0")
-        if self._id != servo_id:
-            tell(f"id {self._id} -> {servo_id}")
-            self._unlock()
-            written = line.write(self._id, "id", servo_id)
-            # The confirmation may arrive from either id, or be lost.
-            if not written and ping(self._port, kind.family, servo_id, self._baud) is None:
-                raise self._refusal(f"take the id {servo_id}")
-            self._done.append(f"id {self._id} -> {servo_id}")
-            self._id = servo_id
-        rate = kind.family.baud_rates.index(baud)
-        if self._baud != baud or line.read(self._id, "baud_rate") != rate:
-            tell(f"baud rate {self._baud} -> {baud}")
-            self._unlock()
-            # Silence may only be a lost confirmation.
-            if not line.write(self._id, "baud_rate", rate) and line.refusal:
-                raise self._refusal(f"take {baud} bit/s")
-            self._done.append(f"baud rate {self._baud} -> {baud} bit/s")
-            self._baud = baud
-            self._open(baud)
-        seen = ping(self._port, kind.family, self._id, self._baud)
-        if seen is None or seen.number != self._found.number:
-            raise ServoMissing(
-                f"{self._port.port_name}: the servo does not answer as id {self._id} at "
-                f"{self._baud} bit/s: gazerig scan finds it"
-            )
-        if kind.family.lock_register is not None and not line.write(
-            self._id, kind.family.lock_register, 1
-        ):
-            raise self._refusal("close its lock")
-        return SetupResult(self._found, seen, tuple(self._done))
-
-    def _unlock(self) -> None:
-        lock = self._kind.family.lock_register
-        if lock is not None and not self._line.write(self._id, lock, 0):
-            raise self._refusal("open its lock")
-
-    def _open(self, baud: int) -> None:
-        if not self._port.setBaudRate(baud):
-            raise PortError(
-                f"{self._port.port_name} cannot run at {baud} bit/s: choose another rate"
+    def require(confirmed: bool, what: str) -> None:
+        if not confirmed:
+            reason = f"error {line.refusal}" if line.refusal else "no answer"
+            raise ServoFault(
+                f"{port.port_name}: the servo does not {what} ({reason}); it answered last as id "
+                f"{now_id} at {now_baud} bit/s: switch its power off and on and try again"
             )
 
-    def _refusal(self, what: str) -> ServoFault:
-        refusal = self._line.refusal
-        reason = f"error {refusal}" if refusal else "no answer"
-        return ServoFault(
-            f"{self._port.port_name}: the servo does not {what} ({reason}); it answered last as id "
-            f"{self._id} at {self._baud} bit/s: switch its power off and on and try again"
+    def lock(value: int, what: str) -> None:
+        if family.lock_register is not None:
+            require(line.write(now_id, family.lock_register, value), what)
+
+    open_at(port, now_baud)
+    # It then replies to every instruction.
+    line.write_all((now_id,), "status_return_level", [family.answer_level])
+    if line.read(now_id, "torque_enable"):
+        require(line.write(now_id, "torque_enable", 0), "let its torque go")
+        done.append("torque 1 -> 0")
+    if now_id != setup.id:
+        tell(f"id {now_id} -> {setup.id}")
+        lock(0, "open its lock")
+        # The confirmation may arrive from either id, or be lost.
+        confirmed = line.write(now_id, "id", setup.id)
+        confirmed = confirmed or ping(port, family, setup.id, now_baud) is not None
+        require(confirmed, f"take the id {setup.id}")
+        done.append(f"id {now_id} -> {setup.id}")
+        now_id = setup.id
+    rate = family.baud_rates.index(baud)
+    if now_baud != baud or line.read(now_id, "baud_rate") != rate:
+        tell(f"baud rate {now_baud} -> {baud}")
+        lock(0, "open its lock")
+        # Silence may only be a lost confirmation.
+        require(line.write(now_id, "baud_rate", rate) or not line.refusal, f"take {baud} bit/s")
+        done.append(f"baud rate {now_baud} -> {baud} bit/s")
+        now_baud = baud
+        open_at(port, baud)
+    seen = ping(port, family, now_id, now_baud)
+    if seen is None or seen.number != found.number:
+        raise ServoMissing(
+            f"{port.port_name}: the servo does not answer as id {now_id} at {now_baud} bit/s: "
+            "gazerig scan finds it"
         )
+    lock(1, "close its lock")
+    return SetupResult(found, seen, tuple(done))
+
+
+def open_at(port: BusPort, baud: int) -> None:
+    """Open a port at a baud rate.
+
+    Raises:
+        PortError: it cannot be opened, or does not support the rate.
+    """
+    if not port.setBaudRate(baud):
+        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose another rate")

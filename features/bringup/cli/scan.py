@@ -1,11 +1,11 @@
 """The command ``gazerig scan``: lists the ports, and the servos that answer on one."""
 
 import contextlib
-import json
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 import typer
 from rich.progress import Progress
 from rich.table import Table
@@ -15,7 +15,7 @@ from gazerig.drivers.bus.servo_models import FAMILY_OF, US_STEPS, BusKind
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.pca9685.board import probe
 from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c
-from gazerig.drivers.serial.port import BusPort, port_at_path
+from gazerig.drivers.serial.port import BusPort
 from gazerig.features.bringup.bus_search import (
     ORDER,
     RATES,
@@ -60,10 +60,6 @@ def scan(
         ),
     ] = None,
     bauds: Annotated[str, typer.Option(help="all, or bit/s: 1000000,57600")] = "all",
-    thorough: Annotated[
-        bool,
-        typer.Option("--thorough", help="Search every id at every baud rate."),
-    ] = False,
     mock: MockOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -86,9 +82,7 @@ def scan(
                 say(f"port {one.device}: {one.description}{usb}{alias}")
         with _paths(rig, mock, port, found_ports) as paths:
             answered = [
-                _boards(path, as_json)
-                if i2c
-                else _search_port(path, kinds, rates, thorough, as_json)
+                _boards(path, as_json) if i2c else _search_port(path, kinds, rates, as_json)
                 for path, i2c in paths
             ]
     if not any(answered):
@@ -121,7 +115,7 @@ def _boards(path: str, as_json: bool) -> bool:
         found = [f"{address:#x}" for address in probe(line)]
     if as_json:
         boards = [{"kind": "pca9685", "address": address} for address in found]
-        print(json.dumps({"port": path, "servos": [], "boards": boards}))
+        print(msgspec.json.encode({"port": path, "servos": [], "boards": boards}).decode())
         return bool(found)
     out = console()
     for address in found:
@@ -171,7 +165,6 @@ def _search_port(
     path: str,
     kinds: Sequence[BusKind],
     rates: Sequence[int] | None,
-    thorough: bool,
     as_json: bool,
 ) -> bool:
     """Search one port and show the results; return whether a servo answered."""
@@ -184,17 +177,14 @@ def _search_port(
         )
     if not asked:
         raise SetupError(f"--bauds: none of them is a rate of {' or '.join(kinds)}")
-    line = port_at_path(path)
-    try:
-        rounds = _search(line, usb, asked, thorough)
-        if not thorough and not any(one.has_answer for one in rounds):
+    with bench.unopened_port(path) as line:
+        rounds = _search(line, usb, asked, False)
+        if not any(one.has_answer for one in rounds):
             # Ids that are far apart answer after a long silence; some do not answer a broadcast
             # ping.
             servos = [row for row in asked if row[0] != "maestro"]
             boards = [one for one in rounds if one.kind == "maestro"]
             rounds = [*boards, *_search(line, usb, servos, True)]
-    finally:
-        line.closePort()
     _show(rounds, path, as_json)
     return any(one.has_answer for one in rounds)
 
@@ -213,23 +203,12 @@ def _search(
 
 
 def _show(rounds: Sequence[SearchRound], where: str, as_json: bool) -> None:
-    boards = [(one, one.board) for one in rounds if one.board is not None]
     found = found_servos(rounds)
     if as_json:
-        answer: dict[str, object] = {
-            "port": where,
-            "servos": [{"kind": kind, **servo._asdict()} for kind, servo in found],
-            "boards": [
-                {
-                    **board._asdict(),
-                    "channels": one.channels,
-                    "baud": one.baud,
-                    "pulses": [pulse / US_STEPS for pulse in board.pulses],  # us, 0 for none
-                }
-                for one, board in boards
-            ],
-        }
-        print(json.dumps(answer))
+        boards = [one for one in rounds if one.board is not None]
+        servos = [{"kind": kind, **servo._asdict()} for kind, servo in found]
+        answer = {"port": where, "servos": servos, "boards": boards}
+        print(msgspec.json.encode(answer).decode())
         return
     out = console()
     if found:
@@ -239,20 +218,24 @@ def _show(rounds: Sequence[SearchRound], where: str, as_json: bool) -> None:
             version = made.family.format_firmware(servo.firmware)
             table.add_row(str(servo.id), servo.model, version, str(servo.baud), made.title)
         out.print(table)
-    for one, board in boards:
+    for line in (*_board_lines(rounds, where), *scan_remarks(rounds, where)):
+        out.print(complete_suggestions(line), markup=False)
+
+
+def _board_lines(rounds: Sequence[SearchRound], where: str) -> Iterator[str]:
+    """Describe the boards that answered."""
+    for one in rounds:
+        if one.board is None:
+            continue
         size = f"{one.channels} channels"
         if one.channels is None:
             size = "6 channels or more (asking for one too many would send all of them home)"
-        crc = "on" if board.expects_crc else "off"
-        given = [f"{n}: {pulse / US_STEPS:g} us" for n, pulse in enumerate(board.pulses) if pulse]
-        for line in (
-            f"Pololu Maestro: {size}, CRC {crc}",
-            f"pulses: {', '.join(given) or 'none'} (channels 0..{len(board.pulses) - 1})",
-            f"errors it held, cleared by asking: {', '.join(board.errors) or 'none'}",
-        ):
-            out.print(f"{where}: {line}", markup=False)
-    for line in scan_remarks(rounds, where):
-        out.print(complete_suggestions(line), markup=False)
+        crc, pulses = "on" if one.board.expects_crc else "off", one.board.pulses
+        given = [f"{n}: {pulse / US_STEPS:g} us" for n, pulse in enumerate(pulses) if pulse]
+        errors = ", ".join(one.board.errors) or "none"
+        yield f"{where}: Pololu Maestro: {size}, CRC {crc}"
+        yield f"{where}: pulses: {', '.join(given) or 'none'} (channels 0..{len(pulses) - 1})"
+        yield f"{where}: errors it held, cleared by asking: {errors}"
 
 
 def scan_remarks(rounds: Sequence[SearchRound], where: str) -> Iterator[str]:
@@ -269,29 +252,23 @@ def scan_remarks(rounds: Sequence[SearchRound], where: str) -> Iterator[str]:
         yield f"{count} on {where}; {'; '.join(named)}"
     if boards:
         yield "nothing else was sent: packets for servos would move what hangs on the board"
+    heard = {one.baud for one in rounds if one.has_answer}
     for one in rounds:
-        yield from _unusual_lines(one, {rate.baud for rate in rounds if rate.has_answer})
+        twice = {servo.id for servo in one.found if one.found.count(servo) > 1}
+        for servo_id in sorted({*one.shared_ids, *twice}):
+            yield (
+                f"two or more servos have id {servo_id} at {one.baud} bit/s: connect them one at a "
+                "time and run gazerig setup"
+            )
+        if one.unknown_bytes and not one.found and one.baud not in heard:
+            yield (
+                f"at {one.baud} bit/s only pieces came: a wrong rate, a loose plug, or two servos "
+                "with one id"
+            )
     if not found and not boards:
         yield (
             "no servo answers: is the servo supply on? does each servo's LED flash once when it "
             "comes on? is the first cable in the right plug of the adaptor? is another program "
             "using the port? a Maestro on USB: is it set to 'USB Dual Port', and is this the "
             "first of its two ports?"
-        )
-
-
-def _unusual_lines(one: SearchRound, heard: Container[int]) -> Iterator[str]:
-    """Return the unusual results at one baud rate."""
-    twice = {servo.id for servo in one.found if one.found.count(servo) > 1}
-    for servo_id in sorted({*one.shared_ids, *twice}):
-        yield (
-            f"two or more servos have id {servo_id} at {one.baud} bit/s: connect them one at a "
-            "time and run gazerig setup"
-        )
-    if one.found or one.baud in heard:
-        return
-    if one.unknown_bytes:
-        yield (
-            f"at {one.baud} bit/s only pieces came: a wrong rate, a loose plug, or two servos "
-            "with one id"
         )

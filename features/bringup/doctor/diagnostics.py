@@ -103,6 +103,8 @@ class FamilyAdvice(msgspec.Struct, frozen=True):
     registers: tuple[str, ...]
     errors: dict[str, str]
     settings: tuple[Setting, ...]
+    no_reply: str
+    note: str = ""
 
 
 class _Tables(msgspec.Struct, frozen=True):

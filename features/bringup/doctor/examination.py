@@ -10,7 +10,7 @@ from typing import NamedTuple
 import msgspec
 
 from gazerig.drivers.bus.servo_models import servo_label
-from gazerig.drivers.errors import DriverError, PortError, ServoFault, ServoMissing, SetupError
+from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
 from gazerig.drivers.serial.list_ports import SerialPort, persistent_name
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (
@@ -30,6 +30,7 @@ from gazerig.features.bringup.servo_setup import (
     Spare,
     assign_servo,
     find_spare,
+    open_at,
     search_rates,
 )
 from gazerig.robot.guardian.guardian import Guardian
@@ -93,8 +94,9 @@ def examine_bus(
         BusLost: it has disappeared.
     """
     presence = find_servos(port, kind, setups, baud, tell)
+    advice = ADVICE.families[kind.family.name]
     if presence.missing and not presence.present and not presence.elsewhere.found:
-        return [ADVICE.bus["nobody"].at("the bus", baud=baud, kind=kind)]
+        return [ADVICE.bus["nobody"].at("the bus", baud=baud, no_reply=advice.no_reply)]
     if presence.spare is not None:
         found, setup = presence.spare
         fix = Fix(found.id, ADOPT, setup.id, found.id)
@@ -111,8 +113,8 @@ def examine_bus(
     far = find_far({s.setup.name: s.position for s in states if s.position is not None})
     for state in states:
         findings += apply_rules(msgspec.structs.replace(state, far=far.get(state.setup.name, "")))
-    if presence.present:
-        findings += [Diagnostic("note", note, "the bus") for note in kind.notes]
+    if presence.present and advice.note:
+        findings.append(Diagnostic("note", advice.note, "the bus"))
     return findings
 
 
@@ -144,7 +146,7 @@ def find_servos(
         PortError: the port cannot be opened.
         BusLost: it has disappeared.
     """
-    _open(port, baud)
+    open_at(port, baud)
     answers = [*search_rates(port, kind, (baud,), tell, thorough=True).found]
     there = {found.id: found for found in answers}
     shared = {found.id for found in answers if answers.count(found) > 1}
@@ -164,13 +166,8 @@ def find_servos(
     others = [rate for rate in kind.family.baud_rates if rate != baud and missing]
     elsewhere = search_rates(port, kind, others, tell)
     spare = find_spare(port, kind, setups, baud, [*answers, *elsewhere.found])
-    _open(port, baud)
+    open_at(port, baud)
     return Presence(there, missing, strangers, elsewhere, shared, spare)
-
-
-def _open(port: BusPort, baud: int) -> None:
-    if not port.setBaudRate(baud):
-        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 57600 or 1000000")
 
 
 # --- fixes
@@ -200,7 +197,7 @@ def adopt_spare(
         BusLost: the port has disappeared.
     """
     factory_baud = kind.family.factory_baud
-    _open(port, factory_baud)
+    open_at(port, factory_baud)
     spare = ping(port, kind.family, fix.servo_id, factory_baud)
     if spare is None:
         return "the servo does not answer"
