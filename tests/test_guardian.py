@@ -66,7 +66,6 @@ def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
 
 def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
     access = pytest.importorskip("gazerig.features.bringup.calibration.smart_servo_access")
-    params = access.StopSearchParams()
     rig, guardian = StsRig(), Unattended()
     rig.port.setBaudRate(1_000_000)
     joint = JointParams(
@@ -77,12 +76,12 @@ def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
     servo = access.SmartServoAccess("eye", joint, rig.port, clock, lambda: None, guardian)
     servo.check()
     assert not guardian.other.is_armed(0)
-    servo.enable_torque(params)
+    servo.enable_torque()
     assert guardian.other.is_armed(0) and rig.get(1, TORQUE_ENABLE)
-    servo.go(params, 2060)
+    servo.go(2060)
     guardian.other.set_state(0, RELEASING)
     with pytest.raises(ServoFault, match="did not run"):
-        servo.go(params, 2020)
+        servo.go(2020)
     servo.restore()
     assert not guardian.other.is_armed(0) and not rig.get(1, TORQUE_ENABLE)
 

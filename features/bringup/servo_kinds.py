@@ -19,32 +19,15 @@ Tell = Callable[[str], None]
 """Receives a short text about the present step."""
 
 
-class Setting(NamedTuple):
-    """Register that must have a value for calibration; ``mask`` selects its bits."""
-
-    register: str
-    value: int
-    mask: int = ~0
-
-    def apply_to(self, now: int) -> int:
-        """Return the correct value of the register, whose present value is ``now``."""
-        return now & ~self.mask | self.value & self.mask
-
-
 class CalibrationRegisters(NamedTuple):
     """Registers for the calibration and gentle motion of one servo of a kind.
 
-    settings: settings without which its steps have another meaning
-    offset: register that shifts its position; offset_usable: whether the servo applies it
     full_drive: a register, and the register of its largest value, which is restored
     gentle_drive: returns the register values for a share of full drive and a speed in steps/s;
         reads registers by name
     load: present current as a fraction of the stall current, by the name of the model
     """
 
-    settings: tuple[Setting, ...]
-    offset: str
-    offset_usable: bool
     full_drive: tuple[str, str] | None
     gentle_drive: Callable[[Callable[[str], int], float, float], dict[str, int]]
     load: Callable[[str, int], float]
@@ -97,9 +80,6 @@ DYNAMIXEL = ServoKind(
     title="Dynamixel",
     family=DYNAMIXEL_FAMILY,
     calibration=CalibrationRegisters(
-        settings=(Setting("operating_mode", 3), Setting("drive_mode", 0)),
-        offset="homing_offset",
-        offset_usable=False,
         full_drive=("goal_pwm", "pwm_limit"),
         gentle_drive=_gentle_dynamixel,
         # Present Current, or Present Load for a model with that register.
@@ -112,13 +92,6 @@ FEETECH = ServoKind(
     title="Feetech STS",
     family=FEETECH_FAMILY,
     calibration=CalibrationRegisters(
-        settings=(
-            Setting("operating_mode", 0),
-            Setting("phase", 0, feetech.MULTI_TURN),
-            Setting("angular_resolution", 1),
-        ),
-        offset="position_offset",
-        offset_usable=True,
         full_drive=None,
         gentle_drive=_gentle_feetech,
         load=lambda model, current: (

@@ -77,7 +77,7 @@ def commands(name: str, rig: str = "") -> dict[str, list[str]]:
         "run": ["run", rig, "--scene", "visitor", "--no-page"],
         "jog": ["jog", rig, joint, "8", "--hold", "--yes"],
         "calibrate": ["calibrate", rig, "--dry-run", "--joint", joint, *by, "--yes"],
-        "calibrate face": ["calibrate", "face", rig, "--scene", "sits-still", "--no-page", *out],
+        "calibrate face": ["calibrate", "face", rig, "--scene", "sits-still", *out],
         "monitor": ["monitor", rig, "--json"],
     }  # fmt: skip
 

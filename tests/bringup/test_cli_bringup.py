@@ -252,7 +252,6 @@ def test_a_shipped_rig_is_copied_not_written(tmp_path: Path) -> None:
         ("desk", ("--joint", "nose"), "no such joint; there is left_eye_pan"),
         ("desk", ("--joint", "neck_yaw", "--answers", "EMPTY"), "no answer left to: turn neck_yaw"),
         ("maker", ("--by", "motion"), "hobby servos do not report their position"),
-        ("maker", ("--pulses", "400:2000"), "within 500:2500 us"),
         ("maker", ("--set-middle",), "only Feetech STS servos"),
     ],
 )

@@ -7,35 +7,26 @@ half a second.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
-from gazerig.params import Bounds
 
 STEPS_PER_DEG = STEPS_PER_TURN / 360.0
 
-NEAR_DEG = 1.0
-"""Distance of a servo with factory gains and a light load from its goal."""
+SPEED_DEG_S = 15.0
+"""Speed of the search, at the servo."""
+STRENGTH = 0.3
+"""Drive during the search, as a share of the full one, so of the stall torque."""
+BACK_OFF_DEG = 3.0
+"""Way back from a stop."""
 
-BACK_OFF_EXCHANGES = 25
-"""Half a second at 50 Hz, for the motion back from a stop."""
-
-
-@dataclass(frozen=True)
-class StopSearchParams:
-    """Speed and force of a search for a stop; angles are those of the servo."""
-
-    # fmt: off
-    speed_deg_s: Annotated[float, Bounds(1, 60), "speed of the search"] = 15.0
-    strength: Annotated[float, Bounds(0.05, 1), "the servo's Goal PWM as a share of its limit, so of its stall torque"] = 0.3
-    lead_deg: Annotated[float, Bounds(1, 30), "the goal is never farther ahead of the joint"] = 8.0
-    progress_deg: Annotated[float, Bounds(0.1, 5), "a smaller advance counts as standing still"] = 0.3
-    touch_share: Annotated[float, Bounds(0.01, 1), "share of the stall current that, standing still, is a push"] = 0.15
-    touch_ms: Annotated[float, Bounds(20, 500), "standing still under such a current for so long is a stop"] = 200.0
-    longest_push_ms: Annotated[float, Bounds(50, 500), "standing still for so long is a stop whatever the current"] = 450.0
-    back_off_deg: Annotated[float, Bounds(0.5, 20), "so far the joint goes back from its stop"] = 3.0
-    # fmt: on
+_LEAD_DEG = 8.0  # the goal is never farther ahead of the joint
+_PROGRESS_DEG = 0.3  # a smaller advance is no motion
+# Without motion for this time under this share of the stall current, or for the longer time under
+# any current, the joint is at a stop.
+_TOUCH, _TOUCH_S, _LONGEST_PUSH_S = 0.15, 0.2, 0.45
+_NEAR_DEG = 1.0  # distance of a servo with factory gains and a light load from its goal
+_BACK_OFF_EXCHANGES = 25  # half a second at 50 Hz
 
 
 class EndStop(NamedTuple):
@@ -50,81 +41,57 @@ class EndStop(NamedTuple):
     pushed_s: float
 
 
-class StopSearch:
-    """One search in one direction; call ``step`` for the next goal until ``found`` is not None.
-
-    Args:
-        params: speed and force.
-        direction: 1 towards more steps, -1 towards fewer.
-        low: the smallest goal that the servo permits, in steps.
-        high: the largest goal.
-    """
-
-    def __init__(self, params: StopSearchParams, direction: int, low: int, high: int) -> None:
-        self._params = params
-        self._way = direction
-        self._end = high if direction > 0 else low
-        self._room = (low, high)
-        self._goal: float | None = None
-        self.found: EndStop | None = None
-
-    def step(self, position_steps: int, load: float, t_s: float) -> int:
-        """Add a measurement and return the goal; after the end, a goal away from the stop.
-
-        load: present current as a fraction of the stall current, 0 if unknown
-        """
-        par, way = self._params, self._way
-        if self._goal is None:
-            self._goal = self._best = float(position_steps)
-            self._moved_s = self._t_s = t_s
-        if self.found is None:
-            if (position_steps - self._best) * way > par.progress_deg * STEPS_PER_DEG:
-                self._best, self._moved_s = float(position_steps), t_s
-            still_s = t_s - self._moved_s
-            pushed = abs(load) >= par.touch_share and still_s >= par.touch_ms / 1e3
-            if (self._end - position_steps) * way <= NEAR_DEG * STEPS_PER_DEG:
-                self.found = EndStop(position_steps, "limit", still_s)
-            elif pushed or still_s >= par.longest_push_ms / 1e3:
-                self.found = EndStop(position_steps, "stop", still_s)
-        if self.found is not None:
-            back = self.found.position_steps - way * par.back_off_deg * STEPS_PER_DEG
-            return self._within(back)
-        ahead = self._goal + way * par.speed_deg_s * STEPS_PER_DEG * (t_s - self._t_s)
-        most = position_steps + way * par.lead_deg * STEPS_PER_DEG
-        nearer = min if way > 0 else max
-        self._goal, self._t_s = nearer(ahead, most, self._end), t_s
-        return self._within(self._goal)
-
-    def _within(self, goal: float) -> int:
-        low, high = self._room
-        return round(min(max(goal, low), high))
-
-
 Exchange = Callable[[int | None], tuple[int, float, float]]
-"""Sends a goal (None: no goal) and returns position in steps, load and time in seconds."""
+"""Sends a goal (None: no goal) and returns position in steps, load and time in seconds.
+
+The load is the present current as a fraction of the stall current, 0 if unknown.
+"""
 
 
-def find_end_stop(
-    params: StopSearchParams, direction: int, limits: tuple[int, int], exchange: Exchange
-) -> EndStop:
-    """Run one search to its end and move back; return the stop."""
-    look = StopSearch(params, direction, *limits)
-    goal: int | None = None
-    while look.found is None:
-        goal = look.step(*exchange(goal))
-    for _ in range(BACK_OFF_EXCHANGES):
-        exchange(goal)
-    return look.found
+def find_end_stop(direction: int, limits: tuple[int, int], exchange: Exchange) -> EndStop:
+    """Move to the stop towards more (1) or fewer (-1) steps, and a little back; return the stop.
+
+    limits: smallest and largest goal that the servo permits, in steps
+    """
+    stop = _search(direction, limits, exchange)
+    back = stop.position_steps - direction * BACK_OFF_DEG * STEPS_PER_DEG
+    for _ in range(_BACK_OFF_EXCHANGES):
+        exchange(_within(back, limits))
+    return stop
 
 
-def move_to_goal(goal_steps: int, params: StopSearchParams, exchange: Exchange) -> bool:
+def move_to_goal(goal_steps: int, exchange: Exchange) -> bool:
     """Move a joint slowly to a position; return whether it arrived unhindered."""
     position, _, _ = exchange(None)
     way = 1 if goal_steps > position else -1
-    look = StopSearch(params, way, min(goal_steps, position), max(goal_steps, position))
-    goal: int | None = None
-    while look.found is None:
-        goal = look.step(*exchange(goal))
-    free = look.found.kind == "limit"
-    exchange(goal_steps if free else goal)
-    return free
+    limits = min(goal_steps, position), max(goal_steps, position)
+    stop = _search(way, limits, exchange)
+    back = _within(stop.position_steps - way * BACK_OFF_DEG * STEPS_PER_DEG, limits)
+    exchange(goal_steps if stop.kind == "limit" else back)
+    return stop.kind == "limit"
+
+
+def _search(way: int, limits: tuple[int, int], exchange: Exchange) -> EndStop:
+    """Move until the joint is at a stop or at the end of the limits."""
+    end = limits[1] if way > 0 else limits[0]
+    nearer = min if way > 0 else max
+    position, _, now_s = exchange(None)
+    goal = best = float(position)
+    moved_s = last_s = now_s
+    while True:
+        goal += way * SPEED_DEG_S * STEPS_PER_DEG * (now_s - last_s)
+        goal = nearer(goal, position + way * _LEAD_DEG * STEPS_PER_DEG, end)
+        last_s = now_s
+        position, load, now_s = exchange(_within(goal, limits))
+        if (position - best) * way > _PROGRESS_DEG * STEPS_PER_DEG:
+            best, moved_s = float(position), now_s
+        still_s = now_s - moved_s
+        if (end - position) * way <= _NEAR_DEG * STEPS_PER_DEG:
+            return EndStop(position, "limit", still_s)
+        if (abs(load) >= _TOUCH and still_s >= _TOUCH_S) or still_s >= _LONGEST_PUSH_S:
+            return EndStop(position, "stop", still_s)
+
+
+def _within(goal: float, limits: tuple[int, int]) -> int:
+    low, high = limits
+    return round(min(max(goal, low), high))

@@ -181,9 +181,6 @@ AIMED_DEG = 1.0
 STALE_S = 0.4
 """Largest age of an image with a face."""
 
-WAIT_S = 1.5
-"""Time for which an Enter waits for moving eyes."""
-
 _LOST_S = 5.0
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 # The head turns to the face as far as possible, so that the eyes have their whole range.
@@ -225,12 +222,11 @@ class FaceSteering:
         self._shift = 0
         self._lost_at = self._rest
         self._seen_s = -inf
-        self._entered_s: float | None = None
 
     @property
     def is_aimed(self) -> bool:
-        """Return whether both eyes are on the part and no key waits."""
-        return self.face is not None and self._entered_s is None and self.error_deg <= AIMED_DEG
+        """Return whether both eyes are on the part."""
+        return self.face is not None and self.error_deg <= AIMED_DEG
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the current part as target, or the rest point while no face is seen."""
@@ -263,44 +259,26 @@ class FaceSteering:
             self._shift, why, face.p_world_m,
         )  # fmt: skip
 
-    def press(self, key: Key, t_s: float) -> str | None:
-        """Apply a key; return the reason if that is impossible.
-
-        An Enter takes effect as soon as the eyes are on the part, see ``update``.
-        """
+    def press(self, key: Key) -> str | None:
+        """Apply a key; return the reason if that is impossible."""
         if key != "end" and self.face is None:
             return "no face is seen: keys wait until one is"
-        if key == "enter":
-            self._entered_s = t_s
-            return None
-        self._entered_s = None
+        if key == "enter" and not self.is_aimed:
+            return (
+                "not taken: the eyes are not on the point yet; if they never come, be nearer to "
+                "where the head points"
+            )
         self.state = apply_key(self.state, key)
         self.error_deg = inf
         return None
 
-    def update(self, tick: Tick) -> str | None:
-        """Measure the gaze; return the reason if a waiting Enter was dropped."""
-        self.error_deg = self._gaze_error_deg(tick)
-        if tick.target.kind != "part" or tick.gaze.phase == "saccade":
-            self.error_deg = inf
-        if self._entered_s is None:
-            return None
-        if self.error_deg <= AIMED_DEG:
-            self._entered_s = None
-            self.state = apply_key(self.state, "enter")
-            self.error_deg = inf
-        elif tick.t_s - self._entered_s > WAIT_S:
-            self._entered_s = None
-            off = self._gaze_error_deg(tick)
-            return (
-                f"not taken: the eyes are {off:.1f} deg off the point, as far as they can turn; "
-                "come before the robot, nearer to where its head points"
-            )
-        return None
-
-    def _gaze_error_deg(self, tick: Tick) -> float:
-        """Return the angle between the gaze and the part, as far as the eyes can reach it."""
-        return degrees(gaze_error(tick.target.p_world_m, tick.pose, self._converges).whole)
+    def update(self, tick: Tick) -> None:
+        """Measure the gaze."""
+        self.error_deg = inf
+        if tick.target.kind == "part" and tick.gaze.phase != "saccade":
+            # The angle between the gaze and the part, as far as the eyes can reach it.
+            error = gaze_error(tick.target.p_world_m, tick.pose, self._converges)
+            self.error_deg = degrees(error.whole)
 
     def _count(self, identity: object) -> None:
         """Count a shift whenever the target point changes."""

@@ -8,20 +8,25 @@ from collections.abc import Callable
 
 from gazerig.drivers.bus.servo_models import US_STEPS
 from gazerig.drivers.errors import BusLost
-from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoBus, ServoConfig
+from gazerig.features.bringup.calibration.joint_procedure import Operator
+from gazerig.features.bringup.calibration.linkage_calibration import angle_now
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.robot.guardian.guardian import GuardedBus, Guardian
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams
 
+PULSES_US = (500.0, 2500.0)
+"""Range of the pulses; 180 deg or more of a hobby servo."""
 PERIOD_S = 0.03
 SPEED_US_S = 200.0
 """18 deg/s of the shaft: slow enough to stop before something bends."""
+LEAD_US = 50.0
+"""Travel in a quarter of a second at its slow speed, until it stops after the release of a key."""
 
 NEAR_STEPS = 4
 TIMEOUT_S = 1.0
@@ -31,16 +36,16 @@ SILENT_S = 2.0
 
 
 class HobbyServoAccess:
-    """The servo of one joint.
+    """The servo of one joint, and the person who steers it; a Marker of linkage_calibration.
 
     Args:
         name: name of the joint.
         joint: configuration of the joint.
-        port: port of the board; opened by ``open``.
+        port: port of the board; opened by ``begin``.
         params: protocol of the board.
         clock: clock of the host.
         stopped: called regularly; returns why to stop, None without a reason.
-        pulses_us: range of permitted pulses.
+        person: steers the servo.
         guardian: has one plan, for this servo; None: nothing else stops its pulses.
     """
 
@@ -52,65 +57,83 @@ class HobbyServoAccess:
         params: MaestroParams | Pca9685Params,
         clock: Clock,
         stopped: Callable[[], str | None],
-        pulses_us: tuple[float, float],
+        person: Operator,
         guardian: Guardian | None = None,
     ) -> None:
         self.name, self.joint = name, joint
         self.who = f"{name} (channel {joint.id})"
-        self._clock, self._stopped = clock, stopped
-        low, high = (round(end * US_STEPS) for end in pulses_us)
+        self._clock, self._stopped, self._person = clock, stopped, person
+        low, high = (round(end * US_STEPS) for end in PULSES_US)
         speed = SPEED_US_S * US_STEPS
         self._setup = ServoConfig(joint.id, joint.model, low, high, speed, name)
-        self._maestro = isinstance(params, MaestroParams)
-        board: Board
-        if isinstance(params, MaestroParams):
-            board = MaestroBoard(port, params)
-        else:
-            board = Pca9685Board(port, params)
+        maestro = isinstance(params, MaestroParams)
+        board = MaestroBoard(port, params) if maestro else Pca9685Board(port, params)
         bus = HobbyBoardBus(board, [self._setup])
         self._bus: ServoBus = (
             bus if guardian is None else GuardedBus(bus, [self._setup], guardian, 0)
         )
         self._goal = self._pulse = 0
         self._on = False
-        self._said: list[str] = []
 
     @property
     def place_us(self) -> float:
         """Return the commanded pulse."""
         return self._goal / US_STEPS
 
-    @property
-    def pulse_us(self) -> float:
-        """Return the present pulse."""
-        return self._pulse / US_STEPS
+    def begin(self) -> None:
+        """Hold the joint at its present pulse, or at the first pulse that the user chooses.
 
-    def open(self) -> float | None:
-        """Find board and channel; return the pulse width in us, None without pulses.
+        A servo without pulses moves there immediately, at its own speed.
 
         Raises:
             SetupError: the board or the channel does not answer.
         """
         self._bus.open()
-        self._read()
-        return self._pulse / US_STEPS if self._on else None
-
-    def begin(self, place_us: float) -> float:
-        """Hold the joint at its present pulse, or start with a given one; return the pulse in us.
-
-        A servo without pulses moves there immediately, at its own speed.
-
-        Raises:
-            ServoMissing: the channel does not accept it.
-        """
-        self._bus.retune([self._setup._replace(rest_steps=self._within(place_us))])
+        at_us = self._read()
+        if not self._on:
+            rest = self.joint.make_linkage().steps(0.0) / self.joint.model_facts.unit_steps
+            at_us = self._person.ask_number(
+                f"{self.who} gets no pulses, so its position is not known: it goes to the first "
+                "one at once, at its own full speed. Keep your fingers out. "
+                "At which pulse width (us) shall it begin?",
+                float(round(rest)),
+                str,
+            )
+        self.aim(at_us)
+        self._bus.retune([self._setup._replace(rest_steps=self._goal)])
         (self._goal,) = self._bus.enable_torque()
-        return self.place_us
+        self._tell_events()
+        self._person.tell(
+            f"{self.who}: held at {self.place_us:g} us; should this program die, its guardian stops "
+            "the pulses; should the computer die, cut the servo power"
+        )
+
+    def mark(self, where: str) -> float:
+        """Let the user move the joint to a position; return the pulse width in us."""
+        self._person.steer(f"move {self.name} {where}, then press Enter", self)
+        return self._arrive()
+
+    def move_to(self, place_us: float) -> float:
+        """Move the joint slowly to a pulse width; return the reached width."""
+        self.aim(place_us)
+        return self._arrive()
 
     def aim(self, place_us: float) -> float:
-        """Move slowly to a pulse; return that pulse, limited to the permitted range."""
-        self._goal = self._within(place_us)
+        """Start a slow motion to a pulse; return that pulse, limited to the permitted range."""
+        low, high = self._setup.min_steps, self._setup.max_steps
+        self._goal = min(max(round(place_us * US_STEPS), low), high)
         return self.place_us
+
+    def nudge(self, us: float) -> None:
+        """Move the joint by a pulse width, at most ``LEAD_US`` ahead of its pulse."""
+        at_us = self._pulse / US_STEPS
+        self.aim(min(max(self.place_us + us, at_us - LEAD_US), at_us + LEAD_US))
+
+    def live(self) -> str:
+        """Continue the motion; return pulse width and angle as text."""
+        self.look()
+        angle = angle_now(self.joint, self.place_us)
+        return f"{self.name}: {self.place_us:g} us ({angle:+.1f} deg so far)"
 
     def look(self) -> bool:
         """Wait a moment and continue the motion; return whether it is at its goal.
@@ -123,28 +146,10 @@ class HobbyServoAccess:
         if why is not None:
             raise CalibrationStopped(why)
         self._clock.sleep_until(self._clock.now_s() + PERIOD_S)
-        at = self._read()
+        self._read()
         self._bus.write([self._goal])
-        return abs(at - self._goal) <= NEAR_STEPS
-
-    def arrive(self) -> float:
-        """Move the servo to its goal; return the pulse in us at the end.
-
-        Raises:
-            BusLost, CalibrationStopped: see ``look``.
-        """
-        way = abs(self._goal - self._read()) / US_STEPS
-        end_s = self._clock.now_s() + way / SPEED_US_S + TIMEOUT_S
-        while not self.look():
-            if self._clock.now_s() > end_s:
-                self._goal = self._pulse
-                break
-        return self.place_us
-
-    def events(self) -> tuple[str, ...]:
-        """Return the events since the last call."""
-        said, self._said = self._said, []
-        return (*self._bus.events(), *said)
+        self._tell_events()
+        return abs(self._pulse - self._goal) <= NEAR_STEPS
 
     def disable(self) -> None:
         """Stop its pulses and close the port; safe to call at any time.
@@ -157,29 +162,33 @@ class HobbyServoAccess:
         finally:
             self._bus.close()
 
-    def _within(self, place_us: float) -> int:
-        low, high = self._setup.min_steps, self._setup.max_steps
-        return min(max(round(place_us * US_STEPS), low), high)
+    def _arrive(self) -> float:
+        """Move the servo to its goal; return the pulse in us at the end."""
+        way_us = abs(self.place_us - self._read())
+        end_s = self._clock.now_s() + way_us / SPEED_US_S + TIMEOUT_S
+        while not self.look():
+            if self._clock.now_s() > end_s:
+                self._goal = self._pulse
+        return self.place_us
 
-    def _read(self) -> int:
-        """Read the board until it replies; return its present pulse in steps."""
+    def _read(self) -> float:
+        """Read the board until it replies; return its present pulse in us."""
         end_s = self._clock.now_s() + SILENT_S
-        while True:
-            feedback = self._bus.read(self._clock.now_s())
-            if not feedback.missing:
-                self._pulse, self._on = int(feedback.position_steps[0]), feedback.torque[0]
-                if feedback.rearmed[0]:
-                    # Keep the pulse of the board, for any reason.
-                    sent_us, self._goal = self.place_us, self._pulse
-                    remedy = (
-                        ": if it never comes farther, widen the range of its channel in "
-                        "Pololu's program"
-                    )
-                    self._said.append(
-                        f"{self.who} was sent to {sent_us:g} us and is held at "
-                        f"{self.pulse_us:g} us{remedy if self._maestro else ''}"
-                    )
-                return self._pulse
+        while (feedback := self._bus.read(self._clock.now_s())).missing:
             if self._clock.now_s() > end_s:
                 raise BusLost(f"{self.who}: the board does not answer: check its cable and power")
             self._clock.sleep_until(self._clock.now_s() + PERIOD_S)
+        self._pulse, self._on = int(feedback.position_steps[0]), feedback.torque[0]
+        if feedback.rearmed[0]:
+            # Keep the pulse of the board, for any reason.
+            sent_us, self._goal = self.place_us, self._pulse
+            self._person.tell(
+                f"{self.who} was sent to {sent_us:g} us and is held at {self.place_us:g} us: if it "
+                "never comes farther on a Maestro, widen the range of its channel in Pololu's "
+                "program"
+            )
+        return self._pulse / US_STEPS
+
+    def _tell_events(self) -> None:
+        for line in self._bus.events():
+            self._person.tell(line)

@@ -11,15 +11,18 @@ from collections.abc import Callable
 from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
 from gazerig.drivers.errors import BusLost, DriverError, ServoFault, ServoMissing, SetupError
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.settings import write_settings
+from gazerig.drivers.servo_bus.discovery import ping
 from gazerig.drivers.servo_bus.transaction import Transactions
+from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.calibration.endstop_search import (
+    SPEED_DEG_S,
     STEPS_PER_DEG,
+    STRENGTH,
     EndStop,
-    StopSearchParams,
     find_end_stop,
     move_to_goal,
 )
+from gazerig.features.bringup.doctor.servo_rules import find_obstacles, read_state
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.model.clock import Clock
@@ -58,7 +61,7 @@ class SmartServoAccess:
             the port calls its ``beat``. None: only the servo's watchdog does so.
 
     who: its name in messages, "neck_yaw (servo 7)"
-    alone: effect of the program's death during a motion, "" if its watchdog stops it
+    alone: note about a servo without a watchdog, "" if it has one
     """
 
     def __init__(
@@ -83,11 +86,8 @@ class SmartServoAccess:
         self.alone = ""
         if self._family.watchdog_unit_s is None:
             self.alone = (
-                "these servos have no watchdog: if this program is killed, it holds its last goal "
-                "weakly until the servo power is cut"
-                if guardian is None
-                else "these servos have no watchdog: should this program die, its guardian "
-                "switches the torque off"
+                "; these servos have no watchdog: should this program die, its guardian switches "
+                "the torque off"
             )
         self._id, self._model, self._port = joint.id, joint.model, port
         self._clock, self._stopped, self._at_s = clock, stopped, clock.now_s()
@@ -99,50 +99,19 @@ class SmartServoAccess:
         """Check that it is the right servo, without faults, and in position mode.
 
         Raises:
-            ServoMissing: it does not answer, is another model, or has other settings.
-            ServoFault: it reports an error.
+            ServoMissing: it does not answer.
+            ServoFault: the doctor's rules have an error, or a setting gives its steps another
+                meaning.
         """
         # A servo may be set to answer only queries; this write needs no answer and changes that.
         self._line.write_all((self._id,), "status_return_level", [self._family.answer_level])
-        found = self._line.identify(self._id)
+        found = ping(self._line.port, self._family, self._id, self._line.baud)
         if found is None:
             raise ServoMissing(f"{self.who} does not answer: check power, cable, id and baud rate")
-        if found.model_number != self._family.models[self._model].number:
-            raise ServoMissing(
-                f"{self.who} is {self._family.model_name(found.model_number)}, "
-                f"not {self._model}: correct the rig file, or check the ids"
-            )
-        value, driving = self._value, self._driving
-        status = value(self._family.error_register)
-        if status:
-            remedy = "let it cool, free it, check its supply"
-            if self._family.faults_latch:
-                remedy = "find the cause, then switch its power off and on"
-            names = " and ".join(self._family.name_errors(status))
-            raise ServoFault(f"{self.who}: {names}: {remedy}")
-        for setting in driving.settings:
-            now = value(setting.register)
-            if now != setting.apply_to(now):
-                raise ServoMissing(
-                    f"{self.who}: {setting.register} is {now}, not {setting.apply_to(now)}: "
-                    "gazerig doctor --fix sets it"
-                )
-        offset = value(driving.offset)
-        if offset and not driving.offset_usable:
-            raise ServoMissing(
-                f"{self.who}: its Homing Offset is {offset} steps, which some "
-                "firmware loses by a whole turn as the torque comes on: set it to 0 "
-                "(--clear-offset), the calibration makes up for it"
-            )
-
-    def clear_offset(self) -> int:
-        """Set the offset of its position to 0, torque off; return the previous offset."""
-        register = self._driving.offset
-        was = self._value(register)
-        if was:
-            self._torque_off()
-            write_settings(self._line, self._id, {register: 0})
-        return was
+        whole_turn = 0, self._family.steps_per_turn - 1
+        setup = ServoConfig(self._id, self.joint.model, *whole_turn, 0.0, self.name)
+        for finding in find_obstacles(read_state(self._line, self._kind, setup, found, False)):
+            raise ServoFault(f"{self.who}: {finding.what}: {finding.remedy}")
 
     def set_middle(self) -> int:
         """Set the servo's present position as its middle, 2048; return the new offset.
@@ -171,7 +140,7 @@ class SmartServoAccess:
                 f"{self.who} does not accept its present position as its middle (it reads {place}): "
                 "switch its power off and on and try again"
             )
-        return self._value(self._driving.offset)
+        return self._value("position_offset")
 
     def disable_torque(self) -> None:
         """Switch the torque off and verify it; then the guardian has nothing to watch.
@@ -197,7 +166,7 @@ class SmartServoAccess:
 
     # --- motion with low drive
 
-    def enable_torque(self, params: StopSearchParams) -> None:
+    def enable_torque(self) -> None:
         """Switch the torque on at its position, weak and slow, for goals anywhere in the turn.
 
         Raises:
@@ -214,9 +183,7 @@ class SmartServoAccess:
             put(self._family.lock_register, 1)
         wanted = {
             **dict(zip(LIMITS, (0, self._family.steps_per_turn - 1), strict=True)),
-            **driving.gentle_drive(
-                value, params.strength, 2.0 * params.speed_deg_s * STEPS_PER_DEG
-            ),
+            **driving.gentle_drive(value, STRENGTH, 2.0 * SPEED_DEG_S * STEPS_PER_DEG),
         }
         was = {name: value(name) for name in wanted}
         found = dict(was)
@@ -246,14 +213,14 @@ class SmartServoAccess:
         if unit_s is not None:
             put("bus_watchdog", round(WATCHDOG_S / unit_s))
 
-    def find_stop(self, params: StopSearchParams, direction: int) -> EndStop:
+    def find_stop(self, direction: int) -> EndStop:
         """Move it to its stop towards more (1) or fewer (-1) steps, and a little back.
 
         Raises:
             ServoFault: its torque went off during the search, so it was not at a stop.
             CalibrationStopped: a person or the system requested the end.
         """
-        stop = find_end_stop(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)
+        stop = find_end_stop(direction, (0, STEPS_PER_TURN - 1), self._exchange)
         if not self._value("torque_enable"):
             raise ServoFault(
                 f"{self.who} let go during the search: it protected itself or restarted; "
@@ -261,9 +228,9 @@ class SmartServoAccess:
             )
         return stop
 
-    def go(self, params: StopSearchParams, goal_steps: int) -> bool:
+    def go(self, goal_steps: int) -> bool:
         """Move it slowly to a position; return whether it arrived unhindered."""
-        return move_to_goal(goal_steps, params, self._exchange)
+        return move_to_goal(goal_steps, self._exchange)
 
     def _exchange(self, goal: int | None) -> tuple[int, float, float]:
         """Send a goal, if any; return position, load and time."""

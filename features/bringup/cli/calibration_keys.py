@@ -1,12 +1,9 @@
 """Keys of a terminal or words of a script that control a calibration."""
 
-from abc import ABC, abstractmethod
-from contextlib import AbstractContextManager
 from typing import cast
 
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.face_steering import Key
-from gazerig.features.bringup.cli.prompts import Lines
 from gazerig.robot.cli.key_input import TerminalInput, split_keys
 
 HELP = (
@@ -19,11 +16,9 @@ _PLAIN: dict[str, Key] = {
     "+": "larger", "=": "larger", "-": "smaller", "_": "smaller",
     "\r": "enter", "\n": "enter", "n": "skip", "b": "back", "q": "end",
 }  # fmt: skip
-_WORDS: dict[str, Key] = {
-    "": "enter", "enter": "enter", "left": "left", "right": "right", "up": "up", "down": "down",
-    "+": "larger", "-": "smaller", "skip": "skip", "n": "skip", "back": "back", "b": "back",
-    "end": "end", "q": "end",
-}  # fmt: skip
+_WORDS: dict[str, Key] = {"": "enter", **_PLAIN} | {
+    word: word for word in ("enter", "left", "right", "up", "down", "skip", "back", "end")
+}
 
 
 def split_words(text: str) -> tuple[list[Key], str]:
@@ -33,7 +28,7 @@ def split_words(text: str) -> tuple[list[Key], str]:
     return [cast(Key, key) for key in named if key is not None], rest
 
 
-def key_and_count(line: str) -> tuple[Key, int]:
+def parse_keys(line: str) -> list[Key]:
     """Parse "left 3", "enter" or an empty line, which is Enter.
 
     Raises:
@@ -46,62 +41,21 @@ def key_and_count(line: str) -> tuple[Key, int]:
             f"{line!r} is no key: left, right, up, down, +, - with a number of times (left 3), "
             "enter or an empty line, skip, back, end"
         )
-    return _WORDS[word], int(number)
+    return [_WORDS[word]] * int(number)
 
 
-class Keys(AbstractContextManager["Keys"], ABC):
-    """Source of single keys within the block."""
-
-    def __exit__(self, *raised: object) -> None:
-        """End."""
-
-    @abstractmethod
-    def next(self, ready: bool) -> Key | None:
-        """Return the next key, None without one; ``ready``: the last one has taken effect."""
-
-
-class TerminalKeys(TerminalInput, Keys):
-    """Keys of standard input one by one."""
+class TerminalKeys(TerminalInput):
+    """Keys of standard input one by one, within the block."""
 
     def __init__(self) -> None:
         self._ready: list[Key] = []
         self._rest = ""
 
-    def next(self, ready: bool) -> Key | None:
-        """Return the next key, None if none has been pressed; ``ready`` is ignored."""
+    def next(self) -> Key | None:
+        """Return the next key, None if none has been pressed."""
         if not self._ready:
             text = self.text()
             if text is None:
                 return "end"
             self._ready, self._rest = split_words(self._rest + text)
         return self._ready.pop(0) if self._ready else None
-
-
-class LineKeys(Keys):
-    """Keys from lines of a file or a pipe, each after the eyes have finished the previous one."""
-
-    def __init__(self, lines: Lines) -> None:
-        self._lines = lines
-        self._ready: list[Key] = []
-
-    def next(self, ready: bool) -> Key | None:
-        """Return the next key if the eyes are ready for it.
-
-        Raises:
-            SetupError: a line is not a key, or no lines remain.
-        """
-        if self._ready:
-            return self._ready.pop(0)
-        if not ready:
-            return None
-        try:
-            line = self._lines.next(0.0)
-        except EOFError:
-            raise SetupError(
-                "no key left: after the last part comes its Enter (an empty line) or end"
-            ) from None
-        if line is None:
-            return None
-        key, times = key_and_count(line)
-        self._ready = [key] * times
-        return self._ready.pop(0)

@@ -75,6 +75,7 @@ class Setting(Advice, frozen=True, kw_only=True):
     value: correct value of the register, within ``mask``
     least, most: values between them are also correct
     fix: whether ``--fix`` may write it
+    blocks: whether a joint is not calibrated with another value
     unit: factor for {scaled} in the texts
     """
 
@@ -84,6 +85,7 @@ class Setting(Advice, frozen=True, kw_only=True):
     least: int | None = None
     most: int | None = None
     fix: bool = False
+    blocks: bool = False
     unit: float = 1.0
 
     def accepts(self, found: int) -> bool:

@@ -5,7 +5,7 @@ overload and overcurrent, which last until a goal that moves away from the obsta
 Sources: ROBOTIS e-Manual, X series; Feetech memory table STS3215.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import msgspec
 
@@ -24,6 +24,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
     Diagnostic,
     FamilyAdvice,
     Fix,
+    Setting,
     has_fault,
 )
 from gazerig.features.bringup.servo_kinds import ServoKind
@@ -128,6 +129,13 @@ def apply_rules(state: ServoState) -> list[Diagnostic]:
     return findings
 
 
+def find_obstacles(state: ServoState) -> list[Diagnostic]:
+    """Return the faults with which a joint is not calibrated."""
+    blocking = [rule for rule in state.advice.settings if rule.blocks]
+    errors = [finding for finding in apply_rules(state) if finding.level == "error"]
+    return [*errors, *_check(state, blocking)]
+
+
 def _unread(state: ServoState) -> Iterator[Diagnostic]:
     names = [name.replace("_", " ") for name, value in state.values.items() if value is None]
     if names:
@@ -192,8 +200,12 @@ def _baud(state: ServoState) -> Iterator[Diagnostic]:
 
 
 def _settings(state: ServoState) -> Iterator[Diagnostic]:
+    yield from _check(state, state.advice.settings)
+
+
+def _check(state: ServoState, settings: Iterable[Setting]) -> Iterator[Diagnostic]:
     low, high = state.values["min_voltage_limit"] or 0, state.values["max_voltage_limit"] or 0
-    for wanted in state.advice.settings:
+    for wanted in settings:
         value = state.values.get(wanted.register)
         if value is None or wanted.accepts(value):
             continue
