@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig
-from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step
+from gazerig.features.bringup.manual_control import ManualControl, Step
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.control.body import Body
@@ -37,7 +37,7 @@ class Bench(EmulatedRig):
             Body(rig_bus(rig, self.ports), rig.joints, park_rad(rig)),
             guard,
             self.clock,
-            JogParams(speed_deg_s=speed_deg_s),
+            speed_deg_s,
             lambda: self.why,
             self.note,
         )
@@ -76,7 +76,7 @@ def test_one_joint_moves_and_the_others_hold(bench: Bench) -> None:
     moved = bench.control.jog("neck_yaw", 20.0)
     after = bench.where()
     assert moved.arrived
-    assert moved.joint_move("neck_yaw").error == pytest.approx(0.0, abs=2.0)
+    assert moved.joint_move("neck_yaw").measured == pytest.approx(20.0, abs=2.0)
     assert after.pop("neck_yaw") == pytest.approx(20.0, abs=2.0)
     assert moved.joint_move("neck_yaw").reasons == ()
     del before["neck_yaw"]
@@ -131,7 +131,7 @@ def test_a_joint_that_cannot_is_named_and_not_pushed(
     part = moved.joint_move("neck_yaw")
     assert not moved.arrived and moved.end_reason == end_reason
     assert any(reason in one for one in part.reasons)
-    assert (moved.level == "torque_off") == (end_reason == "torque_off")
+    assert (moved.last.guard_result.level == "torque_off") == (end_reason == "torque_off")
     assert part.commanded == pytest.approx(before, abs=15.0)
     assert bench.where()["neck_yaw"] < 10.0
 

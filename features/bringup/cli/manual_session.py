@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 import typer
 
 from gazerig.config.rig import Rig
-from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step, park_slowly
-from gazerig.features.bringup.servo_kinds import KINDS
+from gazerig.features.bringup.manual_control import RATE_HZ, ManualControl, Step, park_slowly
 from gazerig.robot.app.bus_wiring import bus_names, can_be_released, guarded_rig_bus, has_watchdog
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.app.rig_weight import rest_park_deg
@@ -18,15 +17,12 @@ from gazerig.robot.control.power_down import PowerDown
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.safety.guard import Guard
 
-BOARDS = {"maestro": "a Maestro", "pca9685": "a PCA9685"}
-"""Boards of hobby servos by the kind of bus."""
-
 
 @contextlib.contextmanager
 def holding_rig(
     rig: Rig,
     paths: Mapping[str, str],
-    params: JogParams,
+    speed_deg_s: float,
     stopped: Callable[[], str | None],
     interrupts: Interrupts,
     park: bool = True,
@@ -37,7 +33,7 @@ def holding_rig(
     Args:
         rig: the rig to move.
         paths: paths of the serial ports, by the name of the bus.
-        params: speed of the motion.
+        speed_deg_s: top speed of the motion.
         stopped: returns why to end a motion, None without a reason.
         interrupts: requests to end this program.
         park: whether to park the joints at the end.
@@ -50,8 +46,8 @@ def holding_rig(
     body = Body(
         guarded_rig_bus(rig, paths), rig.joints, park_rad(rig), pairs=rig.couplings.values()
     )
-    guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=1.0 / params.rate_hz)
-    control = ManualControl(body, guard, RealClock(), params, stopped, watch)
+    guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=1.0 / RATE_HZ)
+    control = ManualControl(body, guard, RealClock(), speed_deg_s, stopped, watch)
     with PowerDown(
         (lambda again: park_slowly(control, rest_park_deg(rig), again)) if park else None,
         control.stop,
@@ -86,14 +82,11 @@ def unreleased_text(rig: Rig) -> str:
     texts: dict[str, None] = {}
     for bus in bus_names(rig):
         kind = rig.bus_named(bus).kind
-        title = KINDS[kind].title if kind in KINDS else kind
-        if kind in BOARDS:
-            text = f"{BOARDS[kind]} goes on with its last pulses {until}"
-        elif not can_be_released(rig, bus):
-            text = f"the {title} servos' own watchdog stops them"
+        if not can_be_released(rig, bus):
+            text = f"the {kind} servos' own watchdog stops them"
         elif has_watchdog(rig, bus):
-            text = f"{title} servos stop by their own watchdog and hold {until}"
+            text = f"{kind} servos stop by their own watchdog and hold {until}"
         else:
-            text = f"{title} servos hold their last goal {until}"
+            text = f"{kind} servos hold their last goal or pulse {until}"
         texts[text] = None
     return "; ".join(texts)

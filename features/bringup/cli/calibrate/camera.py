@@ -45,7 +45,6 @@ from gazerig.features.bringup.cli.rig_writer import (
     refuse_unwritable,
     show_and_write,
 )
-from gazerig.features.bringup.manual_control import JogParams
 from gazerig.robot.app.camera_factory import frame_orientation
 from gazerig.robot.app.rig_limits import lid_ends, neck_span
 from gazerig.robot.cli.terminal import (
@@ -371,10 +370,11 @@ def _moving_neck(
     say("will look at it from several sides: keep your fingers away; Ctrl-C stops it")
     if mock is None and not person.agrees("does the board hang, and is the head free to move?"):
         raise CameraCalibrationRefused("left out as you asked: nothing was written")
-    params = JogParams(speed_deg_s=_GENTLE_DEG_S)
     with (
         rig_ports(rig, mock is not None, port) as wire,
-        holding_rig(rig, wire.paths, params, stopped, Interrupts.from_stop(stopped)) as control,
+        holding_rig(
+            rig, wire.paths, _GENTLE_DEG_S, stopped, Interrupts.from_stop(stopped)
+        ) as control,
     ):
         neck = JoggedNeck(control)
         if mock is not None:
