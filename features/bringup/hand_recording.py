@@ -85,8 +85,10 @@ def record_hand_motion(
         on = [name for name, seen in row.servos.items() if seen is not None and seen.torque]
         if on:
             raise SetupError(f"the torque of {on[0]} came on: another program moves the head")
-        angles = {name: seen and seen.position_deg for name, seen in row.servos.items()}
-        return row.at_s, angles
+        angles = {
+            name: None if seen is None else seen.position_deg for name, seen in row.servos.items()
+        }
+        return row.t_s, angles
 
     return _record(measure, clock, stopped, seconds)
 

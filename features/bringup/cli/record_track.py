@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +12,7 @@ from gazerig.config.schema import load_rig
 from gazerig.config.tracks import track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
+from gazerig.features.bringup.cli.monitor import open_readers
 from gazerig.features.bringup.cli.motion import enter_pressed
 from gazerig.features.bringup.cli.ports import (
     MockOption,
@@ -28,8 +28,7 @@ from gazerig.features.bringup.hand_recording import (
     record_live,
     switch_off,
 )
-from gazerig.features.bringup.servo_kinds import servo_kind
-from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry
+from gazerig.features.bringup.telemetry import Monitor
 from gazerig.gaze.track.track import MAX_DURATION_S
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.rig_command import RigCommand
@@ -135,16 +134,14 @@ def _record_hand(
         yes,
     )
     clock, there = RealClock(), {one: rig.joints[one] for one in measured}
-    with rig_ports(rig, mock, port) as wire, ExitStack() as ports:
-        readers = {}
+    with rig_ports(rig, mock, port) as wire:
         for bus in dict.fromkeys(joint.bus for joint in there.values()):
-            line = ports.enter_context(open_port(rig, wire, bus))
-            own = {one: joint for one, joint in there.items() if joint.bus == bus}
-            switch_off(own, line)
-            readers[bus] = SmartServoTelemetry(line, servo_kind(next(iter(own.values())).model))
+            with open_port(rig, wire, bus) as line:
+                switch_off({one: joint for one, joint in there.items() if joint.bus == bus}, line)
         say(f"the torque is off and stays off; move the head, Enter ends it (within {seconds:g} s)")
-        watch = Monitor(readers, there, clock.now_s)
-        return record_hand_motion(watch.sample, clock, end, seconds)
+        with open_readers(rig, wire, there) as readers:
+            watch = Monitor(readers, there, clock.now_s)
+            return record_hand_motion(watch.sample, clock, end, seconds)
 
 
 def _record_live(
