@@ -71,23 +71,14 @@ class SearchRound:
         return bool(self.found) or self.board is not None
 
 
-def plan_search(
-    usb: str, kinds: Sequence[BusKind], rates: Sequence[int] | None
-) -> tuple[tuple[BusKind, int], ...]:
+def plan_search(usb: str, kinds: Sequence[BusKind]) -> tuple[tuple[BusKind, int], ...]:
     """Return the kinds and rates to search, in order.
 
     usb: vendor and product id of the port, "" if it has none
-    kinds, rates: kinds and rates to search; None: all rates
     """
     if usb.startswith(POLOLU):
         return (("maestro", MaestroParams().baud),) if "maestro" in kinds else ()
-    rows: list[tuple[BusKind, int]] = []
-    for kind in ORDER:
-        if kind in kinds:
-            # Always search for a Maestro: its presence must be known.
-            wanted = RATES[kind] if rates is None or kind == "maestro" else rates
-            rows += [(kind, rate) for rate in RATES[kind] if rate in wanted]
-    return tuple(rows)
+    return tuple((kind, rate) for kind in ORDER if kind in kinds for rate in RATES[kind])
 
 
 def search_bus(

@@ -26,14 +26,14 @@ ROW = r"(\d) +[│|] ([\w-]+) +[│|] ([\d.]+) +[│|] (\d+) +[│|] "
 
 
 def test_scan_lists_every_servo():
-    code, out, _ = invoked("scan", "--mock", "--bauds", "57600,1000000")
+    code, out, _ = invoked("scan", "--mock", "--kind", "dynamixel")
     assert code == 0
     rows = re.findall(ROW + "Dynamixel", out)
     assert [int(row[0]) for row in rows] == list(range(1, 10))
     assert rows[0][1] == "xl330-m077" and rows[8][1] == "xc330-m288"
     assert {row[3] for row in rows} == {"1000000"}
-    assert "9 servos on" in out and "searched dynamixel at 1000000, 57600 bit/s" in out
-    code, out, _ = invoked("scan", "--mock", "--bauds", "1000000", "--json")
+    assert "9 servos on" in out and "searched dynamixel at 1000000, 57600, " in out
+    code, out, _ = invoked("scan", "--mock", "--kind", "dynamixel", "--json")
     found = json.loads(out)
     assert code == 0 and [servo["id"] for servo in found["servos"]] == list(range(1, 10))
     assert found["servos"][6]["model"] == "xc330-m288"
@@ -221,7 +221,7 @@ def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig: Path, tmp_pa
     assert "# The desk rig" in rig.read_text("utf-8")
     assert "joints.left_eye_pan.sign: 1 -> -1" in done.err
     assert "left_eye_pan (servo 1): torque off" in done.err
-    assert "joints.left_eye_pan.zero_step" in done.out
+    assert "joints.left_eye_pan.zero_step" in done.err
 
 
 def test_what_makes_no_calibration_is_refused_and_the_rest_is_kept(

@@ -5,6 +5,7 @@ board has no watchdog: a guardian stops the pulses if this program is killed.
 """
 
 from collections.abc import Callable
+from math import degrees
 
 from gazerig.drivers.bus.servo_models import US_STEPS
 from gazerig.drivers.errors import BusLost
@@ -14,7 +15,6 @@ from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.features.bringup.calibration.joint_procedure import Operator
-from gazerig.features.bringup.calibration.linkage_calibration import angle_now
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.robot.guardian.guardian import GuardedBus, Guardian
 from gazerig.robot.model.clock import Clock
@@ -35,8 +35,13 @@ TIMEOUT_S = 1.0
 SILENT_S = 2.0
 
 
+def angle_now(joint: JointParams, position: float) -> float:
+    """Return the angle of a position according to the rig file, to a tenth of a degree."""
+    return round(degrees(joint.angle_rad(position * joint.model_facts.unit_steps)), 1) + 0.0
+
+
 class HobbyServoAccess:
-    """The servo of one joint, and the person who steers it; a Marker of linkage_calibration.
+    """The servo of one joint, and the person who steers it.
 
     Args:
         name: name of the joint.

@@ -37,7 +37,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
 )
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
 from gazerig.features.bringup.servo_kinds import servo_kind
-from gazerig.robot.app.bus_wiring import bus_names, can_be_released, release_plan
+from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.rig_weight import weight_findings
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
 from gazerig.robot.safety.start_range import find_far_outside
@@ -128,8 +128,6 @@ def _examine(rig: Rig, bus: str, line: BusPort) -> list[Diagnostic]:
         baud = config.section.baud
         examine = partial(checkup.examine_bus, line, kind, setups, baud, progress, far)
     findings = checkup.examine_port(line, examine)
-    if can_be_released(rig, bus):
-        findings.append(checkup.examine_guardian(release_plan(rig, bus, line.port_name)))
     clear_progress()
     return [msgspec.structs.replace(one, bus=bus) for one in findings]
 

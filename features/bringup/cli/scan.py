@@ -18,7 +18,6 @@ from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c
 from gazerig.drivers.serial.port import BusPort
 from gazerig.features.bringup.bus_search import (
     ORDER,
-    RATES,
     SearchRound,
     found_servos,
     plan_search,
@@ -32,7 +31,6 @@ from gazerig.features.bringup.cli.ports import (
     refuse_packages,
     rig_ports,
 )
-from gazerig.features.bringup.doctor.examination import name_ports
 from gazerig.features.bringup.servo_kinds import KINDS, servo_kind
 from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
@@ -59,7 +57,6 @@ def scan(
             "Required for a Maestro that cannot answer."
         ),
     ] = None,
-    bauds: Annotated[str, typer.Option(help="all, or bit/s: 1000000,57600")] = "all",
     mock: MockOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -68,7 +65,6 @@ def scan(
     Moves and changes nothing; only a Maestro's list of errors is cleared by asking for it.
     """
     with clear_errors(rig or DEFAULT_RIG, port, mock):
-        rates = parse_bauds(bauds)
         kinds = [one for one in ORDER if kind in (None, one)]
         if not kinds:
             raise SetupError(f"--kind {kind}: not one of {', '.join(ORDER)}")
@@ -82,7 +78,7 @@ def scan(
                 say(f"port {one.device}: {one.description}{usb}{alias}")
         with _paths(rig, mock, port, found_ports) as paths:
             answered = [
-                _boards(path, as_json) if i2c else _search_port(path, kinds, rates, as_json)
+                _boards(path, as_json) if i2c else _search_port(path, kinds, as_json)
                 for path, i2c in paths
             ]
     if not any(answered):
@@ -129,22 +125,6 @@ def _boards(path: str, as_json: bool) -> bool:
     return bool(found)
 
 
-def parse_bauds(text: str) -> tuple[int, ...] | None:
-    """Parse --bauds; None for all.
-
-    Raises:
-        SetupError: it contains a rate that no servo supports.
-    """
-    if text == "all":
-        return None
-    known = sorted({rate for rates in RATES.values() for rate in rates})
-    rates = [int(word) if word.strip().isdecimal() else -1 for word in text.split(",")]
-    if not set(rates) <= set(known):
-        named = ", ".join(map(str, known))
-        raise SetupError(f"--bauds {text}: not all or some of {named}, with commas between")
-    return tuple(rates)
-
-
 def _only_port(ports: Sequence[SerialPort]) -> str:
     """Return the only port on USB; queries to unknown devices need a person's consent."""
     usb = [port for port in ports if port.usb]
@@ -154,7 +134,8 @@ def _only_port(ports: Sequence[SerialPort]) -> str:
     if len(usb) == 1:
         return usb[0].by_id or usb[0].device
     if usb:
-        raise SetupError(f"which port? name it with --port: {name_ports(usb)}")
+        named = ", ".join(f"{port.by_id or port.device} ({port.description})" for port in usb)
+        raise SetupError(f"which port? name it with --port: {named}")
     raise SetupError(
         "no serial port on USB: plug the adaptor in (its LED should light), or name a port "
         "with --port"
@@ -164,19 +145,16 @@ def _only_port(ports: Sequence[SerialPort]) -> str:
 def _search_port(
     path: str,
     kinds: Sequence[BusKind],
-    rates: Sequence[int] | None,
     as_json: bool,
 ) -> bool:
     """Search one port and show the results; return whether a servo answered."""
     usb = bench.usb_id(path)
-    asked = plan_search(usb, kinds, rates)
-    if not asked and usb.startswith(POLOLU):
+    asked = plan_search(usb, kinds)
+    if not asked:
         raise SetupError(
             f"{path} is a board of Pololu: packets for servos would move what hangs on it; "
             "name the adaptor's port with --port, or ask with --kind maestro"
         )
-    if not asked:
-        raise SetupError(f"--bauds: none of them is a rate of {' or '.join(kinds)}")
     with bench.unopened_port(path) as line:
         rounds = _search(line, usb, asked, False)
         if not any(one.has_answer for one in rounds):

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import msgspec
 
 from gazerig.drivers.bus.servo_models import servo_label
-from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
-from gazerig.drivers.serial.list_ports import SerialPort, persistent_name
+from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing
+from gazerig.drivers.serial.list_ports import persistent_name
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (
     ANSWERS,
@@ -33,8 +33,6 @@ from gazerig.features.bringup.servo_setup import (
     open_at,
     search_rates,
 )
-from gazerig.robot.guardian.guardian import Guardian
-from gazerig.robot.guardian.release_plan import ReleasePlan, describe
 
 ADOPT = "id"
 """Register of the fix that gives a new servo the id and the baud rate of a missing one."""
@@ -207,31 +205,3 @@ def adopt_spare(
     except (ServoFault, ServoMissing) as error:
         return str(error)
     return ""
-
-
-# --- the guardian
-
-
-def examine_guardian(plan: ReleasePlan) -> Diagnostic:
-    """Start a guardian, end it again, and return its planned actions; nothing is sent.
-
-    Args:
-        plan: servos that it would release.
-    """
-    guardian = Guardian((plan,))
-    try:
-        guardian.join(0)
-        guardian.wait_until_ready()
-    except SetupError as error:
-        return Diagnostic("error", str(error), "guardian", "torque stays off until it starts")
-    finally:
-        guardian.leave(0)
-    return Diagnostic(
-        "ok", f"{describe(plan)} within .5 s if the program dies or hangs", "guardian"
-    )
-
-
-def name_ports(ports: Sequence[SerialPort]) -> str:
-    """Format a list of ports for people."""
-    named = [f"{port.by_id or port.device} ({port.description})" for port in ports]
-    return ", ".join(named) or "none"

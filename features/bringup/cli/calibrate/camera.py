@@ -36,14 +36,13 @@ from gazerig.features.bringup.calibration.lens_calibration import (
     lens_params,
 )
 from gazerig.features.bringup.cli.manual_session import holding_rig
-from gazerig.features.bringup.cli.ports import MockOption, rig_ports
+from gazerig.features.bringup.cli.ports import MockOption, YesOption, rig_ports
 from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
 from gazerig.features.bringup.cli.rig_writer import (
-    AllYesOption,
     DryRunOption,
     OutOption,
     refuse_unwritable,
-    show_and_write,
+    write_values,
 )
 from gazerig.robot.app.camera_factory import frame_orientation
 from gazerig.robot.app.rig_limits import lid_ends, neck_span
@@ -109,7 +108,7 @@ def calibrate_camera(
     ] = float(RULER_MM),
     out: OutOption = None,
     dry_run: DryRunOption = False,
-    yes: AllYesOption = False,
+    yes: YesOption = False,
     mock: MockOption = False,
     port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
 ) -> None:
@@ -135,7 +134,7 @@ def calibrate_camera(
             if moves:
                 found = _measure_mount(loaded, board, eye, seen, port, stopped, person)
                 changes |= mount_changes(found, seen)
-        show_and_write(rig, loaded, changes, out, dry_run, person)
+        write_values(rig, changes, out, person, dry_run)
 
 
 def _refuse_fixed(rig: Rig) -> None:

@@ -23,10 +23,9 @@ from gazerig.features.bringup.calibration.face_steering import (
 )
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibration_keys import HELP, TerminalKeys, parse_keys
-from gazerig.features.bringup.cli.ports import MockOption, PortOption
+from gazerig.features.bringup.cli.ports import MockOption, PortOption, YesOption
 from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
 from gazerig.features.bringup.cli.rig_writer import (
-    AllYesOption,
     OutOption,
     refuse_unwritable,
     write_values,
@@ -60,7 +59,7 @@ def calibrate_face(
     camera: Annotated[int | None, typer.Option(min=0, help="Look through webcam N.")] = None,
     oak: Annotated[bool, typer.Option("--oak", help="Look through an OAK-D camera.")] = False,
     out: OutOption = None,
-    yes: AllYesOption = False,
+    yes: YesOption = False,
     answers: Annotated[
         Path | None, typer.Option(help="File with one key per line, e.g. left 3; empty is Enter.")
     ] = None,

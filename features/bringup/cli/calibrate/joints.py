@@ -26,10 +26,7 @@ from gazerig.features.bringup.calibration.joint_procedure import (
     calibrate_by_hand,
     calibrate_by_motion,
 )
-from gazerig.features.bringup.calibration.linkage_calibration import (
-    HandMarker,
-    calibrate_by_marks,
-)
+from gazerig.features.bringup.calibration.linkage_calibration import calibrate_by_marks
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
     SmartServoAccess,
@@ -38,17 +35,17 @@ from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
     RigPorts,
+    YesOption,
     open_port,
     refuse_packages,
     rig_ports,
 )
 from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
 from gazerig.features.bringup.cli.rig_writer import (
-    AllYesOption,
     DryRunOption,
     OutOption,
     refuse_unwritable,
-    show_and_write,
+    write_values,
 )
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.app.bus_wiring import release_plan
@@ -97,7 +94,7 @@ def calibrate_joints(
     ] = False,
     out: OutOption = None,
     dry_run: DryRunOption = False,
-    yes: AllYesOption = False,
+    yes: YesOption = False,
     answers: Annotated[
         Path | None, typer.Option(help="File with one answer per line; empty is Enter.")
     ] = None,
@@ -119,8 +116,11 @@ def calibrate_joints(
             refuse_unwritable(rig, out)
             if out is None:
                 # A linkage on several lines of the file cannot be rewritten: the lines are kept.
-                points = {f"joints.{one}.transmission_points": ((0, 0),) for one in names
-                          if _has_marks(loaded, one)}  # fmt: skip
+                points = {
+                    f"joints.{one}.transmission_points": ((0, 0),)
+                    for one in names
+                    if not loaded.joints[one].model_facts.measures_position
+                }
                 propose(find_file("rigs", rig), points)
         person = TerminalPerson(Lines(answers), stopped, yes)
         wanted, refused = dict[str, Value](), list[str]()
@@ -135,19 +135,13 @@ def calibrate_joints(
                         refused.append(name)
                         say(f"refused: {error}")
             if len(refused) < len(names):
-                show_and_write(rig, loaded, wanted, out, dry_run, person)
+                write_values(rig, wanted, out, person, dry_run)
         except CalibrationStopped as why:
             say(f"stopped by {why}: nothing written")
             raise typer.Exit(FAULT) from None
     if refused:
         say(f"not calibrated: {', '.join(refused)}")
         raise typer.Exit(FAULT)
-
-
-def _has_marks(rig: Rig, name: str) -> bool:
-    """Return whether a joint is calibrated by marks and their angles."""
-    joint = rig.joints[name]
-    return bool(joint.transmission_points) or not joint.model_facts.measures_position
 
 
 _BY_LEVEL = (
@@ -215,10 +209,13 @@ def _calibrate(job: CalibrationJob, name: str) -> Calibration | LinkageFit:
             return _calibrate_smart_servo(single, job)
 
 
-def _calibrate_smart_servo(
-    single: SmartServoAccess, job: CalibrationJob
-) -> Calibration | LinkageFit:
+def _calibrate_smart_servo(single: SmartServoAccess, job: CalibrationJob) -> Calibration:
     person, by_motion = job.person, job.by is ActuationMode.motion
+    if single.joint.transmission_points:
+        raise CalibrationRefused(
+            f"{single.name}: its push rod has measured places: read steps with gazerig monitor at "
+            "some angles, and write them into transmission_points"
+        )
     single.check()
     if job.set_middle:
         single.disable_torque()
@@ -230,13 +227,6 @@ def _calibrate_smart_servo(
             f"{single.who}: its place is 2048 now (offset {single.set_middle()}); until this "
             "calibration is written the rig file's zero is wrong by that"
         )
-    if single.joint.transmission_points and by_motion:
-        raise CalibrationRefused(
-            f"{single.name}: its push rod has measured places (transmission_points), which motion "
-            "cannot find: --by hand"
-        )
-    if single.joint.transmission_points:
-        return calibrate_by_marks(HandMarker(single, person), person, job.margin_deg)
     if not by_motion:
         return calibrate_by_hand(single, person, job.margin_deg)
     # A heavy head must not move on its own without a confirmation.
