@@ -1,13 +1,10 @@
-"""Search for a new servo, alone or in a chain, and assignment of its id and baud rate.
+"""Search for a new servo, and assignment of its id and baud rate.
 
-A servo is connected alone, or it is the factory-new spare of the only servo that a chain misses:
-two servos with the same id appear as one, and both would receive the new id.
-
-Id and baud rate take effect immediately, after the status packet of their own write. The id comes
-first: in a chain the servo is alone at the factory's baud rate, but perhaps not with its id at the
-chain's. If the memory has a lock, they are written with it open; otherwise they would be lost at
-the next power-off. It is closed under the new id and at the new rate. Sources: ROBOTIS e-Manual;
-Feetech memory table STS3215.
+A servo is connected alone: two servos with the same id appear as one, and both would receive the
+new id. Id and baud rate take effect immediately, after the status packet of their own write. If the
+memory has a lock, they are written with it open; otherwise they would be lost at the next
+power-off. It is closed under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech
+memory table STS3215.
 """
 
 from collections.abc import Sequence
@@ -40,10 +37,6 @@ class Answers(NamedTuple):
 
     found: Sequence[FoundServo]
     spoilt_bauds: Sequence[int]
-
-
-Spare = tuple[FoundServo, ServoConfig]
-"""A factory-new servo, and the setup of the missing one that it replaces."""
 
 
 class SetupResult(NamedTuple):
@@ -82,42 +75,6 @@ def search_rates(
         found += [*answers, *shared]
         spoilt += [baud] if junk or shared else []
     return Answers(found, spoilt)
-
-
-def find_spare(
-    port: BusPort,
-    kind: ServoKind,
-    chain: Sequence[ServoConfig],
-    baud: int,
-    found: Sequence[FoundServo],
-) -> Spare | None:
-    """Return the factory-new servo that replaces the only missing one of a chain.
-
-    None if not exactly one is missing, or not exactly one other servo answers and is such a one.
-    If its assignment was interrupted, it has its id at the factory's baud rate.
-
-    Args:
-        port: open port.
-        kind: kind of the servos.
-        chain: setups of all servos of the chain.
-        baud: baud rate of the chain.
-        found: servos that answered, at all rates.
-    """
-    wanted = {setup.id: setup for setup in chain}
-    present = {one.id for one in found if one.baud == baud}
-    missing = [setup for setup in chain if setup.id not in present]
-    others = [one for one in found if one.baud != baud or one.id not in wanted]
-    if (len(missing), len(others)) != (1, 1):
-        return None
-    (setup,), (spare,) = missing, others
-    new = spare.baud == kind.family.factory_baud and spare.id in (FACTORY_ID, setup.id)
-    fits = spare.number == kind.family.models[setup.model].number
-    if not (new and fits and port.setBaudRate(baud)):
-        return None
-    # An answer of the missing one may only have been lost, or spoilt by another with its id.
-    is_silent = ping(port, kind.family, setup.id, baud) is None
-    is_free = is_silent and not count_corrupt(port, kind.family, setup.id, SHARED)
-    return (spare, setup) if is_free else None
 
 
 def find_alone(answers: Answers, where: str) -> FoundServo:

@@ -30,13 +30,13 @@ from gazerig.features.bringup.doctor import examination as checkup
 from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685
 from gazerig.features.bringup.doctor.diagnostics import (
     Diagnostic,
-    Fix,
     group_findings,
     summarize,
     worst_level,
 )
-from gazerig.features.bringup.doctor.servo_rules import apply_fix
+from gazerig.features.bringup.doctor.servo_rules import apply_fixes
 from gazerig.features.bringup.servo_kinds import servo_kind
+from gazerig.features.bringup.servo_setup import open_at
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.rig_weight import weight_findings
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
@@ -102,10 +102,12 @@ def _examine_and_fix(rig: Rig, bus: str, line: BusPort, fix: bool, tell: Tell) -
     show_findings(findings, tell)
     if not fix:
         return findings
-    done = _apply_fixes(rig, bus, line, findings)
-    if any(fix.register == checkup.ADOPT for one in findings for fix in one.fixes):
-        # The settings of a new servo are those of the factory.
-        done += _apply_fixes(rig, bus, line, _examine(rig, bus, line))
+    done = []
+    if any(finding.fixes for finding in findings):
+        kind = servo_kind(setups_on(rig, bus)[0].model)
+        open_at(line, rig.bus_named(bus).section.baud)
+        done = [text for finding in findings for text in apply_fixes(line, kind, finding)]
+        line.closePort()
     for text in done or ["nothing that --fix may mend"]:
         tell(text)
     tell("after that:")
@@ -141,22 +143,6 @@ def _print_line(line: str) -> None:
         out.print(rest, markup=False)
     else:
         out.print(complete_suggestions(line), markup=False)
-
-
-def _apply_fixes(rig: Rig, bus: str, line: BusPort, findings: Sequence[Diagnostic]) -> list[str]:
-    """Apply all fixes; return a line about each."""
-
-    def write(fix: Fix) -> str:
-        setups, baud = setups_on(rig, bus), rig.bus_named(bus).section.baud
-        kind = servo_kind(setups[0].model)
-        if fix.register == checkup.ADOPT:
-            return checkup.adopt_spare(line, kind, fix, setups, baud, progress)
-        line.setBaudRate(baud)
-        return apply_fix(line, kind, fix)
-
-    done = list(checkup.apply_fixes(write, findings))
-    line.closePort()
-    return done
 
 
 def show_findings(findings: Sequence[Diagnostic], tell: Tell) -> None:

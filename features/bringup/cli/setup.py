@@ -77,35 +77,30 @@ def _set_up_chain(
     baud, count, done = rig.bus_named(bus).section.baud, len(setups), set[str]()
     say(
         f"{bus_label(rig, bus)}: {count} of {len(rig.names)} servos to set up for {baud} bit/s. "
-        "Switch the servo supply off before you plug or unplug one. A new servo in the place of "
-        "the only missing one may be set up in the chain."
+        "Switch the servo supply off before you plug or unplug one."
     )
     for n, wanted in enumerate(setups, 1):
         # Factory settings.
         kind, zero = servo_kind(wanted.model), rig.joints[wanted.name].zero
         spec = ServoSpec(servo_setup.FACTORY_ID, wanted.model, zero)
         fresh = {bus: CHAINS[kind.name]((spec,), kind.family.factory_baud)}
-        if wanted.name not in done:
-            label = servo_label(wanted)
-            say(f"{n} of {count}: connect the {wanted.model} of {label}, and no other servo")
-        while wanted.name not in done:
-            if not yes and _press_enter().lower().startswith("s"):
-                break
+        say(
+            f"{n} of {count}: connect the {wanted.model} of {servo_label(wanted)}, and no other servo"
+        )
+        while yes or not _press_enter().lower().startswith("s"):
             try:
                 with (
                     rig_ports(rig, mock, port, fresh) as wired,
                     unopened_port(wired.paths[bus]) as line,
                 ):
-                    names = _set_up(line, wanted, setups_on(rig, bus), setups, baud, yes)
+                    if _set_up(line, wanted, baud, yes):
+                        done.add(wanted.name)
+                break
             except DriverError as error:
                 if yes:
                     raise
                 say(f"   {error}")
-                continue
-            done.update(names)
-            if not names:
-                break
-    return done & {one.name for one in setups}
+    return done
 
 
 def _press_enter() -> str:
@@ -119,41 +114,25 @@ def _press_enter() -> str:
 def _set_up(
     line: BusPort,
     wanted: ServoConfig,
-    chain: Sequence[ServoConfig],
-    asked: Sequence[ServoConfig],
     baud: int,
     yes: bool,
-) -> list[str]:
-    """Give the new servo its id and baud rate; return the joints that are done, none if skipped.
-
-    chain: all servos of the bus; asked: those to set up
-    """
+) -> bool:
+    """Give the new servo its id and baud rate; return whether it is done."""
     kind = servo_kind(wanted.model)
     order = servo_setup.search_order(kind, baud)
     answers = servo_setup.search_rates(line, kind, order, progress, thorough=True)
     clear_progress()
-    spare = servo_setup.find_spare(line, kind, chain, baud, answers.found)
-    joints = [wanted.name]
-    if spare is None or spare[1] not in asked:
-        found = servo_setup.find_alone(answers, line.port_name)
-    else:
-        found, wanted = spare
-        joints = [one.name for one in chain]
+    found = servo_setup.find_alone(answers, line.port_name)
     label = servo_label(wanted)
     firmware = kind.family.format_firmware(found.firmware)
     say(f"   found: {found.model}, firmware {firmware}, id {found.id} at {found.baud} bit/s")
-    if len(joints) > 1:
-        say(
-            f"   all others of the chain answer, so it is for {label}; its zero is "
-            f"another: then gazerig calibrate --joint {wanted.name}"
-        )
     servo_setup.refuse_model(found, kind, wanted, line.port_name)
     question = f"   give it id {wanted.id} and {baud} bit/s?"
     if not yes and not confirm(question, default=True, err=True):
-        return []
+        return False
     result = servo_setup.assign_servo(line, kind, found, wanted, baud, progress)
     clear_progress()
     changes = "; ".join(result.changes) or "nothing to change"
     after = result.after
     say(f"   {label}: {changes}; answers as id {after.id} at {after.baud} bit/s")
-    return joints
+    return True

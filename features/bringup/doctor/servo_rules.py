@@ -263,17 +263,26 @@ RULES: tuple[Callable[[ServoState], Iterator[Diagnostic]], ...] = (
 )
 
 
-def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
-    """Write a fix if the torque is off, so that it persists; return "" or the reason of a failure.
+def apply_fixes(port: BusPort, kind: ServoKind, finding: Diagnostic) -> Iterator[str]:
+    """Write the fixes of a finding; yield a line about each.
+
+    port: open at the rate of the servos
 
     Raises:
         BusLost: the port has disappeared.
     """
-    line, servo_id = Transactions(port, kind.family), fix.servo_id
+    for fix in finding.fixes:
+        why = _apply_fix(Transactions(port, kind.family), fix)
+        yield f"{finding.where}: {fix}: {f'not done, {why}' if why else 'done'}"
+
+
+def _apply_fix(line: Transactions, fix: Fix) -> str:
+    """Write a fix if the torque is off, so that it persists; return "" or the reason why not."""
+    servo_id, level = fix.servo_id, line.family.answer_level
     torque = line.read(servo_id, "torque_enable")
-    if not torque and line.read(servo_id, "status_return_level") != kind.family.answer_level:
+    if not torque and line.read(servo_id, "status_return_level") != level:
         # A servo that answers only queries or pings does not confirm the following writes.
-        line.write_all((servo_id,), "status_return_level", [kind.family.answer_level])
+        line.write_all((servo_id,), "status_return_level", [level])
         torque = line.read(servo_id, "torque_enable")
     if torque:
         return "its torque is on"
