@@ -17,20 +17,15 @@ detected: with such a board on the line, specify the kind of servo.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
-from gazerig.drivers.bus.servo_models import FAMILY_OF, BusKind
+from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.maestro.board import USB_CHANNELS, DetectedMaestro, MaestroParams, probe
 from gazerig.drivers.serial.list_ports import POLOLU
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.discovery import (
-    SHARED,
-    FoundServo,
-    count_corrupt,
-    has_any_reply,
-    scan_ids,
-)
+from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.features.bringup.servo_kinds import KINDS
+from gazerig.features.bringup.servo_setup import Answers, search_rate
 
 ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
 """Order of the search by kind; see above."""
@@ -47,23 +42,23 @@ RATES: Mapping[BusKind, Sequence[int]] = {
 }
 
 
-@dataclass(frozen=True)
-class SearchRound:
+class SearchRound(NamedTuple):
     """Result of the search for one kind at one baud rate.
 
-    is_supported: whether the adaptor supports the rate; unknown_bytes: bytes that are not valid
-    shared_ids: ids that two servos seem to have
+    answers: of servos, None if the adaptor does not support the rate, or for a board
     board: a Maestro; channels: number of its channels, None if unknown
     """
 
     kind: BusKind
     baud: int
-    is_supported: bool = True
-    found: tuple[FoundServo, ...] = ()
-    unknown_bytes: int = 0
-    shared_ids: tuple[int, ...] = ()
+    answers: Answers | None = None
     board: DetectedMaestro | None = None
     channels: int | None = None
+
+    @property
+    def found(self) -> tuple[FoundServo, ...]:
+        """Return the servos that answered."""
+        return () if self.answers is None else self.answers.found
 
     @property
     def has_answer(self) -> bool:
@@ -102,28 +97,15 @@ def search_bus(
     for kind, baud in asked:
         if met not in (None, kind):
             return
+        looked = SearchRound(kind, baud)
         if kind != "maestro":
-            looked = _search_servos(port, kind, baud, thorough)
+            looked = SearchRound(kind, baud, search_rate(port, KINDS[kind], baud, thorough))
         elif port.setBaudRate(baud):
             # Every board has the first six channels; others might cause an error.
             board = probe(port, MaestroParams())
             looked = SearchRound(kind, baud, board=board, channels=USB_CHANNELS.get(usb))
-        else:
-            looked = SearchRound(kind, baud, is_supported=False)
         met = kind if looked.has_answer else met
         yield looked
-
-
-def _search_servos(port: BusPort, kind: BusKind, baud: int, thorough: bool) -> SearchRound:
-    family = KINDS[kind].family
-    if not port.setBaudRate(baud):
-        return SearchRound(kind, baud, is_supported=False)
-    if not thorough and not has_any_reply(port, family):
-        return SearchRound(kind, baud)
-    found, junk = scan_ids(port, family, baud)
-    tables = {one.id: FAMILY_OF.get(one.model, family) for one in found}
-    shared = tuple(i for i, table in tables.items() if count_corrupt(port, table, i) >= SHARED)
-    return SearchRound(kind, baud, found=found, unknown_bytes=junk, shared_ids=shared)
 
 
 def found_servos(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServo]]:

@@ -7,10 +7,10 @@ power-off. It is closed under the new id and at the new rate. Sources: ROBOTIS e
 memory table STS3215.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from gazerig.drivers.bus.servo_models import servo_label
+from gazerig.drivers.bus.servo_models import FAMILY_OF, servo_label
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (
@@ -30,13 +30,19 @@ FACTORY_ID = 1
 
 
 class Answers(NamedTuple):
-    """Servos that answered; one of several with the same id twice.
+    """Answers at one baud rate.
 
-    spoilt_bauds: baud rates at which bytes came that were no answers, or two servos share an id
+    junk: bytes that are not part of an answer; shared_ids: ids that two servos seem to have
     """
 
-    found: Sequence[FoundServo]
-    spoilt_bauds: Sequence[int]
+    found: tuple[FoundServo, ...] = ()
+    junk: int = 0
+    shared_ids: tuple[int, ...] = ()
+
+    @property
+    def is_spoilt(self) -> bool:
+        """Return whether two servos may have answered at the same time."""
+        return bool(self.junk or self.shared_ids)
 
 
 class SetupResult(NamedTuple):
@@ -52,46 +58,58 @@ def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
     return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.baud_rates)))
 
 
-def search_rates(
-    port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell, thorough: bool = False
-) -> Answers:
-    """Find all connected servos at some baud rates.
+def search_rate(
+    port: BusPort, kind: ServoKind, baud: int, thorough: bool = False
+) -> Answers | None:
+    """Find all connected servos at a baud rate, None if the adaptor does not support it.
 
-    thorough: read every id at the first rates even if no servo answers a broadcast ping
+    thorough: read every id even if no servo answers a broadcast ping
 
     Raises:
         PortError: the port cannot be opened.
         BusLost: it has disappeared.
     """
-    family, found, spoilt = kind.family, list[FoundServo](), list[int]()
+    family = kind.family
+    if not port.setBaudRate(baud):
+        return None
+    if not thorough and not has_any_reply(port, family):
+        return Answers()
+    found, junk = scan_ids(port, family, baud)
+    tables = {one.id: FAMILY_OF.get(one.model, family) for one in found}
+    twice = {i for i in tables if [one.id for one in found].count(i) > 1}
+    shared = (i for i, table in tables.items() if count_corrupt(port, table, i) >= SHARED)
+    return Answers(found, junk, tuple(sorted({*twice, *shared})))
+
+
+def search_rates(
+    port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell, thorough: bool = False
+) -> dict[int, Answers]:
+    """Find all connected servos at some baud rates; return the answers by rate.
+
+    thorough: see ``search_rate``; only until a servo has answered
+    """
+    found: dict[int, Answers] = {}
     for baud in bauds:
         tell(f"asking at {baud} bit/s")
-        quick = not thorough or bool(found)
-        if not port.setBaudRate(baud) or (quick and not has_any_reply(port, family)):
-            continue
-        answers, junk = scan_ids(port, family, baud)
-        each = dict.fromkeys(answers)
-        shared = [one for one in each if count_corrupt(port, family, one.id) >= SHARED]
-        found += [*answers, *shared]
-        spoilt += [baud] if junk or shared else []
-    return Answers(found, spoilt)
+        wanted = thorough and not any(one.found for one in found.values())
+        found[baud] = search_rate(port, kind, baud, wanted) or Answers()
+    return found
 
 
-def find_alone(answers: Answers, where: str) -> FoundServo:
+def find_alone(answers: Mapping[int, Answers], where: str) -> FoundServo:
     """Return the only servo that answered on the port ``where``.
 
     Raises:
         ServoMissing: no servo or more than one answered.
     """
-    found, spoilt_bauds = answers
+    found = [servo for one in answers.values() for servo in one.found]
+    shared = [i for one in answers.values() for i in one.shared_ids]
+    if shared:
+        raise ServoMissing(f"{where}: two servos answer as id {shared[0]}: connect one servo alone")
     if len(found) > 1:
-        named = [f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found]
-        crowd = f"{len(named)} servos answer: {', '.join(named)}"
-        twice = [name for name in named if named.count(name) > 1]
-        if twice:
-            crowd = f"two servos answer as {twice[0]}"
-        raise ServoMissing(f"{where}: {crowd}: connect one servo alone")
-    if not found and spoilt_bauds:
+        named = ", ".join(f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found)
+        raise ServoMissing(f"{where}: {len(found)} servos answer: {named}: connect one servo alone")
+    if not found and any(one.is_spoilt for one in answers.values()):
         raise ServoMissing(
             f"{where}: answers in pieces only: connect one servo alone, and check its plug"
         )

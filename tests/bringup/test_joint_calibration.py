@@ -16,10 +16,11 @@ from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.servo_bus.settings import write_settings
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.features.bringup.calibration.endstop_search import STEPS_PER_DEG
-from gazerig.features.bringup.calibration.hobby_access import (
+from gazerig.features.bringup.calibration.hobby_calibration import (
     PULSES_US,
     SPEED_US_S,
     HobbyServoAccess,
+    calibrate_by_marks,
 )
 from gazerig.features.bringup.calibration.joint_calibration import (
     CalibrationRefused,
@@ -32,7 +33,6 @@ from gazerig.features.bringup.calibration.joint_procedure import (
     calibrate_by_hand,
     calibrate_by_motion,
 )
-from gazerig.features.bringup.calibration.linkage_calibration import calibrate_by_marks
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
     SmartServoAccess,
@@ -180,7 +180,7 @@ def test_what_is_found_is_what_is_there_or_it_is_refused(
         return
     assert inside
     assert found.zero_step == zero and found.sign == sign
-    made = with_calibration(joint, found)
+    made = with_calibration("left_eye_pan", joint, found)
     for angle, end in ((found.max_deg, ends[0]), (found.min_deg, ends[1])):
         short_steps = (end - made.steps(radians(angle))) * (1 if angle > 0 else -1) * sign
         assert margin <= short_steps / (ratio * STEPS_PER_DEG) + 0.1 / ratio

@@ -27,7 +27,7 @@ from gazerig.features.bringup.calibration.smart_servo_access import SmartServoAc
 from gazerig.robot.model.types import GAZE_JOINTS
 
 if TYPE_CHECKING:
-    from gazerig.features.bringup.calibration.hobby_access import HobbyServoAccess
+    from gazerig.features.bringup.calibration.hobby_calibration import HobbyServoAccess
 
 
 class Operator(Protocol):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
-from gazerig.features.bringup.calibration.hobby_access import HobbyServoAccess
+from gazerig.features.bringup.calibration.hobby_calibration import HobbyServoAccess
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibration_keys import TerminalKeys
 from gazerig.robot.cli.terminal import say, status

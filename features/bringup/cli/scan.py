@@ -224,7 +224,7 @@ def scan_remarks(rounds: Sequence[SearchRound], where: str) -> Iterator[str]:
         count = f"{len(found)} servo{'s' if len(found) != 1 else ''}"
         rates: dict[BusKind, list[str]] = {}
         for one in rounds:
-            if one.is_supported:
+            if one.kind == "maestro" or one.answers is not None:
                 rates.setdefault(one.kind, []).append(str(one.baud))
         named = (f"searched {kind} at {', '.join(some)} bit/s" for kind, some in rates.items())
         yield f"{count} on {where}; {'; '.join(named)}"
@@ -232,13 +232,14 @@ def scan_remarks(rounds: Sequence[SearchRound], where: str) -> Iterator[str]:
         yield "nothing else was sent: packets for servos would move what hangs on the board"
     heard = {one.baud for one in rounds if one.has_answer}
     for one in rounds:
-        twice = {servo.id for servo in one.found if one.found.count(servo) > 1}
-        for servo_id in sorted({*one.shared_ids, *twice}):
+        if one.answers is None:
+            continue
+        for servo_id in one.answers.shared_ids:
             yield (
                 f"two or more servos have id {servo_id} at {one.baud} bit/s: connect them one at a "
                 "time and run gazerig setup"
             )
-        if one.unknown_bytes and not one.found and one.baud not in heard:
+        if one.answers.junk and not one.found and one.baud not in heard:
             yield (
                 f"at {one.baud} bit/s only pieces came: a wrong rate, a loose plug, or two servos "
                 "with one id"

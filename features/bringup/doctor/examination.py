@@ -72,9 +72,10 @@ def examine_bus(
     others = [rate for rate in kind.family.baud_rates if rate != baud and missing]
     answers = search_rates(port, kind, others, tell)
     open_at(port, baud)
-    if missing and not present and not answers.found:
+    elsewhere = {found.id: found for one in answers.values() for found in one.found}
+    if missing and not present and not elsewhere:
         return [ADVICE.bus["nobody"].at("the bus", baud=baud, no_reply=advice.no_reply)]
-    elsewhere, findings = {found.id: found for found in answers.found}, []
+    findings = []
     for setup in missing:
         found = elsewhere.pop(setup.id, None)
         cause = "elsewhere" if found else "pieces" if setup.id in shared else "silent"
@@ -83,8 +84,9 @@ def examine_bus(
     named = ", ".join(f"{servo_label(setup)}: {setup.model}" for setup in missing)
     for found in elsewhere.values():
         findings.append(ADVICE.bus["new"].at("the bus", found=found, missing=named))
-    if kind.family.factory_baud in answers.spoilt_bauds:
-        findings.append(ADVICE.bus["new ones"].at("the bus", baud=kind.family.factory_baud))
+    factory = kind.family.factory_baud
+    if factory in answers and answers[factory].is_spoilt:
+        findings.append(ADVICE.bus["new ones"].at("the bus", baud=factory))
     states, known = [], {setup.id: setup for setup in setups}
     for servo_id, servo in sorted(present.items()):
         if servo_id in known:
@@ -105,9 +107,8 @@ def _find_present(
     port: BusPort, kind: ServoKind, setups: Sequence[ServoConfig], baud: int, tell: Tell
 ) -> tuple[dict[int, FoundServo], set[int]]:
     """Return the servos at the rig's rate by id, and the ids that two servos seem to share."""
-    answers = search_rates(port, kind, (baud,), tell, thorough=True).found
-    present = {found.id: found for found in answers}
-    shared = {found.id for found in answers if answers.count(found) > 1}
+    answers = search_rates(port, kind, (baud,), tell, thorough=True)[baud]
+    present, shared = {found.id: found for found in answers.found}, set(answers.shared_ids)
     for setup in setups:
         if setup.id not in present:
             tell(f"asking {servo_label(setup)}")

@@ -14,7 +14,10 @@ from gazerig.config.save import propose
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.serial.port import port_at_path
-from gazerig.features.bringup.calibration.hobby_access import HobbyServoAccess
+from gazerig.features.bringup.calibration.hobby_calibration import (
+    HobbyServoAccess,
+    calibrate_by_marks,
+)
 from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
@@ -26,7 +29,6 @@ from gazerig.features.bringup.calibration.joint_procedure import (
     calibrate_by_hand,
     calibrate_by_motion,
 )
-from gazerig.features.bringup.calibration.linkage_calibration import calibrate_by_marks
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
     SmartServoAccess,

@@ -1,4 +1,4 @@
-"""Access to one hobby servo on a board, moved slowly by a person who watches it.
+"""Calibration of one hobby servo on a board, moved slowly by a person who reads its angles.
 
 The servo has no position sensor: its position is that of its pulse unless something blocks it. The
 board has no watchdog: a guardian stops the pulses if this program is killed.
@@ -14,6 +14,14 @@ from gazerig.drivers.maestro.board import MaestroBoard, MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoBus, ServoConfig
+from gazerig.features.bringup.calibration.joint_calibration import (
+    LinkageFit,
+    end_names,
+    is_lid,
+    range_within,
+    with_calibration,
+    zero_name,
+)
 from gazerig.features.bringup.calibration.joint_procedure import Operator
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.robot.guardian.guardian import GuardedBus, Guardian
@@ -197,3 +205,61 @@ class HobbyServoAccess:
     def _tell_events(self) -> None:
         for line in self._bus.events():
             self._person.tell(line)
+
+
+Place = tuple[float, float]
+"""(angle, position)"""
+
+
+def likely_angle(joint: JointParams, position: float, one: Place, other: Place) -> float:
+    """Return the likely angle of a position between two marks: the old curve, adjusted to them."""
+    (low, at_low), (high, at_high) = one, other
+    was_low, was_high = angle_now(joint, at_low), angle_now(joint, at_high)
+    if was_low == was_high:
+        share = (position - at_low) / (at_high - at_low)
+    else:
+        share = (angle_now(joint, position) - was_low) / (was_high - was_low)
+    return round(low + share * (high - low), 1) + 0.0
+
+
+def calibrate_by_marks(hobby: HobbyServoAccess, person: Operator, margin_deg: float) -> LinkageFit:
+    """Mark the ends of a joint, its zero, and a position between each two; ask for their angles.
+
+    margin_deg: distance from the ends, not for lids
+
+    Raises:
+        CalibrationRefused: the marks do not give a linkage.
+        DriverError: the servo does not answer any more.
+        CalibrationStopped: the person ended it.
+    """
+    name, joint = hobby.name, hobby.joint
+    positive, negative = end_names(name)
+
+    def ask(at: float, proposed: float) -> Place:
+        asked = f"{name} at {at:g} {joint.model_facts.unit}: how many degrees ({positive} is +)?"
+        return person.ask_number(asked, proposed, hobby.live), at
+
+    hobby.begin()
+    if is_lid(name):
+        meets = "meets the upper lid" if "lower" in name else "shall meet the lower lid"
+        marked, ends = [], (("to where it is fully OPEN", 1), (f"to where it is SHUT: {meets}", -1))
+    else:
+        end = "to its {} end, as far as it goes freely"
+        marked = [(0.0, hobby.mark(zero_name(name)))]
+        ends = ((end.format(positive), 1), (end.format(negative), -1))
+    for where, sign in ends:
+        at = hobby.mark(where)
+        marked.append(ask(at, sign * abs(angle_now(joint, at))))
+    marked.sort()
+    between = []
+    for one, other in zip(marked, marked[1:], strict=False):
+        at = hobby.move_to(float(round((one[1] + other[1]) / 2.0)))
+        between.append(ask(at, likely_angle(joint, at, one, other)))
+    points = sorted((round(angle, 1) + 0.0, at) for angle, at in (*marked, *between))
+    kept_deg = 0.0 if is_lid(name) else margin_deg
+    made = LinkageFit(tuple(points), *range_within(name, points[0][0], points[-1][0], kept_deg))
+    with_calibration(name, joint, made)
+    # A lid stays shut, so that the other lid can be moved to meet it; friction must hold both.
+    hobby.move_to(marked[0][1] if is_lid(name) else dict(marked)[0.0])
+    hobby.live()  # the shaft is a moment behind its pulse
+    return made
