@@ -17,7 +17,7 @@ LARGEST = {
     "gazerig": 14_000,
     "doors": 10_260,
     "features/animation": 6_790,
-    "features/bringup": 37_900,
+    "features/bringup": 37_940,
     "features/lab": 52_480,
     "features/study": 10_170,
     "features/world": 47_970,

@@ -18,8 +18,6 @@ from gazerig.features.bringup.calibration.face_steering import (
     FaceCalibration,
     FaceSteering,
     Key,
-    changed_places,
-    initial_calibration,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibration_keys import HELP, TerminalKeys, parse_keys
@@ -85,7 +83,7 @@ def calibrate_face(
         ).check_and_complete()
         try:
             found = _calibrate(options, loaded, lines, stopped)
-            values = changed_places(found)
+            values = found.changed_places()
             if not values:
                 say("no part was chosen: nothing to write")
                 return
@@ -109,7 +107,7 @@ def _calibrate(
     options: RunOptions, rig: Rig, lines: Lines, stopped: Callable[[], str | None]
 ) -> FaceCalibration:
     """Let the user steer the gaze from part to part; the rig ends parked, torque off."""
-    begin = initial_calibration(rig.face_parts_mm)
+    begin = FaceCalibration(rig.face_parts_mm)
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), REST_M, "eyes_pan" not in rig.joints)
     made = assemble(exact_gaze(rig), options, Substitutes(chooser=lambda own: steering))
     about = {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"}
@@ -168,7 +166,7 @@ class _CalibrationSession:
         if (why := self._stopped()) is not None:
             return why
         if steering.state.part is None:
-            return "you" if steering.state.part_number < len(PART_NAMES_TEXT) else "the last part"
+            return "the last part"
         key = self._next_of_script() if self.keys is None else self.keys.next()
         if key is not None and (refused := steering.press(key)) is not None:
             say(refused)
