@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from enum import StrEnum
 from math import degrees, radians
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Self
 
 import typer
 
@@ -14,7 +14,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.capture_loop import CameraParts
 from gazerig.drivers.camera.oak.source import OakSource
-from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.camera.worker import CameraWorker
@@ -57,10 +57,10 @@ from gazerig.robot.cli.terminal import (
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.frames import CameraParams, LensParams
+from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import NECK, Kinematics
-from gazerig.sim_mock.cameras.charuco_scene import BOARD_LENS, BoardScene
+from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 _GENTLE_DEG_S = 15.0
 _FIRST_FRAME_S = 5.0
@@ -127,12 +127,12 @@ def calibrate_camera(
         board = CharucoBoard(BoardParams().scaled(ruler / RULER_MM))
         person = TerminalPerson(Lines(None), stopped, yes)
         source = OakSource(loaded.oak) if oak else Webcam(camera or 0, loaded.webcam)
-        with _open_camera(loaded, board, None if mock else source, stopped) as eye:
+        with _Eye(loaded, board, None if mock else source, stopped) as eye:
             seen, changes = loaded.camera, dict[str, Any]()
             if what is not CalibrationTarget.mount:
-                seen, changes = _find_lens(loaded, board, eye)
+                seen, changes = _find_lens(loaded, eye)
             if moves:
-                found = _measure_mount(loaded, board, eye, seen, port, stopped, person)
+                found = _measure_mount(loaded, eye, seen, port, person)
                 changes |= mount_changes(found, seen)
         write_values(rig, changes, out, person, dry_run)
 
@@ -164,15 +164,6 @@ def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
     }
 
 
-class _CameraView(NamedTuple):
-    """Source of frames, and the simulated camera behind it, if any."""
-
-    next: Callable[[], Shot]
-    look: Callable[[], Shot | None]
-    now_s: Callable[[], float]
-    mock: BoardScene | None
-
-
 class _NullDetector:
     """Detector for a board, which has no faces."""
 
@@ -181,82 +172,92 @@ class _NullDetector:
         return ()
 
 
-@contextlib.contextmanager
-def _open_camera(
-    rig: Rig, board: CharucoBoard, source: FrameSource | None, stopped: Callable[[], str | None]
-) -> Iterator[_CameraView]:
-    """Open the camera; a simulated one without a source."""
-    clock, last = RealClock(), 0
-    scene: BoardScene | None = None
-    worker: CameraWorker | None = None
-    if source is None:
-        scene = BoardScene(rig.camera, board, _kinematics(rig))
-    else:
-        parts = CameraParts(
-            lambda: source, _NullDetector, orientation=frame_orientation(rig.camera)
-        )
-        worker = CameraWorker(parts, clock.now_s, in_thread=True)
+class _Eye(contextlib.ExitStack):
+    """Frames of the camera within the block; of a simulated one without a source."""
 
-    def look() -> Shot | None:
-        if scene is not None:
-            return scene.look(clock.now_s())
-        found = None if worker is None else worker.latest(clock.now_s())
+    def __init__(
+        self,
+        rig: Rig,
+        board: CharucoBoard,
+        source: FrameSource | None,
+        stopped: Callable[[], str | None],
+    ) -> None:
+        super().__init__()
+        self.board, self.stopped, self._last = board, stopped, 0
+        self.kinematics = Kinematics(rig.geometry, rig.joints, lid_ends(rig))
+        self.clock = RealClock()
+        self.scene = BoardScene(rig.camera, board, self.kinematics) if source is None else None
+        self._worker: CameraWorker | None = None
+        if source is not None:
+            orientation = frame_orientation(rig.camera)
+            parts = CameraParts(lambda: source, _NullDetector, orientation=orientation)
+            self._worker = CameraWorker(parts, self.clock.now_s, in_thread=True)
+
+    def __enter__(self) -> Self:
+        """Open the camera."""
+        if self._worker is not None:
+            self._worker.open()
+            self.callback(self._worker.close)
+        return self
+
+    def look(self) -> Shot | None:
+        """Return the newest frame immediately, None before the first."""
+        now_s = self.clock.now_s()
+        if self.scene is not None:
+            return self.scene.look(now_s)
+        found = None if self._worker is None else self._worker.latest(now_s)
         if found is None or found.image is None:
             return None
         return Shot(found.captured_s, found.number, found.image, lens=found.lens)
 
-    def wait_for_next() -> Shot:
-        nonlocal last
-        end_s = clock.now_s() + _FIRST_FRAME_S
-        while (shot := look()) is None or shot.number == last:
-            raise_if_stopped(stopped)
-            if clock.now_s() > end_s:
+    def next(self) -> Shot:
+        """Wait for a new frame."""
+        end_s = self.clock.now_s() + _FIRST_FRAME_S
+        while (shot := self.look()) is None or shot.number == self._last:
+            self.raise_if_stopped()
+            if self.clock.now_s() > end_s:
                 raise SetupError(
                     "the camera gives no frames: check its cable, or name another (--camera N)"
                 )
-            clock.sleep_until(clock.now_s() + 0.01)
-        raise_if_stopped(stopped)
-        last = shot.number
+            self.clock.sleep_until(self.clock.now_s() + 0.01)
+        self.raise_if_stopped()
+        self._last = shot.number
         return shot
 
-    with contextlib.ExitStack() as closed:
-        if worker is not None:
-            worker.open()
-            closed.callback(worker.close)
-        yield _CameraView(wait_for_next, look, clock.now_s, scene)
+    def raise_if_stopped(self) -> None:
+        """Refuse to continue if there is a reason to stop."""
+        why = self.stopped()
+        if why is not None:
+            raise CameraCalibrationRefused(f"stopped by {why}: nothing was written")
 
 
-def _find_lens(
-    rig: Rig, board: CharucoBoard, eye: _CameraView
-) -> tuple[CameraParams, dict[str, Any]]:
+def _find_lens(rig: Rig, eye: _Eye) -> tuple[CameraParams, dict[str, Any]]:
     """Return the camera with its lens, from its own frames or measured, and the keys to write."""
     first = eye.next()
     height, width = first.image.shape[:2]
-    if (own := first.lens) is not None:
+    if (lens := first.lens) is not None:
         say(
-            f"the camera's own lens: focal length {own.fx_px:.1f}, {own.fy_px:.1f} px, axis at "
-            f"{own.cx_px:.1f}, {own.cy_px:.1f} px of {width} x {height}"
+            f"the camera's own lens: focal length {lens.fx_px:.1f}, {lens.fy_px:.1f} px, axis at "
+            f"{lens.cx_px:.1f}, {lens.cy_px:.1f} px of {width} x {height}"
         )
-        return _with_lens(rig.camera, own, width, height)
-    lens = _measure_lens(rig, board, eye, width, height)
-    i, (fx, fy, cx, cy) = lens.intrinsics, lens.std_px
-    say(
-        f"lens: {len(lens.view_rms_px)} views, {lens.dropped} dropped, reprojection error "
-        f"{lens.rms_px:.2f} px (worst view {max(lens.view_rms_px):.2f})"
-    )
-    say(
-        f"focal length {i.fx_px:.1f} +-{fx:.1f}, {i.fy_px:.1f} +-{fy:.1f} px; axis at "
-        f"{i.cx_px:.1f} +-{cx:.1f}, {i.cy_px:.1f} +-{cy:.1f} px"
-    )
-    if eye.mock is not None:
-        t = BOARD_LENS
-        say(f"true: {t.fx_px:.1f}, {t.fy_px:.1f} px; axis at {t.cx_px:.1f}, {t.cy_px:.1f} px")
-    return _with_lens(rig.camera, i, width, height)
+    else:
+        found = _measure_lens(rig, eye, width, height)
+        lens, (fx, fy, cx, cy) = found.intrinsics, found.std_px
+        say(
+            f"lens: {len(found.view_rms_px)} views, {found.dropped} dropped, reprojection error "
+            f"{found.rms_px:.2f} px (worst view {max(found.view_rms_px):.2f})"
+        )
+        say(
+            f"focal length {lens.fx_px:.1f} +-{fx:.1f}, {lens.fy_px:.1f} +-{fy:.1f} px; axis at "
+            f"{lens.cx_px:.1f} +-{cx:.1f}, {lens.cy_px:.1f} +-{cy:.1f} px"
+        )
+    params = lens_params(lens, width, height)
+    keys = {f"camera.lens.{key}": value for key, value in asdict(params).items()}
+    keys["camera.horizontal_field_deg"] = round(field_deg(lens, width, height), 2)
+    return replace(rig.camera, lens=params), keys
 
 
-def _measure_lens(
-    rig: Rig, board: CharucoBoard, eye: _CameraView, width: int, height: int
-) -> LensCalibration:
+def _measure_lens(rig: Rig, eye: _Eye, width: int, height: int) -> LensCalibration:
     """Collect views of a board in a person's hands until they determine the lens."""
     guess = intrinsics_of_view(radians(rig.camera.horizontal_field_deg), width, height)
     collector = ViewCollector(guess, width, height)
@@ -265,7 +266,7 @@ def _measure_lens(
         image = eye.next().image
         if image.shape[:2] != (height, width):
             raise SetupError("the size of the camera's frames has changed: start again")
-        why = collector.offer(board.find(image))
+        why = collector.offer(eye.board.find(image))
         desired = collector.missing
         if not desired and not why:
             try:
@@ -277,50 +278,24 @@ def _measure_lens(
         status(f"{len(collector.views)} views ({why or 'kept'}): {desired}")
 
 
-def _with_lens(
-    camera: CameraParams, lens: Intrinsics, width: int, height: int
-) -> tuple[CameraParams, dict[str, Any]]:
-    params = lens_params(lens, width, height)
-    return replace(camera, lens=params), lens_keys(params, field_deg(lens, width, height))
-
-
-def lens_keys(lens: LensParams, horizontal_field_deg: float) -> dict[str, Any]:
-    """Return a lens as dotted keys of a rig file and values."""
-    keys = {f"camera.lens.{key}": value for key, value in asdict(lens).items()}
-    return {"camera.horizontal_field_deg": round(horizontal_field_deg, 2), **keys}
-
-
 def _measure_mount(
-    rig: Rig,
-    board: CharucoBoard,
-    eye: _CameraView,
-    camera: CameraParams,
-    port: str | None,
-    stopped: Callable[[], str | None],
-    person: TerminalPerson,
+    rig: Rig, eye: _Eye, camera: CameraParams, port: str | None, person: TerminalPerson
 ) -> HandEye:
     """Observe the hanging board from several neck angles."""
-    if camera.lens is None:
-        raise SetupError("the lens is not measured yet: calibrate it first (--what lens or all)")
     height, width = eye.next().image.shape[:2]
-    if camera.lens.size_px != (width, height):
-        wide, high = camera.lens.size_px
-        raise SetupError(
-            f"frames are {width} x {height}, the lens was measured on {wide} x {high}: calibrate it "
-            "again (--what all)"
-        )
+    if camera.lens is None or camera.lens.size_px != (width, height):
+        raise SetupError(f"the lens is not measured on {width} x {height} frames: use --what all")
     lens = intrinsics_of_lens(camera.lens, radians(camera.horizontal_field_deg), width, height)
     planned = neck_angles([neck_span(rig, name) for name in NECK], lens, width, height)
     views = []
-    with _moving_neck(rig, eye.mock, port, stopped, person) as neck:
-        steps = neck_steps(neck, eye.look, eye.now_s, board, _kinematics(rig), planned)
+    with _moving_neck(rig, eye, port, person) as neck:
+        steps = neck_steps(neck, eye.look, eye.clock.now_s, eye.board, eye.kinematics, planned)
         for number, step in enumerate(steps, 1):
-            raise_if_stopped(stopped)
+            eye.raise_if_stopped()
             angles = ", ".join(f"{degrees(angle):+.0f}" for angle in step.asked_rad)
             found = step.why if step.view is None else f"{len(step.view.seen.ids)} corners"
             say(f"{number}/{len(planned)}: yaw, pitch, roll {angles}: {found}")
-            if step.view is not None:
-                views.append(step.view)
+            views += [step.view] if step.view is not None else []
     result = camera_on_head(views, lens, width)
     x, y, z = result.position_std_mm
     say(
@@ -328,15 +303,7 @@ def _measure_mount(
         f"{result.joint_error_deg:.2f} deg; sure to {x:.1f}, {y:.1f}, {z:.1f} mm and "
         f"{max(result.angle_std_deg):.2f} deg"
     )
-    if eye.mock is not None:
-        t = eye.mock.mount
-        at = ", ".join(f"{mm:.1f}" for mm in t.position_mm)
-        say(f"true: {at} mm, yaw {t.yaw_deg:.2f}, pitch {t.pitch_deg:.2f}, roll {t.roll_deg:.2f}")
     return result
-
-
-def _kinematics(rig: Rig) -> Kinematics:
-    return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
 
 
 class _SimulatedNeck(JoggedNeck):
@@ -352,43 +319,26 @@ class _SimulatedNeck(JoggedNeck):
 
 @contextlib.contextmanager
 def _moving_neck(
-    rig: Rig,
-    mock: BoardScene | None,
-    port: str | None,
-    stopped: Callable[[], str | None],
-    person: TerminalPerson,
+    rig: Rig, eye: _Eye, port: str | None, person: TerminalPerson
 ) -> Iterator[JoggedNeck]:
     """Return a neck that moves gently; in all cases it ends with the torque off.
-
-    mock: the simulated board, for which the servos are also emulated
 
     Raises:
         SetupError: port or servos do not match the configuration, or the answer was no.
     """
     say("hang the board upright, 0.5 to 1 m before the head, where it cannot move; the head")
     say("will look at it from several sides: keep your fingers away; Ctrl-C stops it")
-    if mock is None and not person.agrees("does the board hang, and is the head free to move?"):
+    mock, stopped = eye.scene is not None, eye.stopped
+    if not mock and not person.agrees("does the board hang, and is the head free to move?"):
         raise CameraCalibrationRefused("left out as you asked: nothing was written")
+    interrupts = Interrupts.from_stop(stopped)
     with (
-        rig_ports(rig, mock is not None, port) as wire,
-        holding_rig(
-            rig, wire.paths, _GENTLE_DEG_S, stopped, Interrupts.from_stop(stopped)
-        ) as control,
+        rig_ports(rig, mock, port) as wire,
+        holding_rig(rig, wire.paths, _GENTLE_DEG_S, stopped, interrupts) as control,
     ):
         neck = JoggedNeck(control)
-        if mock is not None:
+        if eye.scene is not None:
             neck = _SimulatedNeck(control)
-            neck.scene = mock
+            neck.scene = eye.scene
         neck.rest(0.1)
         yield neck
-
-
-def raise_if_stopped(stopped: Callable[[], str | None]) -> None:
-    """Refuse to continue if there is a reason to stop.
-
-    Raises:
-        CameraCalibrationRefused: the message has the reason.
-    """
-    why = stopped()
-    if why is not None:
-        raise CameraCalibrationRefused(f"stopped by {why}: nothing was written")
