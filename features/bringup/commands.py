@@ -72,8 +72,8 @@ RECORD_TRACK = CommandEntry(
         "record-track": (
             ("record-track my.yaml greeting", "torque off; move the head by hand, Enter ends it"),
             (
-                "record-track my.yaml mouth --live --joints jaw --play turn",
-                "of a running head: your jaw to a track of the neck",
+                "record-track my.yaml mouth --live --joint jaw",
+                "of a running head: your jaw to a track of the neck that plays",
             ),
         )
     },

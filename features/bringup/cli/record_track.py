@@ -43,7 +43,6 @@ from gazerig.robot.cli.terminal import (
 from gazerig.robot.cli.tracks import FolderOption, print_track_fit
 from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import Play
 from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
@@ -58,16 +57,10 @@ def record_track(
         bool,
         typer.Option("--live", help="Record what moves a running head: page, keys or program."),
     ] = False,
-    joints: Annotated[
-        str,
-        typer.Option(
-            metavar="JOINT,...", help="With --live: joints to record; default: those of no track."
-        ),
-    ] = "",
-    play: Annotated[
-        str,
-        typer.Option(metavar="TRACK", help="With --live: play a track meanwhile, until its end."),
-    ] = "",
+    joint: Annotated[
+        list[str] | None,
+        typer.Option(help="With --live: this joint only; repeatable; default: those of no track."),
+    ] = None,
     which: PidOption = None,
     seconds: Annotated[
         float | None,
@@ -91,8 +84,7 @@ def record_track(
         with record_signals() as stopped:
             end = lambda: stopped() or (enter_pressed() if sys.stdin.isatty() else None)  # noqa: E731
             if live:
-                wanted = [word.strip() for word in joints.split(",") if word.strip()]
-                recorded = _record_live(which, wanted, play, end, seconds or MAX_DURATION_S)
+                recorded = _record_live(which, joint or [], end, seconds or MAX_DURATION_S)
             else:
                 recorded = _record_hand(loaded, mock, port, yes, end, seconds or LONGEST_S)
             ended = stopped()
@@ -144,14 +136,8 @@ def _record_hand(
             return record_hand_motion(watch.sample, clock, end, seconds)
 
 
-def _record_live(
-    which: str | None,
-    joints: list[str],
-    play: str,
-    end: Callable[[], str | None],
-    seconds: float,
-) -> HandRecording:
-    """Record joints of a running head, which others move."""
+def _record_live(which: str | None, end: Callable[[], str | None], seconds: float) -> HandRecording:
+    """Record a running head, which others move."""
     with RobotClient.connect(which, "record-track") as head:
 
         def read() -> HeadState:
@@ -160,15 +146,5 @@ def _record_live(
                 raise SetupError("the head has just started: its loop is not running yet")
             return state
 
-        there = read()
-        unknown = [one for one in joints if one not in there.joints]
-        if unknown:
-            raise SetupError(
-                f"no joint {unknown[0]!r}; joints of the head: {', '.join(there.joints)}"
-            )
-        track = head.send(Play(play)).track if play else None
-        owned = {joint for one in read().tracks if not one.end_reason for joint in one.owns}
-        wanted = joints or [one for one in there.joints if one not in owned]
-        say(f"recording {', '.join(wanted)}; Enter ends it (within {seconds:g} s)")
-        number = track.number if track else 0
-        return record_live(read, wanted, RealClock(), end, seconds, number)
+        say(f"recording what moves the head; Enter ends it (within {seconds:g} s)")
+        return record_live(read, joints, RealClock(), end, seconds)
