@@ -7,7 +7,7 @@ from command_line import Invoked, answers_in, invoked
 from commands_started import OnTerminal
 
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.cli.calibration_keys import (
+from gazerig.features.bringup.cli.prompts import (
     split_words,
 )
 from gazerig.robot.control.command_handler import accept_only_stops

@@ -23,7 +23,7 @@ from gazerig.drivers.pca9685.board import (
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.bus_search import (
+from gazerig.features.bringup.cli.scan import (
     ORDER,
     found_servos,
     plan_search,

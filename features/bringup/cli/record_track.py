@@ -136,7 +136,9 @@ def _record_hand(
             return record_hand_motion(watch.sample, clock, end, seconds)
 
 
-def _record_live(which: str | None, end: Callable[[], str | None], seconds: float) -> HandRecording:
+def _record_live(
+    which: str | None, joints: list[str], end: Callable[[], str | None], seconds: float
+) -> HandRecording:
     """Record a running head, which others move."""
     with RobotClient.connect(which, "record-track") as head:
 

@@ -35,7 +35,7 @@ from gazerig.features.bringup.calibration.lens_calibration import (
     field_deg,
     lens_params,
 )
-from gazerig.features.bringup.cli.manual_session import holding_rig
+from gazerig.features.bringup.cli.motion import holding_rig
 from gazerig.features.bringup.cli.ports import MockOption, YesOption, rig_ports
 from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
 from gazerig.features.bringup.cli.rig_writer import (

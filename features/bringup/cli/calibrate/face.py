@@ -20,9 +20,14 @@ from gazerig.features.bringup.calibration.face_steering import (
     Key,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
-from gazerig.features.bringup.cli.calibration_keys import HELP, TerminalKeys, parse_keys
 from gazerig.features.bringup.cli.ports import MockOption, PortOption, YesOption
-from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
+from gazerig.features.bringup.cli.prompts import (
+    HELP,
+    Lines,
+    TerminalKeys,
+    TerminalPerson,
+    parse_keys,
+)
 from gazerig.features.bringup.cli.rig_writer import (
     OutOption,
     refuse_unwritable,
