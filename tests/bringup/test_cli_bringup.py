@@ -186,6 +186,10 @@ def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
             assert code == 2 and "board of Pololu" in err and "would move" in err, words
         code, out, _ = invoked("scan", "--port", path)
         assert code == 0 and "12 channels" in out
+        bus.command("lose all")
+        code, out, _ = invoked("scan", "--port", path)
+        assert code == 1 and "no servo answers" in out
+        bus.command("clear")
         done = invoked("doctor", "maker", "--port", path)
         # Any packet of theirs would have been an error to it.
         assert done.code == 0 and "held an error" not in done.out

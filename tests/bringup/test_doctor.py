@@ -23,12 +23,7 @@ from gazerig.drivers.pca9685.board import (
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.cli.scan import (
-    ORDER,
-    found_servos,
-    plan_search,
-    search_bus,
-)
+from gazerig.features.bringup.cli.scan import ORDER, search_bus
 from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685
 from gazerig.features.bringup.doctor.diagnostics import ADVICE, Diagnostic, Fix, worst_level
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
@@ -529,9 +524,6 @@ def test_a_lost_confirmation_does_not_matter(address):
 # --- Searching a port for every kind: servos are found, and none is moved or changed
 
 
-FEW = (1_000_000, 57_600)
-
-
 class Line:
     """A port in this process, and all that was sent through it."""
 
@@ -542,11 +534,8 @@ class Line:
     def tap(self, data):
         self.sent += data
 
-    def search(self, rates=FEW, usb="", kinds=ORDER, thorough=False):
-        asked = [
-            row for row in plan_search(usb, kinds) if rates is None or row[1] in (*rates, 115_200)
-        ]
-        return list(search_bus(self.port, usb, asked, thorough))
+    def search(self, kinds=ORDER, thorough=False):
+        return list(search_bus(self.port, kinds, thorough))
 
 
 # --- a board is never sent what moves it
@@ -563,21 +552,10 @@ def test_a_board_is_recognised_before_anything_could_move_it(board):
     board.exchange(bytes.fromhex("8403102F"))
     before = [one["target"] for one in board.faults.reports()]
     line = Line(board)
-    rounds = line.search(rates=None)
+    rounds = line.search()
     assert rounds[-1].board is not None and {one.kind for one in rounds} == {"maestro"}
     assert b"\xff" not in line.sent
     assert [one["target"] for one in board.faults.reports()] == before
-
-
-def test_a_port_of_pololu_is_never_sent_servo_packets_even_where_nobody_answers():
-    board = build_board(12, lambda: 0.0)
-    board.faults.command("lose all")
-    line = Line(board)
-    (only,) = line.search(usb=MINI, rates=None)
-    assert only.board is None and line.sent and b"\xff" not in line.sent
-    for kind in ("dynamixel", "feetech"):
-        assert plan_search(MINI, (kind,)) == ()
-    assert plan_search(MICRO, ORDER) == (("maestro", 115_200),)
 
 
 # --- servos of each kind hear the other's packets and are left as they are
@@ -599,7 +577,7 @@ def test_no_packet_changes_dynamixel_servos():
     assert bytes.fromhex("FFFF0104020009") in line.sent  # an STS packet went over the line
     assert [memory(servo) for servo in chain.servos] == before
     assert chain.positions_steps() == places
-    assert not any(one.found for one in rounds if one.kind == "feetech")
+    assert not any(one.has_answer for one in rounds if one.kind == "feetech")
 
 
 def test_no_packet_changes_sts_servos():
@@ -607,9 +585,8 @@ def test_no_packet_changes_sts_servos():
     before = [chain[i].read(0, 56) for i in (1, 49, 253)]
     places = chain.positions_steps()
     rounds = Line(chain).search(thorough=True)
-    assert {(kind, servo.id) for kind, servo in found_servos(rounds)} == {
-        ("feetech", 1), ("feetech", 49), ("feetech", 253),
-    }  # fmt: skip
+    found = {(one.kind, servo.id) for one in rounds if one.answers for servo in one.answers.found}
+    assert found == {("feetech", 1), ("feetech", 49), ("feetech", 253)}
     assert [chain[i].read(0, 56) for i in (1, 49, 253)] == before
     assert chain.positions_steps() == places
-    assert not any(one.found for one in rounds if one.kind == "dynamixel")
+    assert not any(one.has_answer for one in rounds if one.kind == "dynamixel")

@@ -17,13 +17,12 @@ detected: with such a board on the line, specify the kind of servo.
 """
 
 import contextlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import msgspec
 import typer
-from rich.progress import Progress
 from rich.table import Table
 
 from gazerig.config.schema import load_rig
@@ -34,18 +33,10 @@ from gazerig.drivers.maestro.board import probe as probe_maestro
 from gazerig.drivers.pca9685.board import probe as probe_pca9685
 from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.features.bringup.cli import ports as bench
-from gazerig.features.bringup.cli.ports import (
-    JsonOption,
-    MockOption,
-    console,
-    refuse_packages,
-    rig_ports,
-)
+from gazerig.features.bringup.cli.ports import JsonOption, MockOption
 from gazerig.features.bringup.servo_kinds import KINDS, servo_kind
 from gazerig.features.bringup.servo_setup import Answers, search_rate
-from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, complete_suggestions, say
 
@@ -54,87 +45,23 @@ app = typer.Typer()
 ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
 """Order of the search by kind; see above."""
 
-RATES: Mapping[BusKind, Sequence[int]] = {
-    "maestro": (MaestroParams().baud,),
-    # The usual rate first, then that of the factory.
-    **{
-        kind.name: tuple(
-            dict.fromkeys((1_000_000, kind.family.factory_baud, *kind.family.baud_rates))
-        )
-        for kind in KINDS.values()
-    },
-}
-
 
 class SearchRound(NamedTuple):
     """Result of the search for one kind at one baud rate.
 
     answers: of servos, None if the adaptor does not support the rate, or for a board
-    board: a Maestro; channels: number of its channels, None if unknown
+    board: a Maestro
     """
 
     kind: BusKind
     baud: int
     answers: Answers | None = None
     board: DetectedMaestro | None = None
-    channels: int | None = None
-
-    @property
-    def found(self) -> tuple[FoundServo, ...]:
-        """Return the servos that answered."""
-        return () if self.answers is None else self.answers.found
 
     @property
     def has_answer(self) -> bool:
         """Return whether a servo of this kind has answered."""
-        return bool(self.found) or self.board is not None
-
-
-def plan_search(usb: str, kinds: Sequence[BusKind]) -> tuple[tuple[BusKind, int], ...]:
-    """Return the kinds and rates to search, in order.
-
-    usb: vendor and product id of the port, "" if it has none
-    """
-    if usb.startswith(POLOLU):
-        return (("maestro", MaestroParams().baud),) if "maestro" in kinds else ()
-    return tuple((kind, rate) for kind in ORDER if kind in kinds for rate in RATES[kind])
-
-
-def search_bus(
-    port: BusPort,
-    usb: str,
-    asked: Sequence[tuple[BusKind, int]],
-    thorough: bool = False,
-) -> Iterator[SearchRound]:
-    """Search for one kind after the other; end after the first kind that replies.
-
-    asked: result of ``plan_search``
-    thorough: wait longer for Dynamixel servos, and ping each STS id even if no servo answers a
-        broadcast ping
-
-    Raises:
-        PortError: the port cannot be opened.
-        BusLost: it has disappeared.
-
-    """
-    met: BusKind | None = None
-    for kind, baud in asked:
-        if met not in (None, kind):
-            return
-        looked = SearchRound(kind, baud)
-        if kind != "maestro":
-            looked = SearchRound(kind, baud, search_rate(port, KINDS[kind], baud, thorough))
-        elif port.setBaudRate(baud):
-            # Every board has the first six channels; others might cause an error.
-            board = probe_maestro(port, MaestroParams())
-            looked = SearchRound(kind, baud, board=board, channels=USB_CHANNELS.get(usb))
-        met = kind if looked.has_answer else met
-        yield looked
-
-
-def found_servos(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServo]]:
-    """Return all servos that answered, with their kinds."""
-    return [(one.kind, servo) for one in rounds for servo in one.found]
+        return self.board is not None or (self.answers is not None and bool(self.answers.found))
 
 
 @app.command(cls=RigCommand)
@@ -176,7 +103,7 @@ def scan(
                 say(f"port {one.device}: {one.description}{usb}{alias}")
         with _paths(rig, mock, port, found_ports) as paths:
             answered = [
-                _boards(path, as_json) if i2c else _search_port(path, kinds, as_json)
+                _search_i2c(path, as_json) if i2c else _search_port(path, kinds, as_json)
                 for path, i2c in paths
             ]
     if not any(answered):
@@ -193,42 +120,18 @@ def _paths(
         yield [(path, is_i2c(path))]
         return
     model = load_rig(rig or DEFAULT_RIG)
-    refuse_packages(model, "scan")
-    with rig_ports(model, mock, port) as wired:
+    bench.refuse_packages(model, "scan")
+    with bench.rig_ports(model, mock, port) as wired:
         yield [
             (path, model.bus_named(name).kind == "pca9685") for name, path in wired.paths.items()
         ]
-
-
-def _boards(path: str, as_json: bool) -> bool:
-    """Search one I2C bus and show the results; return whether any board answered.
-
-    A serial port is searched only if the user named it: for a Maestro such bytes are commands.
-    """
-    with bench.unopened_port(path) as line:
-        found = [f"{address:#x}" for address in probe_pca9685(line)]
-    if as_json:
-        boards = [{"kind": "pca9685", "address": address} for address in found]
-        print(msgspec.json.encode({"port": path, "servos": [], "boards": boards}).decode())
-        return bool(found)
-    out = console()
-    for address in found:
-        out.print(f"{path}: PCA9685 at {address}, 16 channels", markup=False)
-    if not found:
-        out.print(
-            f"{path}: no PCA9685 answers from 0x40 to 0x77: has it its logic supply (VCC)? check "
-            "SDA, SCL and ground",
-            markup=False,
-        )
-    return bool(found)
 
 
 def _only_port(ports: Sequence[SerialPort]) -> str:
     """Return the only port on USB; queries to unknown devices need a person's consent."""
     usb = [port for port in ports if port.usb]
     if len(usb) == 2 and usb[0].usb == usb[1].usb and usb[0].usb.startswith(POLOLU):
-        # Both ports of one Maestro: its Command Port is the first.
-        return usb[0].device
+        usb = usb[:1]  # both ports of one Maestro: its Command Port is the first
     if len(usb) == 1:
         return usb[0].by_id or usb[0].device
     if usb:
@@ -240,53 +143,92 @@ def _only_port(ports: Sequence[SerialPort]) -> str:
     )
 
 
-def _search_port(
-    path: str,
-    kinds: Sequence[BusKind],
-    as_json: bool,
-) -> bool:
+def _search_i2c(path: str, as_json: bool) -> bool:
+    """Search one I2C bus and show the results; return whether any board answered.
+
+    A serial port is searched only if the user named it: for a Maestro such bytes are commands.
+    """
+    with bench.unopened_port(path) as line:
+        found = [f"{address:#x}" for address in probe_pca9685(line)]
+    if as_json:
+        _print_json(path, (), [{"kind": "pca9685", "address": address} for address in found])
+        return bool(found)
+    lines = [f"PCA9685 at {address}, 16 channels" for address in found] or [
+        "no PCA9685 answers from 0x40 to 0x77: has it its logic supply (VCC)? check SDA, SCL and "
+        "ground"
+    ]
+    for text in lines:
+        bench.console().print(f"{path}: {text}", markup=False)
+    return bool(found)
+
+
+def _print_json(path: str, servos: Sequence[object], boards: Sequence[object]) -> None:
+    answer = {"port": path, "servos": servos, "boards": boards}
+    print(msgspec.json.encode(answer).decode())
+
+
+def _search_port(path: str, kinds: Sequence[BusKind], as_json: bool) -> bool:
     """Search one port and show the results; return whether a servo answered."""
     usb = bench.usb_id(path)
-    asked = plan_search(usb, kinds)
-    if not asked:
+    if usb.startswith(POLOLU):
+        kinds = [kind for kind in kinds if kind == "maestro"]
+    if not kinds:
         raise SetupError(
             f"{path} is a board of Pololu: packets for servos would move what hangs on it; "
             "name the adaptor's port with --port, or ask with --kind maestro"
         )
     with bench.unopened_port(path) as line:
-        rounds = _search(line, usb, asked, False)
+        rounds = list(search_bus(line, kinds))
         if not any(one.has_answer for one in rounds):
             # Ids that are far apart answer after a long silence; some do not answer a broadcast
             # ping.
-            servos = [row for row in asked if row[0] != "maestro"]
             boards = [one for one in rounds if one.kind == "maestro"]
-            rounds = [*boards, *_search(line, usb, servos, True)]
-    _show(rounds, path, as_json)
+            servos = [kind for kind in kinds if kind != "maestro"]
+            rounds = [*boards, *search_bus(line, servos, thorough=True)]
+    bench.clear_progress()
+    _show(rounds, path, USB_CHANNELS.get(usb), as_json)
     return any(one.has_answer for one in rounds)
 
 
-def _search(
-    line: BusPort, usb: str, asked: Sequence[tuple[BusKind, int]], thorough: bool
-) -> list[SearchRound]:
-    rounds = []
-    errors = Console(stderr=True)
-    with Progress(console=errors, transient=True, disable=not errors.is_terminal) as bar:
-        task = bar.add_task("asking", total=len(asked))
-        for one in search_bus(line, usb, asked, thorough):
-            rounds.append(one)
-            bar.update(task, advance=1, description=f"searched {one.kind} at {one.baud} bit/s")
-    return rounds
+def search_bus(
+    port: BusPort, kinds: Sequence[BusKind], thorough: bool = False
+) -> Iterator[SearchRound]:
+    """Search for one kind after the other at all its rates; end after the first that replies.
+
+    thorough: wait longer for Dynamixel servos, and ping each STS id even if no servo answers a
+        broadcast ping
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: it has disappeared.
+    """
+    for kind in kinds:
+        rounds: list[SearchRound] = []
+        if kind == "maestro":
+            baud = MaestroParams().baud
+            # Every board has the first six channels; others might cause an error.
+            board = probe_maestro(port, MaestroParams()) if port.setBaudRate(baud) else None
+            rounds.append(SearchRound(kind, baud, board=board))
+        else:
+            family = KINDS[kind].family
+            # The usual rate first, then that of the factory.
+            for baud in dict.fromkeys((1_000_000, family.factory_baud, *family.baud_rates)):
+                bench.progress(f"searching {kind} at {baud} bit/s")
+                answers = search_rate(port, KINDS[kind], baud, thorough)
+                rounds.append(SearchRound(kind, baud, answers))
+        yield from rounds
+        if any(one.has_answer for one in rounds):
+            return
 
 
-def _show(rounds: Sequence[SearchRound], where: str, as_json: bool) -> None:
-    found = found_servos(rounds)
+def _show(rounds: Sequence[SearchRound], where: str, channels: int | None, as_json: bool) -> None:
+    searched = [(one.kind, one.baud, one.answers) for one in rounds if one.answers is not None]
+    found = [(kind, servo) for kind, _, answers in searched for servo in answers.found]
+    boards = [one.board for one in rounds if one.board is not None]
     if as_json:
-        boards = [one for one in rounds if one.board is not None]
-        servos = [{"kind": kind, **servo._asdict()} for kind, servo in found]
-        answer = {"port": where, "servos": servos, "boards": boards}
-        print(msgspec.json.encode(answer).decode())
+        _print_json(where, [{"kind": kind, **servo._asdict()} for kind, servo in found], boards)
         return
-    out = console()
+    out = bench.console()
     if found:
         table = Table("id", "model", "firmware", "baud", "kind")
         for kind, servo in found:
@@ -294,58 +236,44 @@ def _show(rounds: Sequence[SearchRound], where: str, as_json: bool) -> None:
             version = made.family.format_firmware(servo.firmware)
             table.add_row(str(servo.id), servo.model, version, str(servo.baud), made.title)
         out.print(table)
-    for line in (*_board_lines(rounds, where), *scan_remarks(rounds, where)):
-        out.print(complete_suggestions(line), markup=False)
-
-
-def _board_lines(rounds: Sequence[SearchRound], where: str) -> Iterator[str]:
-    """Describe the boards that answered."""
-    for one in rounds:
-        if one.board is None:
-            continue
-        size = f"{one.channels} channels"
-        if one.channels is None:
+    lines: list[str] = []
+    for board in boards:
+        size = f"{channels} channels"
+        if channels is None:
             size = "6 channels or more (asking for one too many would send all of them home)"
-        crc, pulses = "on" if one.board.expects_crc else "off", one.board.pulses
-        given = [f"{n}: {pulse / US_STEPS:g} us" for n, pulse in enumerate(pulses) if pulse]
-        errors = ", ".join(one.board.errors) or "none"
-        yield f"{where}: Pololu Maestro: {size}, CRC {crc}"
-        yield f"{where}: pulses: {', '.join(given) or 'none'} (channels 0..{len(pulses) - 1})"
-        yield f"{where}: errors it held, cleared by asking: {errors}"
-
-
-def scan_remarks(rounds: Sequence[SearchRound], where: str) -> Iterator[str]:
-    """Return remarks on a scan beyond its tables of servos and boards."""
-    found = found_servos(rounds)
-    boards = sum(1 for one in rounds if one.board is not None)
-    if not boards or found:
-        count = f"{len(found)} servo{'s' if len(found) != 1 else ''}"
+        pulses = enumerate(board.pulses)
+        given = ", ".join(f"{n}: {pulse / US_STEPS:g} us" for n, pulse in pulses if pulse)
+        lines += [
+            f"{where}: Pololu Maestro: {size}, CRC {'on' if board.expects_crc else 'off'}",
+            f"{where}: pulses: {given or 'none'} (channels 0..{len(board.pulses) - 1})",
+            f"{where}: errors it held, cleared by asking: {', '.join(board.errors) or 'none'}",
+            "nothing else was sent: packets for servos would move what hangs on the board",
+        ]
+    if found or not boards:
         rates: dict[BusKind, list[str]] = {}
-        for one in rounds:
-            if one.kind == "maestro" or one.answers is not None:
-                rates.setdefault(one.kind, []).append(str(one.baud))
-        named = (f"searched {kind} at {', '.join(some)} bit/s" for kind, some in rates.items())
-        yield f"{count} on {where}; {'; '.join(named)}"
-    if boards:
-        yield "nothing else was sent: packets for servos would move what hangs on the board"
-    heard = {one.baud for one in rounds if one.has_answer}
-    for one in rounds:
-        if one.answers is None:
-            continue
-        for servo_id in one.answers.shared_ids:
-            yield (
-                f"two or more servos have id {servo_id} at {one.baud} bit/s: connect them one at a "
-                "time and run gazerig setup"
-            )
-        if one.answers.junk and not one.found and one.baud not in heard:
-            yield (
-                f"at {one.baud} bit/s only pieces came: a wrong rate, a loose plug, or two servos "
-                "with one id"
+        for kind, baud, _ in searched:
+            rates.setdefault(kind, []).append(str(baud))
+        named = "; ".join(
+            f"searched {kind} at {', '.join(some)} bit/s" for kind, some in rates.items()
+        )
+        lines.append(f"{len(found)} servo{'s' if len(found) != 1 else ''} on {where}; {named}")
+    for _, baud, answers in searched:
+        lines += [
+            f"two or more servos have id {servo_id} at {baud} bit/s: connect them one at a time and "
+            "run gazerig setup"
+            for servo_id in answers.shared_ids
+        ]
+        if answers.junk and not answers.found and baud not in {servo.baud for _, servo in found}:
+            lines.append(
+                f"at {baud} bit/s only pieces came: a wrong rate, a loose plug, or two servos with "
+                "one id"
             )
     if not found and not boards:
-        yield (
+        lines.append(
             "no servo answers: is the servo supply on? does each servo's LED flash once when it "
             "comes on? is the first cable in the right plug of the adaptor? is another program "
             "using the port? a Maestro on USB: is it set to 'USB Dual Port', and is this the "
             "first of its two ports?"
         )
+    for line in lines:
+        out.print(complete_suggestions(line), markup=False)
