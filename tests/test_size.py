@@ -17,7 +17,7 @@ LARGEST = {
     "gazerig": 14_000,
     "doors": 10_260,
     "features/animation": 6_790,
-    "features/bringup": 37_940,
+    "features/bringup": 34_720,
     "features/lab": 52_480,
     "features/study": 10_170,
     "features/world": 47_970,

@@ -255,7 +255,6 @@ def test_a_shipped_rig_is_copied_not_written(tmp_path: Path) -> None:
     [
         ("desk", ("--joint", "nose"), "no such joint; there is left_eye_pan"),
         ("desk", ("--joint", "neck_yaw", "--answers", "EMPTY"), "no answer left to: turn neck_yaw"),
-        ("maker", ("--by", "motion"), "hobby servos do not report their position"),
         ("maker", ("--set-middle",), "only Feetech STS servos"),
     ],
 )
@@ -273,16 +272,24 @@ def test_what_cannot_be_is_said(
 
 
 @pytest.mark.pty
-def test_ctrl_c_while_calibrating_lets_go_and_writes_nothing(rig: Path) -> None:
+def test_ctrl_c_while_calibrating_lets_go_and_writes_nothing(rigs: dict[str, str]) -> None:
+    rig = Path(rigs["maker"])
     before = rig.read_bytes()
     with served(str(rig)) as buses:
-        words = ("--joint", "left_eye_pan", "--by", "motion", "--yes", "--port", buses.ports)
+        words = ("--joint", "eyes_pan", "--yes", "--port", buses.ports)
         process = start("calibrate", str(rig), *words)
-        hear(process.stderr, "torque on")
+        assert process.stdin is not None
+        hear(process.stderr, "shall it begin?")
+        process.stdin.write("\n")
+        process.stdin.flush()
+        hear(process.stderr, "held at 1500 us")
+        assert json.loads(buses.command("status"))["servos"][0]["target"]
         process.send_signal(signal.SIGINT)
-        _, words_said = process.communicate(timeout=20)
-        assert process.returncode == 1 and "stopped by SIGINT" in words_said
-        assert not status(buses.command, 1)["torque"] and rig.read_bytes() == before
+        hear(process.stderr, "stopped by SIGINT: nothing written")
+        process.communicate(timeout=20)
+        assert process.returncode == 1
+        assert all(one["target"] == 0 for one in json.loads(buses.command("status"))["servos"])
+        assert rig.read_bytes() == before
 
 
 # --- a camera

@@ -15,7 +15,6 @@ from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.servo_bus.settings import write_settings
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.features.bringup.calibration.endstop_search import STEPS_PER_DEG
 from gazerig.features.bringup.calibration.hobby_calibration import (
     PULSES_US,
     SPEED_US_S,
@@ -29,10 +28,7 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     joint_calibration,
     with_calibration,
 )
-from gazerig.features.bringup.calibration.joint_procedure import (
-    calibrate_by_hand,
-    calibrate_by_motion,
-)
+from gazerig.features.bringup.calibration.joint_procedure import calibrate_by_hand
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
     SmartServoAccess,
@@ -47,17 +43,14 @@ from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 STS = JointParams(3, "sts3215", -35.0, 35.0, 300.0, 20000.0)
-FREE = (-1e9, 1e9)
 
 
 class Bench:
-    """One emulated servo between stops, and a person with a script."""
+    """One emulated servo, and a person with a script."""
 
-    def __init__(
-        self, joint: JointParams, start: int = 2100, stops: tuple[float, float] = FREE
-    ) -> None:
+    def __init__(self, joint: JointParams, start: int = 2100) -> None:
         self.clock = SimulatedClock()
-        physics = Physics(stop_low_steps=stops[0], stop_high_steps=stops[1])
+        physics = Physics(stop_low_steps=-1e9, stop_high_steps=1e9)
         spec = ServoSpec(joint.id, joint.model, start, physics=physics)
         build = build_feetech if joint is STS else build_dynamixel
         self.chain = build([spec], self.clock.now_s)
@@ -65,14 +58,10 @@ class Bench:
         self.port.setBaudRate(1_000_000)
         self.kind = servo_kind(joint.model)
         self.registers = Transactions(self.port, self.kind.family)
-        self.why: str | None = None
         self.id = joint.id
         self.script: list[int] = []
         self.said: list[str] = []
-        self.agreed = True
-        self.joint = SmartServoAccess(
-            "left_eye_pan", joint, self.port, self.clock, lambda: self.why
-        )
+        self.joint = SmartServoAccess("left_eye_pan", joint, self.port, self.clock.now_s)
 
     def get(self, register: str) -> int:
         value = self.registers.read(self.id, register)
@@ -81,9 +70,6 @@ class Bench:
 
     def put(self, register: str, value: int) -> None:
         write_settings(self.registers, self.id, {register: value})
-
-    def limits(self) -> tuple[int, int]:
-        return self.get("min_position_limit"), self.get("max_position_limit")
 
     def command(self, text: str) -> None:
         self.port.faults.command(text.format(id=self.id))
@@ -106,11 +92,6 @@ class Bench:
             self.clock.sleep_until(self.clock.now_s() + 0.04)
             live()
 
-    def agrees(self, question: str, live: Callable[[], str]) -> bool:
-        self.said.append(question)
-        live()
-        return self.agreed
-
     def steer(self, question: str, servo: HobbyServoAccess) -> None:
         raise AssertionError(question)
 
@@ -119,6 +100,7 @@ class Bench:
 
 
 TURN = 4096
+STEPS_PER_DEG = TURN / 360.0
 
 
 # --- following a position over the seam
@@ -190,10 +172,6 @@ def test_what_is_found_is_what_is_there_or_it_is_refused(
 # --- Calibrating one emulated joint by hand or by motion; refused joints
 
 
-STOPS = (1700.0, 2500.0)
-each = pytest.mark.parametrize("joint", [EYE, STS], ids=["dynamixel", "feetech"])
-
-
 def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> None:
     bench = Bench(STS, 3900)
     bench.script = [600, -1200, 600]
@@ -208,85 +186,6 @@ def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> Non
     bench.script = [600, -1200, 600]
     found = calibrate_by_hand(bench.joint, bench, 2.0)
     assert found.zero_step == pytest.approx(2048, abs=4) and found.max_deg > 45.0
-
-
-# --- driven
-
-
-@each
-def test_by_motion_finds_the_stops_and_puts_everything_back(joint: JointParams) -> None:
-    bench = Bench(joint, 2100, STOPS)
-    bench.put("min_position_limit", 2000)
-    bench.put("max_position_limit", 2200)
-    names = (
-        ("torque_limit", "goal_speed", "acceleration", "lock")
-        if joint is STS
-        else ("goal_pwm", "profile_acceleration", "profile_velocity", "bus_watchdog")
-    )
-    before = [bench.get(name) for name in names]
-    found = calibrate_by_motion(bench.joint, bench, 2.0)
-    assert found.sign == 1 and found.zero_step == pytest.approx(2100, abs=8)
-    assert found.max_deg == pytest.approx(400 / STEPS_PER_DEG - 2.0, abs=1.0)
-    assert found.min_deg == pytest.approx(-400 / STEPS_PER_DEG + 2.0, abs=1.0)
-    assert bench.get("torque_enable") == 0
-    assert bench.limits() == (2000, 2200) and [bench.get(name) for name in names] == before
-    pushed = [float(line.split("pushed for ")[1].split()[0]) for line in bench.said if "pu" in line]
-    assert len(pushed) == 2 and max(pushed) <= 500.0
-
-
-def test_by_motion_the_person_says_which_way_it_went() -> None:
-    bench = Bench(EYE, 2100, STOPS)
-    bench.agreed = False
-    assert calibrate_by_motion(bench.joint, bench, 2.0).sign == -1
-
-
-def test_by_motion_without_a_stop_before_the_seam_is_refused() -> None:
-    bench = Bench(EYE, 3900, (3000.0, 1e9))
-    with pytest.raises(CalibrationRefused, match="end of the servo's turn"):
-        calibrate_by_motion(bench.joint, bench, 2.0)
-    assert bench.get("torque_enable") == 0
-
-
-@each
-def test_by_motion_a_stop_that_is_asked_for_lets_go_at_once(joint: JointParams) -> None:
-    bench = Bench(joint, 2100, STOPS)
-    bench.why = "SIGINT"
-    with pytest.raises(CalibrationStopped, match="SIGINT"):
-        calibrate_by_motion(bench.joint, bench, 2.0)
-    assert bench.get("torque_enable") == 0
-    if joint is STS:
-        assert bench.get("torque_limit") == 1000
-    else:
-        assert bench.get("bus_watchdog") == 0
-
-
-def test_by_motion_is_slow_and_weak() -> None:
-    bench = Bench(EYE, 2100, STOPS)
-    bench.joint.enable_torque()
-    assert bench.get("goal_pwm") == round(0.3 * bench.get("pwm_limit"))
-    assert 0 < bench.get("profile_velocity") <= 2.0 * 15.0 * STEPS_PER_DEG / 15.6 + 1
-    assert bench.get("bus_watchdog") == 15
-    start, seen = bench.clock.now_s(), []
-    real = bench.joint.position
-
-    def position() -> tuple[int, float]:
-        seen.append(real())
-        return seen[-1]
-
-    bench.joint.position = position  # type: ignore[method-assign]
-    bench.joint.find_stop(1)
-    way = [(p, t) for p, t in seen if t > start + 1.0]
-    speed = (way[60][0] - way[0][0]) / (way[60][1] - way[0][1]) / STEPS_PER_DEG
-    assert 10.0 < speed < 20.0
-    bench.joint.restore()
-
-
-def test_a_servo_that_restarts_on_the_way_has_met_no_stop() -> None:
-    bench = Bench(STS, 2100, (1000.0, 3000.0))
-    bench.joint.enable_torque()
-    bench.chain.faults.command(f"brown-out {STS.id}")
-    with pytest.raises((ServoFault, BusLost)):
-        bench.joint.find_stop(1)
 
 
 # --- refused
@@ -313,12 +212,15 @@ def test_a_servo_that_suffers_or_is_silent_is_named(
         bench.joint.position()
 
 
-def test_a_joint_that_a_hand_took_over_the_seam_is_not_driven() -> None:
-    bench = Bench(EYE, 4000)
-    bench.chain.find_servo(1).turn(200)
-    with pytest.raises(ServoMissing, match="turned over the seam"):
-        bench.joint.enable_torque()
-    assert bench.get("torque_enable") == 0
+def test_a_servo_in_another_mode_or_with_an_offset_is_not_calibrated() -> None:
+    bench = Bench(EYE)
+    bench.put("operating_mode", 4)
+    with pytest.raises(ServoFault, match=r"not in position mode .* --fix"):
+        bench.joint.check()
+    bench = Bench(EYE)
+    bench.put("homing_offset", -200)
+    with pytest.raises(ServoFault, match="Homing Offset -200"):
+        bench.joint.check()
 
 
 # --- measured by eye
@@ -371,9 +273,6 @@ class LinkageBench:
         self.said.append(line)
 
     def wait(self, question: str, live: Callable[[], str]) -> None:
-        raise AssertionError(question)
-
-    def agrees(self, question: str, live: Callable[[], str]) -> bool:
         raise AssertionError(question)
 
     def steer(self, question: str, servo: HobbyServoAccess) -> None:

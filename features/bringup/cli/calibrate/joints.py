@@ -1,8 +1,6 @@
 """The command calibrate joints: zero, sign and range of each joint, as its servo permits."""
 
-import contextlib
-from collections.abc import Callable, Iterator, Sequence
-from enum import StrEnum
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -25,10 +23,7 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     Value,
     rig_changes,
 )
-from gazerig.features.bringup.calibration.joint_procedure import (
-    calibrate_by_hand,
-    calibrate_by_motion,
-)
+from gazerig.features.bringup.calibration.joint_procedure import calibrate_by_hand
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
     SmartServoAccess,
@@ -59,19 +54,11 @@ from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling import joint_partners
 
 
-class ActuationMode(StrEnum):
-    """Source of the motion of a joint."""
-
-    hand = "hand"
-    motion = "motion"
-
-
 class CalibrationJob(NamedTuple):
     """Context of a calibration, without the joint."""
 
     rig: Rig
     wire: RigPorts
-    by: ActuationMode
     margin_deg: float
     set_middle: bool
     person: TerminalPerson
@@ -83,10 +70,6 @@ def calibrate_joints(
     joint: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="This joint only; repeatable.")
     ] = None,
-    by: Annotated[
-        ActuationMode,
-        typer.Option(help="By hand with the torque off, or by gentle motion of the servo."),
-    ] = ActuationMode.hand,
     margin: Annotated[
         float, typer.Option(metavar="DEG", min=0.0, max=20.0, help="Margin kept from each end.")
     ] = 2.0,
@@ -111,7 +94,7 @@ def calibrate_joints(
         loaded = load_rig(rig)
         refuse_packages(loaded, "calibrate joints")
         names = _names(loaded, joint)
-        _refuse_impossible(loaded, names, by, set_middle)
+        _refuse_impossible(loaded, names, set_middle)
         if dry_run and set_middle:
             raise SetupError("--dry-run and --set-middle exclude each other: that is a write")
         if not dry_run:
@@ -128,7 +111,7 @@ def calibrate_joints(
         wanted, refused = dict[str, Value](), list[str]()
         try:
             with rig_ports(loaded, mock, port) as wire:
-                job = CalibrationJob(loaded, wire, by, margin, set_middle, person, stopped)
+                job = CalibrationJob(loaded, wire, margin, set_middle, person, stopped)
                 for name in names:
                     try:
                         found = _calibrate(job, name)
@@ -167,24 +150,14 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     return tuple(name for name in rig.names if name not in coupled and (not asked or name in asked))
 
 
-def _refuse_impossible(rig: Rig, names: Sequence[str], by: ActuationMode, set_middle: bool) -> None:
-    """Refuse options that the servos of these joints do not support."""
-    models = {name: rig.joints[name].model_facts for name in names}
-    hobby = [name for name, facts in models.items() if not facts.measures_position]
-    if by is ActuationMode.motion and len(hobby) == len(names):
+def _refuse_impossible(rig: Rig, names: Sequence[str], set_middle: bool) -> None:
+    """Refuse an option that the servos of these joints do not support."""
+    joints = [rig.joints[name] for name in names]
+    if set_middle and not all(
+        one.model_facts.measures_position and servo_kind(one.model).set_middle for one in joints
+    ):
         raise SetupError(
-            f"--by motion: hobby servos do not report their position ({', '.join(hobby)}), so no "
-            "stop can be found: leave --by away and steer them yourself"
-        )
-    others = [
-        name
-        for name in names
-        if name in hobby or servo_kind(rig.joints[name].model).set_middle is None
-    ]
-    if set_middle and others:
-        raise SetupError(
-            f"--set-middle: only Feetech STS servos can be set so, not that of {', '.join(others)}: "
-            "choose joints with --joint"
+            "--set-middle: only Feetech STS servos can be set so: choose joints with --joint"
         )
 
 
@@ -192,27 +165,33 @@ def _calibrate(job: CalibrationJob, name: str) -> Calibration | LinkageFit:
     """Calibrate one joint; in all cases its torque is off at the end."""
     joint, person = job.rig.joints[name], job.person
     bus, clock = joint.bus, RealClock()
-    # It switches this servo off if this program dies or hangs.
+    person.hand = None
+    if joint.model_facts.measures_position:
+        with open_port(job.rig, job.wire, bus) as port:
+            if (buses := job.wire.buses) is not None:
+                person.hand = lambda steps: buses.command(f"turn {joint.id} {steps}", bus)
+            return _calibrate_smart_servo(SmartServoAccess(name, joint, port, clock.now_s), job)
+    # It stops this servo's pulses if this program dies or hangs.
     plan = release_plan(job.rig, bus, job.wire.paths[bus])
     guardian = Guardian((plan._replace(ids=(joint.id,)),))
-    person.hand = None
-    if not joint.model_facts.measures_position:
-        config = job.rig.bus_named(bus)
-        params = config.maestro if config.kind == "maestro" else config.pca9685
-        line = port_at_path(job.wire.paths[bus], on_traffic=guardian.beat)
-        hobby = HobbyServoAccess(name, joint, line, params, clock, job.stopped, person, guardian)
-        with _torque_off_after(hobby.who, hobby.disable, job.stopped):
-            return calibrate_by_marks(hobby, person, job.margin_deg)
-    with open_port(job.rig, job.wire, bus, guardian) as port:
-        single = SmartServoAccess(name, joint, port, clock, job.stopped, guardian)
-        if (buses := job.wire.buses) is not None:
-            person.hand = lambda steps: buses.command(f"turn {joint.id} {steps}", bus)
-        with _torque_off_after(single.who, single.disable_torque, job.stopped):
-            return _calibrate_smart_servo(single, job)
+    config = job.rig.bus_named(bus)
+    params = config.maestro if config.kind == "maestro" else config.pca9685
+    line = port_at_path(job.wire.paths[bus], on_traffic=guardian.beat)
+    hobby = HobbyServoAccess(name, joint, line, params, clock, job.stopped, person, guardian)
+    # Nothing is printed on success.
+    with PowerDown(
+        None,
+        hobby.disable,
+        lambda text: say(f"{hobby.who}: {text}"),
+        Interrupts.from_stop(job.stopped),
+        left=": cut the servo power",
+        quiet=True,
+    ) as power:
+        power.switch_on(lambda: None)  # what follows does it, at a time of its own
+        return calibrate_by_marks(hobby, person, job.margin_deg)
 
 
 def _calibrate_smart_servo(single: SmartServoAccess, job: CalibrationJob) -> Calibration:
-    person, by_motion = job.person, job.by is ActuationMode.motion
     if single.joint.transmission_points:
         raise CalibrationRefused(
             f"{single.name}: its push rod has measured places: read steps with gazerig monitor at "
@@ -221,7 +200,7 @@ def _calibrate_smart_servo(single: SmartServoAccess, job: CalibrationJob) -> Cal
     single.check()
     if job.set_middle:
         single.disable_torque()
-        person.wait(
+        job.person.wait(
             f"turn {single.name} to the middle of its travel, then press Enter",
             lambda: f"{single.name}: step {single.position()[0]}",
         )
@@ -229,30 +208,4 @@ def _calibrate_smart_servo(single: SmartServoAccess, job: CalibrationJob) -> Cal
             f"{single.who}: its place is 2048 now (offset {single.set_middle()}); until this "
             "calibration is written the rig file's zero is wrong by that"
         )
-    if not by_motion:
-        return calibrate_by_hand(single, person, job.margin_deg)
-    # A heavy head must not move on its own without a confirmation.
-    asked = (
-        f"{single.name} will move on its own, and sink when the torque goes off: hold the head. "
-        "Go on?"
-    )
-    if "neck" in single.name.split("_") and not person.agrees(asked):
-        raise CalibrationRefused(f"{single.name}: left out as you asked")
-    return calibrate_by_motion(single, person, job.margin_deg)
-
-
-@contextlib.contextmanager
-def _torque_off_after(
-    who: str, torque_off: Callable[[], None], stopped: Callable[[], str | None]
-) -> Iterator[None]:
-    """Switch the torque off after the block in all cases; nothing is printed on success."""
-    with PowerDown(
-        None,
-        torque_off,
-        lambda line: say(f"{who}: {line}"),
-        Interrupts.from_stop(stopped),
-        left=": cut the servo power",
-        quiet=True,
-    ) as way_out:
-        way_out.switch_on(lambda: None)  # what follows does it, at a time of its own
-        yield
+    return calibrate_by_hand(single, job.person, job.margin_deg)
