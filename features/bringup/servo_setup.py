@@ -45,14 +45,6 @@ class Answers(NamedTuple):
         return bool(self.junk or self.shared_ids)
 
 
-class SetupResult(NamedTuple):
-    """Result for one servo: its state before and now, and the written values."""
-
-    before: FoundServo
-    after: FoundServo
-    changes: tuple[str, ...]
-
-
 def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
     """List all baud rates, the most likely ones first."""
     return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.baud_rates)))
@@ -135,8 +127,10 @@ def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: 
 
 def assign_servo(
     port: BusPort, kind: ServoKind, found: FoundServo, setup: ServoConfig, baud: int, tell: Tell
-) -> SetupResult:
+) -> tuple[FoundServo, list[str]]:
     """Assign the id of a joint and the bus's baud rate to the servo, and verify them.
+
+    Returns the servo as it answers then, and the written values.
 
     Its torque is switched off. The message of every failure has the present id and rate.
 
@@ -193,7 +187,7 @@ def assign_servo(
             "gazerig scan finds it"
         )
     lock(1, "close its lock")
-    return SetupResult(found, seen, tuple(done))
+    return seen, done
 
 
 def open_at(port: BusPort, baud: int) -> None:

@@ -409,12 +409,12 @@ ANYWHERE = [
 @pytest.mark.parametrize(("kind", "servo_id", "baud"), ANYWHERE)
 def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, baud):
     bench = Bench(ServoSpec(servo_id, NECK[kind.name]), baud=baud, kind=kind)
-    result = bench.assign()
-    assert result.before == FoundServo(servo_id, *NUMBER[kind.name], baud, bench.model)
-    assert result.after == FoundServo(7, *NUMBER[kind.name], BAUD, bench.model)
-    assert (f"id {servo_id} -> 7" in result.changes) == (servo_id != 7)
-    assert (f"baud rate {baud} -> {BAUD} bit/s" in result.changes) == (baud != BAUD)
-    assert len(result.changes) == (servo_id != 7) + (baud != BAUD)
+    assert bench.find() == FoundServo(servo_id, *NUMBER[kind.name], baud, bench.model)
+    after, changes = bench.assign()
+    assert after == FoundServo(7, *NUMBER[kind.name], BAUD, bench.model)
+    assert (f"id {servo_id} -> 7" in changes) == (servo_id != 7)
+    assert (f"baud rate {baud} -> {BAUD} bit/s" in changes) == (baud != BAUD)
+    assert len(changes) == (servo_id != 7) + (baud != BAUD)
     (servo,) = bench.chain.servos
     assert (servo.id, servo.torque) == (7, False)
     rate = bench.registers().read(7, "baud_rate")
@@ -435,7 +435,7 @@ def test_a_servo_whose_torque_is_on_is_let_go_first(kind):
     bench = Bench(kind=kind)
     bench.port.setBaudRate(bench.baud)
     assert bench.registers().write(1, "torque_enable", 1)
-    assert bench.assign().changes[0] == "torque 1 -> 0"
+    assert bench.assign()[1][0] == "torque 1 -> 0"
     assert not bench.chain[7].torque
 
 
@@ -518,7 +518,7 @@ def test_a_lost_confirmation_does_not_matter(address):
 
     bench = Bench()
     bench.port = Lossy(bench.chain)
-    assert bench.assign().after == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
+    assert bench.assign()[0] == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
 
 
 # --- Searching a port for every kind: servos are found, and none is moved or changed

@@ -77,17 +77,8 @@ class HandEye:
     angle_std_deg: Floats
 
     def camera_params(self, params: CameraParams) -> CameraParams:
-        """Return the camera at the calibrated pose, rounded to 0.1 mm and 0.01 deg."""
-        found = camera_at_pose(params, self.R_head_camera, self.p_head_camera_m)
-        x, y, z = (round(mm, 1) for mm in found.position_mm)
-        return replace(
-            found,
-            mount="head",
-            position_mm=(x, y, z),
-            yaw_deg=round(found.yaw_deg, 2),
-            pitch_deg=round(found.pitch_deg, 2),
-            roll_deg=round(found.roll_deg, 2),
-        )
+        """Return the camera at the calibrated pose."""
+        return camera_at_pose(params, self.R_head_camera, self.p_head_camera_m)
 
 
 def camera_on_head(views: Sequence[NeckView], lens: Intrinsics, width_px: int) -> HandEye:

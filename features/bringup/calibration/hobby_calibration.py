@@ -211,17 +211,6 @@ Place = tuple[float, float]
 """(angle, position)"""
 
 
-def likely_angle(joint: JointParams, position: float, one: Place, other: Place) -> float:
-    """Return the likely angle of a position between two marks: the old curve, adjusted to them."""
-    (low, at_low), (high, at_high) = one, other
-    was_low, was_high = angle_now(joint, at_low), angle_now(joint, at_high)
-    if was_low == was_high:
-        share = (position - at_low) / (at_high - at_low)
-    else:
-        share = (angle_now(joint, position) - was_low) / (was_high - was_low)
-    return round(low + share * (high - low), 1) + 0.0
-
-
 def calibrate_by_marks(hobby: HobbyServoAccess, person: Operator, margin_deg: float) -> LinkageFit:
     """Mark the ends of a joint, its zero, and a position between each two; ask for their angles.
 
@@ -254,7 +243,7 @@ def calibrate_by_marks(hobby: HobbyServoAccess, person: Operator, margin_deg: fl
     between = []
     for one, other in zip(marked, marked[1:], strict=False):
         at = hobby.move_to(float(round((one[1] + other[1]) / 2.0)))
-        between.append(ask(at, likely_angle(joint, at, one, other)))
+        between.append(ask(at, round((one[0] + other[0]) / 2.0, 1)))
     points = sorted((round(angle, 1) + 0.0, at) for angle, at in (*marked, *between))
     kept_deg = 0.0 if is_lid(name) else margin_deg
     made = LinkageFit(tuple(points), *range_within(name, points[0][0], points[-1][0], kept_deg))

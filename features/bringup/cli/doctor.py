@@ -17,7 +17,6 @@ from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
     bus_label,
-    clear_progress,
     console,
     progress,
     refuse_packages,
@@ -130,7 +129,7 @@ def _examine(rig: Rig, bus: str, line: BusPort) -> list[Diagnostic]:
         baud = config.section.baud
         examine = partial(checkup.examine_bus, line, kind, setups, baud, progress, far)
     findings = checkup.examine_port(line, examine)
-    clear_progress()
+    progress()
     return [msgspec.structs.replace(one, bus=bus) for one in findings]
 
 

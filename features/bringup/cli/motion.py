@@ -21,7 +21,7 @@ from gazerig.features.bringup.manual_control import (
     park_slowly,
     refuse_angle,
 )
-from gazerig.robot.app.bus_wiring import bus_names, can_be_released, guarded_rig_bus, has_watchdog
+from gazerig.robot.app.bus_wiring import guarded_rig_bus
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.app.rig_weight import rest_park_deg
 from gazerig.robot.cli.rig_command import RigCommand
@@ -137,6 +137,12 @@ def _print_events(events: Iterable[str]) -> None:
         say(line)
 
 
+_UNRELEASED = (
+    ": servos hold their last goal or pulse until their own watchdog stops them, the servo power is "
+    "cut, or the guardian, which tries for 10 s, reaches the port"
+)
+
+
 @contextlib.contextmanager
 def holding_rig(
     rig: Rig,
@@ -173,7 +179,7 @@ def holding_rig(
         say,
         interrupts,
         "torque off on all servos",
-        f": {unreleased_text(rig)}",
+        _UNRELEASED,
     ) as way_out:
         way_out.switch_on(control.start)
         yield control
@@ -183,29 +189,11 @@ def holding_rig(
 
 def holding_text(rig: Rig) -> str:
     """Return the behaviour of the servos once the torque is on."""
-    measured_joints = [name for name in rig.names if rig.joints[name].model_facts.measures_position]
-    without_feedback = len(rig.names) - len(measured_joints)
-    if not without_feedback:
-        return f"torque on: {len(measured_joints)} servos hold where they are"
-    pulses = f"{without_feedback} hobby servos hold where their pulses are (estimated: they report nothing)"
-    return (
-        f"torque on: {len(measured_joints)} servos hold where they are, {pulses}"
-        if measured_joints
-        else f"pulses on: {pulses}"
-    )
-
-
-def unreleased_text(rig: Rig) -> str:
-    """Return the behaviour of servos whose torque could not be switched off."""
-    until = "until the servo power is cut, or the guardian, which tries for 10 s, reaches the port"
-    texts: dict[str, None] = {}
-    for bus in bus_names(rig):
-        kind = rig.bus_named(bus).kind
-        if not can_be_released(rig, bus):
-            text = f"the {kind} servos' own watchdog stops them"
-        elif has_watchdog(rig, bus):
-            text = f"{kind} servos stop by their own watchdog and hold {until}"
-        else:
-            text = f"{kind} servos hold their last goal or pulse {until}"
-        texts[text] = None
-    return "; ".join(texts)
+    hobby = [name for name in rig.names if not rig.joints[name].model_facts.measures_position]
+    texts = []
+    if measured := len(rig.names) - len(hobby):
+        texts.append(f"torque on: {measured} servos hold where they are")
+    if hobby:
+        where = "hobby servos hold where their pulses are (estimated: they report nothing)"
+        texts.append(f"{len(hobby)} {where}")
+    return ", ".join(texts)

@@ -50,16 +50,10 @@ def console() -> Console:
     return Console(soft_wrap=True, highlight=False)
 
 
-def progress(line: str) -> None:
-    """Show the present activity, on a terminal only."""
+def progress(line: str = "") -> None:
+    """Show the present activity on a terminal only, nothing without a line."""
     if sys.stderr.isatty():
         status(line)
-
-
-def clear_progress() -> None:
-    """Remove the progress line."""
-    if sys.stderr.isatty():
-        status("")
 
 
 MockOption = Annotated[

@@ -185,7 +185,7 @@ def _search_port(path: str, kinds: Sequence[BusKind], as_json: bool) -> bool:
             boards = [one for one in rounds if one.kind == "maestro"]
             servos = [kind for kind in kinds if kind != "maestro"]
             rounds = [*boards, *search_bus(line, servos, thorough=True)]
-    bench.clear_progress()
+    bench.progress()
     _show(rounds, path, USB_CHANNELS.get(usb), as_json)
     return any(one.has_answer for one in rounds)
 

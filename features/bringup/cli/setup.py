@@ -17,7 +17,6 @@ from gazerig.features.bringup.cli.ports import (
     PortOption,
     YesOption,
     bus_label,
-    clear_progress,
     progress,
     refuse_packages,
     rig_ports,
@@ -121,7 +120,7 @@ def _set_up(
     kind = servo_kind(wanted.model)
     order = servo_setup.search_order(kind, baud)
     answers = servo_setup.search_rates(line, kind, order, progress, thorough=True)
-    clear_progress()
+    progress()
     found = servo_setup.find_alone(answers, line.port_name)
     label = servo_label(wanted)
     firmware = kind.family.format_firmware(found.firmware)
@@ -130,9 +129,8 @@ def _set_up(
     question = f"   give it id {wanted.id} and {baud} bit/s?"
     if not yes and not confirm(question, default=True, err=True):
         return False
-    result = servo_setup.assign_servo(line, kind, found, wanted, baud, progress)
-    clear_progress()
-    changes = "; ".join(result.changes) or "nothing to change"
-    after = result.after
-    say(f"   {label}: {changes}; answers as id {after.id} at {after.baud} bit/s")
+    after, changes = servo_setup.assign_servo(line, kind, found, wanted, baud, progress)
+    progress()
+    done = "; ".join(changes) or "nothing to change"
+    say(f"   {label}: {done}; answers as id {after.id} at {after.baud} bit/s")
     return True

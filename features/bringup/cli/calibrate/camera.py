@@ -157,8 +157,11 @@ def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
     They include the lens that belongs to this pose, at the image size of its measurement.
     """
     params, lens = found.camera_params(camera), found.lens
-    place = ("position_mm", "yaw_deg", "pitch_deg", "roll_deg")
-    return {f"camera.{key}": getattr(params, key) for key in place} | {
+    return {
+        "camera.position_mm": tuple(round(mm, 1) for mm in params.position_mm),
+        "camera.yaw_deg": round(params.yaw_deg, 2),
+        "camera.pitch_deg": round(params.pitch_deg, 2),
+        "camera.roll_deg": round(params.roll_deg, 2),
         "camera.lens.focal_px": (round(lens.fx_px, 2), round(lens.fy_px, 2)),
         "camera.lens.centre_px": (round(lens.cx_px, 2), round(lens.cy_px, 2)),
     }
