@@ -120,7 +120,6 @@ def test_a_position_is_followed_over_the_seam_however_it_is_reported(
         true += move
         reported = true % TURN if wraps else true
         assert track.see(reported, i * 0.05) == true
-    assert track.steps == true
 
 
 def test_turning_unseen_is_refused_when_its_way_is_unknown() -> None:

@@ -36,13 +36,10 @@ def board_page(board: CharucoBoard, paper: str) -> ImageArray:
     top = round((_EDGE_MM + (room_high_mm - board_high_mm) / 2) * _PX_PER_MM)
     sheet[top : top + drawn.shape[0], left : left + drawn.shape[1]] = drawn
     below = round((high_mm - _EDGE_MM - _STRIP_MM + 3.0) * _PX_PER_MM)
-    # A line of 100 mm with a mark every 10 mm; the length is between the outer edges.
-    mm = _PX_PER_MM
-    sheet[below : below + 3, left : left + RULER_MM * mm] = _BLACK
-    for at_mm in range(0, RULER_MM + 1, 10):
-        high = (4 if at_mm % 50 == 0 else 2) * mm
-        start = left + at_mm * mm - (3 if at_mm == RULER_MM else 0)
-        sheet[below : below + high, start : start + 3] = _BLACK
+    # A line of 100 mm with a mark at each end; the length is between the outer edges.
+    sheet[below : below + 3, left : left + RULER_MM * _PX_PER_MM] = _BLACK
+    for start in (left, left + RULER_MM * _PX_PER_MM - 3):
+        sheet[below : below + 4 * _PX_PER_MM, start : start + 3] = _BLACK
     lines = (
         f"The line on the left is {RULER_MM} mm long: measure it.",
         "Print at 100 %, not 'fit to page'. Glue it on something flat and stiff.",
@@ -50,7 +47,7 @@ def board_page(board: CharucoBoard, paper: str) -> ImageArray:
         f"markers {par.marker_mm:g} mm.",
     )
     for number, line in enumerate(lines):
-        at = (left + (RULER_MM + 6) * mm, below + round((1.6 + 3.9 * number) * mm))
+        at = (left + (RULER_MM + 6) * _PX_PER_MM, below + round((1.6 + 3.9 * number) * _PX_PER_MM))
         cv2.putText(sheet, line, at, cv2.FONT_HERSHEY_SIMPLEX, 1.1, _BLACK, 3, cv2.LINE_8)
     return sheet
 

@@ -33,10 +33,12 @@ _SETTLE_S, _TIMEOUT_S = 0.4, 4.0
 
 
 class JoggedNeck:
-    """Neck that moves gently through the guard, like jogging."""
+    """Neck that moves gently through the guard, like jogging; watch: receives its angles."""
 
-    def __init__(self, control: ManualControl) -> None:
-        self._control = control
+    def __init__(
+        self, control: ManualControl, watch: Callable[[Angles3], None] | None = None
+    ) -> None:
+        self._control, self._watch = control, watch
         self.angles: Angles3 = (0.0, 0.0, 0.0)
         """Yaw, pitch and roll as last measured."""
 
@@ -60,6 +62,8 @@ class JoggedNeck:
         moved = self._control.hold(seconds)
         at = dict(zip(self._control.body.names, moved.last.joints.position_rad, strict=True))
         self.angles = (at.get(NECK[0], 0.0), at.get(NECK[1], 0.0), at.get(NECK[2], 0.0))
+        if self._watch is not None:
+            self._watch(self.angles)
 
 
 class NeckStep(NamedTuple):

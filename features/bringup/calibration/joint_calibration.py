@@ -75,10 +75,6 @@ class LinkageFit(NamedTuple):
     max_deg: float
 
 
-Value = int | float | tuple[float, float] | tuple[tuple[float, float], ...]
-"""A value that a calibration writes."""
-
-
 class PositionUnwrapper:
     """Follows a position register over the seam.
 
@@ -89,11 +85,6 @@ class PositionUnwrapper:
     def __init__(self) -> None:
         self._at: int | None = None
         self._seen_s = 0.0
-
-    @property
-    def steps(self) -> int | None:
-        """Return the unwrapped position, in 0..4095 at the first sample; None before it."""
-        return self._at
 
     def see(self, position_steps: int, t_s: float) -> int:
         """Add one sample; return the unwrapped position.
@@ -239,24 +230,17 @@ def with_calibration(name: str, joint: JointParams, made: Calibration | LinkageF
 
 def rig_changes(
     name: str, joint: JointParams, made: Calibration | LinkageFit, park_deg: Mapping[str, float]
-) -> dict[str, Value]:
+) -> dict[str, object]:
     """Return dotted keys of the rig file and their new values, only those that differ.
 
     Values that depend on the old range also change: a lid's shut and open angles are set to its
     ends, a parking angle outside the new range to the nearer end.
     """
-    wanted: dict[str, Value] = {
+    wanted: dict[str, object] = {
         f"joints.{name}.{key}": value
         for key, value in made._asdict().items()
         if getattr(joint, key) != value
     }
-    places = f"joints.{name}.transmission_points"
-    if isinstance(made, LinkageFit) and places in wanted:
-        # Write whole numbers as integers: 1500 us is not more exact as 1500.0.
-        wanted[places] = tuple(
-            (int(angle) if angle == int(angle) else angle, int(at) if at == int(at) else at)
-            for angle, at in made.transmission_points
-        )
     if is_lid(name):
         key = name.removesuffix("_lid").removesuffix("_upper")
         wanted[f"lid_joints.{key}_deg"] = made.min_deg, made.max_deg

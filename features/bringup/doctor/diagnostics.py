@@ -112,6 +112,7 @@ class FamilyAdvice(msgspec.Struct, frozen=True):
 class _Tables(msgspec.Struct, frozen=True):
     servos: dict[str, Advice]
     bus: dict[str, Advice]
+    registers: tuple[str, ...]
     families: dict[str, FamilyAdvice]
     maestro: dict[str, str]
     boards: dict[str, Advice]

@@ -29,14 +29,6 @@ from gazerig.features.bringup.doctor.diagnostics import (
 )
 from gazerig.features.bringup.servo_kinds import ServoKind
 
-COMMON = (
-    *("status_return_level", "torque_enable", "baud_rate", "return_delay_time", "operating_mode"),
-    *("temperature_limit", "max_voltage_limit", "min_voltage_limit"),
-    *("max_position_limit", "min_position_limit"),
-    *("present_position", "present_input_voltage", "present_temperature"),
-)
-"""Registers of every smart servo that are read."""
-
 MOST_NAMED = 6
 WARM_C = 10
 """Distance from the temperature limit at which a servo is called warm."""
@@ -100,7 +92,7 @@ def read_state(
     Raises:
         BusLost: the port has disappeared.
     """
-    names = (*COMMON, *ADVICE.families[kind.family.name].registers)
+    names = (*ADVICE.registers, *ADVICE.families[kind.family.name].registers)
     values = line.read_many(setup.id, [name for name in names if name in kind.family.registers])
     return ServoState(kind, setup, found, values, shares_id)
 

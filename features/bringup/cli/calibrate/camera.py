@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from enum import StrEnum
+from functools import partial
 from math import degrees, radians
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -309,17 +310,6 @@ def _measure_mount(
     return result
 
 
-class _SimulatedNeck(JoggedNeck):
-    """Neck of emulated servos, which also turns the simulated camera."""
-
-    scene: BoardScene
-
-    def rest(self, seconds: float) -> None:
-        """Hold still for a time, and measure the head."""
-        super().rest(seconds)
-        self.scene.head_rad = self.angles
-
-
 @contextlib.contextmanager
 def _moving_neck(
     rig: Rig, eye: _Eye, port: str | None, person: TerminalPerson
@@ -339,9 +329,7 @@ def _moving_neck(
         rig_ports(rig, mock, port) as wire,
         holding_rig(rig, wire.paths, _GENTLE_DEG_S, stopped, interrupts) as control,
     ):
-        neck = JoggedNeck(control)
-        if eye.scene is not None:
-            neck = _SimulatedNeck(control)
-            neck.scene = eye.scene
+        watch = partial(setattr, eye.scene, "head_rad") if mock else None
+        neck = JoggedNeck(control, watch)
         neck.rest(0.1)
         yield neck

@@ -20,7 +20,6 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
     LinkageFit,
-    Value,
     rig_changes,
 )
 from gazerig.features.bringup.calibration.joint_procedure import calibrate_by_hand
@@ -108,7 +107,7 @@ def calibrate_joints(
                 }
                 propose(find_file("rigs", rig), points)
         person = TerminalPerson(Lines(answers), stopped, yes)
-        wanted, refused = dict[str, Value](), list[str]()
+        wanted, refused = dict[str, object](), list[str]()
         try:
             with rig_ports(loaded, mock, port) as wire:
                 job = CalibrationJob(loaded, wire, margin, set_middle, person, stopped)
