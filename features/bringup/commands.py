@@ -13,7 +13,6 @@ SCAN = CommandEntry(
                 "scan --port /dev/ttyUSB0",
                 "who answers on this port, of any kind, at every baud rate",
             ),
-            ("scan --port /dev/ttyUSB0 --kind feetech", "Feetech servos only"),
         )
     },
 )

@@ -7,7 +7,7 @@ applied result:
     control.start()
     try:
         moved = control.jog("neck_yaw", 20.0)
-        print(moved.joint_move("neck_yaw"))
+        print(moved.joints["neck_yaw"])
     finally:
         control.stop()
 
@@ -90,7 +90,7 @@ class MoveResult(NamedTuple):
 
     end_reason: str
     seconds: float
-    joints: tuple[JointMove, ...]
+    joints: dict[str, JointMove]
     events: tuple[str, ...]
     last: Step
 
@@ -102,13 +102,11 @@ class MoveResult(NamedTuple):
     def __str__(self) -> str:
         """Write the result, with the reasons by joint."""
         reasons = [
-            f"{part.joint}: {', '.join(part.reasons)}" for part in self.joints if part.reasons
+            f"{part.joint}: {', '.join(part.reasons)}"
+            for part in self.joints.values()
+            if part.reasons
         ]
         return f"{self.end_reason} ({'; '.join(reasons)})" if reasons else self.end_reason
-
-    def joint_move(self, joint: str) -> JointMove:
-        """Return one joint's result."""
-        return next(part for part in self.joints if part.joint == joint)
 
 
 def _deg(angle: float) -> str:
@@ -275,13 +273,13 @@ class ManualControl:
                 ended = "not there in time"
         measured = joints.measured or (True,) * len(result.joints)
         rows = zip(result.joints, ends_on, self._goal, joints.position_rad, measured, strict=True)
-        moves = tuple(
-            JointMove(
+        moves = {
+            name: JointMove(
                 name, degrees(wanted), degrees(goal), degrees(at),
                 (*reasons.get(name, {}), *reasons.get("all", {})), not has_sensor,
             )
             for name, wanted, goal, at, has_sensor in rows
-        )  # fmt: skip
+        }  # fmt: skip
         return MoveResult(ended, passed_s, moves, tuple(events), step)
 
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import SERVOS, BusKind
 from gazerig.drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
-from gazerig.drivers.errors import SetupError
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
 from gazerig.drivers.feetech.family import FEETECH_SCS
 from gazerig.drivers.feetech.memory_table import SET_MIDDLE
@@ -44,12 +43,5 @@ _KIND_OF = {kind.family.name: kind for kind in (*KINDS.values(), SCS)}
 
 
 def servo_kind(model: str) -> ServoKind:
-    """Return the kind of a servo by its model.
-
-    Raises:
-        SetupError: the model is not a smart servo.
-    """
-    kind = _KIND_OF.get(SERVOS[model].family)
-    if kind is None:
-        raise SetupError(f"{model} is no servo that answers: name a joint with a smart servo")
-    return kind
+    """Return the kind of a smart servo by its model."""
+    return _KIND_OF[SERVOS[model].family]

@@ -45,11 +45,6 @@ class Answers(NamedTuple):
         return bool(self.junk or self.shared_ids)
 
 
-def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
-    """List all baud rates, the most likely ones first."""
-    return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.baud_rates)))
-
-
 def search_rate(
     port: BusPort, kind: ServoKind, baud: int, thorough: bool = False
 ) -> Answers | None:
@@ -95,12 +90,10 @@ def find_alone(answers: Mapping[int, Answers], where: str) -> FoundServo:
         ServoMissing: no servo or more than one answered.
     """
     found = [servo for one in answers.values() for servo in one.found]
-    shared = [i for one in answers.values() for i in one.shared_ids]
-    if shared:
-        raise ServoMissing(f"{where}: two servos answer as id {shared[0]}: connect one servo alone")
-    if len(found) > 1:
-        named = ", ".join(f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found)
-        raise ServoMissing(f"{where}: {len(found)} servos answer: {named}: connect one servo alone")
+    named = [f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found]
+    named += [f"two as id {i}" for one in answers.values() for i in one.shared_ids]
+    if len(named) > 1:
+        raise ServoMissing(f"{where}: several servos answer: {', '.join(named)}: connect one alone")
     if not found and any(one.is_spoilt for one in answers.values()):
         raise ServoMissing(
             f"{where}: answers in pieces only: connect one servo alone, and check its plug"

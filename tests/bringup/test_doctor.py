@@ -31,7 +31,6 @@ from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, KINDS
 from gazerig.features.bringup.servo_setup import (
     assign_servo,
     find_alone,
-    search_order,
     search_rates,
 )
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -382,7 +381,8 @@ class Bench:
         self.chain.positions_steps()
 
     def find(self):
-        order = search_order(self.kind, BAUD)
+        order = (self.kind.family.factory_baud, *self.kind.family.baud_rates)
+        order = tuple(dict.fromkeys(order))
         answers = search_rates(self.port, self.kind, order, self.reported.append, thorough=True)
         return find_alone(answers, self.port.port_name)
 
@@ -445,7 +445,7 @@ def test_a_servo_whose_torque_is_on_is_let_go_first(kind):
     [
         ((1,), "lose all", "no servo answers at any baud rate"),
         ((1,), "truncate all 5", "in pieces only"),
-        ((1, 2), "clear", "2 servos answer: id 1 .* id 2 .*: connect"),
+        ((1, 2), "clear", "several servos answer: id 1 .* id 2 .*: connect"),
         ((1, 1), "clear", "alone"),
     ],
 )

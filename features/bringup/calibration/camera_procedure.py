@@ -110,8 +110,8 @@ def neck_steps(
     """
     for asked in angles_rad:
         neck.turn(asked)
-        arrived_s, step = now_s(), NeckStep(asked, None, "no new frame came")
-        while step.view is None and now_s() - arrived_s < _TIMEOUT_S:
+        arrived_s, view, why = now_s(), None, "no new frame came"
+        while view is None and now_s() - arrived_s < _TIMEOUT_S:
             before = neck.angles
             neck.rest(0.04)
             shot = look()
@@ -122,10 +122,10 @@ def neck_steps(
             moved_rad = max(abs(a - b) for a, b in zip(before, neck.angles, strict=True))
             seen = board.find(shot.image)
             if moved_rad > _STILL_RAD:
-                step = step._replace(why="the head does not hold still")
+                why = "the head does not hold still"
             elif seen is None:
-                step = step._replace(why="no board seen")
+                why = "no board seen"
             else:
-                step = step._replace(view=NeckView(*geometry.head_pose(neck.angles), seen))
-        yield step
+                view = NeckView(*geometry.head_pose(neck.angles), seen)
+        yield NeckStep(asked, view, why)
     neck.turn((0.0, 0.0, 0.0))

@@ -100,7 +100,11 @@ def camera_on_head(views: Sequence[NeckView], lens: Intrinsics, width_px: int) -
     problem = _Problem(views, lens, width_px)
     try:
         found = least_squares(
-            problem.residuals, problem.start(), x_scale="jac", loss="huber", f_scale=_HUBER
+            problem.residuals,
+            np.zeros(_SHARED + 3 * len(views)),
+            x_scale="jac",
+            loss="huber",
+            f_scale=_HUBER,
         )
         # The Jacobian of robust losses is scaled so that this is their curvature.
         spread = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))[:6]
@@ -144,10 +148,6 @@ class _Problem:
             self._R[first] @ self._camera[0] @ R_board,
             self._R[first] @ in_head + self._p[first],
         )
-
-    def start(self) -> Floats:
-        """Return no displacement."""
-        return np.zeros(_SHARED + 3 * len(self._R))
 
     def lens(self, x: Floats) -> Intrinsics:
         """Return the lens."""

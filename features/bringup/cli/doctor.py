@@ -135,13 +135,12 @@ def _examine(rig: Rig, bus: str, line: BusPort) -> list[Diagnostic]:
 
 def _print_line(line: str) -> None:
     """Print a line; all lines are written to one stream, which keeps their order."""
-    level, space, rest = complete_suggestions(line).partition(" ")
-    out = console()
+    text, out = complete_suggestions(line), console()
+    level, space, rest = text.partition(" ")
     if level in STYLES:
         out.print(f"[{STYLES[level]}]{level:5}[/]", end=space)
-        out.print(rest, markup=False)
-    else:
-        out.print(complete_suggestions(line), markup=False)
+        text = rest
+    out.print(text, markup=False)
 
 
 def show_findings(findings: Sequence[Diagnostic], tell: Tell) -> None:

@@ -33,7 +33,6 @@ from gazerig.features.bringup.telemetry import (
     board_reader,
     smart_servo_reader,
 )
-from gazerig.robot.app.bus_wiring import bus_names, joints_on
 from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, record_signals
 from gazerig.robot.model.clock import RealClock
@@ -92,11 +91,10 @@ def open_readers(
     """Open the buses of some joints for reading only."""
     with contextlib.ExitStack() as ports:
         readers = {}
-        for name in bus_names(rig):
-            if any(joint.bus == name for joint in joints.values()):
-                port = ports.enter_context(open_port(rig, wire, name))
-                model = rig.joints[joints_on(rig, name)[0]].model
-                readers[name] = reader_of(port, rig.bus_named(name), model)
+        for joint in joints.values():
+            if joint.bus not in readers:
+                port = ports.enter_context(open_port(rig, wire, joint.bus))
+                readers[joint.bus] = reader_of(port, rig.bus_named(joint.bus), joint.model)
         yield readers
 
 

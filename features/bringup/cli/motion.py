@@ -11,7 +11,13 @@ import typer
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.cli.ports import MockOption, PortOption, confirm_safe, rig_ports
+from gazerig.features.bringup.cli.ports import (
+    MockOption,
+    PortOption,
+    YesOption,
+    confirm_safe,
+    rig_ports,
+)
 from gazerig.features.bringup.manual_control import (
     PASSING,
     RATE_HZ,
@@ -58,9 +64,7 @@ def jog(
             "--no-park", help="Switch the torque off at the present pose, without parking first."
         ),
     ] = False,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="Hobby servos: do not ask; no hand is in the mechanism.")
-    ] = False,
+    yes: YesOption = False,
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
@@ -86,7 +90,7 @@ def jog(
         gentle = loaded.guard.soft_start_speed_deg_s
         if speed > gentle:
             say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")
-        watch = _StatusLine().show if sys.stderr.isatty() else None
+        watch = _show if sys.stderr.isatty() else None
         by_key = hold and sys.stdin.isatty()
         end = lambda: stopped() or (enter_pressed() if by_key else None)  # noqa: E731
         top = min(speed, gentle)
@@ -95,7 +99,7 @@ def jog(
             say(f"{holding_text(loaded)}; Ctrl-C switches it off")
             moved = control.jog(joint, deg)
             _print_events(moved.events)
-            for part in moved.joints:
+            for part in moved.joints.values():
                 if part.joint == joint or part.reasons:
                     say(str(part))
             say(f"{moved} after {moved.seconds:.1f} s")
@@ -107,18 +111,10 @@ def jog(
         raise typer.Exit(FAULT)
 
 
-class _StatusLine:
-    """Shows the reasons that limit a motion; written only when they change."""
-
-    def __init__(self) -> None:
-        self._shown = ""
-
-    def show(self, step: Step) -> None:
-        reasons = [r for r in step.guard_result.reasons if r.partition(": ")[2] not in PASSING]
-        line = ", ".join(reasons) or "on the way"
-        if line != self._shown:
-            self._shown = line
-            status(line)
+def _show(step: Step) -> None:
+    """Show the reasons that limit a motion."""
+    reasons = [r for r in step.guard_result.reasons if r.partition(": ")[2] not in PASSING]
+    status(", ".join(reasons) or "on the way")
 
 
 def enter_pressed() -> str | None:

@@ -10,7 +10,7 @@ import typer
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.plugins import BUS, find, is_ours
-from gazerig.drivers.serial.list_ports import SerialPort, check_owner, serial_ports, usb_id_of
+from gazerig.drivers.serial.list_ports import check_owner, serial_ports, usb_id_of
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_setup import open_at
@@ -25,14 +25,9 @@ YesOption = Annotated[bool, typer.Option("--yes", help="Answer yes to every ques
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one line of JSON instead of text.")]
 
 
-def list_ports() -> tuple[SerialPort, ...]:
-    """List the serial ports of this computer."""
-    return serial_ports()
-
-
 def usb_id(path: str) -> str:
     """Return the USB vendor and product id of a port, "" if it has none."""
-    return usb_id_of(path, list_ports())
+    return usb_id_of(path, serial_ports())
 
 
 @contextlib.contextmanager
@@ -102,7 +97,7 @@ def rig_ports(
     if mock and port is not None:
         raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
     if not mock:
-        paths, here = bus_ports(rig, port), list_ports()
+        paths, here = bus_ports(rig, port), serial_ports()
         for name, path in paths.items():
             check_owner(path, rig.bus_named(name).kind, here)
         yield RigPorts(paths, None)

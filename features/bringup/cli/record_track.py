@@ -17,6 +17,7 @@ from gazerig.features.bringup.cli.motion import enter_pressed
 from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
+    YesOption,
     confirm_safe,
     open_port,
     rig_ports,
@@ -68,9 +69,7 @@ def record_track(
     ] = None,
     folder: FolderOption = Path("."),
     force: ForceOption = False,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="Do not ask: the head is held, torque may go off.")
-    ] = False,
+    yes: YesOption = False,
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:

@@ -31,7 +31,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.maestro.board import USB_CHANNELS, DetectedMaestro, MaestroParams
 from gazerig.drivers.maestro.board import probe as probe_maestro
 from gazerig.drivers.pca9685.board import probe as probe_pca9685
-from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c
+from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c, serial_ports
 from gazerig.drivers.serial.port import BusPort
 from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.cli.ports import JsonOption, MockOption
@@ -93,7 +93,7 @@ def scan(
         kinds = [one for one in ORDER if kind in (None, one)]
         if not kinds:
             raise SetupError(f"--kind {kind}: not one of {', '.join(ORDER)}")
-        found_ports = bench.list_ports()
+        found_ports = serial_ports()
         if not as_json:
             for bus in sorted(Path("/dev").glob("i2c-*")):
                 say(f"I2C bus {bus}")

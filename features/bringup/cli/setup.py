@@ -118,7 +118,8 @@ def _set_up(
 ) -> bool:
     """Give the new servo its id and baud rate; return whether it is done."""
     kind = servo_kind(wanted.model)
-    order = servo_setup.search_order(kind, baud)
+    # The most likely rates first.
+    order = list(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.baud_rates)))
     answers = servo_setup.search_rates(line, kind, order, progress, thorough=True)
     progress()
     found = servo_setup.find_alone(answers, line.port_name)

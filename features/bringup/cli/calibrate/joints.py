@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import typer
 
@@ -53,17 +53,6 @@ from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling import joint_partners
 
 
-class CalibrationJob(NamedTuple):
-    """Context of a calibration, without the joint."""
-
-    rig: Rig
-    wire: RigPorts
-    margin_deg: float
-    set_middle: bool
-    person: TerminalPerson
-    stopped: Callable[[], str | None]
-
-
 def calibrate_joints(
     rig: RigArgument = "desk",
     joint: Annotated[
@@ -110,10 +99,13 @@ def calibrate_joints(
         wanted, refused = dict[str, object](), list[str]()
         try:
             with rig_ports(loaded, mock, port) as wire:
-                job = CalibrationJob(loaded, wire, margin, set_middle, person, stopped)
                 for name in names:
                     try:
-                        found = _calibrate(job, name)
+                        found = (
+                            _calibrate_smart(loaded, wire, name, person, margin, set_middle)
+                            if loaded.joints[name].model_facts.measures_position
+                            else _calibrate_hobby(loaded, wire, name, person, margin, stopped)
+                        )
                         wanted |= rig_changes(name, loaded.joints[name], found, loaded.park_deg)
                     except (CalibrationRefused, ServoMissing, ServoFault) as error:
                         refused.append(name)
@@ -160,51 +152,63 @@ def _refuse_impossible(rig: Rig, names: Sequence[str], set_middle: bool) -> None
         )
 
 
-def _calibrate(job: CalibrationJob, name: str) -> Calibration | LinkageFit:
-    """Calibrate one joint; in all cases its torque is off at the end."""
-    joint, person = job.rig.joints[name], job.person
-    bus, clock = joint.bus, RealClock()
-    person.hand = None
-    if joint.model_facts.measures_position:
-        with open_port(job.rig, job.wire, bus) as port:
-            if (buses := job.wire.buses) is not None:
-                person.hand = lambda steps: buses.command(f"turn {joint.id} {steps}", bus)
-            return _calibrate_smart_servo(SmartServoAccess(name, joint, port, clock.now_s), job)
+def _calibrate_hobby(
+    rig: Rig,
+    wire: RigPorts,
+    name: str,
+    person: TerminalPerson,
+    margin_deg: float,
+    stopped: Callable[[], str | None],
+) -> LinkageFit:
+    """Calibrate a hobby servo; in all cases its pulses are off at the end."""
+    joint = rig.joints[name]
+    config, path = rig.bus_named(joint.bus), wire.paths[joint.bus]
     # It stops this servo's pulses if this program dies or hangs.
-    plan = release_plan(job.rig, bus, job.wire.paths[bus])
-    guardian = Guardian((plan._replace(ids=(joint.id,)),))
-    config = job.rig.bus_named(bus)
+    guardian = Guardian((release_plan(rig, joint.bus, path)._replace(ids=(joint.id,)),))
     params = config.maestro if config.kind == "maestro" else config.pca9685
-    line = port_at_path(job.wire.paths[bus], on_traffic=guardian.beat)
-    hobby = HobbyServoAccess(name, joint, line, params, clock, job.stopped, person, guardian)
+    line = port_at_path(path, on_traffic=guardian.beat)
+    hobby = HobbyServoAccess(name, joint, line, params, RealClock(), stopped, person, guardian)
     # Nothing is printed on success.
     with PowerDown(
         None,
         hobby.disable,
         lambda text: say(f"{hobby.who}: {text}"),
-        Interrupts.from_stop(job.stopped),
+        Interrupts.from_stop(stopped),
         left=": cut the servo power",
         quiet=True,
     ) as power:
         power.switch_on(lambda: None)  # what follows does it, at a time of its own
-        return calibrate_by_marks(hobby, person, job.margin_deg)
+        return calibrate_by_marks(hobby, person, margin_deg)
 
 
-def _calibrate_smart_servo(single: SmartServoAccess, job: CalibrationJob) -> Calibration:
-    if single.joint.transmission_points:
+def _calibrate_smart(
+    rig: Rig,
+    wire: RigPorts,
+    name: str,
+    person: TerminalPerson,
+    margin_deg: float,
+    set_middle: bool,
+) -> Calibration:
+    """Calibrate a smart servo by hand; its torque is off."""
+    joint = rig.joints[name]
+    if joint.transmission_points:
         raise CalibrationRefused(
-            f"{single.name}: its push rod has measured places: read steps with gazerig monitor at "
+            f"{name}: its push rod has measured places: read steps with gazerig monitor at "
             "some angles, and write them into transmission_points"
         )
-    single.check()
-    if job.set_middle:
-        single.disable_torque()
-        job.person.wait(
-            f"turn {single.name} to the middle of its travel, then press Enter",
-            lambda: f"{single.name}: step {single.position()[0]}",
-        )
-        say(
-            f"{single.who}: its place is 2048 now (offset {single.set_middle()}); until this "
-            "calibration is written the rig file's zero is wrong by that"
-        )
-    return calibrate_by_hand(single, job.person, job.margin_deg)
+    with open_port(rig, wire, joint.bus) as port:
+        single = SmartServoAccess(name, joint, port, RealClock().now_s)
+        if (buses := wire.buses) is not None:
+            person.hand = lambda steps: buses.command(f"turn {joint.id} {steps}", joint.bus)
+        single.check()
+        if set_middle:
+            single.disable_torque()
+            person.wait(
+                f"turn {name} to the middle of its travel, then press Enter",
+                lambda: f"{name}: step {single.position()[0]}",
+            )
+            say(
+                f"{single.who}: its place is 2048 now (offset {single.set_middle()}); until this "
+                "calibration is written the rig file's zero is wrong by that"
+            )
+        return calibrate_by_hand(single, person, margin_deg)
