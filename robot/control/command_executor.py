@@ -237,9 +237,13 @@ class CommandExecutor:
 
     def _play_by_itself(self, command: Play, t_s: float) -> None:
         """Play a track that no client has asked for, unless a client or a show moves the head."""
-        if self._stop.stop_reason or self._lead.active or self._tracks.ends_show(command):
+        if (
+            self._stop.stop_reason
+            or self._lead.active
+            or self._tracks.ends_show(command, self._guard.limits)
+        ):
             return
-        reply = self._play(self._tracks.measure_sound(command), t_s)
+        reply = self._play(self._tracks.complete(command, self._guard.limits), t_s)
         if reply.refused:
             self._messages.append(f"track for {command.who} {reply.text()}")
 

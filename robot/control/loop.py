@@ -165,7 +165,9 @@ class Robot:
             ValueError: As ``command``.
         """
         command = check_command(command)
-        refuse_impossible(command, self.menus, self.body.names, self._animation, self._tracks)
+        refuse_impossible(
+            command, self.menus, self.body.names, self._animation, self._tracks, self._guard.limits
+        )
         return self._commands.add(command)
 
     def set_opponent(self, opponent: TickClockOpponent) -> None:
@@ -401,7 +403,7 @@ class Robot:
             if isinstance(command, Ask) and command.menu == "track":
                 command = Play("" if command.choice == NO_TRACK else command.choice)
             if isinstance(command, Play | Speak):
-                command = self._tracks.measure_sound(command)
+                command = self._tracks.complete(command, self._guard.limits)
             taken.append(command)
             self._commands.reply(waiting, self._executor.execute(command, t_s))
         self._executor.end_expired(t_s)
