@@ -63,7 +63,7 @@ class Voice:
         self._correction: tuple[float, float, Quintic] | None = None
         begin_s = motion.position_at(0.0)
         self._cue = sum([time < begin_s for time, _ in motion.events.cues])
-        self._exits: dict[int, tuple[float, float]] = {}
+        self._exit: tuple[float, float] | None = None
 
     @property
     def duration_s(self) -> float:
@@ -126,35 +126,30 @@ class Voice:
             time_s = PEAK_SPEED * abs(off_s) / _SYNC_SHARE
             self._correction = t_s, time_s, Quintic((0.0, 0.0, 0.0), off_s, time_s)
 
-    def leave(self, t_s: float, gaze: OwnedPose, covered: frozenset[int], covered_s: float) -> None:
+    def leave(self, t_s: float, gaze: OwnedPose, taken_s: float) -> None:
         """Begin to return the owned channels to gaze.
 
         Args:
             t_s: present time.
             gaze: the angles by gaze.
-            covered: channels that a newer track takes over; they end when it has.
-            covered_s: time that it takes.
+            taken_s: time in which a newer track takes over some of them; until then they stay.
         """
         gap = np.zeros(len(self._sizes))
         value = self.state(t_s)[0]
-        for i in self.motion.owned - covered:
-            gap[i] = value[i] + _rest(i) - gaze.gaze.get(i, 0.0)
-        time_s = max(BLEND_OUT_S, self._move_s(gap))
         for i in self.motion.owned:
-            self._exits[i] = (t_s + covered_s, 0.0) if i in covered else (t_s, time_s)
+            gap[i] = value[i] + _rest(i) - gaze.gaze.get(i, 0.0)
+        self._exit = t_s + taken_s, max(BLEND_OUT_S, self._move_s(gap))
 
     def has_left(self, t_s: float) -> bool:
         """Return whether it no longer owns a channel."""
-        return all([t_s >= begin + time for begin, time in self._exits.values()])
+        return self._exit is not None and t_s >= sum(self._exit)
 
-    def weight(self, channel: int, t_s: float) -> float:
-        """Return the share of the track in a channel that it owns, 0..1."""
+    def weight(self, t_s: float) -> float:
+        """Return the share of the track in the channels that it owns, 0..1."""
         entered = min_jerk((t_s - self.begins_s) / self.entry_s)
-        if channel not in self._exits:
+        if self._exit is None:
             return entered
-        begin_s, time_s = self._exits[channel]
-        if time_s == 0.0:
-            return entered if t_s < begin_s else 0.0
+        begin_s, time_s = self._exit
         return entered * (1.0 - min_jerk((t_s - begin_s) / time_s))
 
 
@@ -199,12 +194,16 @@ class TrackPlayer:
         """Return the name of the newest track, "" without one."""
         return self.voices[-1].name if self.voices else ""
 
-    def overlapping(self, motion: TrackMotion) -> list[Voice]:
-        """Return the tracks that move or own a channel which another one moves, or also look."""
+    def overlapping(self, motion: TrackMotion, name: str) -> list[Voice]:
+        """Return the tracks that another one replaces, as it has one of their channels or events.
+
+        A track replaces the one of its name: a stream of speech moves the mouth by a level.
+        """
         return [
             one
             for one in self.voices
-            if one.motion.channels & motion.channels
+            if one.name == name
+            or one.motion.channels & motion.channels
             or any(a and b for a, b in zip(one.motion.events[:2], motion.events[:2], strict=True))
         ]
 
@@ -224,23 +223,21 @@ class TrackPlayer:
         self._fade = (t_s, fade_s, Quintic(tuple(state), 0.0, fade_s)) if state.any() else None
         taken_s = by.begins_s + by.entry_s - t_s if by is not None else 0.0
         for voice in ended:
-            self._remove(voice, t_s, by.motion.owned if by is not None else frozenset(), taken_s)
+            self._remove(voice, t_s, taken_s)
         self.moves = True
 
-    def _remove(
-        self, voice: Voice, t_s: float, covered: frozenset[int] = frozenset(), taken_s: float = 0.0
-    ) -> None:
+    def _remove(self, voice: Voice, t_s: float, taken_s: float = 0.0) -> None:
         """Remove a track; the expression before it returns."""
         self.voices.remove(voice)
         if voice.motion.owned:
-            voice.leave(t_s, self.owned, voice.motion.owned & covered, taken_s)
+            voice.leave(t_s, self.owned, taken_s)
             self._leaving.append(voice)
         if self._expressions is not None and voice.number in self._expressed:
             self._expressions.express(*self._expressed.pop(voice.number)[1])
 
     def play(self, voice: Voice, t_s: float, fade_s: float) -> None:
         """Begin a track at its time; those which it replaces return to rest meanwhile."""
-        self.end(self.overlapping(voice.motion), t_s, fade_s, voice)
+        self.end(self.overlapping(voice.motion, voice.name), t_s, fade_s, voice)
         self.voices.append(voice)
 
     def state(self, t_s: float, voices: Sequence[Voice] | None = None) -> Floats:
@@ -284,7 +281,7 @@ class TrackPlayer:
             voice.add_to(own, t_s)
             for i, value in enumerate(own):
                 if i in owned:
-                    self.owned.layers.setdefault(i, []).append((value, voice.weight(i, t_s)))
+                    self.owned.layers.setdefault(i, []).append((value, voice.weight(t_s)))
                     self.replaces_gaze |= i < len(HEAD_CHANNELS)
                 elif voice in self.voices:
                     flat[i] += value - self._rest_flat[i]

@@ -220,11 +220,7 @@ class CommandExecutor:
         starts = isinstance(command, Speak) or bool(command.track)
         if starts and self._lead.pose_rad:
             return CommandReply(f"{self._lead.controlled_by}: the joints are held at their angles")
-        limits = self._guard.limits
-        if isinstance(command, Speak):
-            reply = self._tracks.speak(command, t_s, self.commanded_rad, limits)
-        else:
-            reply = self._tracks.play(command, t_s, self.commanded_rad, limits)
+        reply = self._tracks.play(command, t_s, self.commanded_rad, self._guard.limits)
         if starts:
             by = f" for {command.who}" if command.who else ""
             self._messages.append(f"track{by}: {reply.text()}")

@@ -302,17 +302,6 @@ class TrackChoices:
         found = {number: state for number, (state, _) in self._ended.items()} | self._playing
         return tuple([found[number] for number in sorted(found)])
 
-    def speak(
-        self, command: Speak, t_s: float, commanded_rad: JointAngles, limits: Sequence[JointLimit]
-    ) -> CommandReply:
-        """Start a speech; the arguments are those of ``play``."""
-        # A stream sets its level itself, so that its track does not overlap another speech.
-        replaced = self._player.overlapping(self.prepare(command, limits).motion)
-        others = [one for one in self._player.voices if one.name == SPEECH and one not in replaced]
-        if others:
-            self._end(others, t_s, limits, command.who)
-        return self.play(command, t_s, commanded_rad, limits)
-
     def play(
         self, command: Play | Speak, t_s: float, commanded_rad: JointAngles,
         limits: Sequence[JointLimit],
@@ -337,7 +326,7 @@ class TrackChoices:
             return CommandReply(f"{name}: {refused}".removeprefix(f"{name}: {name}: "))
         track, motion = found.placed.track, found.motion
         loop = track.loop or (isinstance(command, Play) and command.loop)
-        replaced = player.overlapping(motion)
+        replaced = player.overlapping(motion, name)
         state = player.state(t_s, replaced)
         fade_s = fit.fade_s(state, limits, BLEND_OUT_S)
         self._number += 1
@@ -374,7 +363,7 @@ class TrackChoices:
             motion = self.prepare(command, limits).motion
         except ValueError:
             return False
-        return any(voice.motion.owned for voice in self._player.overlapping(motion))
+        return any(one.motion.owned for one in self._player.overlapping(motion, command.track))
 
     def end(self, command: EndTrack, t_s: float, limits: Sequence[JointLimit]) -> CommandReply:
         """End tracks that play; to end all is done with none."""
