@@ -125,9 +125,8 @@ class CommandExecutor:
             )
             self._conversation.end(talk, t_s)
             self._menus.converse(self._conversation.state, t_s)
-        if t_s >= levels.lapses_s:
-            for name in levels.drop_lapsed(t_s):
-                self._messages.append(f"level {name}: not set any more, so it returns to 0")
+        for name in levels.drop_lapsed(t_s):
+            self._messages.append(f"level {name}: not set any more, so it returns to 0")
 
     def execute(self, command: Command, t_s: float) -> CommandReply:
         """Execute a command; return its reply."""
