@@ -1,5 +1,6 @@
 """Tracks of a robot: the available ones, their fit to this rig, and their control."""
 
+import contextlib
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -143,19 +144,13 @@ class TrackChoices:
         """Return the tracks whose joints this rig has. Thread-safe."""
         self._read_files()
         if self._names is None:
-            self._names = tuple([name for name in self._tracks if not self._refusal(name)])
+            found = []
+            for name, track in self._tracks.items():
+                with contextlib.suppress(TrackRefused):
+                    if isinstance(track, Track) and self._fit.place(track):
+                        found.append(name)
+            self._names = tuple(found)
         return self._names
-
-    def _refusal(self, name: str) -> str:
-        """Return the reason why the rig cannot play a track, "" if it can."""
-        track = self._tracks[name]
-        if isinstance(track, str):
-            return track
-        try:
-            self._fit.place(track)
-        except TrackRefused as refused:
-            return str(refused)
-        return ""
 
     def all_tracks(self, limits: Sequence[JointLimit]) -> tuple[TrackInfo, ...]:
         """Return all tracks with their fit to this rig. Thread-safe.
@@ -190,27 +185,24 @@ class TrackChoices:
         key = structs.replace(command, lead_s=None, who="")
         if isinstance(key, Play):
             key = structs.replace(key, sound_s=0.0)
+            if key.track in self._changed:  # its text is only for the recording
+                key = structs.replace(key, yaml="")
         found = self._prepared.get((key, tuple(limits)))
-        if found is None:
-            if len(self._prepared) >= _MOST_KEPT:
-                self._prepared = {}
-            if isinstance(command, Speak):
-                found = self._prepare_speech(command, limits)
-            else:
-                found = self._prepare_track(command, limits)
-            self._prepared[key, tuple(limits)] = found
-        return found
-
-    def _prepare_speech(self, command: Speak, limits: Sequence[JointLimit]) -> PreparedTrack:
-        if command.level and command.level not in self._tables.levels:
-            raise ValueError(f"no level {command.level!r} for the mouth")
-        placed = self._fit.place(
-            speech_track(
+        if found is not None:
+            return found
+        if isinstance(command, Play):
+            found = self._prepare_track(command, limits)
+        else:
+            track = speech_track(
                 command.sound, command.duration_s, command.level, command.mouth, command.volume
             )
-        )
-        motion = self._fit.motion(placed, limits)
-        return PreparedTrack(placed, motion, motion, command.duration_s)
+            placed = self._fit.place(track)
+            motion = self._fit.motion(placed, limits)
+            found = PreparedTrack(placed, motion, motion, command.duration_s)
+        if len(self._prepared) >= _MOST_KEPT:
+            self._prepared = {}
+        self._prepared[key, tuple(limits)] = found
+        return found
 
     def _prepare_track(self, command: Play, limits: Sequence[JointLimit]) -> PreparedTrack:
         name = command.track
@@ -262,7 +254,10 @@ class TrackChoices:
             return command
         if isinstance(command, Speak):
             return structs.replace(command, lead_s=self.latencies_s())
-        found = self.prepare(command, limits)
+        try:
+            found = self.prepare(command, limits)
+        except ValueError:  # ``play`` reports it
+            return command
         if found.sound_s:
             command = structs.replace(command, lead_s=self.latencies_s(), sound_s=found.sound_s)
         return structs.replace(command, yaml=found.yaml) if found.yaml else command
@@ -322,8 +317,10 @@ class TrackChoices:
         try:
             found = self.prepare(command, limits)
             sizes, reduced = fit.sizes(found.placed, base_rad, limits)
-        except ValueError as refused:
-            return CommandReply(f"{name}: {refused}".removeprefix(f"{name}: {name}: "))
+        except TrackRefused as refused:
+            return CommandReply(f"{name}: {refused}")
+        except ValueError as error:
+            return CommandReply(str(error))
         track, motion = found.placed.track, found.motion
         loop = track.loop or (isinstance(command, Play) and command.loop)
         replaced = player.overlapping(motion, name)
