@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Iterable, Iterator, Mapping
 from math import degrees
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -151,7 +151,7 @@ def track_text(
     lines = [f"description: {format_value(description)}"]
     lines += [f"owns: [{owns}]"] if owned else []
     lines += ["frames:"]
-    lines += [f"  - {{{', '.join(_frame_lines(t, frames[t]))}}}" for t in sorted(frames)]
+    lines += [f"  - {_frame_text(t, frames[t])}" for t in sorted(frames)]
     return TrackText("\n".join(lines) + "\n", notes)
 
 
@@ -241,7 +241,8 @@ def _lines_of_sight(series: Mapping[str, Series]) -> dict[str, Series]:
     for name, (times, angles) in series.items():
         head = heads.get(channel_of_joint(name).replace("eyes", "head"))
         if channel_of_joint(name) in EYE_CHANNELS and head is not None:
-            found[name] = times, angles + np.interp(times, *head)
+            both_s = np.union1d(times, head[0])
+            found[name] = both_s, np.interp(both_s, times, angles) + np.interp(both_s, *head)
     return found
 
 
@@ -301,17 +302,11 @@ def _channel_value(rig: Rig, joint: str, angle: float, first: float, owned: bool
     return min(max((angle - shut) / (base - shut), 0.0), 3.0)
 
 
-def _frame_lines(time_s: float, values: Mapping[str, float]) -> list[str]:
-    own = [f"{n}_deg: {v}" for n, v in values.items() if n in (*HEAD_CHANNELS, *EYE_CHANNELS)]
-    lids = [f"{n}: {v}" for n, v in values.items() if n in LIDS]
-    others = [
-        f"{n}: {v}"
-        for n, v in values.items()
-        if n not in LIDS and not n.startswith(("head_", "eyes_"))
-    ]
-    return [
-        f"time_s: {time_s}",
-        *own,
-        *([f"lids: {{{', '.join(lids)}}}"] if lids else []),
-        *([f"joints_deg: {{{', '.join(others)}}}"] if others else []),
-    ]
+def _frame_text(time_s: float, values: Mapping[str, float]) -> str:
+    frame: dict[str, Any] = {"time_s": time_s}
+    for name, value in values.items():
+        if name in (*HEAD_CHANNELS, *EYE_CHANNELS):
+            frame[f"{name}_deg"] = value
+        else:
+            frame.setdefault("lids" if name in LIDS else "joints_deg", {})[name] = value
+    return format_value(frame)

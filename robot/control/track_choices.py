@@ -409,29 +409,27 @@ class TrackChoices:
         if look != self._look:
             self._look, self._nearest = look, None
             self._shifts += 1
-        shift = chosen.shift + self._shifts
+        if look is KEEP or look is None:
+            return chosen
         if isinstance(look, tuple):
             x, y, z = map(float, look)
-            return Target(
-                (x, y, z), (0.0, 0.0, 0.0), t_s, ORDERED, -1, 1.0, True, None, shift,
-                "a track looks there", saliences=chosen.saliences,
-            )  # fmt: skip
-        if look is KEEP or look is None or percept is None:
-            return chosen
-        faces = {face.id: face for face in percept.faces}
-        if isinstance(look, int):
-            self._nearest = look
-        elif faces and self._nearest not in faces:
-            self._nearest = min(faces, key=lambda i: norm(sub(faces[i].p_world_m, p_head_m)))
-            self._shifts += 1
-            shift += 1
-        face = faces.get(self._nearest) if self._nearest is not None else None
-        if face is None:
-            return chosen
+            seen = (x, y, z), (0.0, 0.0, 0.0), t_s, ORDERED, -1
+            why = "a track looks there"
+        else:
+            faces = {face.id: face for face in percept.faces} if percept is not None else {}
+            if isinstance(look, int):
+                self._nearest = look
+            elif faces and self._nearest not in faces:
+                self._nearest = min(faces, key=lambda i: norm(sub(faces[i].p_world_m, p_head_m)))
+                self._shifts += 1
+            if percept is None or self._nearest not in faces:
+                return chosen
+            face = faces[self._nearest]
+            seen = face.p_world_m, face.v_world_m_s, percept.captured_s, "face", face.id
+            why = f"face {face.id}: a track looks at it"
         return Target(
-            face.p_world_m, face.v_world_m_s, percept.captured_s, "face", face.id, 1.0, True, None,
-            shift, f"face {face.id}: a track looks at it", saliences=chosen.saliences,
-        )  # fmt: skip
+            *seen, 1.0, True, None, chosen.shift + self._shifts, why, saliences=chosen.saliences
+        )
 
 
 def _track_of_text(text: str) -> Track:
