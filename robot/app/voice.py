@@ -142,7 +142,7 @@ class RunVoice:
             sound = check_sound(self._find(what, confined), MAX_SPEECH_S)
             samples = read_samples(sound).astype(np.float64)
             keys = self._mouth(samples, len(samples) / sound.duration_s)
-            speech = self._speak(sound.path, sound.duration_s, keys)
+            speech = Speak(sound.path, sound.duration_s, self._level, keys)
         else:
             said = speak(what, params.voice)
             silent_s = _LEAD_IN_S + params.latency_ms / 1e3
@@ -173,10 +173,7 @@ class RunVoice:
         samples = _mono(pcm, channels)
         path = "" if self._fast else str(self._write(pcm, rate_hz, channels))
         keys = self._mouth(samples, rate_hz, phonemes)
-        return self._speak(path, len(samples) / rate_hz, keys)
-
-    def _speak(self, path: str, duration_s: float, keys: tuple[MouthKey, ...] = ()) -> Speak:
-        return Speak(path, duration_s, self._level, keys)
+        return Speak(path, len(samples) / rate_hz, self._level, keys)
 
     def _mouth(
         self, samples: Floats, rate_hz: float, spoken: Sequence[tuple[str, float]] = ()
@@ -315,7 +312,7 @@ class RunVoice:
     ) -> None:
         rig = self._rig()
         check_format(rate_hz, channels)
-        ticket = self._command(self._speak("", _STREAM_TRACK_S))
+        ticket = self._command(Speak("", _STREAM_TRACK_S, self._level))
         reply = ticket.wait(_REPLY_S) if ticket is not None else None
         if reply is None or reply.track is None:
             raise SoundError(reply.refused if reply is not None else "the control loop hangs")
