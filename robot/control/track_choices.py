@@ -121,14 +121,17 @@ class TrackChoices:
         self._number = self._shifts = 0
         self._look: object = KEEP
         self._nearest: int | None = None
+        self._lid_spans_rad: Mapping[str, float] | None = None
         self.retune(lid_spans_rad, latency_s)
 
     def retune(self, lid_spans_rad: Mapping[str, float], latency_s: float) -> None:
         """Change the parameters of the next track."""
         self._latency_s = latency_s
-        self._fit = TrackFit(self._joints, lid_spans_rad, self._tables)
-        self._prepared: dict[object, PreparedTrack] = {}
-        self._names: tuple[str, ...] | None = None
+        if lid_spans_rad != self._lid_spans_rad:  # else what is prepared stays
+            self._lid_spans_rad = lid_spans_rad
+            self._fit = TrackFit(self._joints, lid_spans_rad, self._tables)
+            self._prepared: dict[object, PreparedTrack] = {}
+            self._names: tuple[str, ...] | None = None
 
     # --- the available ones
 
