@@ -8,11 +8,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 LARGEST = {
-    "gaze": 60_280,
+    "gaze": 57_960,
     "drivers": 79_990,
     "sim_mock": 35_870,
-    "config": 11_910,
-    "robot": 168_670,
+    "config": 11_880,
+    "robot": 167_700,
     "robot/dashboard": 53_330,
     "gazerig": 14_000,
     "doors": 10_260,
