@@ -18,7 +18,7 @@ LARGEST = {
     "doors": 10_260,
     "features/animation": 6_790,
     "features/bringup": 51_600,
-    "features/lab": 52_480,
+    "features/lab": 30_240,
     "features/study": 10_170,
     "features/world": 47_970,
     "tests": 439_000,

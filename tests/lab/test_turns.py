@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from gaze_targets import target
 
-from gazerig.features.lab.analysis.human_norms import BY_KEY
-from gazerig.features.lab.report.statistics import judge_without_interval
+from gazerig.features.lab.report.statistics import judge
 from gazerig.features.lab.report.turns import STATES, Role, TurnTrace, measures
 from gazerig.gaze.angles import yaw_pitch
 from gazerig.gaze.attention.conversation import (
@@ -69,4 +68,4 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 def test_looks_away_have_the_share_rate_and_direction_of_people(role: Role) -> None:
     for one in measures(model_alone(role)):
         if one.key.endswith(role) or (one.key in ("turn_begins", "turn_ends") and len(one.rows)):
-            assert judge_without_interval(one, BY_KEY[one.key]).verdict == "pass", one.key
+            assert judge(one, interval=False).verdict == "pass", one.key

@@ -1,13 +1,23 @@
-"""Openings of a rig's lids, and the blinks in a trace of them.
+"""Openings of a rig's lids, and the blinks of a run.
 
 A blink closes both lids by half or more and opens them again; lids that follow the gaze down stay
 down. Closing and opening last while the lid is faster than a twentieth of the phase's peak speed,
 as blink kinematics are usually measured (VanderWerf et al. 2003).
+
+Upper lids move up and down with the eyes. A gaze shift with a blink also moves the lids to another
+opening. So a blink found in the opening itself would begin with the shift rather than at its own
+onset, or never end because the lid does not return to its old opening. The share of the opening of
+lids at rest with the same gaze has neither fault.
 """
 
 from collections import deque
 from collections.abc import Sequence
+from math import nan
 from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.types import Floats
 
 _DEEP_SHARE, _BACK_SHARE = 0.5, 0.75
 """Fractions of the opening before: a blink starts below the first and is over above the second."""
@@ -21,6 +31,12 @@ _OPEN_S = 0.5
 
 _LEAST_OPEN = 0.15
 """Lids with a smaller opening than this do not show a blink."""
+
+_BIN_DEG = 2.0
+_LEAST_SHARE = 0.002
+"""Least share of samples near a gaze for an estimate of the lids' opening at rest."""
+
+_GAP_S = 0.1
 
 
 class BlinkEvent(NamedTuple):
@@ -58,19 +74,15 @@ class BlinkFinder:
         self._shut_s: float | None = None
         self._back_s: float | None = None
 
-    def update(self, t_s: float, left: float, right: float) -> BlinkEvent | None:
-        """Add both openings, 0 shut .. 1 open; return the blink that has just ended, if any."""
-        opening = left if left > right else right  # a wink is not a blink
+    def update(self, t_s: float, opening: float) -> BlinkEvent | None:
+        """Add the wider opening, 0 shut .. 1 open; return the blink that has just ended, if any."""
         trace = self._trace
         if not trace:
             self._usual = opening
-        elif t_s <= trace[-1][0]:
-            return None
-        else:
-            if self._shut_s is None:  # quickly up and slowly down
-                share = (t_s - trace[-1][0]) / _OPEN_S
-                self._usual += (opening - self._usual) * min(1.0, 4 * share if opening > self._usual
-                                                             else share)  # fmt: skip
+        elif self._shut_s is None:  # quickly up and slowly down
+            speed = 4.0 if opening > self._usual else 1.0
+            share = min(1.0, speed * (t_s - trace[-1][0]) / _OPEN_S)
+            self._usual += (opening - self._usual) * share
         trace.append((t_s, opening))
         if self._shut_s is None:
             while trace[0][0] < t_s - _BEFORE_S:
@@ -140,19 +152,56 @@ def _interpolate_time(t_low: float, t_high: float, low: float, high: float, leve
 
 
 UPPER = ("left_upper_lid", "right_upper_lid")
-
-
 LOWER = ("left_lower_lid", "right_lower_lid")
 
 
-def lid_openings(
-    left: float, right: float, names: Sequence[str], pair: tuple[str, str]
-) -> tuple[float, float] | None:
-    """Return the openings of two lids, None without lids; a single lid counts for both.
+def wider_opening(left: float, right: float, names: Sequence[str], pair: tuple[str, str]) -> float:
+    """Return the wider opening of two lids, because a wink is not a blink; NaN without lids.
 
     pair: joints of the left and the right lid; names: joints of the rig; empty: all joints
     """
-    if not names:
-        return left, right
-    there = [o for name, o in zip(pair, (left, right), strict=True) if name in names]
-    return (there[0], there[-1]) if there else None
+    openings = zip(pair, (left, right), strict=True)
+    return max((opening for name, opening in openings if not names or name in names), default=nan)
+
+
+def resting_opening(opening: Floats, pitch_deg: Floats) -> Floats:
+    """Return (n,) the opening of the lids without blinks, estimated from the run.
+
+    Args:
+        opening: (n,) of the upper lids, 0 shut .. 1 open.
+        pitch_deg: (n,) of the eyes in the head, + up.
+    """
+    bins = np.floor(pitch_deg / _BIN_DEG).astype(int)
+    bins -= bins.min()
+    counts = np.bincount(bins)
+    often = np.flatnonzero(counts >= max(1.0, _LEAST_SHARE * len(opening)))
+    order = np.argsort(bins, kind="stable")
+    pieces = np.split(order, np.cumsum(counts)[:-1])
+    # Lids are shut for less than half of the time, whatever the gaze.
+    rest = [float(np.median(opening[pieces[at]])) for at in often]
+    middle = [float(np.median(pitch_deg[pieces[at]])) for at in often]
+    return np.asarray(np.interp(pitch_deg, middle, rest))
+
+
+def blinks_of(t_s: Floats, opening: Floats, pitch_deg: Floats) -> tuple[BlinkEvent, ...]:
+    """Return the blinks of a run; depths and speeds are shares of the opening at rest.
+
+    Args:
+        t_s: (n,) times.
+        opening: (n,) the wider one of both upper lids, 0 shut .. 1 open; nan without lids.
+        pitch_deg: (n,) of the eyes in the head, + up.
+    """
+    known = np.isfinite(opening) & np.isfinite(pitch_deg)
+    if not known.any():
+        return ()
+    t_s, opening, pitch_deg = t_s[known], opening[known], pitch_deg[known]
+    share = opening / np.maximum(resting_opening(opening, pitch_deg), _LEAST_OPEN)
+    finder, found, last_s = BlinkFinder(), [], float(t_s[0])
+    for now_s, one in zip(t_s.tolist(), share.tolist(), strict=True):
+        if now_s - last_s > _GAP_S:
+            finder.clear()
+        last_s = now_s
+        blink = finder.update(now_s, one)
+        if blink is not None:
+            found.append(blink)
+    return tuple(found)

@@ -1,8 +1,8 @@
-"""Saccades, fixations and blinks, detected tick by tick as by an eye tracker.
+"""Saccades and fixations, detected tick by tick as by an eye tracker.
 
-All values are measured at the servos: the mean of both lines of sight in space, and the opening of
-the upper lids. Without feedback they are estimated from the goals. The commanded saccade is stored
-with the measured one, so that both can be compared.
+All values are measured at the servos: the mean of both lines of sight in space. Without feedback
+they are estimated from the goals. The commanded saccade is stored with the measured one, so that
+both can be compared.
 
 The speed is that of Engbert & Kliegl 2003, a central difference over five samples. It is relative
 to the slow motion of the last 50 ms, so that pursuit of a walking person is not a saccade. 30 deg/s
@@ -11,9 +11,8 @@ above that is the usual threshold of velocity-based detection (I-VT).
 
 from collections import Counter, deque
 from math import degrees, exp, inf, sqrt
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
-from gazerig.features.lab.analysis.blink_finder import UPPER, BlinkEvent, BlinkFinder, lid_openings
 from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.types import PARTS, Vec3
 from gazerig.robot.control.tick import Tick, cyclopean_direction
@@ -50,11 +49,20 @@ _LONGEST_S = 0.4
 _KEPT = 160
 
 
-class MeasuredSaccade(NamedTuple):
-    """One saccade in a trace.
+class CommandedSaccade(NamedTuple):
+    """Saccade commanded by the models."""
 
-    peak_share: time of the peak speed as a fraction of the duration
-    mean_deg_s: amplitude over duration; from_world, to_world: unit directions
+    onset_s: float
+    duration_s: float
+    amplitude_deg: float
+    peak_deg_s: float
+
+
+class SaccadeEvent(NamedTuple):
+    """One saccade of the gaze in space.
+
+    peak_share: time of the peak speed as a fraction of the duration; .5 is symmetric
+    commanded: the commanded saccade, None if the eyes jumped without a command
     """
 
     onset_s: float
@@ -62,13 +70,12 @@ class MeasuredSaccade(NamedTuple):
     amplitude_deg: float
     peak_deg_s: float
     peak_share: float
-    from_world: Vec3
-    to_world: Vec3
+    commanded: CommandedSaccade | None = None
 
     @property
-    def mean_deg_s(self) -> float:
-        """Return the mean speed."""
-        return self.amplitude_deg / self.duration_s
+    def end_s(self) -> float:
+        """Return the time of the landing."""
+        return self.onset_s + self.duration_s
 
 
 class _DirectionSample(NamedTuple):
@@ -109,7 +116,7 @@ class SaccadeFinder:
         self._settles_s: float | None = None
         self.is_in_flight = False
 
-    def update(self, t_s: float, direction: Vec3) -> MeasuredSaccade | None:
+    def update(self, t_s: float, direction: Vec3) -> SaccadeEvent | None:
         """Add a unit direction in the world; return the saccade that has just ended, if any."""
         samples = self._samples
         if samples:
@@ -147,7 +154,7 @@ class SaccadeFinder:
             self._slow = (sx + share * rx, sy + share * ry, sz + share * rz)
         return _SpeedSample(c.t_s, c.direction, (vx, vy, vz), relative, degrees(sharp))
 
-    def _advance_state(self, speed: _SpeedSample) -> MeasuredSaccade | None:
+    def _advance_state(self, speed: _SpeedSample) -> SaccadeEvent | None:
         """Follow the three states: at rest, in flight, and settling after a landing."""
         now, before = speed.relative_deg_s, self._before_deg_s
         self._before_deg_s = now
@@ -168,7 +175,7 @@ class SaccadeFinder:
             self._peak_deg_s, self._began_s = now, speed.t_s
         return None
 
-    def _await_landing(self, speed: _SpeedSample, before_deg_s: float) -> MeasuredSaccade | None:
+    def _await_landing(self, speed: _SpeedSample, before_deg_s: float) -> SaccadeEvent | None:
         """Wait for the landing: a low speed, or a minimum before the eye swings back."""
         now = speed.relative_deg_s
         # Relative to the peak so far: a saccade is also slow at its beginning.
@@ -191,7 +198,7 @@ class SaccadeFinder:
     def _onset_speed_deg_s(self) -> float:
         return max(_FOOT_SHARE * self._peak_deg_s, _FOOT_DEG_S)
 
-    def _measure_saccade(self, end: int) -> MeasuredSaccade:
+    def _measure_saccade(self, end: int) -> SaccadeEvent:
         """Measure the saccade that ended at the last of the first ``end`` speeds."""
         foot, speeds = self._onset_speed_deg_s(), self._speeds
         first = end - 1
@@ -208,14 +215,12 @@ class SaccadeFinder:
         peak = max(speed.unsmoothed_deg_s for speed in inner)
         top = [speed.t_s for speed in inner if speed.unsmoothed_deg_s >= _TOP_SHARE * peak]
         duration_s = end_s - onset_s
-        return MeasuredSaccade(
+        return SaccadeEvent(
             onset_s,
             duration_s,
             degrees(angle_between(part[0].direction, part[-1].direction)),
             peak,
             (0.5 * (top[0] + top[-1]) - onset_s) / duration_s,
-            part[0].direction,
-            part[-1].direction,
         )
 
 
@@ -246,50 +251,19 @@ _COMMAND_BEFORE_S, _COMMAND_AFTER_S = 0.12, 0.03
 _EYE_JOINTS = frozenset(name for name in GAZE_JOINTS if "eye" in name)
 
 
-class CommandedSaccade(NamedTuple):
-    """Saccade commanded by the models."""
-
-    onset_s: float
-    duration_s: float
-    amplitude_deg: float
-    peak_deg_s: float
-
-
-class SaccadeEvent(NamedTuple):
-    """One saccade of the gaze in space.
-
-    peak_share: time of the peak speed as a fraction of the duration; .5 is symmetric
-    commanded: the commanded saccade, None if the eyes jumped without a command
-    """
-
-    onset_s: float
-    duration_s: float
-    amplitude_deg: float
-    peak_deg_s: float
-    peak_share: float
-    commanded: CommandedSaccade | None
-
-    @property
-    def end_s(self) -> float:
-        """Return the time of the landing."""
-        return self.onset_s + self.duration_s
-
-
 class FixationEvent(NamedTuple):
     """Fixation of the gaze between two saccades, on one place or on a moving target.
 
     part: the face part nearest to the lines of sight, None off the parts
-    on_face: whether it was on any face; face: id of that face, -1 without one
-    target_kind, target_part: kind of the current target, and its face part
+    on_face: whether it was on any face
+    target_kind: kind of the current target
     """
 
     start_s: float
     duration_s: float
     part: str | None
     on_face: bool
-    face_id: int
     target_kind: str
-    target_part: str | None
 
     @property
     def end_s(self) -> float:
@@ -297,50 +271,37 @@ class FixationEvent(NamedTuple):
         return self.start_s + self.duration_s
 
 
-Event = SaccadeEvent | FixationEvent | BlinkEvent
-T = TypeVar("T")
-
-
 class EventDetector:
-    """Finds events in ticks as they arrive; reports an event when it is over."""
+    """Finds saccades and fixations in ticks as they arrive; keeps them when they are over."""
 
     def __init__(self) -> None:
-        self._saccades = SaccadeFinder()
-        self._blinks = BlinkFinder()
+        self.saccades = list[SaccadeEvent]()
+        self.fixations = list[FixationEvent]()
+        self._finder = SaccadeFinder()
         self._commands: deque[CommandedSaccade] = deque(maxlen=4)
         self._flight: _CommandedFlight | None = None
         self._rest = _OpenFixation(None)
 
-    def update(self, tick: Tick) -> tuple[Event, ...]:
-        """Add a tick; return the events that have ended, in the order of their onset."""
-        if tick.stopped or (
-            tick.joints.missing and not _EYE_JOINTS.isdisjoint(tick.joints.missing)
-        ):
+    def update(self, tick: Tick) -> None:
+        """Add a tick."""
+        if tick.stopped or not _EYE_JOINTS.isdisjoint(tick.joints.missing):
             # The eyes were not measured, or not moved by the models.
-            if tick.stopped:
-                self._blinks.clear()
-            self._saccades.clear()
+            self._finder.clear()
             self._flight = None
             self._rest = _OpenFixation(None)
-            return ()
+            return
         self._follow_command(tick)
-        t_s = tick.t_s
         direction = cyclopean_direction(tick)
-        jump = self._saccades.update(t_s, direction)
-        names, pose = tick.guard_result.joints, tick.pose
-        lids = lid_openings(pose.lid_left, pose.lid_right, names, UPPER)
-        blink = self._blinks.update(t_s, *lids) if lids is not None else None
-        if jump is None:
-            if not self._saccades.is_in_flight:
-                self._rest.update(tick, direction)
-            return () if blink is None else (blink,)
-        events: list[Event] = [] if blink is None else [blink]
-        fixation = self._rest.close(jump.onset_s)
-        if fixation is not None:
-            events.append(fixation)
-        events.append(SaccadeEvent(*jump[:5], self._find_command(jump.onset_s)))
-        self._rest = _OpenFixation(jump.onset_s + jump.duration_s)
-        return tuple(events)
+        saccade = self._finder.update(tick.t_s, direction)
+        if saccade is not None:
+            fixation = self._rest.close(saccade.onset_s)
+            if fixation is not None:
+                self.fixations.append(fixation)
+            command = self._find_command(saccade.onset_s)
+            self.saccades.append(saccade._replace(commanded=command))
+            self._rest = _OpenFixation(saccade.end_s)
+        elif not self._finder.is_in_flight:
+            self._rest.update(tick, direction)
 
     def _follow_command(self, tick: Tick) -> None:
         """Follow the current saccade of the models."""
@@ -403,8 +364,8 @@ class _OpenFixation:
         self._start_s = start_s
         self._next_s = -1.0
         self._parts: Counter[str | None] = Counter()
-        self._faces: Counter[int] = Counter()
-        self._kinds: Counter[tuple[str, str | None]] = Counter()
+        self._on_face: Counter[bool] = Counter()
+        self._kinds: Counter[str] = Counter()
 
     def update(self, tick: Tick, direction: Vec3) -> None:
         """Determine at intervals the part under the gaze."""
@@ -414,29 +375,33 @@ class _OpenFixation:
         if t_s < self._next_s or t_s < self._start_s + _SETTLING_S:
             return
         self._next_s = t_s + _LOOK_EVERY_S
-        part, face = part_looked_at(tick, direction)
+        part, on_face = part_looked_at(tick, direction)
         self._parts[part] += 1
-        self._faces[face] += 1
-        self._kinds[tick.target.kind, tick.target.part] += 1
+        self._on_face[on_face] += 1
+        self._kinds[tick.target.kind] += 1
 
     def close(self, end_s: float) -> FixationEvent | None:
         """Return the fixation, None if it was too short."""
         if self._start_s is None or end_s - self._start_s < SHORTEST_S:
             return None
-        part = _most_frequent(self._parts, None)
-        face = _most_frequent(self._faces, -1)
-        kind, wanted = _most_frequent(self._kinds, ("", None))
-        length_s = end_s - self._start_s
-        return FixationEvent(self._start_s, length_s, part, face >= 0, face, kind, wanted)
+        if not self._parts:
+            return FixationEvent(self._start_s, end_s - self._start_s, None, False, "")
+        return FixationEvent(
+            self._start_s,
+            end_s - self._start_s,
+            self._parts.most_common(1)[0][0],
+            self._on_face.most_common(1)[0][0],
+            self._kinds.most_common(1)[0][0],
+        )
 
 
-def part_looked_at(tick: Tick, direction: Vec3) -> tuple[str | None, int]:
-    """Return the face part at the measured gaze, and the id of the face, -1 off all faces.
+def part_looked_at(tick: Tick, direction: Vec3) -> tuple[str | None, bool]:
+    """Return the face part at the measured gaze, and whether it is on a face.
 
     direction: unit vector of the gaze in the world
     """
     if tick.percept is None:
-        return None, -1
+        return None, False
     head = tick.pose.p_world_head_m
     since_s = min(max(0.0, tick.t_s - tick.percept.captured_s), _LONGEST_FORESEEN_S)
     for face in tick.percept.faces:
@@ -445,8 +410,8 @@ def part_looked_at(tick: Tick, direction: Vec3) -> tuple[str | None, int]:
             shift_m = sub(moved, head)
             apart = [miss_distance_m(direction, add(p, shift_m)) for p in face.parts_world_m]
             least = min(apart)
-            return (PARTS[apart.index(least)] if least <= NEAR_PART_M else None), face.id
-    return None, -1
+            return (PARTS[apart.index(least)] if least <= NEAR_PART_M else None), True
+    return None, False
 
 
 def miss_distance_m(direction: Vec3, rel_m: Vec3) -> float:
@@ -454,7 +419,3 @@ def miss_distance_m(direction: Vec3, rel_m: Vec3) -> float:
     if dot(direction, rel_m) <= 0.0:
         return norm(rel_m)
     return norm(cross(direction, rel_m))
-
-
-def _most_frequent(counts: Counter[T], otherwise: T) -> T:
-    return counts.most_common(1)[0][0] if counts else otherwise

@@ -4,33 +4,34 @@ Fixations are found by dispersion (I-DT, Salvucci & Goldberg 2000) with pymoveme
 samples without losses and at a constant rate, so it receives one unbroken stretch at a time.
 """
 
-from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from pathlib import Path
+from typing import NamedTuple, Self
 
+import msgspec
 import numpy as np
 
 from gazerig.drivers.errors import SetupError, install_command
-from gazerig.features.lab.analysis.eye_tracker_csv import FixationTable, Samples
+from gazerig.drivers.files.file_input import read_limited
+from gazerig.features.lab.analysis.eye_tracker_csv import Samples
 from gazerig.gaze.scanpath.fit import PartFixation
 from gazerig.gaze.types import PARTS, Floats
-from gazerig.params import Bounds
 
 Box = tuple[float, float, float, float]
 """x0, y0, x1, y1 with x0 < x1 and y0 < y1."""
+_LARGEST = 100_000  # bytes of a file of them
 
 
-@dataclass(frozen=True)
-class PartBoxes:
+class PartBoxes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Rectangles of the parts in the recording's coordinates; parts without one are never seen."""
 
-    DN: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the chin"] = None
-    FL: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the left side"] = None
-    LE: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the left eye"] = None
-    M: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the mouth"] = None
-    N: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the nose"] = None
-    FR: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the right side"] = None
-    RE: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the right eye"] = None
-    UP: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the forehead"] = None
+    DN: Box | None = None
+    FL: Box | None = None
+    LE: Box | None = None
+    M: Box | None = None
+    N: Box | None = None
+    FR: Box | None = None
+    RE: Box | None = None
+    UP: Box | None = None
 
     def __post_init__(self) -> None:
         """Check that there are boxes, and that each has a positive width and height.
@@ -44,11 +45,29 @@ class PartBoxes:
             if not (x0 < x1 and y0 < y1):
                 raise ValueError(f"{part}: [x0, y0, x1, y1] needs x0 < x1 and y0 < y1")
 
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Return the rectangles in a YAML file.
+
+        Raises:
+            SetupError: it cannot be read, or has a fault.
+        """
+        try:
+            return msgspec.yaml.decode(read_limited(path, _LARGEST), type=cls)
+        except (OSError, msgspec.MsgspecError) as error:
+            raise SetupError(f"{path}: {' '.join(str(error).split())}") from None
+
     @property
     def boxes(self) -> dict[str, Box]:
         """Return the given boxes."""
         every = ((part, getattr(self, part)) for part in PARTS)
         return {part: box for part, box in every if box is not None}
+
+    @property
+    def widest_fixation(self) -> float:
+        """Return the largest width plus height of a fixation, in the recording's coordinates."""
+        sides = [min(x1 - x0, y1 - y0) for x0, y0, x1, y1 in self.boxes.values()]
+        return DISPERSION * float(np.median(sides))
 
     def part_at(self, x: float, y: float) -> str | None:
         """Return the part at a position, the smallest one if boxes overlap, None outside."""
@@ -60,15 +79,10 @@ class PartBoxes:
         return min(inside)[1] if inside else None
 
 
-@dataclass(frozen=True)
-class FixationParams:
-    """Criteria of a fixation."""
-
-    # fmt: off
-    shortest_ms: Annotated[float, Bounds(10, 1000), "shortest fixation"] = 60.0
-    dispersion: Annotated[float, Bounds(0.05, 5), "largest width plus height of a fixation, over a part's usual shorter side"] = 0.5
-    longest_loss_ms: Annotated[float, Bounds(0, 1000), "a fixation may go on over a loss of the eye no longer than this"] = 75.0
-    # fmt: on
+SHORTEST_S, DISPERSION = 0.06, 0.5
+"""Shortest fixation; its largest width plus height, over a part's usual shorter side."""
+_LONGEST_LOSS_S = 0.075
+"""A fixation may go on over a loss of the eye no longer than this."""
 
 
 class _RawFixation(NamedTuple):
@@ -80,9 +94,7 @@ class _RawFixation(NamedTuple):
     y: float
 
 
-def fixations_of(
-    samples: Samples, boxes: PartBoxes, params: FixationParams
-) -> tuple[PartFixation, ...]:
+def fixations_of(samples: Samples, boxes: PartBoxes) -> list[PartFixation]:
     """Find the fixations and their parts.
 
     Raises:
@@ -94,41 +106,18 @@ def fixations_of(
     step_s = float(np.median(np.diff(samples.time_s)))
     t_s = samples.time_s[seen]
     places = np.column_stack([samples.x[seen], samples.y[seen]])
-    least = max(2, round(params.shortest_ms / 1e3 / step_s))
-    widest = params.dispersion * usual_side(boxes)
-    pause_s = max(params.longest_loss_ms / 1e3, 1.5 * step_s)
+    least = max(2, round(SHORTEST_S / step_s))
+    widest = boxes.widest_fixation
+    pause_s = max(_LONGEST_LOSS_S, 1.5 * step_s)
     breaks = np.flatnonzero(np.diff(t_s) > pause_s) + 1
     found: list[_RawFixation] = []
     for run in np.split(np.arange(len(t_s)), breaks):
         if len(run) > least:
             found += _find_fixations(t_s[run], places[run], least, widest)
-    joined = _join_split(found, 0.5 * widest, pause_s)
-    return tuple(
-        PartFixation(boxes.part_at(f.x, f.y), f.start_s, f.end_s - f.start_s) for f in joined
-    )
-
-
-def labelled_fixations(table: FixationTable, boxes: PartBoxes | None) -> tuple[PartFixation, ...]:
-    """Return the fixations of a table, with parts from its labels or else from the boxes.
-
-    Raises:
-        SetupError: there are neither labels nor boxes.
-    """
-    if not table.labelled and boxes is None:
-        raise SetupError("fixations without a part column need the rectangles of the parts")
-    return tuple(
-        PartFixation(
-            row.part if table.labelled or boxes is None else boxes.part_at(*row.p),
-            row.start_s,
-            row.duration_s,
-        )
-        for row in table.rows
-    )
-
-
-def usual_side(boxes: PartBoxes) -> float:
-    """Return the median of the boxes' shorter sides, the scale for dispersion."""
-    return float(np.median([min(x1 - x0, y1 - y0) for x0, y0, x1, y1 in boxes.boxes.values()]))
+    return [
+        PartFixation(boxes.part_at(f.x, f.y), f.start_s, f.end_s - f.start_s)
+        for f in _join_split(found, 0.5 * widest, pause_s)
+    ]
 
 
 def _find_fixations(t_s: Floats, places: Floats, least: int, widest: float) -> list[_RawFixation]:

@@ -9,7 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.features.lab.analysis.blink_finder import LOWER, UPPER, BlinkEvent, lid_openings
+from gazerig.features.lab.analysis.blink_finder import (
+    LOWER,
+    UPPER,
+    BlinkEvent,
+    blinks_of,
+    wider_opening,
+)
 from gazerig.features.lab.analysis.event_detector import (
     NEAR_FACE_M,
     EventDetector,
@@ -18,47 +24,31 @@ from gazerig.features.lab.analysis.event_detector import (
     miss_distance_m,
 )
 from gazerig.features.lab.analysis.gaze_on_face import gaze_point_on_face
-from gazerig.features.lab.report.joint_basis import JointBasis, joints_of
-from gazerig.features.lab.report.lid_closure import blinks_of
+from gazerig.features.lab.report.joint_basis import JointBasis
 from gazerig.features.lab.report.turns import STATES, TurnTrace
 from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
 from gazerig.gaze.attention.conversation import face_extent_deg
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
-from gazerig.gaze.types import Face, Floats, Vec3
+from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick, cyclopean_direction
 from gazerig.robot.model.commands import Ask
+from gazerig.robot.model.types import order_joints
 
 _LONGEST_S = 1.0
 """A later saccade is a choice, not a reaction."""
 
 
-class MeasuredReaction(NamedTuple):
-    """Saccade to a thing that has just come into view.
-
-    seen_s: exposure of the first frame with it; onset_s: the saccade's command; kind: its kind
-    """
-
-    seen_s: float
-    onset_s: float
-    kind: str
-
-    @property
-    def latency_s(self) -> float:
-        """Return the time from the frame to the command."""
-        return self.onset_s - self.seen_s
-
-
 class ReactionFinder:
-    """Finds reactions in ticks as they arrive."""
+    """Finds reactions in ticks as they arrive: saccades to things that have just come into view."""
 
     def __init__(self) -> None:
         self._seen: dict[tuple[str, int], float] = {}
         self._captured_s: float | None = None
         self._saccades = -1
 
-    def update(self, tick: Tick) -> MeasuredReaction | None:
-        """Add a tick; return the reaction that begins in it, if any."""
+    def update(self, tick: Tick) -> float | None:
+        """Add a tick; return the time from the first frame with a thing to its saccade, if any."""
         percept = tick.percept
         if percept is not None and percept.captured_s != self._captured_s:
             # A thing in the first percept has not come into view.
@@ -71,9 +61,9 @@ class ReactionFinder:
         name = (tick.target.kind, tick.target.id)
         if not began or tick.stopped or name not in self._seen:
             return None
-        seen_s, self._seen[name] = self._seen[name], -inf
-        late = tick.t_s - seen_s > _LONGEST_S
-        return None if late else MeasuredReaction(seen_s, tick.t_s, tick.target.kind)
+        latency_s = tick.t_s - self._seen[name]
+        self._seen[name] = -inf
+        return latency_s if latency_s <= _LONGEST_S else None
 
 
 PLANE_M = -0.028
@@ -98,7 +88,6 @@ class TraceRow(NamedTuple):
     target_*: direction of the current target from the head; target_*_rate: its speed
     vergence, vergence_due: measured, and required by the target's distance
     off_left, off_right: angle of each line of sight from the target
-    left_y_mm ... right_z_mm: miss distance of each pupil axis, in the face's plane
     face_y, face_z: intersection of the gaze with the face, from the tip of the nose
     face_off: angle of the person's face away from the robot
     lid, lower_lid: the wider opening of the upper and of the lower lids, 0 shut .. 1 open
@@ -113,21 +102,15 @@ class TraceRow(NamedTuple):
     head_yaw: float
     head_pitch: float
     head_roll: float
-    eye_yaw: float
     eye_pitch: float
     target_yaw: float
     target_pitch: float
     target_yaw_rate: float
     target_pitch_rate: float
-    target_m: float
     vergence: float
     vergence_due: float
     off_left: float
     off_right: float
-    left_y_mm: float
-    left_z_mm: float
-    right_y_mm: float
-    right_z_mm: float
     face_y: float
     face_z: float
     face_off: float
@@ -153,7 +136,8 @@ class GazeTrace:
 
     asked_blinks: blinks as commanded by the models; kinds: seconds per kind of target
     joints: joints of the rig, and which of them are estimated
-    reactions: reactions to things that came into view
+    reactions_s: latencies of reactions to things that came into view
+    ideal_servos: whether the servos were a lag without bytes, which says nothing about servos
     """
 
     rows: Floats
@@ -163,7 +147,8 @@ class GazeTrace:
     asked_blinks: tuple[BlinkEvent, ...] = ()
     kinds: dict[str, float] = field(default_factory=dict)
     joints: JointBasis = JointBasis()
-    reactions: tuple[MeasuredReaction, ...] = ()
+    reactions_s: tuple[float, ...] = ()
+    ideal_servos: bool = False
 
     def column(self, name: str) -> Floats:
         """Return a column of Row by its name."""
@@ -193,14 +178,27 @@ class GazeTrace:
 
     def turns(self) -> TurnTrace:
         """Return the turns of conversation, and the gaze from the partner's face."""
-        state, number = np.nan_to_num(self.columns("turn", "turn_number")).T
         return TurnTrace(
-            self.column("t"),
-            state,
-            number,
-            self.columns("off_yaw", "off_pitch"),
-            self.column("face_edge"),
-        )
+            self.column("t"), self.column("turn"), self.column("turn_number"),
+            self.columns("off_yaw", "off_pitch"), self.column("face_edge"),
+        )  # fmt: skip
+
+    def slices(self, mask: NDArray[np.bool_], least_s: float | None = None) -> list[slice]:
+        """Return the stretches of rows with a true mask.
+
+        Args:
+            mask: (n,) One value a row.
+            least_s: Shortest stretch; stretches also end with their target. None: all.
+        """
+        t, changes = self.column("t"), np.diff(mask.astype(int), prepend=0, append=0) != 0
+        if least_s is not None:
+            changes[1:-1] |= np.diff(self.column("shift")) != 0
+        cuts = np.flatnonzero(changes).tolist()
+        return [
+            slice(a, b)
+            for a, b in zip(cuts, cuts[1:], strict=False)
+            if mask[a] and (least_s is None or (b - a > 2 and t[b - 1] - t[a] >= least_s))
+        ]
 
     def between(self, start_s: float, end_s: float) -> slice:
         """Return the rows from ``start_s`` to before ``end_s``."""
@@ -216,15 +214,18 @@ class GazeTrace:
 
 
 class GazeTraceBuilder:
-    """Builds the gaze trace of a run from its ticks."""
+    """Builds the gaze trace of a run from its ticks.
 
-    def __init__(self) -> None:
+    Args:
+        ideal_servos: Whether the servos are a lag without bytes.
+    """
+
+    def __init__(self, ideal_servos: bool = False) -> None:
+        self._ideal_servos = ideal_servos
         self._events = EventDetector()
         self._flat = array("d")
-        self._saccades: list[SaccadeEvent] = []
-        self._fixations: list[FixationEvent] = []
         self._asked_lids = array("d")
-        self._new, self._reactions = ReactionFinder(), list[MeasuredReaction]()
+        self._new, self._reactions_s = ReactionFinder(), list[float]()
         self._kinds: defaultdict[str, float] = defaultdict(float)
         self._mode = 0
         self._last_s: float | None = None
@@ -234,20 +235,12 @@ class GazeTraceBuilder:
     def update(self, tick: Tick) -> None:
         """Add a tick; time while a user has stopped the robot does not count."""
         for command in tick.commands:
-            if (
-                isinstance(command, Ask)
-                and command.menu == "conversation"
-                and command.choice in MODES
-            ):
-                self._mode = MODES.index(command.choice)
-        for event in self._events.update(tick):
-            if isinstance(event, SaccadeEvent):
-                self._saccades.append(event)
-            elif isinstance(event, FixationEvent):
-                self._fixations.append(event)
-        reaction = self._new.update(tick)
-        if reaction is not None:
-            self._reactions.append(reaction)
+            if isinstance(command, Ask) and command.menu == "conversation":
+                self._mode = MODES.index(command.choice) if command.choice in MODES else self._mode
+        self._events.update(tick)
+        latency_s = self._new.update(tick)
+        if latency_s is not None:
+            self._reactions_s.append(latency_s)
         self._names = tick.guard_result.joints
         self._estimated.update(dict.fromkeys(estimated_joints(tick)))
         if self._last_s is not None:
@@ -257,9 +250,9 @@ class GazeTraceBuilder:
             turn = tick.conversation.state
             self._flat.extend(trace_row(tick, self._mode if turn == "idle" else _TURNS))
             gaze = tick.gaze
-            lids = lid_openings(gaze.lid_left, gaze.lid_right, self._names, UPPER)
+            lid = wider_opening(gaze.lid_left, gaze.lid_right, self._names, UPPER)
             pitch = 0.5 * (gaze.eye_left_rad[1] + gaze.eye_right_rad[1])
-            self._asked_lids.extend((max(lids or (nan,)), degrees(pitch)))
+            self._asked_lids.extend((lid, degrees(pitch)))
 
     def trace(self) -> GazeTrace:
         """Return the trace of all added ticks."""
@@ -269,13 +262,14 @@ class GazeTraceBuilder:
         )
         return GazeTrace(
             rows,
-            tuple(self._saccades),
-            tuple(self._fixations),
+            tuple(self._events.saccades),
+            tuple(self._events.fixations),
             blinks_of(t_s, lid, pitch),
             blinks_of(t_s, *np.array(self._asked_lids).reshape(-1, 2).T),
             dict(self._kinds),
-            joints_of(self._names, self._estimated),
-            tuple(self._reactions),
+            JointBasis(order_joints(self._names), order_joints(self._estimated)),
+            tuple(self._reactions_s),
+            self._ideal_servos,
         )
 
 
@@ -293,36 +287,19 @@ def trace_row(tick: Tick, mode: int) -> TraceRow:
     yaw_rate, pitch_rate = _rates(rel, target.v_world_m_s)
     x, y, _ = rotate_back(pose.R_world_head, rel)
     half = 0.5 * norm(sub(left, right))
-    face, seen = _face(tick, way)
-    on_left = on_right = gaze_at = (nan, nan)
-    off_deg = nan
-    if face is not None:
-        since_s = min(max(0.0, tick.t_s - face[1]), _LONGEST_FORESEEN_S)
-        R = face[0].R_world_face
-        ahead = R[0][0], R[1][0], R[2][0]
-        off_deg = degrees(angle_between(ahead, sub(head, face[0].p_world_m)))
-        # Where the gaze meets the plane of the face, (y, z) from the nose.
-        moved = scale(face[0].v_world_m_s, since_s)
-        centre = add(add(face[0].p_world_m, moved), scale(ahead, PLANE_M))
-        if dot(way, sub(centre, head)) > 0.0:
-            gaze_at = gaze_point_on_face(head, way, centre, R) or gaze_at
-        if target.kind == "face":
-            on_left = gaze_point_on_face(left, sight_left, point, R) or on_left
-            on_right = gaze_point_on_face(right, sight_right, point, R) or on_right
     eye_left, eye_right = pose.eye_left_rad, pose.eye_right_rad
     turned = head_in_space(pose)
     return TraceRow(
         tick.t_s, degrees(yaw), degrees(pitch),
         degrees(turned[0]), degrees(turned[1]), degrees(turned[2]),
-        degrees(0.5 * (eye_left[0] + eye_right[0])), degrees(0.5 * (eye_left[1] + eye_right[1])),
-        degrees(at_yaw), degrees(at_pitch), degrees(yaw_rate), degrees(pitch_rate), norm(rel),
+        degrees(0.5 * (eye_left[1] + eye_right[1])),
+        degrees(at_yaw), degrees(at_pitch), degrees(yaw_rate), degrees(pitch_rate),
         degrees(eye_right[0] - eye_left[0]), degrees(atan2(y + half, x) - atan2(y - half, x)),
         degrees(angle_between(sight_left, sub(point, left))),
         degrees(angle_between(sight_right, sub(point, right))),
-        1e3 * on_left[0], 1e3 * on_left[1], 1e3 * on_right[0], 1e3 * on_right[1],
-        gaze_at[0], gaze_at[1], off_deg, float(seen),
-        max(lid_openings(pose.lid_left, pose.lid_right, names, UPPER) or (nan,)),
-        max(lid_openings(pose.lower_left, pose.lower_right, names, LOWER) or (nan,)),
+        *_face_gaze(tick, way),
+        wider_opening(pose.lid_left, pose.lid_right, names, UPPER),
+        wider_opening(pose.lower_left, pose.lower_right, names, LOWER),
         PHASES.index(tick.gaze.phase),
         float(target.kind == "face"), float(target.kind in _IDLE),
         float(any("eye" in limited.axis for limited in tick.gaze.limited)), target.shift, mode,
@@ -334,16 +311,13 @@ def trace_row(tick: Tick, mode: int) -> TraceRow:
 def _off_partner(tick: Tick, gaze_rad: tuple[float, float]) -> tuple[float, float, float]:
     """Return yaw and pitch of the gaze from the partner's face, and its extent; nan if unknown."""
     now = tick.conversation
-    if now.state == "idle" or tick.percept is None:
-        return nan, nan, nan
     wanted = now.partner if now.partner is not None else tick.target.id
-    for face in tick.percept.faces:
+    for face in tick.percept.faces if tick.percept is not None and now.state != "idle" else ():
         if face.id == wanted:
             rel = sub(face.p_world_m, tick.pose.p_world_head_m)
             at_yaw, at_pitch = yaw_pitch(rel)
             yaw, pitch = gaze_rad[0] - at_yaw, gaze_rad[1] - at_pitch
-            edge = face_extent_deg(atan2(pitch, -yaw), norm(rel))
-            return degrees(yaw), degrees(pitch), edge
+            return degrees(yaw), degrees(pitch), face_extent_deg(atan2(pitch, -yaw), norm(rel))
     return nan, nan, nan
 
 
@@ -359,17 +333,31 @@ def _rates(rel: Vec3, v: Vec3) -> tuple[float, float]:
     return yaw_rate, (level * v[2] - z * outward) / (level2 + z * z)
 
 
-def _face(tick: Tick, way: Vec3) -> tuple[tuple[Face, float] | None, bool]:
-    """Return the target's face, or else the gazed one, with its time; and whether it is gazed."""
-    if tick.percept is None:
-        return None, False
-    captured_s, found = tick.percept.captured_s, None
-    for face in tick.percept.faces:
-        if face.id == tick.target.id or found is None:
-            found = face
-    if found is None:
-        return None, False
-    since_s = min(max(0.0, tick.t_s - captured_s), _LONGEST_FORESEEN_S)
-    centre = add(found.p_world_m, scale(found.v_world_m_s, since_s))
-    seen = miss_distance_m(way, sub(centre, tick.pose.p_world_head_m)) <= NEAR_FACE_M
-    return (found, captured_s), seen
+class _FaceGaze(NamedTuple):
+    """The gaze at a face: where it meets the face, its turn from the robot, whether it is on it."""
+
+    y: float = nan
+    z: float = nan
+    off_deg: float = nan
+    on_face: float = 0.0
+
+
+def _face_gaze(tick: Tick, way: Vec3) -> _FaceGaze:
+    """Return the gaze at the target's face, or else at the first one."""
+    percept, head = tick.percept, tick.pose.p_world_head_m
+    if percept is None or not percept.faces:
+        return _FaceGaze()
+    face = next((one for one in percept.faces if one.id == tick.target.id), percept.faces[0])
+    since_s = min(max(0.0, tick.t_s - percept.captured_s), _LONGEST_FORESEEN_S)
+    nose = add(face.p_world_m, scale(face.v_world_m_s, since_s))
+    R = face.R_world_face
+    ahead = R[0][0], R[1][0], R[2][0]
+    centre = add(nose, scale(ahead, PLANE_M))
+    meets = None
+    if dot(way, sub(centre, head)) > 0.0:
+        meets = gaze_point_on_face(head, way, centre, R)
+    return _FaceGaze(
+        *(meets or (nan, nan)),
+        degrees(angle_between(ahead, sub(head, face.p_world_m))),
+        float(miss_distance_m(way, sub(nose, head)) <= NEAR_FACE_M),
+    )

@@ -6,10 +6,9 @@ raises SetupError with the command that installs it.
 
 from collections.abc import Callable, Sequence
 from io import BytesIO
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from gazerig.drivers.errors import SetupError, extra_hint
-from gazerig.features.lab.report.face import ReferenceWalk
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 
 try:
@@ -17,9 +16,6 @@ try:
     from matplotlib.axes import Axes as Axes
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Figure
-    from matplotlib.patches import Circle as Circle
-    from matplotlib.patches import Ellipse as Ellipse
-    from matplotlib.patches import Patch as Patch
 except ImportError as error:
     raise SetupError(extra_hint("matplotlib", "report", error)) from error
 
@@ -29,62 +25,49 @@ HUMAN = "#7f8c8d"
 
 HUMAN_FILL = "#dfe4e6"
 INK = "#2c3136"
+GREEN = "#2b8a5a"
 
 _STYLE: Any = {
     "text.parse_math": False,  # names of files are not formulas
     "font.family": "DejaVu Sans", "font.size": 10, "text.color": INK, "axes.labelcolor": INK,
     "axes.edgecolor": "#9aa3a9", "axes.titlesize": 11, "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
     "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
     "axes.axisbelow": True, "grid.color": "#eceff1", "grid.linewidth": 0.8,
     "xtick.color": INK, "ytick.color": INK, "legend.frameon": False, "legend.fontsize": 8.5,
     "figure.facecolor": "white",
 }  # fmt: skip
 _DPI = 110
-_LAYOUT: Literal["constrained"] | None = "constrained"
-"""Layout with room for all labels; it takes most of the drawing time, and tests disable it."""
-
-_Corner = Literal["upper left", "upper right", "lower right", "center right"]
 
 
 class ShownRun(NamedTuple):
-    """A run in figures; model: the walk over faces of its rig."""
+    """A run in figures."""
 
     name: str
     run: GazeTrace
     colour: str
-    model: ReferenceWalk | None = None
 
 
 class Drawing(NamedTuple):
-    """One figure: its key (the file's name), its section, title and caption.
+    """One figure: its section, title and caption.
 
-    caption: "{measured}" in it becomes the basis of the runs' figures: measured, or estimated
+    joints: the rig needs one of them
     """
 
-    key: str
     group: str
     title: str
     caption: str
     draw: Callable[[Figure, Sequence[ShownRun]], None]
     size_in: tuple[float, float] = (8.4, 3.8)
+    joints: tuple[str, ...] = ()
 
 
-def basis_text(runs: Sequence[ShownRun], group: str) -> str:
-    """Return the basis of several runs together, e.g. "measured or estimated"."""
-    return " or ".join(dict.fromkeys(shown.run.joints.basis(group) for shown in runs))
-
-
-def drawing_png(drawing: Drawing, runs: Sequence[ShownRun]) -> bytes:
-    """Draw a figure of one run, or of two for comparison."""
-    return draw_png(lambda figure: drawing.draw(figure, runs), drawing.size_in)
-
-
-def draw_png(draw: Callable[[Figure], None], size_in: tuple[float, float]) -> bytes:
-    """Return a PNG of a function's drawing in an empty figure, in the style of all figures."""
+def draw_png(drawing: Drawing, runs: Sequence[ShownRun]) -> bytes:
+    """Return a figure of one run, or of two for comparison, as PNG."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=size_in, dpi=_DPI, layout=_LAYOUT)
+        figure = Figure(figsize=drawing.size_in, dpi=_DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
-        draw(figure)
+        drawing.draw(figure, runs)
         out = BytesIO()
         # print_figure would draw everything twice, once only for the layout.
         canvas.print_png(out)  # type: ignore[no-untyped-call]
@@ -93,21 +76,20 @@ def draw_png(draw: Callable[[Figure], None], size_in: tuple[float, float]) -> by
 
 def draw_no_data(axes: Axes, what: str) -> None:
     """Write a text instead of a figure without data."""
-    axes.set_xticks([])
-    axes.set_yticks([])
-    axes.grid(False)
+    axes.set_axis_off()
     axes.text(0.5, 0.5, what, ha="center", va="center", transform=axes.transAxes, color=HUMAN)
 
 
-def draw_legend(axes: Axes, where: _Corner, columns: int = 1) -> None:
-    """Add a legend if anything has a label."""
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc=where, ncols=columns, markerscale=1.4)
+def draw_histogram(axes: Axes, values: Any, bins: Any, name: str, **style: Any) -> None:
+    """Draw the shares of values as steps; values beyond the bins are at their ends."""
+    if len(values):
+        inside, weights = values.clip(bins[0], bins[-1]), [1.0 / len(values)] * len(values)
+        axes.hist(inside, bins, weights=weights, histtype="step", lw=1.6,
+                  label=f"{name} ({len(values)})", **style)  # fmt: skip
 
 
-def label_axes(axes: Axes, x: str, y: str, title: str = "") -> None:
-    """Set the labels of the axes and the title."""
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    if title:
-        axes.set_title(title, loc="left")
+def mark_times(axes: Axes, times: dict[float, str]) -> None:
+    """Draw a logarithmic axis of times with these labels."""
+    axes.set_xscale("log")
+    axes.minorticks_off()
+    axes.set_xticks([*times], [*times.values()])
