@@ -12,7 +12,7 @@ states the choice.
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isfinite, nan
 from pathlib import Path
 from typing import NamedTuple
@@ -21,6 +21,7 @@ import numpy as np
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
+from gazerig.gaze.scanpath.fit import PartFixation
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 
 NAMES = {
@@ -73,24 +74,17 @@ class Samples(NamedTuple):
     note: str
 
 
-class FixationTable(NamedTuple):
-    """Fixations (n,) each: part None outside all parts; labelled: they are parts, not places."""
-
-    start_s: Floats
-    duration_s: Floats
-    parts: list[str | None]
-    x: Floats
-    y: Floats
-    labelled: bool
-    note: str
-
-
-def read_recording(path: Path, mapping: Mapping[str, str]) -> Samples | FixationTable:
-    """Read samples or fixations.
+def read_recording(
+    path: Path,
+    mapping: Mapping[str, str],
+    part_at: Callable[[float, float], str | None] | None = None,
+) -> Samples | tuple[list[PartFixation], str]:
+    """Read samples, or fixations with a note on their units.
 
     Args:
         path: Table with commas, semicolons or tabs.
         mapping: Names of the file's columns by those of ``NAMES``.
+        part_at: Returns the part at a place, for fixations without parts.
 
     Raises:
         SetupError: The message has the file, line, column and fault.
@@ -116,14 +110,16 @@ def read_recording(path: Path, mapping: Mapping[str, str]) -> Samples | Fixation
         raise table.fault("duration", row, f"{durations[row]:g} is not above 0")
     unit_s, note = table.unit_s("duration", durations, _LONGEST_FIXATION_S)
     start_s, _ = table.unit_s("start", durations, _LONGEST_FIXATION_S)
-    labelled = table.find("part") is not None or table.find("x") is None
-    parts: list[str | None] = [None] * len(times)
-    x = y = np.full(len(times), nan)
-    if labelled:
+    if table.find("part") is not None or table.find("x") is None:
         parts = [table.part(row) for row in range(len(times))]
+    elif part_at is None:
+        raise SetupError(f"{path}: fixations without parts need their rectangles (--parts)")
     else:
-        x, y = table.numbers("x"), table.numbers("y")
-    return FixationTable(times * start_s, durations * unit_s, parts, x, y, labelled, note)
+        parts = [
+            part_at(*place) for place in zip(table.numbers("x"), table.numbers("y"), strict=True)
+        ]
+    rows = zip(parts, (times * start_s).tolist(), (durations * unit_s).tolist(), strict=True)
+    return [PartFixation(*row) for row in rows], note
 
 
 class _Column(NamedTuple):
@@ -142,46 +138,42 @@ class _Table:
         try:
             data = read_limited(path, _LARGEST)
             wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
-            text = data.decode("utf-16" if wide else "utf-8-sig")
+            lines = data.decode("utf-16" if wide else "utf-8-sig").splitlines()
         except OSError as error:
             raise SetupError(f"{path}: {error.strerror or error}; check the name") from None
         except UnicodeDecodeError:
             raise SetupError(f"{path}: not UTF-8 text; export the recording as CSV") from None
-        lines = text.splitlines()
         first = next((line for line in lines if line.strip()), "")
         reader = csv.reader(lines, delimiter=max(",;\t", key=first.count), skipinitialspace=True)
-        try:
-            rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
-        except csv.Error as error:
-            raise SetupError(f"{path}:{reader.line_num}: {error}") from None
-        rows = [(line, row) for line, row in rows if any(row)]
-        if not rows:
-            raise SetupError(f"{path}: is empty")
-        (self._header_line, self._names), *body = rows
+        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
+        (self._header_line, self._names), *body = [one for one in rows if any(one[1])] or [(1, [])]
         for line, row in body:
             if len(row) != len(self._names):
                 raise SetupError(
                     f"{path}:{line}: {len(row)} cells under {len(self._names)} column names"
                 )
-        lower = [name.lower() for name in self._names]
-        if _SENSOR in lower:
-            body = [one for one in body if one[1][lower.index(_SENSOR)].lower() == _EYES]
+        self._columns = {
+            _split(name)[0]: _Column(at, name, _split(name)[1])
+            for at, name in enumerate(self._names)
+        }
+        if _SENSOR in self._columns:
+            at = self._columns[_SENSOR].at
+            body = [one for one in body if one[1][at].lower() == _EYES]
         if not body:
-            raise SetupError(f"{path}: no line after the column names")
+            raise SetupError(f"{path}: is empty, or has no line after the column names")
         self._rows = body
 
     def find(self, wanted: str) -> _Column | None:
         """Return a column, by the name given for it or by one that is known."""
         given = self._mapping.get(wanted)
-        known = NAMES[wanted] if given is None else (_split(given)[0],)
-        columns = [_Column(at, name, _split(name)[1]) for at, name in enumerate(self._names)]
-        found = (one for name in known for one in columns if _split(one.name)[0] == name)
-        column = next(found, None)
-        if given is not None:
-            if column is None:
-                raise self._missing(f"{given} for {wanted}")
-            return column._replace(unit=_split(given)[1] or column.unit)
-        return column
+        if given is None:
+            known = (self._columns[name] for name in NAMES[wanted] if name in self._columns)
+            return next(known, None)
+        name, unit = _split(given)
+        if name not in self._columns:
+            raise self._missing(f"{given} for {wanted}")
+        column = self._columns[name]
+        return column._replace(unit=unit or column.unit)
 
     def numbers(self, wanted: str, required: bool = False) -> Floats:
         """Return a column as numbers, NaN for missing ones unless they are required."""

@@ -10,6 +10,8 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gazerig.config.schema import load_walk
+from gazerig.gaze.scanpath.scanpath import normalise
 from gazerig.gaze.types import Floats
 
 BAHILL_DEG_S, BALOH_DEG_S, ROUND_DEG = 551.0, 420.0, 14.0
@@ -27,27 +29,14 @@ STAHL_SLOPE, STAHL_SLOPE_SD = 0.77, 0.16
 CONE_DEG = 5.2
 """Diameter of the cone in which a gaze appears direct (Horstmann & Linke 2021)."""
 
-# Nakamoto & Tsuruno, eq 1 as printed: rows from, columns to, in the order of PARTS.
-_PRINTED = (
-    (0.2, 0.2, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0),
-    (0.1, 0.4, 0.0, 0.2, 0.0, 0.0, 0.1, 0.0),
-    (0.0, 0.1, 0.4, 0.0, 0.3, 0.1, 0.2, 0.0),
-    (0.3, 0.0, 0.1, 0.3, 0.3, 0.0, 0.1, 0.0),
-    (0.0, 0.0, 0.1, 0.1, 0.4, 0.0, 0.3, 0.0),
-    (0.1, 0.0, 0.0, 0.0, 0.1, 0.3, 0.4, 0.1),
-    (0.0, 0.0, 0.1, 0.0, 0.2, 0.2, 0.3, 0.2),
-    (0.0, 0.2, 0.0, 0.0, 0.1, 0.0, 0.3, 0.3),
-)
-DWELL_MEAN_S = (0.19, 0.24, 0.11, 0.19, 0.16, 0.20, 0.20, 0.11)
-"""Nakamoto & Tsuruno, table 1, in the order of PARTS."""
-DWELL_SD_S = (0.35, 0.25, 0.14, 0.22, 0.30, 0.30, 0.38, 0.15)
+_WALK = load_walk("nakamoto_tsuruno")
+"""Nakamoto & Tsuruno, eq 1 and table 1, in the order of PARTS."""
+DWELL_MEAN_S = _WALK.dwell_mean_s
 
 
 def transition_matrix() -> Floats:
     """Return Nakamoto & Tsuruno's eq 1 with every row summing to 1, (8, 8), rows from."""
-    printed = np.array(_PRINTED)
-    out: Floats = printed / printed.sum(axis=1, keepdims=True)
-    return out
+    return normalise(_WALK.matrix)
 
 
 def visit_matrix(steps: Floats) -> Floats:
@@ -123,13 +112,6 @@ def mean_head_deg(eccentricity_deg: ArrayLike) -> Floats:
     """Return the mean head movement for a gaze shift (Stahl 1999)."""
     beyond = np.abs(np.asarray(eccentricity_deg, dtype=float)) - STAHL_FREE_DEG
     out: Floats = STAHL_SLOPE * np.maximum(0.0, beyond)
-    return out
-
-
-def evoked_blink_probability(amplitude_deg: ArrayLike) -> Floats:
-    """Return a blink's probability with a gaze shift: .5 at 17, .97 at 33 deg (Evinger 1994)."""
-    a = np.asarray(amplitude_deg, dtype=float)
-    out: Floats = 1.0 / (1.0 + np.exp(-0.217 * (a - 17.0)))
     return out
 
 

@@ -34,9 +34,8 @@ def fit_scanpath(
 ) -> None:
     """Fit a walk over the face to an eye-tracker recording; write it as YAML for gazerig run."""
     with clear_errors():
-        from gazerig.features.lab.analysis import fit_scanpath as fitting
         from gazerig.features.lab.analysis.eye_tracker_csv import NAMES
-        from gazerig.features.lab.analysis.fixations import PartBoxes
+        from gazerig.features.lab.analysis.fit_scanpath import PartBoxes, fit_to_recording
 
         mapping = dict(text.partition("=")[::2] for text in columns or ())
         for name, column in mapping.items():
@@ -45,4 +44,4 @@ def fit_scanpath(
                     f"--map {name}={column}: not NAME=COLUMN; names: {', '.join(NAMES)}"
                 )
         boxes = PartBoxes.read(parts) if parts is not None else None
-        say(fitting.fit_to_recording(recording, boxes, out, smoothing, mapping, force))
+        say(fit_to_recording(recording, boxes, out, smoothing, mapping, force))

@@ -58,8 +58,6 @@ def sweep(
     bus: options.Bus = None,
     profile: options.Profile = None,
     character: options.Character = None,
-    rules: options.Rules = None,
-    behaviour: options.Behaviour = None,
     conversation: options.Conversation = None,
     force: ForceOption = False,
 ) -> None:
@@ -76,7 +74,7 @@ def sweep(
 
         run_options = RunOptions(
             mock=True, fast=True, scene=scene, seconds=seconds, bus=bus, rig=rig, profile=profile,
-            character=character, rules=rules, behaviour=behaviour, conversation=conversation,
+            character=character, conversation=conversation,
         ).check_and_complete()  # fmt: skip
         points = grid(setting or (), read_value)
         if points == [{}]:

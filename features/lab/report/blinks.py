@@ -1,4 +1,4 @@
-"""Blinks: their rate, their shape, and gaze shifts that evoke them."""
+"""Blinks: their rate and their shape."""
 
 from collections.abc import Sequence
 
@@ -10,13 +10,7 @@ from gazerig.features.lab.report.statistics import MeasuredValue, mean, median, 
 from gazerig.gaze.types import Floats
 
 _DOUBLE_S = 0.6
-_EVOKING_DEG = 33.0
-_WITH_BEFORE_S, _WITH_AFTER_S = 0.12, 0.2
-_AGAIN_S = 0.3
-"""Time after a blink within which a blink with a gaze shift would be a double blink."""
-
 _PART_S = 10.0
-_TIED_S = 0.006
 _SHUT = 0.96
 """Depth of a blink that counts as shut, given the resolution of a servo."""
 
@@ -33,32 +27,11 @@ def blink_shapes(blinks: Sequence[BlinkEvent]) -> Floats:
     return np.array(rows).reshape(-1, 4)
 
 
-def evoked_blinks(run: GazeTrace) -> Floats:
-    """Return (n,) whether a blink accompanied each large gaze shift.
-
-    Shifts during an earlier blink are omitted, because shut eyes cannot blink.
-    """
-    onsets = np.array([blink.onset_s for blink in run.blinks])
-    opened = onsets + np.array([blink.duration_s for blink in run.blinks])
-    rows = []
-    for saccade in run.saccades:
-        if saccade.commanded is None:
-            continue
-        if max(saccade.commanded.amplitude_deg, saccade.amplitude_deg) < _EVOKING_DEG:
-            continue
-        since = onsets - saccade.onset_s
-        if not ((since <= -_WITH_BEFORE_S) & (opened + _AGAIN_S > saccade.onset_s)).any():
-            rows.append(((since > -_WITH_BEFORE_S) & (since < _WITH_AFTER_S)).any())
-    return np.array(rows, dtype=float)
-
-
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of lids."""
     seen, asked = blink_shapes(run.blinks), blink_shapes(run.asked_blinks)
     onsets = np.array([blink.onset_s for blink in run.blinks])
     gaps = np.diff(onsets)
-    saccades = [saccade.onset_s for saccade in run.saccades] or [-np.inf]
-    tied = np.array([np.abs(np.array(saccades) - onset).min() <= _TIED_S for onset in onsets])
     partial = np.array([blink.depth < _SHUT for blink in run.blinks], dtype=float)
     counts = _counts(run, onsets)
     due = np.array([(60.0 * len(run.asked_blinks), run.seconds)] if run.seconds else [])
@@ -75,9 +48,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         # A double blink counts once.
         MeasuredValue("blink_cv", gaps[gaps > _DOUBLE_S], _spread_over_mean),
         *shapes,
-        MeasuredValue("evoked", evoked_blinks(run), mean),
         MeasuredValue("blink_partial", partial, mean),
-        MeasuredValue("blink_tied", tied.astype(float), mean),
     ]
 
 

@@ -1,14 +1,13 @@
 """Eyes and head in a gaze shift, the gaze held while the head turns, and smooth pursuit."""
 
 from math import nan
-from typing import NamedTuple
 
 import numpy as np
 
 from gazerig.features.lab.analysis import human_norms as human
 from gazerig.features.lab.analysis.event_detector import THRESHOLD_DEG_S
-from gazerig.features.lab.report.gaze_trace import PHASES, GazeTrace
-from gazerig.features.lab.report.statistics import MeasuredValue, longest, median
+from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.statistics import MeasuredValue, median
 from gazerig.gaze.types import Floats
 
 LEAST_DEG = 5.0
@@ -31,23 +30,9 @@ _HALF = 4
 """Half of the samples over which a speed is measured."""
 
 
-class Shift(NamedTuple):
-    """One gaze shift and the head's motion in it; sideways angles, along the shift.
-
-    aside_deg: target from the previous direction of the head; also for a shift back to it
-    head_deg: turn of the head until the next shift, 0.9 s at most
-    head_after_s: start of the head after that of the eyes, nan if the head did not move with them
-    """
-
-    aside_deg: float
-    head_deg: float
-    head_after_s: float
-    head_peak_deg_s: float
-
-
-def speeds(run: GazeTrace, *names: str) -> Floats:
-    """Return (n, k) speeds of columns by differences over 8 samples, 0 at the ends."""
-    t, x = run.column("t"), run.columns(*names)
+def speeds(run: GazeTrace, name: str) -> Floats:
+    """Return (n, k) speeds of a column by differences over 8 samples, 0 at the ends."""
+    t, x = run.column("t"), run.column(name)
     out = np.zeros_like(x)
     if len(x) > 2 * _HALF:
         span = np.maximum(t[2 * _HALF :] - t[: -2 * _HALF], 1e-6)
@@ -55,10 +40,15 @@ def speeds(run: GazeTrace, *names: str) -> Floats:
     return out
 
 
-def gaze_shifts(run: GazeTrace) -> list[Shift]:
-    """Return the shifts that began with the head at rest."""
-    t, head, goal = run.column("t"), run.column("head_yaw"), run.column("target_yaw")
-    speed, moves = speeds(run, "head_yaw")[:, 0], np.abs(run.column("target_yaw_rate"))
+def gaze_shifts(run: GazeTrace) -> Floats:
+    """Return (n, 4) of the shifts that began with the head at rest; sideways, along the shift.
+
+    Columns: target from the previous direction of the head, in deg, also for a shift back to it;
+    turn of the head until the next shift, .9 s at most; start of the head after that of the eyes,
+    in s, NaN if the head did not move with them; peak speed of the head, in deg/s.
+    """
+    t, head, goal = run.column("t"), run.column("head")[:, 0], run.column("target")[:, 0]
+    speed, moves = speeds(run, "head")[:, 0], np.abs(run.column("target_rate")[:, 0])
     large = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG and s.commanded is not None]
     out = []
     for at, saccade in enumerate(large):
@@ -79,8 +69,8 @@ def gaze_shifts(run: GazeTrace) -> list[Shift]:
         fast, near = sign * speed[around], t[around]
         moving = np.flatnonzero((fast > _STARTS_DEG_S) & (near < onset_s + _SOON_S))
         after = float(near[moving[0]] - onset_s) if len(moving) and turned >= _MOVES_DEG else nan
-        out.append(Shift(abs(aside), turned, after, float(fast.max())))
-    return out
+        out.append((abs(aside), turned, after, float(fast.max())))
+    return np.array(out).reshape(-1, 4)
 
 
 def vor_gains(run: GazeTrace) -> Floats:
@@ -89,13 +79,11 @@ def vor_gains(run: GazeTrace) -> Floats:
     The required eye motion is the target's motion seen from the head, minus the head's: a near
     target requires more than the head's rotation, which is not an error of the gain.
     """
-    gaze = speeds(run, "gaze_yaw", "gaze_pitch")
-    target = speeds(run, "target_yaw", "target_pitch")
-    head = speeds(run, "head_yaw", "head_pitch")
-    still = np.hypot(*run.columns("target_yaw_rate", "target_pitch_rate").T)
+    gaze, target, head = speeds(run, "gaze"), speeds(run, "target"), speeds(run, "head")[:, :2]
+    still = np.hypot(*run.column("target_rate").T)
     turns = np.hypot(*head.T) > _HEAD_DEG_S
     # If the eyes cannot follow a fast head, this motion is part of the shift, short of the target.
-    held = run.slow() & (still < _STILL_TARGET_DEG_S) & turns & (run.column("off_left") < 3.0)
+    held = run.slow() & (still < _STILL_TARGET_DEG_S) & turns & (run.column("off")[:, 0] < 3.0)
     rows = []
     for part in run.slices(held, _HOLDS_S):
         inner = slice(part.start + _HALF, part.stop - _HALF)
@@ -109,7 +97,7 @@ def vor_gains(run: GazeTrace) -> Floats:
 
 def head_rolls(run: GazeTrace) -> Floats:
     """Return (n,) the roll of the head in each fixation of a target to the side, in deg."""
-    roll, aside = np.abs(run.column("head_roll")), np.abs(run.column("target_yaw"))
+    roll, aside = np.abs(run.column("head")[:, 2]), np.abs(run.column("target")[:, 0])
     parts = [run.between(f.start_s, f.end_s) for f in run.fixations]
     return np.array(
         [np.median(roll[p]) for p in parts if p.stop > p.start and aside[p].mean() > _ASIDE_DEG]
@@ -118,11 +106,8 @@ def head_rolls(run: GazeTrace) -> Floats:
 
 def pursuit_stretches(run: GazeTrace) -> Floats:
     """Return (n, 3) target speed in deg/s, gain, and lag in ms: one row a stretch."""
-    at, gaze = (
-        run.columns("target_yaw_rate", "target_pitch_rate"),
-        speeds(run, "gaze_yaw", "gaze_pitch"),
-    )
-    error = run.columns("target_yaw", "target_pitch") - run.columns("gaze_yaw", "gaze_pitch")
+    at, gaze = run.column("target_rate"), speeds(run, "gaze")
+    error = run.column("target") - run.column("gaze")
     speed = np.hypot(*at.T)
     follows = run.slow(0.02, 0.06) & (speed > SLOWEST_DEG_S) & (speed < FASTEST_DEG_S)
     rows = []
@@ -134,20 +119,9 @@ def pursuit_stretches(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 3)
 
 
-def smooth_speeds(run: GazeTrace) -> Floats:
-    """Return (n,) the highest speed of the gaze in each stretch of smooth pursuit."""
-    t, phase = run.column("t"), run.column("phase")
-    speed = np.hypot(*speeds(run, "gaze_yaw", "gaze_pitch").T)
-    follows = run.slow(0.03, 0.08) & (phase == PHASES.index("pursue"))
-    # Plans reach the joints later, and the speed criterion misses small saccades.
-    flying = np.where(phase == PHASES.index("saccade"), t, -np.inf)
-    follows &= t - np.maximum.accumulate(flying) > 0.08
-    return np.array([speed[part].max() for part in run.slices(follows, _FOLLOWS_S)])
-
-
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of eyes and head, and of pursuit."""
-    shifts = np.array(gaze_shifts(run)).reshape(-1, 4)
+    shifts = gaze_shifts(run)
     beyond = shifts[shifts[:, 0] > human.STAHL_FREE_DEG]
     large = shifts[shifts[:, 0] >= _LARGE_DEG]
     after = 1e3 * shifts[:, 2]
@@ -163,7 +137,6 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         MeasuredValue("vor", vor_gains(run), median),
         MeasuredValue("pursuit_gain", stretches[:, 1], median),
         MeasuredValue("pursuit_lag", stretches[:, 2], median),
-        MeasuredValue("smooth_peak", smooth_speeds(run), longest),
     ]
 
 

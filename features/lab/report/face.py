@@ -109,11 +109,11 @@ def face_points(run: GazeTrace) -> Floats:
 
     The fixations may miss the face.
     """
-    points = run.columns("face_y", "face_z")
+    points = run.column("face")
     rows = []
     for f in run.fixations:
         rested = points[run.between(f.start_s + _SETTLED_S, f.end_s)]
-        if f.target_kind == "face" and np.isfinite(rested).any():
+        if f.is_face and np.isfinite(rested).any():
             rows.append((*np.nanmedian(rested, axis=0), f.duration_s))
     return np.array(rows).reshape(-1, 3)
 
@@ -146,18 +146,26 @@ def map_axes(run: GazeTrace) -> Floats:
     Columns: angles of the left and the right pupil axis from the target point; vergence error.
     """
     due = run.column("vergence") - run.column("vergence_due")
-    table = np.column_stack([run.columns("off_left", "off_right"), due])
+    table = np.column_stack([run.column("off"), due])
     on = (run.column("is_face") > 0.0) & np.isfinite(run.column("face_off"))
     parts = [run.between(f.start_s + _SETTLED_S, f.end_s) for f in run.fixations]
     rows = [np.median(table[part], axis=0) for part in parts if len(on[part]) and on[part].all()]
     return np.array(rows).reshape(-1, 3)
 
 
-def gaze_bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
-    """Return (n, 3) start, end, and whether the run cut it off, of each interval of a mask."""
-    t = run.column("t")
+def face_looks(run: GazeTrace, mutual: bool = False) -> Floats:
+    """Return (n, 3) start, end, and whether the run cut it off, of each look at a face.
+
+    mutual: only if the face is turned to the robot too
+    """
+    t, inside = (
+        run.column("t"),
+        np.hypot(*(run.column("face") / (HALF_WIDE_M, HALF_HIGH_M)).T) <= 1.0,
+    )
+    if mutual:
+        inside &= run.column("face_off") < _FACING_DEG
     out: list[list[float]] = []
-    for part in run.slices(mask):
+    for part in run.slices(inside):
         begin, end = float(t[part.start]), float(t[min(part.stop, len(t) - 1)])
         cut = float(part.start == 0 or part.stop >= len(t))
         if out and begin - out[-1][1] < BRIDGED_S:
@@ -168,24 +176,13 @@ def gaze_bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
     return np.asarray(rows[rows[:, 1] - rows[:, 0] >= BRIDGED_S])
 
 
-def face_looks(run: GazeTrace, mutual: bool = False) -> Floats:
-    """Return the intervals of looks at a face; mutual: that is turned to the robot too."""
-    y, z = run.column("face_y") / HALF_WIDE_M, run.column("face_z") / HALF_HIGH_M
-    inside = np.nan_to_num(y * y + z * z, nan=9.0) <= 1.0
-    if mutual:
-        inside &= run.column("face_off") < _FACING_DEG
-    return gaze_bouts(run, inside)
-
-
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of the gaze on faces and of looks at people."""
     parts, moves = fixations_on_parts(run), part_shifts(run)
     on_eyes = np.isin(parts[:, 0], _EYES).astype(float)
     forbidden = (human.transition_matrix() == 0.0)[tuple(moves.T)].astype(float)
     lengths = np.array([visit.end_s - visit.start_s for visit in part_visits(run)])
-    meant = [
-        (float(f.part is not None), f.duration_s) for f in run.fixations if f.target_kind == "face"
-    ]
+    meant = [(float(f.part is not None), f.duration_s) for f in run.fixations if f.is_face]
     left, right, vergence = map_axes(run).T
     passes = (vergence >= -2.5) & (vergence <= 4.5)
     direct = np.maximum(left, right) <= 0.5 * human.CONE_DEG
@@ -199,7 +196,6 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         MeasuredValue("transitions", moves, _transition_difference),
         MeasuredValue("heat", face_points(run), _heat_correlation),
         MeasuredValue("in_cone", direct.astype(float), mean),
-        MeasuredValue("vergence", vergence, median),
         MeasuredValue("vergence_ok", passes.astype(float), mean),
         MeasuredValue("bout_none", (ends - begins)[cut == 0.0], median),
         MeasuredValue("longest_look", ends - begins, longest),

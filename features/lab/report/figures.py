@@ -1,29 +1,92 @@
-"""The figures of a report, each of one run or of two."""
+"""The figures of a report, each of one run or of two, drawn without a screen as PNG.
 
-from collections.abc import Sequence
+matplotlib is an extra; without it, importing this module raises SetupError with the command that
+installs it.
+"""
+
+from collections.abc import Callable, Sequence
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 
+from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.lab.analysis import human_norms as human
 from gazerig.features.lab.analysis.blink_finder import UPPER
 from gazerig.features.lab.report import eye_head, face, saccades
-from gazerig.features.lab.report.plotting import (
-    GREEN,
-    HUMAN,
-    HUMAN_FILL,
-    INK,
-    Axes,
-    Drawing,
-    Figure,
-    ShownRun,
-    draw_histogram,
-    draw_no_data,
-    mark_times,
-)
+from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
+
+try:
+    import matplotlib as mpl
+    from matplotlib.axes import Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+except ImportError as error:
+    raise SetupError(extra_hint("matplotlib", "report", error)) from error
+
+COLOURS = ("#1c6ea4", "#d9660a")
+HUMAN = "#7f8c8d"
+"""Human values are grey in every figure."""
+
+HUMAN_FILL = "#dfe4e6"
+INK = "#2c3136"
+GREEN = "#2b8a5a"
+
+_STYLE: Any = {
+    "text.parse_math": False,  # names of files are not formulas
+    "font.family": "DejaVu Sans", "font.size": 10, "text.color": INK, "axes.labelcolor": INK,
+    "axes.edgecolor": "#9aa3a9", "axes.titlesize": 11, "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
+    "axes.axisbelow": True, "grid.color": "#eceff1", "grid.linewidth": 0.8,
+    "xtick.color": INK, "ytick.color": INK, "legend.frameon": False, "legend.fontsize": 8.5,
+    "figure.facecolor": "white",
+}  # fmt: skip
+_DPI = 110
+
+
+class ShownRun(NamedTuple):
+    """A run in figures."""
+
+    name: str
+    run: GazeTrace
+    colour: str
+
+
+class Drawing(NamedTuple):
+    """One figure: its section, title and caption.
+
+    joints: the rig needs one of them
+    """
+
+    group: str
+    title: str
+    caption: str
+    draw: Callable[[Figure, Sequence[ShownRun]], None]
+    size_in: tuple[float, float] = (8.4, 3.8)
+    joints: tuple[str, ...] = ()
+
+
+def draw_png(drawing: Drawing, runs: Sequence[ShownRun]) -> bytes:
+    """Return a figure of one run, or of two for comparison, as PNG."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=drawing.size_in, dpi=_DPI, layout="constrained")
+        canvas = FigureCanvasAgg(figure)
+        drawing.draw(figure, runs)
+        out = BytesIO()
+        # print_figure would draw everything twice, once only for the layout.
+        canvas.print_png(out)  # type: ignore[no-untyped-call]
+    return out.getvalue()
+
+
+def draw_no_data(axes: Axes, what: str) -> None:
+    """Write a text instead of a figure without data."""
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, what, ha="center", va="center", transform=axes.transAxes, color=HUMAN)
+
 
 _OVERVIEW_S = 12.0
 _BLINK_S = np.arange(-0.1, 0.5, 0.005)
@@ -42,10 +105,10 @@ def _overview(figure: Figure, runs: Sequence[ShownRun]) -> None:
         many = np.searchsorted(onsets, onsets + _OVERVIEW_S) - np.arange(len(onsets))
         start = float(onsets[many.argmax()]) if len(many) else float(t[0])
         part = run.between(start, start + _OVERVIEW_S)
-        axes.plot(t[part], run.column("target_yaw")[part], color=HUMAN, lw=1.0, label="target")
+        axes.plot(t[part], run.column("target")[part, 0], color=HUMAN, lw=1.0, label="target")
         if run.joints.has_any(("neck_yaw",)):
-            axes.plot(t[part], run.column("head_yaw")[part], color=GREEN, lw=1.4, label="head")
-        axes.plot(t[part], run.column("gaze_yaw")[part], color=colour, lw=1.2, label="gaze")
+            axes.plot(t[part], run.column("head")[part, 0], color=GREEN, lw=1.4, label="head")
+        axes.plot(t[part], run.column("gaze")[part, 0], color=colour, lw=1.2, label="gaze")
         axes.set(xlabel="time, s", ylabel="yaw, deg", title=name)
         axes.legend(loc="upper right", ncols=3)
 
@@ -71,19 +134,6 @@ def _main_sequence(figure: Figure, runs: Sequence[ShownRun]) -> None:
     peaks.legend(loc="lower right")
 
 
-def _fixations(figure: Figure, runs: Sequence[ShownRun]) -> None:
-    axes = figure.subplots()
-    axes.axvspan(1 / 4.0, 1 / 1.5, color=HUMAN_FILL, lw=0, label="people: mean, 1.5 to 4 a second")
-    for name, run, colour in runs:
-        lengths = np.array([f.duration_s for f in run.fixations])
-        draw_histogram(axes, lengths, np.geomspace(0.04, 6.0, 34), name, color=colour)
-        if len(lengths):
-            axes.axvline(lengths.mean(), color=colour, lw=1.2, ls="--")
-    mark_times(axes, {0.05: "50 ms", 0.1: "100 ms", 0.2: "0.2 s", 0.5: "0.5 s", 1: "1 s", 2: "2 s"})
-    axes.set(xlabel="length of a fixation (dashed: mean)", ylabel="share of fixations")
-    axes.legend(loc="upper right")
-
-
 def _time_share(figure: Figure, runs: Sequence[ShownRun]) -> None:
     shares, lengths = figure.subplots(1, 2)
     places, wide = np.arange(len(PARTS)), 0.8 / (len(runs) + 1)
@@ -95,15 +145,13 @@ def _time_share(figure: Figure, runs: Sequence[ShownRun]) -> None:
         if len(parts):
             shares.bar(places + n * wide, face.part_shares(parts), wide, color=colour, label=name)
         each = [[v.end_s - v.start_s for v in seen if v.part == part] or [0.0] for part in places]
-        errors = [np.std(one) / np.sqrt(len(one)) for one in each]
-        lengths.bar(places + n * wide, [np.mean(one) for one in each], wide, color=colour,
-                    yerr=errors, ecolor=INK, error_kw={"lw": 0.8})  # fmt: skip
+        lengths.bar(places + n * wide, [np.mean(one) for one in each], wide, color=colour)
     names = [PART_NAMES[part] for part in PARTS]
     for axes in (shares, lengths):
         axes.set_xticks(places + 0.5 * wide * len(runs), names, rotation=38, ha="right")
         axes.grid(axis="x", visible=False)
     shares.set_title("share of the time on parts")
-    lengths.set_title("mean visit, s (bar: standard error)")
+    lengths.set_title("mean visit, s")
     shares.legend(loc="upper left")
 
 
@@ -154,26 +202,22 @@ def _draw_map(axes: Axes, density: Floats, title: str) -> None:
 
 
 def _head_part(figure: Figure, runs: Sequence[ShownRun]) -> None:
-    amount, latency = figure.subplots(1, 2)
+    axes = figure.subplots()
     aside, free, spread = np.linspace(0.0, 80.0, 90), human.STAHL_FREE_DEG, human.STAHL_FREE_SD_DEG
     least, most = (
         (human.STAHL_SLOPE + sign * human.STAHL_SLOPE_SD)
         * np.maximum(0.0, aside - free + sign * spread)
         for sign in (-1.0, 1.0)
     )
-    amount.fill_between(aside, least, most, color=HUMAN_FILL, lw=0)
-    amount.plot(aside, human.mean_head_deg(aside), color=HUMAN, lw=1.6, label="people (Stahl 1999)")
-    latency.axhspan(-100.0, 140.0, color=HUMAN_FILL, lw=0)
+    axes.fill_between(aside, least, most, color=HUMAN_FILL, lw=0)
+    axes.plot(aside, human.mean_head_deg(aside), color=HUMAN, lw=1.6, label="people (Stahl 1999)")
     for name, run, colour in runs:
-        shifts = np.array(eye_head.gaze_shifts(run)).reshape(-1, 4)
-        amount.scatter(shifts[:, 0], shifts[:, 1], color=colour, label=f"{name} ({len(shifts)})",
-                       **_DOTS)  # fmt: skip
-        latency.scatter(shifts[:, 0], 1e3 * shifts[:, 2], color=colour, **_DOTS)
-    amount.set(ylim=(-10.0, 80.0), title="head movement in 0.9 s, deg")
-    latency.set(xlim=(0.0, 80.0), ylim=(-200.0, 550.0), title="head after eyes, ms")
-    for axes in (amount, latency):
-        axes.set_xlabel("gaze shift from where the head pointed, deg")
-    amount.legend(loc="upper left")
+        shifts = eye_head.gaze_shifts(run)
+        axes.scatter(shifts[:, 0], shifts[:, 1], color=colour, label=f"{name} ({len(shifts)})",
+                     **_DOTS)  # fmt: skip
+    axes.set(ylim=(-10.0, 80.0), xlabel="gaze shift from where the head pointed, deg",
+             ylabel="head movement in 0.9 s, deg")  # fmt: skip
+    axes.legend(loc="upper left")
 
 
 def _following(figure: Figure, runs: Sequence[ShownRun]) -> None:
@@ -189,40 +233,27 @@ def _following(figure: Figure, runs: Sequence[ShownRun]) -> None:
 def _blink(figure: Figure, runs: Sequence[ShownRun]) -> None:
     axes = figure.subplots()
     for name, run, colour in runs:
-        t, lids = run.column("t"), run.columns("lid", "lower_lid").T
+        t, lid = run.column("t"), run.column("lid")
         onsets = [b.onset_s for b in run.blinks if t[0] < b.onset_s - 0.1 < b.onset_s + 0.5 < t[-1]]
-        for lid, text, style in zip(lids, ("upper", "lower"), ("-", "--"), strict=True):
-            shapes = np.array([np.interp(onset + _BLINK_S, t, lid) for onset in onsets])
-            if len(shapes) and np.isfinite(shapes).all():
-                low, middle, high = np.percentile(shapes, (10, 50, 90), axis=0)
-                axes.plot(1e3 * _BLINK_S, middle, color=colour, ls=style,
-                          label=f"{name}: {text} lids ({len(onsets)})")  # fmt: skip
-                axes.fill_between(1e3 * _BLINK_S, low, high, lw=0, color=colour, alpha=0.15)
-    axes.set(xlabel="time from the blink's beginning, ms", ylabel="lid opening")
+        shapes = np.array([np.interp(onset + _BLINK_S, t, lid) for onset in onsets])
+        if len(shapes):
+            low, middle, high = np.percentile(shapes, (10, 50, 90), axis=0)
+            axes.plot(1e3 * _BLINK_S, middle, color=colour, label=f"{name} ({len(onsets)})")
+            axes.fill_between(1e3 * _BLINK_S, low, high, lw=0, color=colour, alpha=0.15)
+    axes.set(xlabel="time from the blink's beginning, ms", ylabel="opening of the upper lids")
     axes.legend(loc="lower right")
 
 
 def _looks(figure: Figure, runs: Sequence[ShownRun]) -> None:
-    *strips, lengths = figure.subplots(len(runs) + 1, 1,
-                                       height_ratios=[0.5] * len(runs) + [1.0])  # fmt: skip
-    for axes, (name, run, colour) in zip(strips, runs, strict=True):
-        for row, (text, ink) in enumerate((("on a face", colour), ("mutual", GREEN))):
+    panels = figure.subplots(len(runs), 1, squeeze=False)[:, 0]
+    for axes, (name, run, colour) in zip(panels, runs, strict=True):
+        for row, ink in enumerate((colour, GREEN)):
             begins, ends, _ = face.face_looks(run, mutual=row == 1).T
             spans = np.column_stack([begins - run.column("t")[0], ends - begins])
             axes.broken_barh(spans.tolist(), (row - 0.36, 0.72), facecolors=ink, lw=0)
-            draw_histogram(lengths, ends - begins, np.geomspace(0.15, 60.0, 30),
-                           f"{name}: {text}", color=ink)  # fmt: skip
         axes.set_yticks([0, 1], ["on a face", "mutual"])
-        axes.set(ylim=(-0.5, 1.5), xlim=(0.0, run.seconds), xlabel="time, s", title=name)
+        axes.set(xlim=(0.0, run.seconds), xlabel="time, s", title=name)
         axes.grid(False)
-    for at_s in (2.2, 3.3, 7.9, 15.0):
-        lengths.axvline(at_s, color=HUMAN, lw=1.0)
-        lengths.text(at_s, 0.99, f" {at_s:g} s", color=HUMAN, fontsize=8, va="top",
-                     transform=lengths.get_xaxis_transform())  # fmt: skip
-    mark_times(lengths, {s: f"{s:g} s" for s in (0.2, 0.5, 1, 2, 5, 10, 20, 50)})
-    lengths.set(xlabel="length of a look", ylabel="share of looks")
-    lengths.margins(y=0.4)
-    lengths.legend(loc="upper left", ncols=2)
 
 
 DRAWINGS = (
@@ -232,8 +263,6 @@ DRAWINGS = (
             "Each dot is a saccade of the gaze in space; grey is the human range: between Baloh's "
             "and the higher of Bahill's and Collewijn's curves, 15 % between people; durations "
             "21 + 2.2 A less 25 % to 25 + 2.4 A ms and 25 %, or 37 + 2.7 A ms.", _main_sequence),
-    Drawing("Saccades", "Fixations", "Time between saccades, on a logarithmic axis.", _fixations,
-            (8.4, 3.2)),
     Drawing("On the face", "Time on the parts of a face",
             "Share of the time on parts and mean visit, refixations merged; grey is Nakamoto & "
             "Tsuruno, eq 1 with table 1 as dwell of each step.", _time_share, (8.4, 4.0)),
@@ -246,18 +275,14 @@ DRAWINGS = (
             "Time on the face, and the map expected from people's shares of time on the parts "
             "(figures 8 and 9 of Nakamoto & Tsuruno).", _heat, (8.4, 4.6)),
     Drawing("Eyes and head", "The head's part in a gaze shift",
-            "Head movement with a shift of the gaze, sideways, and the start of the head. Grey: "
-            "Stahl's mean, and one standard deviation of range and slope; and starts from 100 ms "
-            "before to 140 ms after the eyes.", _head_part, joints=("neck_yaw",)),
+            "Head movement with a shift of the gaze, sideways. Grey: Stahl's mean, and one standard "
+            "deviation of range and slope.", _head_part, joints=("neck_yaw",)),
     Drawing("Following", "Smooth following",
             "Gain of the gaze between saccades against the target's speed; people reach .95 "
             "(Robinson 1986). The target is as seen by the rig.", _following, (8.4, 3.0)),
     Drawing("Lids", "Shape of a blink",
-            "Median and 10th to 90th percentile of the upper lids, and of lower lids if the rig "
-            "has them.", _blink, (8.4, 3.2), joints=UPPER),
+            "Median and 10th to 90th percentile of the upper lids.", _blink, (8.4, 3.2), joints=UPPER),
     Drawing("Social gaze", "Looks at people",
-            "Times with the gaze on a face, and with that face turned to the robot too; and the "
-            "length of each look. 2.2 s: bouts of face gaze in conversation (Rogers 2018); 3.3 s: "
-            "preferred length (Binetti 2016); 7.9 s: while listening (Lee, Badler & Badler 2002); "
-            "15 s is a stare.", _looks, (8.4, 4.4)),
+            "Times with the gaze on a face, and with that face turned to the robot too. Longer than "
+            "15 s is a stare.", _looks, (8.4, 2.4)),
 )  # fmt: skip

@@ -12,7 +12,7 @@ def measure_run(run: GazeTrace) -> tuple[MeasuredValue, ...]:
         measured.key: measured
         for measured in (
             *saccades.measures(run), *face.measures(run), *eye_head.measures(run),
-            *blinks.measures(run), *turns.measures(run.turns()),
+            *blinks.measures(run), *turns.measures(run),
         )
     }  # fmt: skip
     # An estimated eye follows its command, whatever the real eye does.

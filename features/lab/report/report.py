@@ -15,10 +15,9 @@ import msgspec
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, refuse_existing, write_file
 from gazerig.features.lab.analysis.human_norms import BANDS, GROUPS
-from gazerig.features.lab.report.figures import DRAWINGS
+from gazerig.features.lab.report.figures import COLOURS, DRAWINGS, Drawing, ShownRun, draw_png
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.measures import judge_run
-from gazerig.features.lab.report.plotting import COLOURS, Drawing, ShownRun, draw_png
 from gazerig.features.lab.report.statistics import MeasureResult
 from gazerig.robot.control.feedback_basis import ESTIMATED
 from gazerig.robot.recording.read import RunRecording, report_bad_contents
@@ -59,18 +58,13 @@ class ReportedRun:
                 "The servos were ideal: a lag without bytes. Measures of servos are not judged; run "
                 "with emulated servos to see them."
             )
-        if not joints.estimated:
-            return ""
-        if joints.whole_basis == "estimated":
+        if joints.estimated:
             return (
-                f"Nothing here is measured: the servos of this rig have no feedback. All results "
-                f"are {ESTIMATED}. Real eyes may lag, stick or swing without an effect on the "
-                "verdicts."
+                f"Not all of this is measured: the servos of {', '.join(joints.estimated)} have no "
+                f"feedback. Results that depend on them are {ESTIMATED}; their sections are marked. "
+                "Real eyes may lag, stick or swing without an effect on the verdicts."
             )
-        return (
-            f"Not all of this is measured: the servos of {', '.join(joints.estimated)} have no "
-            f"feedback. Results that depend on them are {ESTIMATED}; their sections are marked."
-        )
+        return ""
 
     @property
     def counts(self) -> Counter[str]:
@@ -82,29 +76,14 @@ class ReportedRun:
         return [result for result in self.results if result.verdict == verdict]
 
 
-class _Model(msgspec.Struct):
-    profile: str = ""
-    model: str = ""
-
-
-class _Gaze(msgspec.Struct):
-    saccade: _Model
-    scanpath: _Model
-
-
-class _Config(msgspec.Struct):
-    """The keys of a recorded configuration that select notes."""
-
-    gaze: _Gaze
-
-
 def describe_run(name: str, info: RunInfo, run: GazeTrace, warning: str = "") -> ReportedRun:
     """Return a run with its circumstances and results.
 
     Raises:
-        ValueError: The recorded configuration is damaged.
+        ValueError, KeyError, TypeError: The recorded configuration is damaged.
     """
-    gaze = msgspec.yaml.decode(info.config_yaml, type=_Config).gaze
+    gaze = msgspec.yaml.decode(info.config_yaml)["gaze"]
+    saccade, scanpath = gaze["saccade"]["profile"], gaze["scanpath"]["model"]
     kinds = sorted(run.kinds.items(), key=lambda item: -item[1])
     total = sum(run.kinds.values()) or 1.0
     facts = {
@@ -117,8 +96,8 @@ def describe_run(name: str, info: RunInfo, run: GazeTrace, warning: str = "") ->
         "seed": str(info.seed),
         "started": info.started_utc.isoformat(),
         "versions": ", ".join(f"{name} {v}" for name, v in sorted(info.versions.items())),
-        "saccades": gaze.saccade.profile,
-        "face scanpath": gaze.scanpath.model,
+        "saccades": saccade,
+        "face scanpath": scanpath,
         "length": f"{run.seconds:.1f} s, {len(run.rows)} ticks at {run.rate_hz:.0f} Hz",
         "events": f"{len(run.saccades)} saccades, {len(run.fixations)} fixations, "
         f"{len(run.blinks)} blinks",
@@ -126,7 +105,7 @@ def describe_run(name: str, info: RunInfo, run: GazeTrace, warning: str = "") ->
         "conversation": run.mode,
     }
     styles = {
-        f"saccade {gaze.saccade.profile}", f"scanpath {gaze.scanpath.model}",
+        f"saccade {saccade}", f"scanpath {scanpath}",
         f"conversation {run.mode}",
     }  # fmt: skip
     return ReportedRun(name, run, facts, run.joints.styles | styles, warning, judge_run(run))
@@ -202,7 +181,7 @@ def _page(runs: Sequence[ReportedRun], figures: dict[str, list[tuple[Drawing, st
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"number": format_number, "gauge": gauge_places, "unit": with_unit}
+    environment.filters |= {"number": format_number, "unit": with_unit}
     return environment.from_string(_PAGE.read_text(encoding="utf-8")).render(
         runs=runs, groups=GROUPS, rows=rows, left_out=left_out, figures=figures
     )
@@ -210,26 +189,16 @@ def _page(runs: Sequence[ReportedRun], figures: dict[str, list[tuple[Drawing, st
 
 def _numbers(one: ReportedRun, result: MeasureResult) -> dict[str, object]:
     """Return a result as plain JSON; unknown values are null."""
-    band, measured = result.band, result.measured
     values = {
         "value": result.value, "low95": result.low95, "high95": result.high95,
-        "commanded": measured.commanded_value,
+        "commanded": result.measured.commanded_value,
     }  # fmt: skip
     return {
-        "run": one.name, "key": band.key, "title": band.title, "unit": band.unit,
+        "run": one.name, **msgspec.structs.asdict(result.band),
         **{name: value if isfinite(value) else None for name, value in values.items()},
-        "events": measured.events, "least_events": band.least, "band": [band.low, band.high],
-        "verdict": result.verdict, "source": band.source, "basis": one.run.joints.basis(band.group),
+        "events": result.measured.events, "verdict": result.verdict,
+        "basis": one.run.joints.basis(result.band.group),
     }  # fmt: skip
-
-
-def gauge_places(result: MeasureResult) -> list[float]:
-    """Return band, interval and value on a scale of 0..100; a distant one is at its end."""
-    band = result.band
-    width = 2.5 * (band.high - band.low)
-    start = band.low - 0.3 * width
-    places = (band.low, band.high, result.low95, result.high95, result.value)
-    return [min(100.0, max(0.0, 100.0 * (place - start) / width)) for place in places]
 
 
 def with_unit(value: float, unit: str) -> str:

@@ -1,4 +1,4 @@
-"""Saccades of a run beside the human main sequence: landings, rests between them, reactions."""
+"""Saccades of a run beside the human main sequence: landings, rests between them."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -17,20 +17,13 @@ LEAST_DEG = 1.0
 
 _SOON_S, _PAUSE_S = 0.1, 2.0
 
-EXPRESS_MS = 120.0
-"""Faster reactions are express saccades."""
-
 FAR_DEG = 10.0
 """Size above which people's saccades fall short."""
 
-_OVERSHOOT_DEG = (5.0, 20.0)
-_SETTLED_S, _LANDED_S = (0.06, 0.1), (0.02, 0.04)
+_LANDED_S = 0.02, 0.04
 _LANDS_S = 0.06
-_STILL_DEG_S = 8.0
 _CORRECTION_S = (0.08, 0.35)
-SHORT_S, SLOT_S = 0.15, 0.01
-_SPIKES_S = (0.04, 1.0)
-_NEAR_SLOTS = 5
+SHORT_S = 0.15
 _SMALL_DEG = (0.4, 1.5)
 _PIECE_S = 5.0
 _BRIDGED_S = 0.15
@@ -88,7 +81,7 @@ def planned_saccades(run: GazeTrace) -> Floats:
 
     Columns: onset and end in s, measured gaze amplitude in deg, and 1 on a face.
     """
-    t, gaze = run.column("t"), run.columns("gaze_yaw", "gaze_pitch")
+    t, gaze = run.column("t"), run.column("gaze")
     rows = []
     for flight in run.slices(run.column("phase") == PHASES.index("saccade")):
         first, last = flight.start, flight.stop
@@ -100,27 +93,6 @@ def planned_saccades(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 4)
 
 
-def overshoots(run: GazeTrace) -> Floats:
-    """Return (n,) the overshoot of each saccade of 5 to 20 deg, as a share of its amplitude."""
-    rows, gaze = [], run.columns("gaze_yaw", "gaze_pitch")
-    moves = np.hypot(*run.columns("target_yaw_rate", "target_pitch_rate").T)
-    asked = commanded(run)
-    onsets = [*(s.onset_s for s in asked), np.inf]
-    for saccade, next_s in zip(asked, onsets[1:], strict=True):
-        rest = run.between(saccade.end_s + _SETTLED_S[0], saccade.end_s + _SETTLED_S[1])
-        flight = run.between(saccade.onset_s - 0.01, saccade.end_s + _SETTLED_S[1])
-        small = not _OVERSHOOT_DEG[0] <= saccade.amplitude_deg <= _OVERSHOOT_DEG[1]
-        if small or next_s < saccade.end_s + _SETTLED_S[1] or rest.stop <= rest.start:
-            continue
-        if float(np.median(moves[rest])) > _STILL_DEG_S:
-            continue
-        path = gaze[flight]
-        whole = np.median(gaze[rest], axis=0) - path[0]
-        farthest = float(((path - path[0]) @ whole).max())
-        rows.append(max(0.0, farthest / float(whole @ whole) - 1.0))
-    return np.array(rows)
-
-
 def landing_errors(run: GazeTrace) -> Floats:
     """Return (n, 2) of saccades to targets 10 deg away and more: share of the distance, corrected.
 
@@ -129,7 +101,7 @@ def landing_errors(run: GazeTrace) -> Floats:
     corrected: 1 if another saccade to the same target follows within .35 s
     """
     t, shift = run.column("t"), run.column("shift")
-    gaze, target = run.columns("gaze_yaw", "gaze_pitch"), run.columns("target_yaw", "target_pitch")
+    gaze, target = run.column("gaze"), run.column("target")
     jumps, limited = planned_saccades(run), run.column("eye_limited")
     rows = []
     for number, (onset_s, end_s, _, _) in enumerate(jumps):
@@ -172,36 +144,15 @@ def face_rests(run: GazeTrace) -> Floats:
     return np.array([end - begin for _, begin, end in rests])
 
 
-def largest_slot_excess(rests_s: Floats) -> float:
-    """Return the largest excess share of rests in one slot of 10 ms over its neighbours.
-
-    A plausible law of dwell times is smooth; a lower limit accumulates rests at one duration. The
-    slot is chosen by every second rest and measured by the others, and vice versa, because by
-    chance alone the fullest of a hundred slots exceeds the law.
-    """
-    one, other = _beyond_neighbours(rests_s[::2]), _beyond_neighbours(rests_s[1::2])
-    return 0.5 * float(other[np.argmax(one)] + one[np.argmax(other)])
-
-
-def _beyond_neighbours(rests_s: Floats) -> Floats:
-    """Return the excess share of rests in each slot over its neighbours."""
-    edges = np.arange(_SPIKES_S[0], _SPIKES_S[1] + SLOT_S, SLOT_S)
-    share = np.histogram(rests_s, edges)[0] / max(1, len(rests_s))
-    near = np.ones(2 * _NEAR_SLOTS + 1)
-    near[_NEAR_SLOTS - 1 : _NEAR_SLOTS + 2] = 0.0
-    inside = np.convolve(np.ones_like(share), near, "same")
-    return np.asarray(share - np.convolve(share, near, "same") / inside)
-
-
 def rest_errors(run: GazeTrace) -> Floats:
     """Return per fixation the median angle of the lines of sight from the target, in deg."""
-    off = 0.5 * (run.column("off_left") + run.column("off_right"))
+    off = run.column("off").mean(axis=1)
     parts = [off[run.between(f.start_s + 0.04, f.end_s)] for f in run.fixations]
     return np.array([np.median(part) for part in parts if len(part)])
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
-    """Return the measures of saccades, landings, rests and reactions."""
+    """Return the measures of saccades, landings and rests."""
     seen, asked, every = saccade_table(run), commanded_saccade_table(run), commanded(run)
     onsets, ends = np.array([(s.onset_s, s.end_s) for s in every]).reshape(-1, 2).T
     pauses = onsets[1:] - ends[:-1]
@@ -215,7 +166,6 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     if len(starts):
         starts = starts[idle[np.searchsorted(run.column("t"), starts)]]
     searches = _events_per_piece(run, starts, idle)
-    latency_ms = 1e3 * np.array(run.reactions_s)
     return [
         *(
             MeasuredValue(curves.key, curves.inside(seen), mean, curves.inside(asked))
@@ -227,15 +177,11 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         MeasuredValue("too_soon", (pauses < _SOON_S).astype(float), mean),
         MeasuredValue("unasked", np.array(unasked, dtype=float), mean),
         MeasuredValue("rest_error", rest_errors(run), median),
-        MeasuredValue("overshoot", overshoots(run), median),
         MeasuredValue("landing", landed[:, 0], median),
         MeasuredValue("corrected", landed[:, 1], mean),
         MeasuredValue("short_rests", (rests_s < SHORT_S).astype(float), mean),
-        MeasuredValue("rest_spike", rests_s, largest_slot_excess),
         MeasuredValue("refixations", shifts, rate, count=round(shifts[:, 1].sum())),
         MeasuredValue("idle_rate", searches, rate, count=round(searches[:, 1].sum())),
-        MeasuredValue("reaction", latency_ms, median),
-        MeasuredValue("express", (latency_ms < EXPRESS_MS).astype(float), mean),
     ]
 
 

@@ -10,12 +10,12 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import MeasuredValue, mean, rate
-from gazerig.gaze.types import Floats, TurnState
+from gazerig.gaze.types import Floats
 
 Role = Literal["speaking", "listening", "dialogue"]
 
-STATES: tuple[TurnState, ...] = get_args(TurnState)
 AVERTED_DEG = 6.0
 CLEAR_DEG = 1.0
 _, _, _THINKS, _SPEAKS, _INTERRUPTED = range(5)
@@ -28,26 +28,6 @@ _LONG_S = 3.5
 _BEGINS_S, _ENDS_S = 0.3, 0.05
 """Time after the begin, and before the end of a turn, at which the gaze is judged."""
 _BLOCK_S = 20.0
-_MOVED_DEG = 1.0
-_LATEST_S = 3.0
-
-
-class TurnTrace(NamedTuple):
-    """Columns of a run, one value per tick.
-
-    Attributes:
-        t_s: Time.
-        state: Index in ``STATES``.
-        number: Number of the turn.
-        off_deg: (n, 2) Yaw and pitch of the gaze from the partner's face, NaN if unknown.
-        edge_deg: (n,) Extent of the face in that direction.
-    """
-
-    t_s: Floats
-    state: Floats
-    number: Floats
-    off_deg: Floats
-    edge_deg: Floats
 
 
 class Turn(NamedTuple):
@@ -69,24 +49,28 @@ class TurnLooks:
         looks: (n, 2) First row of each look away, and the one after its last.
     """
 
-    def __init__(self, run: TurnTrace) -> None:
-        self.run = run
-        off = run.off_deg
+    def __init__(self, run: GazeTrace) -> None:
+        self.t_s, self.state = run.column("t"), run.column("turn")
+        self.off_deg = off = run.column("off_partner")
         far = np.nan_to_num(np.hypot(off[:, 0], off[:, 1])) > np.maximum(
-            AVERTED_DEG, np.nan_to_num(run.edge_deg) + CLEAR_DEG
+            AVERTED_DEG, np.nan_to_num(run.column("face_edge")) + CLEAR_DEG
         )
         self.known = ~np.isnan(off[:, 0])
-        self.averted = _bridge(run.t_s, _bridge(run.t_s, far, True), False)
-        cuts = [0, *(np.flatnonzero(np.diff(run.number)) + 1).tolist(), len(run.number)]
+        self.averted = _bridge(self.t_s, _bridge(self.t_s, far, True), False)
+        cuts = [
+            0,
+            *(np.flatnonzero(np.diff(run.column("turn_number"))) + 1).tolist(),
+            len(run.column("turn_number")),
+        ]
         self.turns = [
-            Turn(int(run.state[a]), a, b, float(run.t_s[b - 1] - run.t_s[a]))
+            Turn(int(self.state[a]), a, b, float(self.t_s[b - 1] - self.t_s[a]))
             for a, b in zip(cuts, cuts[1:], strict=False)
         ]
         self.looks = _true_rows(self.averted)
 
     def blocks(self, role: Role) -> Floats:
         """Return (n, 3) seconds averted, seconds and looks away of stretches of a role."""
-        t, begins = self.run.t_s, self.looks[:, 0]
+        t, begins = self.t_s, self.looks[:, 0]
         rows = []
         for first, end in self._stretches(role):
             count = max(1, round(float(t[end - 1] - t[first]) / _BLOCK_S))
@@ -104,8 +88,8 @@ class TurnLooks:
         rows = []
         for first, end in self._stretches(role):
             begins = (self.looks[:, 0] >= first) & (self.looks[:, 0] < end)
-            for a, b in self.looks[begins & (self.run.state[first] != _THINKS)]:
-                off = np.abs(self.run.off_deg[a:b])
+            for a, b in self.looks[begins & (self.state[first] != _THINKS)]:
+                off = np.abs(self.off_deg[a:b])
                 yaw, pitch = off[np.nanargmax(np.hypot(*off.T))]
                 rows.append(float(yaw > pitch))
         return np.array(rows)
@@ -125,40 +109,11 @@ class TurnLooks:
                     found.append(float(not self.averted[last]))
         return np.array(found)
 
-    def latencies(self, state: TurnState) -> Floats:
-        """Return the times from thinking to a look away, or from an interruption to the face.
-
-        Turns that begin so do not count.
-        """
-        wanted = state == "thinking"
-        found = []
-        for one in self.turns:
-            judged = one.state == STATES.index(state) and self.known[one.first]
-            if judged and self.averted[one.first] != wanted:
-                changed = np.flatnonzero(self.averted[one.first : one.end] == wanted)
-                if len(changed):
-                    at = one.first + int(changed[0])
-                    found.append(float(self.run.t_s[at] - self.run.t_s[one.first]))
-                else:
-                    found.append(_LATEST_S)
-        return np.array(found)
-
-    def first_motions(self) -> Floats:
-        """Return the times from states that look away or back to a motion of 1 deg."""
-        t, off, found = self.run.t_s, self.run.off_deg, list[float]()
-        for one in self.turns:
-            soon = self._row_after(one.first, _BEGINS_S)
-            changes = soon < one.end and self.averted[one.first] != self.averted[soon]
-            if one.state in (_THINKS, _SPEAKS, _INTERRUPTED) and self.known[one.first] and changes:
-                moved = np.hypot(*(off[one.first : soon + 1] - off[one.first]).T) > _MOVED_DEG
-                found.append(float(t[one.first + int(np.argmax(moved))] - t[one.first]))
-        return np.array(found)
-
     def _long(self) -> list[Turn]:
         return [one for one in self.turns if one.state == _SPEAKS and one.length_s >= _LONG_S]
 
     def _row_after(self, row: int, later_s: float) -> int:
-        return int(np.searchsorted(self.run.t_s, self.run.t_s[row] + later_s))
+        return int(np.searchsorted(self.t_s, self.t_s[row] + later_s))
 
     def _stretches(self, role: Role) -> list[tuple[int, int]]:
         """Return the rows of a role: thinking between short turns belongs to their dialogue."""
@@ -179,9 +134,9 @@ class TurnLooks:
         return found
 
 
-def measures(run: TurnTrace) -> list[MeasuredValue]:
+def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of a run; none if no turn was reported."""
-    if not run.state.any():
+    if not run.column("turn").any():
         return []
     looks, found = TurnLooks(run), list[MeasuredValue]()
     for role in get_args(Role):
@@ -196,15 +151,7 @@ def measures(run: TurnTrace) -> list[MeasuredValue]:
         *found,
         MeasuredValue("turn_begins", looks.begins(), mean),
         MeasuredValue("turn_ends", looks.ends(), mean),
-        MeasuredValue("turn_motion", 1e3 * looks.first_motions(), late),
-        MeasuredValue("turn_thinks", 1e3 * looks.latencies("thinking"), late),
-        MeasuredValue("turn_yields", 1e3 * looks.latencies("interrupted"), late),
     ]
-
-
-def late(values: Floats) -> float:
-    """Return the 95th percentile."""
-    return float(np.percentile(values, 95.0))
 
 
 def _true_rows(mask: NDArray[np.bool_]) -> NDArray[np.intp]:

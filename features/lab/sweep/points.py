@@ -46,28 +46,20 @@ def grid(settings: Sequence[str], read: Callable[[str, str], Any]) -> list[Point
 
 
 def check_points(rig: Rig, points: Sequence[Point]) -> None:
-    """Refuse values that the rig's rules allow at no point.
-
-    A point that only breaks a rule between two keys is kept: its runs report the fault.
+    """Refuse points of which the rig's rules allow none; another bad one is a failed run.
 
     Raises:
-        ConfigError: With one fault for each such value.
+        ConfigError: With the faults of all.
     """
-    allowed, refused = set[tuple[str, str]](), dict[tuple[str, str], ConfigFault]()
+    faults = list[ConfigFault]()
     for point in points:
         try:
             apply_changes(rig, point)
         except ConfigError as error:
-            for fault in error.faults:
-                if fault.key in point:
-                    refused.setdefault((fault.key, repr(point[fault.key])), fault)
+            faults += error.faults
         else:
-            allowed.update((key, repr(value)) for key, value in point.items())
-    faults = [fault for level, fault in refused.items() if level not in allowed]
-    if faults:
-        raise ConfigError(faults)
-    if not allowed:
-        apply_changes(rig, points[0])
+            return
+    raise ConfigError(dict.fromkeys(faults))
 
 
 def _listed(setting: str, text: str) -> str:
