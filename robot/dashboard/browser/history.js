@@ -1,0 +1,51 @@
+// The last half minute: joint angles, targets, levels of the guard, eye movements.
+
+import { on } from "/rig/connection.js";
+import { degrees, isLed } from "/rig/words.js";
+
+export const KEPT_S = 30;
+
+/** Angles in degrees, oldest first: {t_s, joints: name -> [desired, commanded, measured]}. */
+export const trail = [];
+/** Intervals {start_s, end_s, text, kind} in which a value was constant, oldest first. */
+export const intervals = { target: [], part: [], guard: [], head: [], people: [] };
+/** Saccades and blinks that have ended, as the rig's events. */
+export const movements = [];
+
+/** Lengthen a row's last interval, or begin the next one. */
+function extend(row, t_s, text, kind) {
+  const last = row.at(-1);
+  if (last?.text === text && last.kind === kind) last.end_s = t_s;
+  else row.push({ start_s: last?.end_s ?? t_s, end_s: t_s, text, kind });
+}
+
+function forget(before_s) {
+  while (trail[1]?.t_s < before_s) trail.shift(); // one older, so that lines start at the edge
+  while (movements[0]?.t_s < before_s) movements.shift();
+  for (const row of Object.values(intervals)) while (row[0]?.end_s < before_s) row.shift();
+}
+
+on("state", (state) => {
+  const { t_s, gaze } = state;
+  if (t_s < trail.at(-1)?.t_s) forget(Infinity); // the rig was started again
+  const joints = {};
+  for (const [name, joint] of Object.entries(state.joints)) {
+    joints[name] = [joint.desired_rad, joint.commanded_rad, joint.measured_rad].map(degrees);
+  }
+  trail.push({ t_s, joints });
+  const led = isLed(state);
+  const part = led ? "" : gaze.part ?? "";
+  const turn = state.conversation?.state ?? "idle";
+  const speaking = state.people.filter((person) => person.speaks).map(({ id }) => id).join(", ");
+  extend(intervals.target, t_s, gaze.target.split(":")[0], led ? state.control_source.kind : gaze.kind);
+  extend(intervals.part, t_s, part, part);
+  const level = state.stopped ? "stopped" : state.level;
+  extend(intervals.guard, t_s, level.replace("_", " "), level);
+  extend(intervals.head, t_s, turn === "idle" ? "" : turn, turn);
+  extend(intervals.people, t_s, speaking && `speaks: ${speaking}`, speaking && "face");
+  forget(t_s - KEPT_S);
+});
+
+on("event", (event) => {
+  if (["saccade_landing", "blink"].includes(event.kind)) movements.push(event);
+});
