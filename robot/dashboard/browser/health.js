@@ -91,7 +91,7 @@ function row(name, joint, unanswered, limits) {
   const isKnown = (value) => value !== null && value !== undefined;
   return [
     title,
-    cell(`${degrees(joint.measured_rad).toFixed(0)}°`),
+    cell(`${Math.round(degrees(joint.measured_rad)) + 0}°`),
     cell(isKnown(heat) ? heat.toFixed(0) : "-", heat >= hot_c ? "over" : heat >= warm_c ? "near" : ""),
     cell(isKnown(load) ? `${load < 0 ? "-" : "+"}${Math.abs(100 * load).toFixed(0)} %` : "-",
       Math.abs(load) >= HARD_LOAD ? "over" : Math.abs(load) > heavy_load ? "near" : ""),
@@ -109,7 +109,7 @@ function timing(loop) {
   const late = rate_hz > 0 && worst_ms > (LATE_SHARE * 1000) / rate_hz ? "near" : "";
   return [
     table(["rate", "p50", "p99", "worst", "overruns"], [[
-      make("td", { textContent: `${rate_hz.toFixed(1)} Hz` }), cell(`${p50_ms.toFixed(2)} ms`),
+      `${rate_hz.toFixed(1)} Hz`, cell(`${p50_ms.toFixed(2)} ms`),
       cell(`${p99_ms.toFixed(2)} ms`), cell(`${worst_ms.toFixed(2)} ms`, late),
       cell(overruns, overruns ? "near" : ""),
     ]]),

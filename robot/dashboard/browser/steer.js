@@ -19,11 +19,11 @@ export function gazeButtons() {
   }, "release gaze and joints, or hold the gaze");
 }
 
-/** Row of buttons for a menu of the rig, or for its characters; null without a choice. */
+/** Row of buttons for a menu of the rig, or for its characters; null without anything to choose. */
 export function menu(name, title = name) {
   const names = name === "character" ? choices.characters : choices.menus[name] ?? [];
   const options = fitting(names, now.rig).toSorted();
-  if (!options.length) return null;
+  if (options.length < 2) return null;
   const made = buttons(title, options, (choice) => order(
     name === "character" ? { do: "character", name: choice } : { do: "ask", menu: name, choice },
   ));
