@@ -7,6 +7,7 @@ its own thread or process, and receives each tick with hardly any delay.
 import contextlib
 import os
 from collections.abc import Callable, Iterator
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,25 +20,26 @@ from gazerig.robot.app.door_processes import DoorProcesses
 from gazerig.robot.app.mock_agent import AgentScene, MockAgent
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.app.voice import RunVoice
-from gazerig.robot.control.command_handler import accept_only_stops
 from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.observers import Observers, failure_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
+from gazerig.robot.control.tick_text import health_text
 from gazerig.robot.dashboard.door.token_file import hide_token
-from gazerig.robot.dashboard.feed.live_feed import LiveRig
 from gazerig.robot.dashboard.feed.page_process import PageProcess
-from gazerig.robot.dashboard.feed.publisher import ParamFeed, Publisher
-from gazerig.robot.dashboard.feed.snapshot import RunState
+from gazerig.robot.dashboard.feed.publisher import Publisher
+from gazerig.robot.dashboard.feed.rig_feed import LiveRig
 from gazerig.robot.dashboard.feed.status_line import StatusLine
-from gazerig.robot.dashboard.requests.page_requests import PageRequestHandler
-from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
+from gazerig.robot.model.joint import JointLimit
+from gazerig.robot.model.moved_opponent import has_opponent
 from gazerig.robot.model.types import LoopFigures
-from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.remote.client import rig_name
-from gazerig.robot.remote.live_server import LiveServer
+from gazerig.robot.remote.live_server import LiveServer, StopOnlyServer
+from gazerig.robot.remote.topics import JointInfo, RigInfo, RunState
+from gazerig.robot.safety.health import HOT_C, LASTING_LOAD, VOLTAGE_MARGIN_V, WARM_C
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 
 if TYPE_CHECKING:
@@ -110,8 +112,8 @@ class RunObservers:
         )
         doors = assembly.live_params.rig.doors if self._live is not None and not led_by else ()
         self._doors = DoorProcesses(doors, os.getpid(), say)
-        self._picking = ClickToLook(
-            PixelToWorld(assembly.mount, assembly.poses, assembly.camera_params)
+        self._page_server = self._live or StopOnlyServer(
+            assembly.robot.command, assembly.clock, about, say, f"{led_by} leads the head now"
         )
         address = options.page_address
         self._page = self._make_page(address, options.page_token) if address is not None else None
@@ -121,10 +123,7 @@ class RunObservers:
         tell = say if options.token_file is None else lambda line: say(hide_token(line))
         self._publisher = None
         if live and self._page:
-            feed = ParamFeed(self._page.send, tuning) if tuning is not None else None
-            self._publisher = Publisher(
-                self._page, self._live_rig, self._run_state, feed, tell, browse
-            )
+            self._publisher = Publisher(self._page, self._live_rig, self._run_state, tell, browse)
         health = assembly.robot.body.bus.health
         self._status = (
             StatusLine(status, health, self._timing.figures)
@@ -140,52 +139,49 @@ class RunObservers:
         self.attach(self._observers)
 
     def _make_page(self, address: tuple[str, int], token: str) -> PageProcess:
-        command = self._made.robot.command
-        page_requests = PageRequestHandler(
-            accept_only_stops(command, f"{self._led_by} leads the head now")
-            if self._led_by
-            else command,
-            params=self._tuning,
-            point=self._picking.point,
-            refusals=(ConfigError,) if self._tuning is not None else (),
-            saved=self._live.saved if self._live is not None else None,
-            paths=self._tuning.confined if self._tuning is not None else None,
-        )
         browser = self._made.browser
         on_picture = browser.take if browser is not None else None
-        live = self._live
-        return PageProcess(
-            *address,
-            page_requests,
-            on_picture,
-            lambda: live.path if live is not None else None,
-            token,
-        )
+        return PageProcess(*address, self._page_server.serve, on_picture, token)
 
     def _live_rig(self) -> LiveRig:
-        made = self._made
-        picture = DrawnScene(made.scene) if made.scene is not None else None
+        made, tuning = self._made, self._tuning
+        rig = made.live_params.rig
         shapes = made.room.shapes() if made.room is not None else None
+        names = made.live_params.parts.kinematics.names
         return LiveRig(
-            made.shown_rig(), self._emulated, picture, shapes, self._detector,
-            self._choice,
-        )  # fmt: skip
+            made.shown_rig(),
+            RigInfo(
+                rig.name,
+                str(tuning.path) if tuning is not None else "",
+                self._emulated,
+                self._led_by,
+                has_opponent(shapes),
+                self._detector,
+                self._choice,
+                dict(zip(names, map(_joint_info, limits(rig.joints)), strict=True)),
+            ),
+            DrawnScene(made.scene) if made.scene is not None else None,
+            shapes,
+        )
 
     def _run_state(self) -> RunState:
-        """Return the values of the page that are not in ticks."""
-        robot = self._made.robot
-        errors = {kind: n for kind, n in robot.body.bus.health().errors.items() if n}
+        """Return the state of the run that is not in ticks."""
+        robot, tuning = self._made.robot, self._tuning
         menus = robot.menus()
-        character = self._tuning.character_name if self._tuning is not None else ""
         self._states += 1
         if self._states % _STATES_PER_FIGURES == 1:  # computing them takes half a millisecond
             self._figures = self._timing.figures()
         return RunState(
-            errors, menus["behaviour"][0], menus["conversation"][0], character,
-            self._scene_start_s(),
-            self._figures,
+            menus["behaviour"][0],
+            menus["conversation"][0],
+            tuning.character_name if tuning is not None else "",
             menus.get("expression", ("",))[0],
-        )  # fmt: skip
+            health_text(robot.body.bus.health()),
+            tuning.version if tuning is not None else 0,
+            self._figures,
+            busy_text(self._figures),
+            self._scene_start_s(),
+        )
 
     def attach(self, observers: Observers) -> None:
         """Add all of them as observers of the ticks; any that fails is dropped."""
@@ -198,7 +194,7 @@ class RunObservers:
         if not self._fast:
             observers.add("the loop's time", self._record_time)
         if self._page is not None:
-            observers.add("picking a point on the page", self._follow)
+            observers.add("the page's view", self._follow)
         if self._status is not None:
             observers.add("the status line", self._status.update)
         if self._live is not None:
@@ -250,9 +246,6 @@ class RunObservers:
         with self._report_errors("the page"):
             if self._page is not None:
                 self._page.open()
-                if not self._led_by:
-                    self._page.offer(self._made.robot.menus())
-                    self._page.offer_tracks(self._made.robot.tracks())
         with self._report_errors("the doors"):
             self._doors.open()
 
@@ -263,11 +256,6 @@ class RunObservers:
             yield
         except Exception as error:
             self._say(failure_text(name, error))
-
-    def show_message(self, text: str) -> None:
-        """Show a message to all users of the page."""
-        if self._page is not None:
-            self._page.say(text)
 
     def remove_files(self) -> None:
         """Remove the files of a robot that could not start."""
@@ -293,10 +281,10 @@ class RunObservers:
             if self._live is not None:
                 self._live.close()
         with self._report_errors("the page"):
-            if self._publisher is not None:
-                self._publisher.close()
             if self._page is not None:
                 self._page.close()
+            if not self._live:
+                self._page_server.close()
         with self._report_errors("the recording"):
             if self._recorder is not None:
                 self._say(self._recorder.close(count.stopped_by, self._made.sent_bytes_digest()))
@@ -311,8 +299,7 @@ class RunObservers:
         self._timing.update(tick.t_s)
 
     def _follow(self, tick: Tick) -> None:
-        """Store the percept for the placement of a click, and show the rig again after tuning."""
-        self._picking.newest = tick
+        """Show the rig again after tuning or with another camera."""
         browser = self._made.browser
         if browser is not None:
             browser.update()
@@ -323,3 +310,16 @@ class RunObservers:
         if browser is not None and self._by_browser != browser.in_use:
             self._by_browser = browser.in_use
             self._publisher.resend_geometry()
+
+
+def _joint_info(limit: JointLimit) -> JointInfo:
+    highest_v = limit.highest_v - VOLTAGE_MARGIN_V
+    return JointInfo(
+        limit.low_rad,
+        limit.high_rad,
+        limit.hottest_c - WARM_C,
+        limit.hottest_c - HOT_C,
+        limit.lowest_v + VOLTAGE_MARGIN_V,
+        highest_v if isfinite(highest_v) else None,
+        LASTING_LOAD,
+    )

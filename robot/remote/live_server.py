@@ -8,6 +8,7 @@ found the same, and a missing file when it is missing for several checks.
 """
 
 import contextlib
+import socket
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -177,8 +178,13 @@ class LiveServer:
             robot.command, tuning, refusals, self._watch.saved, voice=voice, menus=robot.menus,
             tracks=robot.tracks,
         )  # fmt: skip
-        requests = RequestHandler(handler, self._pulse, about, fault, changing, paths)
-        self._server = RemoteServer(requests, say)
+        self._server = RemoteServer(
+            RequestHandler(handler, self._pulse, about, fault, changing), say
+        )
+        # Apart from programs of this computer, so that neither uses up the other's time.
+        self._page_server = RemoteServer(
+            RequestHandler(handler, self._pulse, about, fault, changing, paths), say
+        )
 
     def open(self) -> None:
         """Listen to other programs and watch the files; print a line if listening fails."""
@@ -189,22 +195,19 @@ class LiveServer:
         self._watch.start()
 
     @property
-    def path(self) -> Path | None:
-        """Return the path of the socket while it listens, otherwise None."""
-        return self._server.path
+    def serve(self) -> Callable[[socket.socket], None]:
+        """Return the function that answers the page's process over a connection."""
+        return self._page_server.serve
 
     @property
     def update(self) -> Callable[[Tick], None]:
         """Return the function that stores the newest tick, for the loop."""
         return self._pulse.update
 
-    def saved(self, path: Path) -> None:
-        """Record that this program itself has written a file."""
-        self._watch.saved(path)
-
     def close(self) -> None:
         """Close all connections and stop watching the files."""
         self._watch.stop()
+        self._page_server.close()
         self._server.close()
 
     def _files(self) -> tuple[Path, ...]:
@@ -231,9 +234,6 @@ class LiveServer:
             self._say(f"{path} was written again without changes")
 
 
-_FIXED = "it is being calibrated: its parameters cannot be changed until the calibration ends"
-
-
 class StopOnlyServer:
     """Server that executes stop and resume, and refuses all other commands.
 
@@ -242,6 +242,7 @@ class StopOnlyServer:
         clock: Clock of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         say: Prints a line on the terminal.
+        reason: Reason for a refusal.
     """
 
     def __init__(
@@ -250,12 +251,16 @@ class StopOnlyServer:
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
+        reason: str = "it is being calibrated",
     ) -> None:
         self._say = say
         self._pulse = LoopMonitor(clock)
-        only = accept_only_stops(command, "it is being calibrated")
-        handler = CommandHandler(only, None, fixed=_FIXED)
+        handler = CommandHandler(
+            accept_only_stops(command, reason), None,
+            fixed=f"{reason}: its parameters cannot be changed",
+        )  # fmt: skip
         self._server = RemoteServer(RequestHandler(handler, self._pulse, about), say)
+        self.serve = self._server.serve
 
     def open(self) -> None:
         """Listen to other programs; print a line if that fails."""

@@ -9,7 +9,6 @@ Websockets do not count: each kind has a limit of its own.
 import asyncio
 import hashlib
 import hmac
-import threading
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,41 +31,10 @@ _YOUNG_S = 1.0
 _DIGITS = 4
 
 
-class Browsers:
-    """Names of browsers by their cookies; safe to call from any thread."""
-
-    def __init__(self, token: str) -> None:
-        self._key = token.encode()
-        self._lock = threading.Lock()
-        self._open: Counter[str] = Counter()
-        self._leads = ""
-
-    def name(self, cookie: str | None) -> str:
-        """Return a browser's name; it is constant while the browser keeps its cookie."""
-        if not cookie:
-            return "the page"
-        digest = hmac.new(self._key, cookie.encode(errors="replace"), hashlib.sha256)
-        return f"browser {digest.hexdigest()[:_DIGITS]}"
-
-    @contextmanager
-    def connected(self, name: str) -> Iterator[None]:
-        """Count a browser as connected within the block."""
-        with self._lock:
-            self._open[name] += 1
-        try:
-            yield
-        finally:
-            with self._lock:
-                self._open[name] -= 1
-
-    def give_control(self, name: str) -> None:
-        """Record the browser that controlled the head last."""
-        self._leads = name
-
-    def in_control(self) -> str:
-        """Return the browser that controlled the head last, "" if it has disconnected."""
-        with self._lock:
-            return self._leads if self._leads and self._open[self._leads] > 0 else ""
+def browser_name(key: str, cookie: str) -> str:
+    """Return a browser's name; it is constant while the browser keeps its cookie."""
+    digest = hmac.new(key.encode(), cookie.encode(errors="replace"), hashlib.sha256)
+    return f"browser {digest.hexdigest()[:_DIGITS]}"
 
 
 class TabLimits:

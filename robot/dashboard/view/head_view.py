@@ -8,7 +8,8 @@ import numpy as np
 import viser
 
 from gazerig.gaze.angles import compose, rotate_back, rotation, sub, turn_about
-from gazerig.gaze.types import Mat3
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.dashboard.feed.rig_feed import ShownHead
 from gazerig.robot.dashboard.view.glb import (
     CLOTH,
     EYE,
@@ -31,10 +32,9 @@ from gazerig.robot.description.parts import (
     measures_of,
     meeting_rad,
 )
-from gazerig.robot.model.frames import CameraParams, quaternion
+from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.kinematics import LIDS, GeometryParams
-from gazerig.robot.model.types import Snapshot
+from gazerig.robot.model.kinematics import LIDS
 
 _SIGHT: dict[str, Colour] = {
     "fixate": (48, 190, 120),
@@ -82,19 +82,16 @@ class _Node(NamedTuple):
 class HeadView:
     """Rig in the scene, with all parts that its joints move.
 
-    shape: geometry of the rig; None: derived from snapshots
     on_table: whether it is on an object of a drawn world and needs no shadow of its own
     lid_edges: positions of the lid edges; without lids before the first snapshot
     """
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
-        self.shape: RigShape | None = None
         self.on_table = False
         self.links: dict[str, _Node] = {}
         self._paths: dict[str, str] = {}
         self._drawn: RigShape | None = None
-        self._seen: tuple[tuple[str, ...], HeadMeasures] | None = None
         self._description: Description | None = None
         self._root = scene.add_frame("/rig", show_axes=False)
         self._shade = self._add("/shade", painted_glb(glow_disc((20, 24, 34, 140)), FLAT))
@@ -106,28 +103,27 @@ class HeadView:
     def _add(self, name: str, data: bytes) -> viser.GlbHandle:
         return self._scene.add_glb(name, data, cast_shadow=False, receive_shadow=False)
 
-    def show(self, snapshot: Snapshot, *, sight: bool = False, camera: bool = False) -> None:
+    def show(self, head: ShownHead, *, sight: bool = False, camera: bool = False) -> None:
         """Move all parts to their measured positions.
 
         Args:
-            snapshot: snapshot of the rig.
+            head: the rig in a tick.
             sight: whether to show the lines of sight.
             camera: whether to show the camera's housing, which otherwise does not cover the face.
         """
-        shape = with_shown_face(self.shape) if self.shape is not None else None
-        if shape is None:
-            seen = snapshot.joints, head_dimensions(snapshot)
-            shape = self._drawn if seen == self._seen else shape_of(*seen, snapshot)
-            self._seen = seen
-        if shape != self._drawn and shape is not None:  # the geometry has changed
+        tick, pose, names = head.tick, head.tick.pose, head.rig.kinematics.names
+        shape = with_shown_face(head.rig.shape)
+        if shape != self._drawn:  # the geometry has changed
             self._drawn, self.lid_edges = shape, lid_edges(shape)
             self._draw(describe(shape), shape)
-        description, shape = self._description, self._drawn
-        assert description is not None and shape is not None  # fitted
-        angles = description.angles(snapshot.joints, snapshot.measured_rad)
-        angles |= lid_angles(shape, snapshot.lids, snapshot.lower_lids or (0.0, 0.0))
-        drawn = zip(_DRAWN_ONLY, self._blend_face(snapshot), strict=True)
-        angles |= {name: angle for name, angle in drawn if name not in snapshot.joints}
+        description = self._description
+        assert description is not None
+        angles = description.angles(names, tick.joints.position_rad)
+        angles |= lid_angles(
+            shape, (pose.lid_left, pose.lid_right), (pose.lower_left, pose.lower_right)
+        )
+        drawn = zip(_DRAWN_ONLY, self._blend_face(head), strict=True)
+        angles |= {name: angle for name, angle in drawn if name not in names}
         for link in description.links:
             if link.joint is not None:
                 R = compose(link.R, turn_about(link.joint.axis, angles[link.joint.name]))
@@ -135,22 +131,23 @@ class HeadView:
         for look in self.links[CAMERA].looks:
             look.visible = camera
         self._shade.visible = not self.on_table
-        colour = _SIGHT.get(snapshot.phase, _SIGHT["fixate"])
-        for line, p_world_m in zip(self._sights, snapshot.p_world_eyes_m, strict=True):
+        colour = _SIGHT.get(tick.gaze.phase, _SIGHT["fixate"])
+        for line, p_world_m in zip(self._sights, eyes_m(head), strict=True):
             if sight:
                 # Their length is the target's distance: they meet at the target only if the eyes
                 # fixate it.
-                line.scale = round(dist(p_world_m, snapshot.p_world_target_m), 2)
+                line.scale = round(dist(p_world_m, tick.gaze.gaze_point_world_m), 2)
             line.visible = sight
             if colour != self._colour:
                 line.colors = np.array(colour, np.uint8)
         self._colour = colour
 
-    def _blend_face(self, snapshot: Snapshot) -> tuple[float, float, float]:
+    def _blend_face(self, head: ShownHead) -> tuple[float, float, float]:
         """Return the angles of brows and jaw that are only drawn, in radians."""
-        share = 1.0 - exp(-max(0.0, snapshot.t_s - self._face_s) / _FACE_TAU_S)
-        self._face_s = snapshot.t_s
-        known = (_FACES_DEG[name] for name in snapshot.expressed if name in _FACES_DEG)
+        t_s = head.tick.t_s
+        share = 1.0 - exp(-max(0.0, t_s - self._face_s) / _FACE_TAU_S)
+        self._face_s = t_s
+        known = (_FACES_DEG[name] for name in head.expressed if name in _FACES_DEG)
         goal = next(known, (0.0, 0.0))
         brows, jaw = (
             now + share * (radians(to) - now) for now, to in zip(self._face_rad, goal, strict=True)
@@ -222,14 +219,22 @@ def lid_angles(
     }
 
 
-def head_dimensions(snapshot: Snapshot) -> HeadMeasures:
-    """Return the dimensions of the head in a snapshot, from its eyes and the pivot of its neck."""
-    pivot_m = None
-    if snapshot.p_world_pivot_m is not None:
-        off = sub(snapshot.p_world_pivot_m, snapshot.p_world_head_m)
-        x, y, z = rotate_back(snapshot.R_world_head, off)
-        pivot_m = (round(x, 4), round(y, 4), round(z, 4))
-    return measures_of(*snapshot.p_world_eyes_m, pivot_m)
+def eyes_m(head: ShownHead) -> tuple[Vec3, Vec3]:
+    """Return the centres of the left and the right eye, world."""
+    return head.tick.pose.p_world_eye_left_m, head.tick.pose.p_world_eye_right_m
+
+
+def pivot_m(head: ShownHead) -> Vec3:
+    """Return the intersection of the neck's pitch and roll axes, world."""
+    pose = head.tick.pose
+    return head.rig.kinematics.body_volumes(pose.R_world_head, pose.p_world_head_m)[0].start_m
+
+
+def head_dimensions(head: ShownHead) -> HeadMeasures:
+    """Return the dimensions of the head, from its eyes and the pivot of its neck."""
+    pose = head.tick.pose
+    x, y, z = rotate_back(pose.R_world_head, sub(pivot_m(head), pose.p_world_head_m))
+    return measures_of(*eyes_m(head), (round(x, 4), round(y, 4), round(z, 4)))
 
 
 class LidEdges(NamedTuple):
@@ -266,19 +271,6 @@ _LID_RAD = {"upper": radians(74.0), "lower": radians(22.0)}
 """Rotation of shown lids from closed to open, about that of a person. Servos of a small head move
 its lids less, so that the head would always look sleepy."""
 _JOINT = JointParams(1, "xl330-m077", -90.0, 90.0, 600.0, 10_000.0)
-
-
-def shape_of(joints: tuple[str, ...], measures: HeadMeasures, snapshot: Snapshot) -> RigShape:
-    """Return a rig with the joints and the dimensions of a snapshot."""
-    x, _, z = measures.pivot_m
-    pivot_m = snapshot.p_world_pivot_m
-    above_base_m = pivot_m[2] if pivot_m is not None else snapshot.p_world_head_m[2] + z
-    geometry = GeometryParams(
-        max(0.0, 1e3 * above_base_m), -1e3 * x, -1e3 * z, 1e3 * measures.interocular_m
-    )
-    lids = dict.fromkeys((name for name in LIDS if name in joints), (0.0, 0.0))
-    shape = RigShape("rig", geometry, dict.fromkeys(joints, _JOINT), lids, {}, CameraParams())
-    return with_shown_face(shape)
 
 
 def with_shown_face(shape: RigShape) -> RigShape:

@@ -1,5 +1,6 @@
 """Layers of the page's scene around the rig: desired pose, camera, fields of the eyes."""
 
+from collections.abc import Container
 from math import atan, radians, tan
 from typing import NamedTuple
 
@@ -7,15 +8,16 @@ import numpy as np
 import viser
 
 from gazerig.gaze.angles import rotate_back, sub
-from gazerig.gaze.field_of_view import FIELD_DEG
-from gazerig.gaze.types import Floats
-from gazerig.robot.dashboard.feed.live_feed import OverlayChoices
-from gazerig.robot.dashboard.view.head_view import LidEdges
+from gazerig.gaze.field_of_view import FIELD_DEG, line_of_sight
+from gazerig.gaze.types import Floats, GazeState, Vec3
+from gazerig.robot.dashboard.feed.rig_feed import ShownHead
+from gazerig.robot.dashboard.view.head_view import LidEdges, eyes_m
 from gazerig.robot.dashboard.view.scene_node import pitch_up, rotation_to, set_pose
 from gazerig.robot.description.mesh import Colour, Mesh, stored_shape
 from gazerig.robot.description.parts import EYE_RADIUS, SIDES, measures_of
 from gazerig.robot.model.frames import quaternion
-from gazerig.robot.model.types import CommandedPose, Snapshot
+from gazerig.robot.model.requests import Layer
+from gazerig.robot.model.types import JointState
 
 
 class OverlayPanel:
@@ -26,11 +28,11 @@ class OverlayPanel:
         self._camera = CameraField(scene)
         self._eyes = EyeFields(scene)
 
-    def show(self, snapshot: Snapshot, layers: OverlayChoices, edges: LidEdges) -> None:
+    def show(self, head: ShownHead, layers: Container[Layer], edges: LidEdges) -> None:
         """Draw the selected layers and remove the others."""
-        self._commanded_pose.show(snapshot if layers.ghost else None, edges)
-        self._camera.show(snapshot if layers.camera else None)
-        self._eyes.show(snapshot if layers.eyes else None)
+        self._commanded_pose.show(head if "ghost" in layers else None, edges)
+        self._camera.show(head if "camera" in layers else None)
+        self._eyes.show(head if "eyes" in layers else None)
 
 
 _CAMERA: Colour = (120, 128, 140)
@@ -50,14 +52,18 @@ class CameraField:
         self._shape: tuple[float, float] | None = None
         self._frustum: viser.CameraFrustumHandle | None = None
 
-    def show(self, snapshot: Snapshot | None) -> None:
-        """Move it to the camera; hide it without a snapshot or a camera."""
-        camera = snapshot.camera if snapshot is not None else None
-        if camera is None:
+    def show(self, head: ShownHead | None) -> None:
+        """Move it to the camera; hide it without a head or before the first frame."""
+        found = head.tick.detections if head is not None else None
+        if head is None or found is None:
             if self._frustum is not None:
                 self._frustum.visible = False
             return
-        shape = (round(camera.horizontal_rad, 4), round(camera.aspect, 4))
+        pose, across = head.tick.pose, head.rig.horizontal_rad
+        if found.lens is not None:
+            across = 2.0 * atan(0.5 * found.width_px / found.lens.fx_px)
+        shape = (round(across, 4), round(found.width_px / found.height_px, 4))
+        R, p_m = head.rig.mount.pose(pose.R_world_head, pose.p_world_head_m)
         if self._frustum is None or shape != self._shape:
             horizontal_rad, aspect = self._shape = shape
             self._frustum = self._scene.add_camera_frustum(  # replaces one of another shape
@@ -72,7 +78,7 @@ class CameraField:
                 receive_shadow=False,
             )
         self._frustum.visible = True
-        set_pose(self._frustum, camera.p_world_camera_m, quaternion(camera.R_world_camera))
+        set_pose(self._frustum, p_m, quaternion(R))
 
 
 class EyeFields:
@@ -94,13 +100,13 @@ class EyeFields:
                 thickness_units="screen",
             )
 
-    def show(self, snapshot: Snapshot | None) -> None:
-        """Rotate the fields with the eyes; hide them without a snapshot."""
+    def show(self, head: ShownHead | None) -> None:
+        """Rotate the fields with the eyes; hide them without a head."""
         for frame in self._frames:
-            frame.visible = snapshot is not None
-        if snapshot is None:
+            frame.visible = head is not None
+        if head is None:
             return
-        sides = zip(self._frames, snapshot.p_world_eyes_m, snapshot.gaze_world, strict=True)
+        sides = zip(self._frames, eyes_m(head), lines_of_sight(head.tick.pose), strict=True)
         for frame, p_world_m, gaze_world in sides:
             set_pose(frame, p_world_m, rotation_to(gaze_world))
 
@@ -178,32 +184,36 @@ class CommandedPoseView:
             self._add(f"{frame.name}/edge", stored_shape(f"{which}_lid_edge").mesh, 0.45)
         return _CommandedEye(side, ball, upper, lower)
 
-    def show(self, snapshot: Snapshot | None, edges: LidEdges) -> None:
-        """Move the drawing to the desired pose; hide it if there is no snapshot or no such pose."""
-        ghost = snapshot.commanded_pose if snapshot is not None else None
-        self._frame.visible = ghost is not None
-        if snapshot is not None and ghost is not None:
-            if snapshot.joints != self._joints:
-                self._joints = snapshot.joints
-                for eye in self._eyes:  # only lids that a joint moves
-                    eye.upper.visible = f"{eye.side}_upper_lid" in self._joints
-                    eye.lower.visible = f"{eye.side}_lower_lid" in self._joints
-            turned = np.array(ghost.R_world_head) - np.array(snapshot.R_world_head)
-            self._shell.visible = float(np.abs(turned).max()) > _APART
-            self._move(ghost, edges)
+    def show(self, head: ShownHead | None, edges: LidEdges) -> None:
+        """Move the drawing to the desired pose; hide it without a head."""
+        self._frame.visible = head is not None
+        if head is None:
+            return
+        names, desired_rad = head.rig.kinematics.names, head.tick.desired_rad
+        at_rest = (0.0,) * len(desired_rad)
+        ghost = head.rig.kinematics.forward(JointState(desired_rad, at_rest, at_rest, ()))
+        if names != self._joints:
+            self._joints = names
+            for eye in self._eyes:  # only lids that a joint moves
+                eye.upper.visible = f"{eye.side}_upper_lid" in names
+                eye.lower.visible = f"{eye.side}_lower_lid" in names
+        turned = np.array(ghost.R_world_head) - np.array(head.tick.pose.R_world_head)
+        self._shell.visible = float(np.abs(turned).max()) > _APART
+        self._move(ghost, edges)
 
-    def _move(self, ghost: CommandedPose, edges: LidEdges) -> None:
+    def _move(self, ghost: GazeState, edges: LidEdges) -> None:
         R, p_world_head_m = ghost.R_world_head, ghost.p_world_head_m
+        eyes = ghost.p_world_eye_left_m, ghost.p_world_eye_right_m
         set_pose(self._frame, p_world_head_m, quaternion(R))
         sides = zip(
             self._eyes,
-            ghost.p_world_eyes_m,
-            ghost.gaze_world,
-            ghost.lids,
-            ghost.lower_lids or (1.0, 1.0),
+            eyes,
+            lines_of_sight(ghost),
+            (ghost.lid_left, ghost.lid_right),
+            (ghost.lower_left, ghost.lower_right),
             strict=True,
         )
-        unit = measures_of(*ghost.p_world_eyes_m).interocular_m
+        unit = measures_of(*eyes).interocular_m
         if unit != self._unit:
             self._unit = unit
             for part, x in self._sized:
@@ -218,3 +228,8 @@ class CommandedPoseView:
             ):
                 edge_rad = edges.elevation_rad(f"{eye.side}_{which}_lid", so_far)
                 set_pose(frame, p_head_m, pitch_up(edge_rad))
+
+
+def lines_of_sight(pose: GazeState) -> tuple[Vec3, Vec3]:
+    """Return the unit lines of sight of the left and the right eye, world."""
+    return line_of_sight(pose, left=True), line_of_sight(pose, left=False)

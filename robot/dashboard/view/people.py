@@ -1,11 +1,14 @@
 """Draw the rig's detections: faces with their eight parts, moving bodies, the target."""
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import viser
 
 from gazerig.gaze.types import PARTS, Face, Floats, Vec3
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_text import head_activity
 from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glow_disc, painted_glb
 from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose, set_rotation
 from gazerig.robot.description.mesh import Colour, stored_shape
@@ -13,7 +16,6 @@ from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.description.people import SHIRTS, head, part_of, torso
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import quaternion
-from gazerig.robot.model.types import SeenBody, Snapshot
 
 FIXATED_WITHIN_M = 0.02
 """Largest distance of the target from its face part, m (parts are 3 cm apart or more)."""
@@ -33,6 +35,15 @@ _LEFT_EYE, _RIGHT_EYE, _NOSE = (PARTS.index(part) for part in ("LE", "RE", "N"))
 def _person_glb(number: int) -> tuple[bytes, bytes]:
     """Return the head and chest of a person as files for browsers."""
     return painted_glb(head(number), SKIN), painted_glb(torso(number, _CHEST_M), CLOTH)
+
+
+class SeenBody(NamedTuple):
+    """A moving body, world frame."""
+
+    id: int
+    kind: str
+    p_world_m: Vec3
+    radius_m: float
 
 
 class _Shadow:
@@ -224,11 +235,11 @@ class PeopleView:
             while self._bodies:
                 self._bodies.popitem()[1].remove()
 
-    def show(self, snapshot: Snapshot, *, parts: bool = False) -> None:
+    def show(self, tick: Tick, *, parts: bool = False) -> None:
         """Draw the present detections, with parts of faces if selected; remove the others."""
-        faces = {face.id: face for face in snapshot.faces}
-        # A face is not drawn a second time as a ball.
-        bodies = {body.id: body for body in snapshot.bodies if body.id not in faces}
+        target_m = tick.gaze.gaze_point_world_m
+        faces = {face.id: face for face in (tick.percept.faces if tick.percept else ())}
+        bodies = {body.id: body for body in seen_bodies(tick)}
         for gone in self._faces.keys() - faces.keys():
             self._faces.pop(gone).remove()
         for gone in self._bodies.keys() - bodies.keys():
@@ -236,7 +247,7 @@ class PeopleView:
         for face in faces.values():
             if face.id not in self._faces:
                 self._faces[face.id] = _FaceView(self._scene, face, marks=self._as_marks)
-            self._faces[face.id].show(face, snapshot.p_world_target_m, parts)
+            self._faces[face.id].show(face, target_m, parts)
         for body in bodies.values():
             shown = self._bodies.get(body.id)
             if shown is None or shown.kind != body.kind:
@@ -244,8 +255,26 @@ class PeopleView:
                     shown.remove()
                 self._bodies[body.id] = _BodyView(self._scene, body, marks=self._as_marks)
             self._bodies[body.id].show(body)
-        set_pose(self._target, snapshot.p_world_target_m)
-        self._label.text = snapshot.target_name
+        set_pose(self._target, target_m)
+        self._label.text = head_activity(tick).target
+
+
+def seen_bodies(tick: Tick) -> tuple[SeenBody, ...]:
+    """Return targets without a visible face: moving objects and people who are turned away."""
+    if tick.percept is None:
+        return ()
+    bodies = tick.percept.bodies
+    faces = {face.id for face in tick.percept.faces}
+    return tuple(
+        SeenBody(
+            bodies.ids[i],
+            "person" if kind == "face" else kind,
+            tuple(bodies.p_world_m[i].tolist()),
+            float(bodies.radius_m[i]),
+        )
+        for i, kind in enumerate(bodies.kinds)
+        if bodies.ids[i] not in faces
+    )
 
 
 def face_label(face: Face) -> str:

@@ -169,7 +169,6 @@ def _calibrate(
             with keys:
                 count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.update)
             leaving.cause = count.stopped_by
-            observers.show_message("over: the head parks; the terminal asks whether to write it")
     finally:
         made.close()
     if stopped() is not None or count.stopped_by.startswith("fault"):
@@ -242,7 +241,6 @@ class _CalibrationSession:
     def _tell(self, what: str | None) -> None:
         if what is not None:
             say(what)
-            self._observers.show_message(what)
 
 
 def status_text(steering: FaceSteering) -> str:
