@@ -5,11 +5,12 @@
 import { isSilent, now, on } from "/rig/connection.js";
 import { make, write } from "/rig/elements.js";
 import { order } from "/rig/orders.js";
-import { isLed } from "/rig/words.js";
+import { isLed, personOf } from "/rig/words.js";
 
 const STALE_MS = 2500, AGE_MS = 500;
 const PICTURE_EVERY_MS = 700; // without a picture for this long the newest state is shown
 const KEPT_S = 2;
+const LATEST_S = 0.8; // a moment older than this is not kept while the eyes are under way
 const HEAT_S = 12, HEAT_PX = 24;
 const STEP = 0.04; // of the cross that the arrow keys move
 const WIDTH = 640;
@@ -37,10 +38,18 @@ export function onShown(handle) {
   watchers.push(handle);
 }
 
+/** Whether the eyes are at the named part: a target is chosen some time before the saccade to it. */
+function hasArrived({ gaze, people }) {
+  const parts = people.find(({ id }) => id === personOf(gaze))?.parts_m;
+  if (!gaze.part || !parts) return gaze.phase !== "saccade";
+  const away = (part) => Math.hypot(...parts[part].map((value, i) => value - gaze.point_m[i]));
+  return Object.keys(parts).every((part) => away(gaze.part) <= away(part));
+}
+
 function showMoment(state) {
-  // During a saccade the eyes are at no part of a face: what they were at, until they land.
-  const flying = state.gaze.phase === "saccade" && !isLed(state);
-  if (!flying || !now.shown || isLed(now.shown)) now.shown = state;
+  const waits = now.shown && !isLed(now.shown) && !isLed(state) && !hasArrived(state);
+  const old = now.shown && Math.abs(state.t_s - now.shown.t_s) > LATEST_S;
+  if (!waits || old) now.shown = state;
   for (const watch of watchers) watch(now.shown);
 }
 

@@ -19,6 +19,11 @@ function extend(row, t_s, text, kind) {
   else row.push({ start_s: last?.end_s ?? t_s, end_s: t_s, text, kind });
 }
 
+/** Since when the target at a time has been looked at. */
+export function targetSince(t_s) {
+  return intervals.target.findLast(({ start_s }) => start_s <= t_s)?.start_s ?? t_s;
+}
+
 function forget(before_s) {
   while (trail[1]?.t_s < before_s) trail.shift(); // one older, so that lines start at the edge
   while (movements[0]?.t_s < before_s) movements.shift();

@@ -1,6 +1,7 @@
 // Panel: what the head looks at and why, in plain words; the terms of the equation in a fold.
 
 import { chip, heading, make, note, pill, section } from "/rig/elements.js";
+import { targetSince } from "/rig/history.js";
 import { activity, isLed, reason, spaced, TERMS } from "/rig/words.js";
 
 const PHASES = { fixate: "ok", saccade: "saccade", pursue: "pursue", blink: "calm" };
@@ -23,7 +24,7 @@ export default {
     place.append(silence, what, why, chips, terms.node, estimated);
     return ({ shown, state, run, silent }) => {
       silence.textContent = silent ? "The rig has sent nothing for a second: this is the last data." : "";
-      what.textContent = activity(shown);
+      what.textContent = activity(shown, targetSince(shown.t_s));
       why.textContent = isLed(shown) ? "" : sentence(reason(shown, run));
       chips.replaceChildren(...present(shown, run));
       const joints = Object.entries(state.joints);

@@ -17,12 +17,15 @@ export function duration(s) {
 /** Whether a client, a stop or the end of the run leads, and not the head's own choice. */
 export const isLed = (state) => !["gaze", "track"].includes(state.control_source.kind);
 
-/** What the head does, with all that is known about its target. */
-export function activity(state) {
+/** Number of the person at whom the head looks, NaN if it looks at something else. */
+export const personOf = ({ target }) => Number(/^face (\d+)/.exec(target)?.[1]);
+
+/** What the head does, with all that is known about its target; since_s: when it chose this. */
+export function activity(state, since_s) {
   const { gaze, people } = state;
   if (isLed(state) || state.control_source.kind === "track") return state.headline;
-  const lasting = `, for ${duration(Math.max(0, state.t_s - gaze.since_s))}`;
-  const person = gaze.kind === "face" ? people.find(({ id }) => id === gaze.id) : null;
+  const lasting = `, for ${duration(Math.max(0, state.t_s - since_s))}`;
+  const person = people.find(({ id }) => id === personOf(gaze));
   if (!person) return state.headline + lasting;
   const at = gaze.part ? ` (${gaze.part})` : "";
   const who = person.speaks ? ", who speaks" : person.looks_at_head ? ", who looks at it" : "";
@@ -38,13 +41,15 @@ const BECAUSE = {
 export const TERMS = [...Object.keys(BECAUSE), "rule"];
 const LEAST = 0.005, SHARE = 0.1; // of a term that is mentioned, absolute and of the largest
 
-/** Why the head looks there: "It moves, and the behaviour wait adds to that." */
-export function reason(state, run) {
+/** Why the head looks there, with its strongest reasons: "it moves, and the behaviour wait prefers it". */
+export function reason(state, run, count = 3) {
   const [first] = state.saliences;
   if (isLed(state) || !first) return state.gaze.reason;
   const most = Math.max(...Object.keys(BECAUSE).map((term) => first[term]));
   const moves = Object.entries(BECAUSE)
     .filter(([term]) => first[term] >= Math.max(LEAST, SHARE * most))
+    .toSorted(([a], [b]) => first[b] - first[a])
+    .slice(0, count)
     .map(([, words]) => words);
   const [action, because] = (state.plan ?? "").split(": ");
   const behaviour = `the behaviour ${spaced(action || run?.behaviour || "")}`.trim();
