@@ -510,7 +510,7 @@ class PageDoor:
         self._websockets += 1
         name = f"websocket {self._websockets}"
         socket = web.WebSocketResponse(
-            max_msg_size=4 * REQUEST_BYTES, compress=False, autoping=False
+            max_msg_size=4 * REQUEST_BYTES, compress=True, autoping=False
         )
         await socket.prepare(request)
         self._connections.mark_websocket(request)
