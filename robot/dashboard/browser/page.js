@@ -78,6 +78,7 @@ const WITH_LIDS = ["wink", "surprised", "sleepy"];
 /** Why the rig cannot do what a button means, "" if it can. */
 function refusal(name) {
   const { menus } = choices;
+  if (now.rig?.led_by) return `not while ${now.rig.led_by} leads the head`;
   if (!now.rig || !Object.keys(menus).length) return "";
   if (!menus.track) return "not while a calibration is under way";
   const lids = Object.keys(now.rig.joints).some((joint) => joint.includes("lid"));
