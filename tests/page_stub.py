@@ -70,6 +70,7 @@ class Stub:
 
     asked: messages of the browsers, oldest first
     state, rig, run: what a browser receives when it connects, and with ``show``
+    usual: verb -> usual answer
     answer: returns the answer to a message, None for the usual one
     missing: files that the server does not have
     """
@@ -83,7 +84,7 @@ class Stub:
         self._loop = asyncio.new_event_loop()
         rig = load_rig("desk")
         live = [one for one in parameters(rig, rig) if one.live == "next tick"]
-        self._usual = {
+        self.usual: dict[str, object] = {
             "menus": MENUS, "tracks": TRACKS, "characters": ["none", "bold", "shy", "boxer"],
             "parameters": live, "get": values(rig), "unsaved": [],
         }  # fmt: skip
@@ -130,7 +131,7 @@ class Stub:
         answer = self.answer(asked)
         self.asked.append(asked)
         if answer is None:
-            answer = {"ok": self._usual.get(asked["do"], {"notes": []})}
+            answer = {"ok": self.usual.get(asked["do"], {"notes": []})}
         return msgspec.json.encode({**answer, "tag": tag}).decode()
 
     def show(self, **changes: Any) -> None:

@@ -18,10 +18,14 @@ const handlers = new Map(); // kind -> functions
 const waiting = new Map(); // tag -> {resolve, reject, timer}
 let socket = null, tag = 0, heardAt = performance.now(), heard = false, picture = null;
 
-/** Call a function with each message of a kind: hello, state, event, rig, run, picture, panel, silent. */
+/**
+ * Call a function with each message of a kind: hello, state, event, rig, run, picture, panel, silent.
+ * Of state, rig and run also with the newest one before, as scripts are loaded in any order.
+ */
 export function on(kind, handle) {
   if (!handlers.has(kind)) handlers.set(kind, []);
   handlers.get(kind).push(handle);
+  if (now[kind]) queueMicrotask(() => handle(now[kind]));
 }
 
 /** Call the functions of a kind; an error in one does not keep the others from the message. */

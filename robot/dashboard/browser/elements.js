@@ -58,13 +58,12 @@ function describe(node, hint) {
 /** Name a control; names can break after their dots and underscores. */
 function label(text, id) {
   const parts = text.split(/(?<=[._])/).flatMap((part) => [part, make("wbr")]);
-  const mark = make("span", { className: "mark-unsaved", textContent: "● ", hidden: true });
-  return make("label", { htmlFor: id }, mark, ...parts);
+  return make("label", { htmlFor: id }, make("span", { className: "unsaved" }), ...parts);
 }
 
 /** Mark a control whose value differs from the rig's file. */
 export function markUnsaved(control, unsaved) {
-  control.node.querySelector(".mark-unsaved").hidden = !unsaved;
+  control.node.querySelector(".unsaved").textContent = unsaved ? "● " : "";
 }
 
 /** Send values one after another; of those that come meanwhile only the last one is sent. */

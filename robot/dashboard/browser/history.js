@@ -1,6 +1,6 @@
 // The last half minute: joint angles, targets, levels of the guard, eye movements.
 
-import { on } from "/rig/connection.js";
+import { now, on } from "/rig/connection.js";
 import { degrees, isLed } from "/rig/words.js";
 
 export const KEPT_S = 30;
@@ -9,8 +9,9 @@ export const KEPT_S = 30;
 export const trail = [];
 /** Intervals {start_s, end_s, text, kind} in which a value was constant, oldest first. */
 export const intervals = { target: [], part: [], guard: [], head: [], people: [] };
-/** Saccades and blinks that have ended, as the rig's events. */
+/** Saccades and blinks that have ended: {kind, start_s, end_s, size_deg}. */
 export const movements = [];
+const begun = {}; // kind -> {t_s, direction_rad} at the start of the present one
 
 /** Lengthen a row's last interval, or begin the next one. */
 function extend(row, t_s, text, kind) {
@@ -26,7 +27,7 @@ export function targetSince(t_s) {
 
 function forget(before_s) {
   while (trail[1]?.t_s < before_s) trail.shift(); // one older, so that lines start at the edge
-  while (movements[0]?.t_s < before_s) movements.shift();
+  while (movements[0]?.end_s < before_s) movements.shift();
   for (const row of Object.values(intervals)) while (row[0]?.end_s < before_s) row.shift();
 }
 
@@ -51,6 +52,28 @@ on("state", (state) => {
   forget(t_s - KEPT_S);
 });
 
-on("event", (event) => {
-  if (["saccade_landing", "blink"].includes(event.kind)) movements.push(event);
+/** Store a movement of the eyes when it ends. */
+function end(kind, t_s, direction_rad) {
+  if (!begun[kind]) return;
+  const size_deg = degrees(angleBetween(begun[kind].direction_rad, direction_rad));
+  movements.push({ kind, start_s: begun[kind].t_s, end_s: t_s, size_deg });
+  begun[kind] = null;
+}
+
+/** Angle between two directions given by yaw and pitch. */
+function angleBetween([yaw, pitch], [otherYaw, otherPitch]) {
+  const same = Math.cos(pitch) * Math.cos(otherPitch) * Math.cos(yaw - otherYaw)
+    + Math.sin(pitch) * Math.sin(otherPitch);
+  return Math.acos(Math.min(1, same));
+}
+
+on("state", ({ t_s, gaze: { blink, direction_rad } }) => {
+  if (!blink) end("blink", t_s, direction_rad);
+  else begun.blink ??= { t_s, direction_rad };
+});
+
+on("event", ({ kind, t_s }) => {
+  const direction_rad = now.state?.gaze.direction_rad;
+  if (kind === "saccade_start") begun.saccade = { t_s, direction_rad };
+  if (kind === "saccade_landing") end("saccade", t_s, direction_rad);
 });

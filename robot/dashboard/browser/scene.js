@@ -15,7 +15,6 @@ const SCENE = {
   ghost: "ghost of the desired pose",
   sight: "lines of sight",
   camera: "what the camera covers",
-  eyes: "what the eyes can attend to",
   parts: "the eight parts of a face",
 };
 const VIEWS = ["face", "both", "over its shoulder", "from above"];

@@ -3,7 +3,7 @@
 import { drawStrip } from "/rig/charts.js";
 import { make } from "/rig/elements.js";
 import { intervals, KEPT_S, movements } from "/rig/history.js";
-import { count, degrees } from "/rig/words.js";
+import { count } from "/rig/words.js";
 
 const TARGETS = ["face", "hand", "puppet", "idle"];
 const LEVELS = {
@@ -33,14 +33,14 @@ function draw(canvas, t_s) {
       from_s: start_s - t_s, to_s: end_s - t_s, colour: colour(kind), text: labelled ? text : "",
     }),
   );
-  const moved = (kind) => movements.filter((one) => one.kind === kind).map((one) => ({
-    from_s: one.t_s - one.duration_s - t_s, to_s: one.t_s - t_s, colour: "line-grid", size: one.size,
+  const moved = (kind, bar) => movements.filter((one) => one.kind === kind).map((one) => ({
+    from_s: one.start_s - t_s, to_s: one.end_s - t_s, ...bar(one),
   }));
-  const jumps = moved("saccade_landing").map((one) => ({
-    ...one, to_s: one.from_s, colour: "saccade",
-    share: Math.max(0.06, Math.sqrt(Math.min(1, degrees(one.size) / LARGE_DEG))),
+  const jumps = moved("saccade", ({ start_s, size_deg }) => ({
+    to_s: start_s - t_s, colour: "saccade",
+    share: Math.max(0.06, Math.sqrt(Math.min(1, size_deg / LARGE_DEG))),
   }));
-  const blinks = moved("blink").map((one) => ({ ...one, colour: "calm" }));
+  const blinks = moved("blink", () => ({ colour: "calm" }));
   const turn = (kind) => TURNS[kind] ?? "calm";
   const rows = [
     { name: "target", high: 20, bars: bars("target", (kind) => (TARGETS.includes(kind) ? kind : "other")) },

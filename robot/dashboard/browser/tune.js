@@ -42,19 +42,18 @@ export default {
       rows.replaceChildren(...menus.map(({ node }) => node));
     });
 
-    const controls = new Map(); // key -> controls
     on("rig", async () => {
       const parameters = (await ask({ do: "parameters" })).filter(({ live }) => live === LIVE);
-      const values = await ask({ do: "get" });
+      values = await ask({ do: "get" });
       controls.clear();
-      build(parameters, values, controls, first, groups);
-      await read(controls, status);
+      build(parameters, first, groups);
+      await read(status);
     });
     let version;
     setInterval(() => {
       if (!controls.size || now.run?.version === version) return;
       version = now.run.version;
-      read(controls, status);
+      read(status);
     }, READ_MS);
     return ({ run, rig }) => {
       for (const { refresh } of menus) refresh(run);
@@ -63,9 +62,13 @@ export default {
   },
 };
 
+const controls = new Map(); // key -> controls
+let values = {}; // in force, by key
+
 /** Show the values in force, and which of them are not in the rig's file. */
-async function read(controls, status) {
-  const [values, unsaved] = await Promise.all([ask({ do: "get" }), ask({ do: "unsaved" })]);
+async function read(status) {
+  let unsaved;
+  [values, unsaved] = await Promise.all([ask({ do: "get" }), ask({ do: "unsaved" })]);
   const changed = new Set(unsaved.map(({ key }) => key));
   for (const [key, list] of controls) {
     for (const control of list) {
@@ -89,7 +92,7 @@ async function revert() {
 
 // --- controls -----------------------------------------------------------------------------------
 
-function build(parameters, values, controls, first, groups) {
+function build(parameters, first, groups) {
   const bodies = new Map(); // group -> list of nodes
   const opening = [];
   for (const param of parameters) {
@@ -135,6 +138,7 @@ function controlOf(param, value, name) {
 /** Set a value; one that the rig refuses is shown as it was. */
 async function put(key, value) {
   const done = await order({ do: "set", changes: { [key]: value } });
+  if (!done) for (const control of controls.get(key)) control.show(values[key]);
   const later = done?.notes?.filter((text) => text.includes("next start")) ?? [];
   if (later.length) say(later.join("\n"));
 }
