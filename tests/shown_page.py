@@ -1,18 +1,19 @@
-"""A face to show, and waiting for a page."""
+"""A page process to look at, and a face for it to show."""
 
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 import numpy as np
 from page_visitor import PATIENCE_S
 
 from gazerig.gaze.types import Face
+from gazerig.robot.dashboard.feed.page_process import PageProcess, Serve
 
 T = TypeVar("T")
 
-AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # A person's face in its own frame (x out of the face, y to the owner's left, z up), in the
 # order chin, left side, left eye, mouth, nose, right side, right eye, forehead.
 PARTS_M = (
@@ -48,3 +49,15 @@ def free_port() -> int:
     with socket.socket() as trial:
         trial.bind(("127.0.0.1", 0))
         return int(trial.getsockname()[1])
+
+
+@contextmanager
+def running_page(
+    port: int | None = None, serve: Serve | None = None
+) -> Iterator[tuple[PageProcess, str]]:
+    page = PageProcess("127.0.0.1", free_port() if port is None else port, serve)
+    page.open()
+    try:
+        yield page, wait_for(page.url, "the page's address")
+    finally:
+        page.close()

@@ -1,17 +1,14 @@
 """With a world the page shows its room and its people, and only marks what the rig has seen."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import viser
-from shown_page import FACE, SNAPSHOT
+from seen_things import seen
 from world_shapes import LEAVES_S, SmallWorld
 
 from gazerig.robot.dashboard.view.head_view import HeadView
 from gazerig.robot.dashboard.view.people import PeopleView
 from gazerig.robot.dashboard.view.world_view import WorldView
-from gazerig.robot.model.types import SeenBody
 
 
 def shown(server: viser.ViserServer, start: str) -> set[str]:
@@ -42,16 +39,15 @@ def test_people_of_a_world_are_where_they_are_at_the_time() -> None:
 
 def test_with_a_world_what_was_seen_is_only_marked() -> None:
     server = viser.ViserServer(port=0, verbose=False)
-    bodies = (SeenBody(7, "hand", (0.6, 0.2, 0.1), 0.06),)
-    seen = replace(SNAPSHOT, faces=(FACE,), bodies=bodies)
+    rig = seen("hand")
     drawn = {"/faces/3/head", "/chests/3", "/bodies/7/hand", "/shades/3", "/shade"}
     try:
         people, head = PeopleView(server.scene), HeadView(server.scene)
         for marked in (False, True, False):
             people.mark_only(marked)
             head.on_table = marked
-            people.show(seen)
-            head.show(seen)
+            people.show(rig.tick)
+            head.show(rig)
             found = shown(server, "/")
             assert drawn.isdisjoint(found) if marked else drawn <= found
             if marked:

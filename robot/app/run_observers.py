@@ -94,8 +94,12 @@ class RunObservers:
         self._tuning, self._recorder = tuning, recorder
         name = options.name or rig_name(options.rig)
         about = {"rig": options.rig, "name": name, "pid": os.getpid()}
-        self._live = (
-            LiveServer(
+        self._server: LiveServer | StopOnlyServer | None = None
+        doors: tuple[str, ...] = ()
+        if tuning is None and not options.fast:
+            self._server = StopOnlyServer(assembly.robot.command, assembly.clock, about, say)
+        elif tuning is not None and not options.fast:
+            self._server = LiveServer(
                 assembly.robot,
                 tuning,
                 (ConfigError,),
@@ -107,14 +111,8 @@ class RunObservers:
                 tuning.confined,
                 voice,
             )
-            if tuning is not None and not options.fast
-            else None
-        )
-        doors = assembly.live_params.rig.doors if self._live is not None and not led_by else ()
+            doors = assembly.live_params.rig.doors
         self._doors = DoorProcesses(doors, os.getpid(), say)
-        self._page_server = self._live or StopOnlyServer(
-            assembly.robot.command, assembly.clock, about, say, f"{led_by} leads the head now"
-        )
         address = options.page_address
         self._page = self._make_page(address, options.page_token) if address is not None else None
         # Simulated time is faster than a page or a line can show.
@@ -141,7 +139,8 @@ class RunObservers:
     def _make_page(self, address: tuple[str, int], token: str) -> PageProcess:
         browser = self._made.browser
         on_picture = browser.take if browser is not None else None
-        return PageProcess(*address, self._page_server.serve, on_picture, token)
+        serve = self._server.serve if self._server is not None else None
+        return PageProcess(*address, serve, on_picture, token)
 
     def _live_rig(self) -> LiveRig:
         made, tuning = self._made, self._tuning
@@ -197,8 +196,8 @@ class RunObservers:
             observers.add("the page's view", self._follow)
         if self._status is not None:
             observers.add("the status line", self._status.update)
-        if self._live is not None:
-            observers.add("the remote control", self._live.update)
+        if self._server is not None:
+            observers.add("the remote control", self._server.update)
         if self._voice is not None:
             observers.add("the voice", self._voice.update)
 
@@ -217,8 +216,8 @@ class RunObservers:
                 self._voice.stop()
             if self._status is not None:
                 self._status.update(tick)
-            if self._live is not None:
-                self._live.update(tick)
+            if self._server is not None:
+                self._server.update(tick)
             self._parking.update(tick)
 
     def wrap_stop(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
@@ -240,9 +239,8 @@ class RunObservers:
             if self._recorder is not None:
                 self._recorder.begin()
         with self._report_errors("the remote control"):
-            # Opened before the page, which relays to it.
-            if self._live is not None:
-                self._live.open()
+            if self._server is not None:
+                self._server.open()
         with self._report_errors("the page"):
             if self._page is not None:
                 self._page.open()
@@ -278,13 +276,11 @@ class RunObservers:
             if self._voice is not None:
                 self._voice.close()
         with self._report_errors("the remote control"):
-            if self._live is not None:
-                self._live.close()
+            if self._server is not None:
+                self._server.close()
         with self._report_errors("the page"):
             if self._page is not None:
                 self._page.close()
-            if not self._live:
-                self._page_server.close()
         with self._report_errors("the recording"):
             if self._recorder is not None:
                 self._say(self._recorder.close(count.stopped_by, self._made.sent_bytes_digest()))

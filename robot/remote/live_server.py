@@ -234,6 +234,9 @@ class LiveServer:
             self._say(f"{path} was written again without changes")
 
 
+_CALIBRATED = "it is being calibrated"
+
+
 class StopOnlyServer:
     """Server that executes stop and resume, and refuses all other commands.
 
@@ -242,7 +245,6 @@ class StopOnlyServer:
         clock: Clock of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         say: Prints a line on the terminal.
-        reason: Reason for a refusal.
     """
 
     def __init__(
@@ -251,14 +253,11 @@ class StopOnlyServer:
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
-        reason: str = "it is being calibrated",
     ) -> None:
         self._say = say
         self._pulse = LoopMonitor(clock)
-        handler = CommandHandler(
-            accept_only_stops(command, reason), None,
-            fixed=f"{reason}: its parameters cannot be changed",
-        )  # fmt: skip
+        only = accept_only_stops(command, _CALIBRATED)
+        handler = CommandHandler(only, None, fixed=f"{_CALIBRATED}: its parameters are fixed")
         self._server = RemoteServer(RequestHandler(handler, self._pulse, about), say)
         self.serve = self._server.serve
 

@@ -3,7 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -11,11 +11,13 @@ from gazerig.robot.dashboard.door.rig_link import BUSY
 from gazerig.robot.model.commands import COMMANDS, REPEATED, ControlCommand
 from gazerig.robot.model.outcome import Progress, command_outcome
 from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.model.requests import ORDERS
+from gazerig.robot.remote.excess import STOPPED
 from gazerig.robot.remote.topics import ShownPicture
 
 NO_OUTCOME = {name for name, kind in COMMANDS.items() if kind in REPEATED}
 _CONTROLS = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))
-_MOST_OUT = 256
+_MOST_QUEUED, _MOST_OUT = 16, 256
 _REPORT_S = 0.25
 """Time in which dropped messages are counted for one refusal, s."""
 _MOST_OPEN = 64
@@ -31,24 +33,40 @@ class Wishes(NamedTuple):
     rig: bool = False
 
 
+class Visitor(NamedTuple):
+    """Who sends a request: the name of the browser, "" for a program, and the address."""
+
+    browser: str
+    address: str
+
+    @property
+    def name(self) -> str:
+        """Return the name of a visitor that has not chosen one."""
+        return self.browser or f"a program at {self.address}"
+
+
 class ClientSocket:
-    """The messages that wait for one client.
+    """The messages from and for one client.
 
     States and pictures that it does not read in time are replaced by newer ones. If too many events
     or answers wait, the oldest are dropped.
 
     Args:
         wishes: What the client receives.
+        visitor: Who it is.
+        name: Name of the websocket; who stopped resumes over the same one.
 
     Attributes:
+        orders: messages that wait for the rig, in order.
         news: set when a message waits; alive: set when the client has answered a ping.
         ping: the newest ping of the client that is not answered yet.
         held: what the client controls: "gaze" (or joints), "talk" (the conversation).
         who: name under which it does.
     """
 
-    def __init__(self, wishes: Wishes) -> None:
-        self.wishes = wishes
+    def __init__(self, wishes: Wishes, visitor: Visitor, name: str) -> None:
+        self.wishes, self.visitor, self.name = wishes, visitor, name
+        self.orders: asyncio.Queue[dict[str, Any]] = asyncio.Queue(_MOST_QUEUED)
         self._period_s = 1.0 / wishes.rate_hz if wishes.rate_hz else 0.0
         self._due_s = self._not_before_s = 0.0
         self._state = ""
@@ -122,6 +140,15 @@ class ClientSocket:
             change("talk" if talks else "gaze")
             self.who = str(message["who"])
 
+    def refuse_commands(self) -> None:
+        """Refuse the commands that wait: a resume from before a stop must not follow it."""
+        for _ in range(self.orders.qsize()):
+            message = self.orders.get_nowait()
+            if message.get("do") in ORDERS:
+                self.queue_message({"refused": STOPPED, **tag_of(message)})
+            else:
+                self.orders.put_nowait(message)
+
     def drop_message(self) -> None:
         """Count a message that is too many; one refusal follows for all of a short time."""
         if not self._dropped:
@@ -141,6 +168,11 @@ class ClientSocket:
             return state
         picture, self._picture = self._picture, None
         return picture or ""
+
+
+def tag_of(message: Mapping[str, object]) -> dict[str, object]:
+    """Return the tag of a message, which its answer has, too."""
+    return {"tag": message["tag"]} if "tag" in message else {}
 
 
 def takes_control(message: Mapping[str, object]) -> bool:

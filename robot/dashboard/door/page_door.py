@@ -37,7 +37,9 @@ from gazerig.robot.dashboard.door.browsers import Connections, TabLimits, browse
 from gazerig.robot.dashboard.door.client_socket import (
     NO_OUTCOME,
     ClientSocket,
+    Visitor,
     Wishes,
+    tag_of,
     takes_control,
 )
 from gazerig.robot.dashboard.door.page_files import PageFiles
@@ -58,7 +60,6 @@ from gazerig.robot.model.requests import ORDERS, ShowView, State, read_request
 from gazerig.robot.remote.excess import (
     CLOSED,
     REST_S,
-    STOPPED,
     TOO_MANY,
     ExcessCount,
     TokenBucket,
@@ -78,7 +79,6 @@ UNCONFIRMED = (
 _PER_S, _BURST = 50.0, 100.0
 _ALL_PER_S, _ALL_BURST = 100.0, 200.0
 _READ_S = 5.0
-_MOST_QUEUED = 16
 _MOST_RESTS = 10
 """Stops are received for so many times REST_S while more of a client's data waits to be read."""
 _WHO_CHARACTERS = 60
@@ -180,6 +180,25 @@ def parse_flag(request: web.Request, name: str) -> bool:
     if text not in ("true", "false"):
         raise MessageRefused(f"{name}={text:.20}: true or false")
     return text == "true"
+
+
+def add_client(message: dict[str, Any], visitor: Visitor, websocket: str = "") -> dict[str, Any]:
+    """Return a message with the name of its client: the browser's, or a chosen one with address.
+
+    Args:
+        message: Message as received.
+        visitor: Who has sent it.
+        websocket: Name of the websocket, for a stop or a resume.
+    """
+    kind = ORDERS.get(str(message.get("do")))
+    if kind is None or not issubclass(kind, ClientCommand):
+        return message
+    chosen = "".join(filter(str.isprintable, str(message.get("who") or "")))
+    name = f"{chosen[:_WHO_CHARACTERS]} at {visitor.address}" if chosen else visitor.name
+    here = f", {websocket}" if websocket and kind in (Stop, Resume) else ""
+    by = f" ({visitor.browser})" if kind is Stop and visitor.browser else ""
+    why = {"why": f"{message.get('why', '')!s:.100}{by}"} if kind is Stop else {}
+    return {**message, **why, "who": f"{name}{here}"}
 
 
 class PageDoor:
@@ -372,30 +391,10 @@ class PageDoor:
 
         return admit
 
-    def _browser(self, request: web.Request) -> str:
-        """Return the name of a browser, "" for a program."""
+    def _visitor(self, request: web.Request) -> Visitor:
         cookie = request.cookies.get(self._name_cookie)
-        return browser_name(self._token, cookie) if cookie else ""
-
-    def _add_client(
-        self, message: dict[str, Any], request: web.Request, websocket: str = ""
-    ) -> dict[str, Any]:
-        """Return a message with the name of its client: its own or its browser's, and its address.
-
-        websocket: name of the websocket for a stop or a resume; who stopped resumes over the same
-        """
-        kind = ORDERS.get(str(message.get("do")))
-        if kind is None or not issubclass(kind, ClientCommand):
-            return message
-        chosen = "".join(filter(str.isprintable, str(message.get("who") or "")))
-        browser = self._browser(request)
-        name = f"{chosen[:_WHO_CHARACTERS] or 'a program'} at {request.remote}"
-        if browser and not chosen:
-            name = browser
-        if kind is Stop and browser:
-            message = {**message, "why": f"{message.get('why', '')!s:.100} ({browser})"}
-        here = f", {websocket}" if websocket and kind in (Stop, Resume) else ""
-        return {**message, "who": f"{name}{here}"}
+        browser = browser_name(self._token, cookie) if cookie else ""
+        return Visitor(browser, request.remote or "")
 
     # --- HTTP ---------------------------------------------------------------------------
 
@@ -436,7 +435,8 @@ class PageDoor:
         async with asyncio.timeout(_READ_S):
             while len(data) <= REQUEST_BYTES and (more := await request.content.readany()):
                 data += more
-        message = self._add_client(parse_message(data), request)
+        visitor = self._visitor(request)
+        message = add_client(parse_message(data), visitor)
         if message.get("do") == "resume" and message.get("confirmed") is not True:
             raise MessageRefused(UNCONFIRMED, 409)
         if message.get("do") != "stop" and not self._is_within_rate():
@@ -445,7 +445,7 @@ class PageDoor:
         if (ends == "seconds" or takes_control(message)) and message.get(ends) is not None:
             # The order ends after its duration; a request has no connection that could be lost.
             message["stay"] = True
-        answer = await self._ask(message, request)
+        answer = await self._ask(message, visitor)
         match answer:
             case {"ok": {"reply": dict(reply)}} if wait_s and message["do"] not in NO_OUTCOME:
                 answer |= await self._outcome(message, msgspec.convert(reply, CommandReply), wait_s)
@@ -472,24 +472,26 @@ class PageDoor:
             del self._outcomes[outcome]
         return {"outcome": "timed out", "why": ""}
 
-    async def _ask(self, message: Mapping[str, Any], request: web.Request) -> Answer:
+    async def _ask(self, message: Mapping[str, Any], visitor: Visitor) -> Answer:
         """Answer a message, or send it to the rig, a stop before all others."""
         try:
             match message.get("do"):
                 case "stop":  # whatever else it says
-                    why, who = f"{message.get('why', '')!s:.120}", message["who"]
-                    stop = {"do": "stop", "why": why, "who": who}
-                    return await self._rig.stop(stop) | _tag(message)
+                    stop = {key: message[key] for key in ("do", "why", "who")}
+                    answer = await self._rig.stop(stop)
+                    # It has no outcome that could be waited for.
+                    done: Answer = {"ok": {"notes": []}}
+                    return (done if "ok" in answer else answer) | tag_of(message)
                 case "state":
                     asked = read_request(_without_tag(message))
                     assert isinstance(asked, State)
-                    return {"ok": self._report(asked)} | _tag(message)
+                    return {"ok": self._report(asked)} | tag_of(message)
                 case "show_view":
                     view = msgspec.convert(_without_tag(message), ShowView)
-                    self._show_view(view, self._browser(request))
-                    return {"ok": {"notes": []}} | _tag(message)
+                    self._show_view(view, visitor.browser)
+                    return {"ok": {"notes": []}} | tag_of(message)
         except ValueError as error:
-            return {"refused": str(error)} | _tag(message)
+            return {"refused": str(error)} | tag_of(message)
         return await self._rig.ask(message)
 
     def _is_within_rate(self) -> bool:
@@ -499,35 +501,32 @@ class PageDoor:
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         _require_websocket(request)
-        client = ClientSocket(
-            Wishes(
-                parse_number(request, "rate_hz", 1.0, MOST_RATE_HZ, 0.0),
-                parse_flag(request, "events"),
-                parse_flag(request, "pictures"),
-                parse_flag(request, "rig"),
-            )
+        wishes = Wishes(
+            parse_number(request, "rate_hz", 1.0, MOST_RATE_HZ, 0.0),
+            parse_flag(request, "events"),
+            parse_flag(request, "pictures"),
+            parse_flag(request, "rig"),
         )
         self._websockets += 1
-        name = f"websocket {self._websockets}"
+        visitor = self._visitor(request)
+        client = ClientSocket(wishes, visitor, f"websocket {self._websockets}")
         socket = web.WebSocketResponse(
             max_msg_size=4 * REQUEST_BYTES, compress=True, autoping=False
         )
         await socket.prepare(request)
         self._connections.mark_websocket(request)
-        orders: asyncio.Queue[dict[str, Any]] = asyncio.Queue(_MOST_QUEUED)
-        orders.put_nowait({"do": "hello", "version": VERSION, "tag": "hello"})
+        client.orders.put_nowait({"do": "hello", "version": VERSION, "tag": "hello"})
         self._clients.add(client)
-        if client.wishes.rig:
+        if wishes.rig:
             for text in self._lasting.values():
                 client.queue_text(text)
         excess = ExcessCount()
         try:
-            greedy = self._browser(request) or request.remote or ""
-            with self._limits.occupy(greedy) as leave:
+            with self._limits.occupy(visitor.name) as leave:
                 await until_one_ends(
                     _outlasted(self._send(socket, client)),
-                    self._receive(socket, client, orders, request, name, excess),
-                    self._carry_out(client, orders, request),
+                    self._receive(socket, client, request, excess),
+                    self._carry_out(client),
                     _outlasted(self._renew(socket, client)),
                     self._over.wait(),
                     leave.wait(),
@@ -557,9 +556,7 @@ class PageDoor:
         self,
         socket: web.WebSocketResponse,
         client: ClientSocket,
-        orders: "asyncio.Queue[dict[str, Any]]",
         request: web.Request,
-        name: str,
         excess: ExcessCount,
     ) -> None:
         """Receive messages; nothing here waits except a stop, so that a stop never waits.
@@ -567,49 +564,17 @@ class PageDoor:
         A client that sends far too many messages is disconnected, after the stops among those that
         it has sent.
         """
-        rate = TokenBucket(_PER_S, _BURST)
-
-        async def take(frame: aiohttp.WSMessage, late: bool) -> None:
-            """Take one message; of one that is too many only a stop is carried out."""
-            message = self._add_client(parse_message(frame.data), request, name)
-            if message.get("do") == "stop":
-                _refuse_commands(client, orders)
-                client.queue_answer(message, await self._ask(message, request))
-            elif late or orders.full() or not self._is_within_rate():
-                client.queue_message({"refused": BUSY, **_tag(message)})
-            elif (
-                message.get("do") == "resume"
-                and self._browser(request)
-                and message.get("confirmed") is not True
-            ):  # a cookie with the name of a browser proves nothing
-                client.queue_message({"refused": UNCONFIRMED, **_tag(message)})
-            else:
-                orders.put_nowait(message)
-
-        async def take_frame(frame: aiohttp.WSMessage, late: bool = False) -> None:
-            if frame.type is aiohttp.WSMsgType.PING:
-                client.ping = frame.data  # answered by the sender, as the client may not read
-                client.news.set()
-            elif frame.type is aiohttp.WSMsgType.PONG:
-                client.alive.set()
-            elif frame.type is not aiohttp.WSMsgType.TEXT:
-                client.queue_message({"refused": "not text: one JSON object in each message"})
-            else:
-                try:
-                    await take(frame, late)
-                except MessageRefused as error:
-                    client.queue_message({"refused": str(error)})
-
+        loop, rate = asyncio.get_running_loop(), TokenBucket(_PER_S, _BURST)
         while not excess.is_over:
             frame = await socket.receive()
             if frame.type in _ENDS:
                 return
-            now_s = self._loop.time()
+            now_s = loop.time()
             late = frame.type is aiohttp.WSMsgType.TEXT and not rate.take(now_s)
             if late and not _may_stop(frame):
                 client.drop_message()
             else:
-                await take_frame(frame, late)
+                await self._take_frame(frame, client, late)
             excess.add(late, now_s)
         client.queue_message({"refused": CLOSED})
         for _ in range(_MOST_RESTS):
@@ -617,23 +582,49 @@ class PageDoor:
                 async with asyncio.timeout(REST_S):
                     while (frame := await socket.receive()).type not in _ENDS:
                         if _may_stop(frame):
-                            await take_frame(frame, late=True)
+                            await self._take_frame(frame, client, late=True)
                     return
             if not _unread_bytes(request):
                 return
 
-    async def _carry_out(
-        self,
-        client: ClientSocket,
-        orders: "asyncio.Queue[dict[str, Any]]",
-        request: web.Request,
+    async def _take_frame(self, frame: aiohttp.WSMessage, client: ClientSocket, late: bool) -> None:
+        """Take one message; of one that is too many only a stop is carried out."""
+        if frame.type is aiohttp.WSMsgType.PING:
+            client.ping = frame.data  # answered by the sender, as the client may not read
+            client.news.set()
+        elif frame.type is aiohttp.WSMsgType.PONG:
+            client.alive.set()
+        elif frame.type is not aiohttp.WSMsgType.TEXT:
+            client.queue_message({"refused": "not text: one JSON object in each message"})
+        else:
+            try:
+                await self._take_message(parse_message(frame.data), client, late)
+            except MessageRefused as error:
+                client.queue_message({"refused": str(error)})
+
+    async def _take_message(
+        self, message: dict[str, Any], client: ClientSocket, late: bool
     ) -> None:
+        message = add_client(message, client.visitor, client.name)
+        # A cookie with the name of a browser proves nothing.
+        unconfirmed = client.visitor.browser and message.get("confirmed") is not True
+        if message.get("do") == "stop":
+            client.refuse_commands()
+            client.queue_answer(message, await self._ask(message, client.visitor))
+        elif late or client.orders.full() or not self._is_within_rate():
+            client.queue_message({"refused": BUSY, **tag_of(message)})
+        elif message.get("do") == "resume" and unconfirmed:
+            client.queue_message({"refused": UNCONFIRMED, **tag_of(message)})
+        else:
+            client.orders.put_nowait(message)
+
+    async def _carry_out(self, client: ClientSocket) -> None:
         """Send a client's messages to the rig, in order."""
         while True:
-            message = await orders.get()
-            answer = await self._ask(message, request)
-            if message["do"] == "hello" and "ok" in answer:
-                answer["ok"]["you"] = self._browser(request) or f"a program at {request.remote}"
+            message = await client.orders.get()
+            answer = await self._ask(message, client.visitor)
+            if message.get("do") == "hello" and "ok" in answer:
+                answer["ok"]["you"] = client.visitor.name
             client.queue_answer(message, answer)
 
     async def _renew(self, socket: web.WebSocketResponse, client: ClientSocket) -> None:
@@ -661,7 +652,7 @@ class PageDoor:
         socket = self.webcam.new_socket()
         await socket.prepare(request)
         self._connections.mark_websocket(request)
-        with self._webcams.occupy(self._browser(request)) as leave:
+        with self._webcams.occupy(self._visitor(request).name) as leave:
             await until_one_ends(self.webcam.serve(socket), self._over.wait(), leave.wait())
         await close_socket(socket, request)
         return socket
@@ -670,7 +661,8 @@ class PageDoor:
 
     async def _relay_view(self, request: web.Request) -> web.StreamResponse:
         if "upgrade" in request.headers:
-            return await self._view.relay(request, self._browser(request), self._over.wait())
+            browser = self._visitor(request).browser
+            return await self._view.relay(request, browser, self._over.wait())
         if request.path == VIEW:  # paths in the document are relative to it
             return web.Response(status=302, headers={**_HEADERS, "Location": f"{VIEW}/"})
         return await self._view.get(request)
@@ -701,10 +693,6 @@ def _without_tag(message: Mapping[str, object]) -> dict[str, object]:
     return {key: value for key, value in message.items() if key != "tag"}
 
 
-def _tag(message: Mapping[str, object]) -> dict[str, object]:
-    return {"tag": message["tag"]} if "tag" in message else {}
-
-
 def _unread_bytes(request: web.Request) -> int:
     """Return how much of what a client has sent waits in the kernel."""
     end = request.transport and request.transport.get_extra_info("socket")
@@ -726,13 +714,3 @@ async def _outlasted(sending: Awaitable[None]) -> None:
         await sending
     except (ConnectionError, TimeoutError):
         await asyncio.sleep(REST_S)
-
-
-def _refuse_commands(client: ClientSocket, orders: "asyncio.Queue[dict[str, Any]]") -> None:
-    """Refuse the commands that wait: a resume from before a stop must not be carried out after."""
-    for _ in range(orders.qsize()):
-        message = orders.get_nowait()
-        if message.get("do") in ORDERS:
-            client.queue_message({"refused": STOPPED, **_tag(message)})
-        else:
-            orders.put_nowait(message)

@@ -30,7 +30,6 @@ from gazerig.robot.description.parts import (
     SIDES,
     HeadMeasures,
     measures_of,
-    meeting_rad,
 )
 from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.joint import JointParams
@@ -83,7 +82,6 @@ class HeadView:
     """Rig in the scene, with all parts that its joints move.
 
     on_table: whether it is on an object of a drawn world and needs no shadow of its own
-    lid_edges: positions of the lid edges; without lids before the first snapshot
     """
 
     def __init__(self, scene: viser.SceneApi) -> None:
@@ -97,7 +95,6 @@ class HeadView:
         self._shade = self._add("/shade", painted_glb(glow_disc((20, 24, 34, 140)), FLAT))
         self._sights: list[viser.LineSegmentsHandle] = []
         self._colour = _SIGHT["fixate"]
-        self.lid_edges = LidEdges({}, {})
         self._face_rad, self._face_s = (0.0, 0.0), 0.0
 
     def _add(self, name: str, data: bytes) -> viser.GlbHandle:
@@ -114,7 +111,7 @@ class HeadView:
         tick, pose, names = head.tick, head.tick.pose, head.rig.kinematics.names
         shape = with_shown_face(head.rig.shape)
         if shape != self._drawn:  # the geometry has changed
-            self._drawn, self.lid_edges = shape, lid_edges(shape)
+            self._drawn = shape
             self._draw(describe(shape), shape)
         description = self._description
         assert description is not None
@@ -235,36 +232,6 @@ def head_dimensions(head: ShownHead) -> HeadMeasures:
     pose = head.tick.pose
     x, y, z = rotate_back(pose.R_world_head, sub(pivot_m(head), pose.p_world_head_m))
     return measures_of(*eyes_m(head), (round(x, 4), round(y, 4), round(z, 4)))
-
-
-class LidEdges(NamedTuple):
-    """Elevations above the eye's equator, in radians.
-
-    meeting_rad: elevation at which the lids of each side meet
-    span_rad: full opening of each lid from there, by its name
-    """
-
-    meeting_rad: Mapping[str, float]
-    span_rad: Mapping[str, float]
-
-    def elevation_rad(self, lid: str, opening: float) -> float:
-        """Return the elevation of a lid's edge at an opening, 0..1."""
-        side, which, _ = lid.split("_")
-        up = 1.0 if which == "upper" else -1.0
-        return self.meeting_rad[side] + up * opening * self.span_rad[lid]
-
-
-def lid_edges(shape: RigShape) -> LidEdges:
-    """Return the lid edges of a rig; a rig without lids has none."""
-    span_rad = {
-        name: abs(wide - shut)
-        for name, (shut, wide) in ((name, shape.lids.get(name, (0.0, 0.0))) for name in LIDS)
-    }
-    meeting = {
-        side: meeting_rad(span_rad[f"{side}_upper_lid"], span_rad[f"{side}_lower_lid"])
-        for side in SIDES
-    }
-    return LidEdges(meeting, span_rad)
 
 
 _LID_RAD = {"upper": radians(74.0), "lower": radians(22.0)}

@@ -2,17 +2,14 @@
 
 from collections.abc import Container
 from math import atan, radians, tan
-from typing import NamedTuple
 
 import numpy as np
 import viser
 
 from gazerig.gaze.angles import rotate_back, sub
-from gazerig.gaze.field_of_view import FIELD_DEG, line_of_sight
-from gazerig.gaze.types import Floats, GazeState, Vec3
+from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.robot.dashboard.feed.rig_feed import ShownHead
-from gazerig.robot.dashboard.view.head_view import LidEdges, eyes_m
-from gazerig.robot.dashboard.view.scene_node import pitch_up, rotation_to, set_pose
+from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose
 from gazerig.robot.description.mesh import Colour, Mesh, stored_shape
 from gazerig.robot.description.parts import EYE_RADIUS, SIDES, measures_of
 from gazerig.robot.model.frames import quaternion
@@ -26,22 +23,16 @@ class OverlayPanel:
     def __init__(self, scene: viser.SceneApi) -> None:
         self._commanded_pose = CommandedPoseView(scene)
         self._camera = CameraField(scene)
-        self._eyes = EyeFields(scene)
 
-    def show(self, head: ShownHead, layers: Container[Layer], edges: LidEdges) -> None:
+    def show(self, head: ShownHead, layers: Container[Layer]) -> None:
         """Draw the selected layers and remove the others."""
-        self._commanded_pose.show(head if "ghost" in layers else None, edges)
+        self._commanded_pose.show(head if "ghost" in layers else None)
         self._camera.show(head if "camera" in layers else None)
-        self._eyes.show(head if "eyes" in layers else None)
 
 
 _CAMERA: Colour = (120, 128, 140)
-_FIELD: dict[str, Colour] = {"left": (20, 150, 120), "right": (190, 90, 30)}
 _DEPTH_M = 0.12
 """Distance of the drawn frame from the camera, m."""
-_RADIUS_M = 0.22
-"""Distance of the drawn edge of the field from the eye, m."""
-_AROUND = 72
 
 
 class CameraField:
@@ -81,60 +72,10 @@ class CameraField:
         set_pose(self._frustum, p_m, quaternion(R))
 
 
-class EyeFields:
-    """Edge of each eye's field of attention, which rotates with the eye."""
-
-    def __init__(self, scene: viser.SceneApi) -> None:
-        self._frames = tuple(
-            scene.add_frame(f"/field_{side}", show_axes=False, visible=False) for side in _FIELD
-        )
-        for side, colour in _FIELD.items():
-            edge = field_edge(left=side == "left")
-            around = np.stack((edge, np.roll(edge, -1, axis=0)), axis=1)
-            spokes = np.stack((np.zeros((4, 3)), edge[:: _AROUND // 4]), axis=1)
-            scene.add_line_segments(
-                f"/field_{side}/edge",
-                np.concatenate((around, spokes)),
-                colour,
-                thickness=1.2,
-                thickness_units="screen",
-            )
-
-    def show(self, head: ShownHead | None) -> None:
-        """Rotate the fields with the eyes; hide them without a head."""
-        for frame in self._frames:
-            frame.visible = head is not None
-        if head is None:
-            return
-        sides = zip(self._frames, eyes_m(head), lines_of_sight(head.tick.pose), strict=True)
-        for frame, p_world_m, gaze_world in sides:
-            set_pose(frame, p_world_m, rotation_to(gaze_world))
-
-
-def field_edge(*, left: bool) -> Floats:
-    """Return points (72, 3) on the edge of an eye's field in the eye's frame, x ahead, in metres.
-
-    Between two of its limits the edge is a quarter of an ellipse (gazerig.gaze.field_of_view).
-    """
-    temporal, nasal, up, down = np.radians(FIELD_DEG)
-    turn = 2.0 * np.pi * np.arange(_AROUND) / _AROUND  # from the left, towards above
-    side, high = np.cos(turn), np.sin(turn)
-    to_side = np.where((side > 0.0) == left, temporal, nasal)
-    away = 1.0 / np.hypot(side / to_side, high / np.where(high > 0.0, up, down))
-    return _RADIUS_M * np.column_stack((np.cos(away), np.sin(away) * side, np.sin(away) * high))
-
-
 _GHOST: Colour = (70, 110, 255)
 _SIGHT = 5.6  # length of its lines of sight, in distances between the eyes
 _IRIS_RAD = radians(29.0)
 _APART = radians(1.5)  # of the head's axes: less would only tint the rig's own shell
-
-
-class _CommandedEye(NamedTuple):
-    side: str
-    ball: viser.FrameHandle
-    upper: viser.FrameHandle
-    lower: viser.FrameHandle
 
 
 class CommandedPoseView:
@@ -147,7 +88,6 @@ class CommandedPoseView:
         self._frame = scene.add_frame("/ghost", show_axes=False, visible=False)
         self._shell = self._add("/ghost/shell", stored_shape("shell").mesh, 0.2)
         self._eyes = [self._add_eye(side) for side in SIDES]
-        self._joints: tuple[str, ...] = ()
         self._unit = 0.0
 
     def _add(self, name: str, mesh: Mesh, opacity: float, x: float = 0.0) -> viser.MeshHandle:
@@ -163,8 +103,8 @@ class CommandedPoseView:
         self._sized.append((handle, x))
         return handle
 
-    def _add_eye(self, side: str) -> _CommandedEye:
-        """Add a ring for the iris with a line of sight, and the edges of the lids."""
+    def _add_eye(self, side: str) -> viser.FrameHandle:
+        """Add a ring for the iris with a line of sight; return their frame."""
         name = f"/ghost/eye_{side}"
         ball = self._scene.add_frame(name, show_axes=False)
         iris, faces = stored_shape("ring").mesh
@@ -176,60 +116,27 @@ class CommandedPoseView:
             f"{name}/sight", line, _GHOST, thickness=1.0, thickness_units="screen"
         )
         self._sized.append((sight, 0.0))
-        upper, lower = (
-            self._scene.add_frame(f"/ghost/{name}_{side}", show_axes=False)
-            for name in ("lid", "lower_lid")
-        )
-        for frame, which in ((upper, "upper"), (lower, "lower")):
-            self._add(f"{frame.name}/edge", stored_shape(f"{which}_lid_edge").mesh, 0.45)
-        return _CommandedEye(side, ball, upper, lower)
+        return ball
 
-    def show(self, head: ShownHead | None, edges: LidEdges) -> None:
+    def show(self, head: ShownHead | None) -> None:
         """Move the drawing to the desired pose; hide it without a head."""
         self._frame.visible = head is not None
         if head is None:
             return
-        names, desired_rad = head.rig.kinematics.names, head.tick.desired_rad
+        desired_rad = head.tick.desired_rad
         at_rest = (0.0,) * len(desired_rad)
         ghost = head.rig.kinematics.forward(JointState(desired_rad, at_rest, at_rest, ()))
-        if names != self._joints:
-            self._joints = names
-            for eye in self._eyes:  # only lids that a joint moves
-                eye.upper.visible = f"{eye.side}_upper_lid" in names
-                eye.lower.visible = f"{eye.side}_lower_lid" in names
-        turned = np.array(ghost.R_world_head) - np.array(head.tick.pose.R_world_head)
-        self._shell.visible = float(np.abs(turned).max()) > _APART
-        self._move(ghost, edges)
-
-    def _move(self, ghost: GazeState, edges: LidEdges) -> None:
         R, p_world_head_m = ghost.R_world_head, ghost.p_world_head_m
-        eyes = ghost.p_world_eye_left_m, ghost.p_world_eye_right_m
+        turned = np.array(R) - np.array(head.tick.pose.R_world_head)
+        self._shell.visible = float(np.abs(turned).max()) > _APART
         set_pose(self._frame, p_world_head_m, quaternion(R))
-        sides = zip(
-            self._eyes,
-            eyes,
-            lines_of_sight(ghost),
-            (ghost.lid_left, ghost.lid_right),
-            (ghost.lower_left, ghost.lower_right),
-            strict=True,
-        )
+        eyes = ghost.p_world_eye_left_m, ghost.p_world_eye_right_m
         unit = measures_of(*eyes).interocular_m
         if unit != self._unit:
             self._unit = unit
             for part, x in self._sized:
                 part.scale = unit
                 part.position = (x * unit, 0.0, 0.0)
-        for eye, p_world_m, gaze_world, opening, lower in sides:
+        for ball, p_world_m, left in zip(self._eyes, eyes, (True, False), strict=True):
             p_head_m = rotate_back(R, sub(p_world_m, p_world_head_m))
-            set_pose(eye.ball, p_head_m, rotation_to(rotate_back(R, gaze_world)))
-            for frame, which, so_far in (
-                (eye.upper, "upper", opening),
-                (eye.lower, "lower", lower),
-            ):
-                edge_rad = edges.elevation_rad(f"{eye.side}_{which}_lid", so_far)
-                set_pose(frame, p_head_m, pitch_up(edge_rad))
-
-
-def lines_of_sight(pose: GazeState) -> tuple[Vec3, Vec3]:
-    """Return the unit lines of sight of the left and the right eye, world."""
-    return line_of_sight(pose, left=True), line_of_sight(pose, left=False)
+            set_pose(ball, p_head_m, rotation_to(rotate_back(R, line_of_sight(ghost, left))))

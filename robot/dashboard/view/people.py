@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from gazerig.gaze.types import PARTS, Face, Floats, Vec3
+from gazerig.gaze.types import PARTS, Face, Floats, Percept, Vec3
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import head_activity
 from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glow_disc, painted_glb
@@ -22,10 +22,6 @@ FIXATED_WITHIN_M = 0.02
 
 _BODY: Colour = (118, 146, 190)
 _TARGET: Colour = (255, 120, 40)
-_FOUND: Colour = (40, 120, 255)
-"""Colour of marks of detected faces and bodies on people of a simulated world."""
-_OUTLINE_M, _OUTLINE_MIDDLE_M = 0.115, np.array((-0.02, 0.0, 0.01))
-"""Radius and centre of the line around a face, from the nose, m."""
 _CHEST_M = 0.34
 _LABEL_ABOVE_M, _BEHIND_M, _HALO_M = 0.155, 0.11, 0.019
 _LEFT_EYE, _RIGHT_EYE, _NOSE = (PARTS.index(part) for part in ("LE", "RE", "N"))
@@ -94,38 +90,14 @@ class _Person:
         self._shade.remove()
 
 
-class _Outline:
-    """Line around a detected face, used if the world draws the person."""
-
-    def __init__(self, scene: viser.SceneApi, frame: str) -> None:
-        line, faces = stored_shape("thin_ring").mesh
-        self._line = scene.add_mesh_simple(
-            f"{frame}/outline", _OUTLINE_M * line, faces, color=_FOUND, side="double"
-        )
-
-    def show(self, face: Face, nose_m: Floats) -> None:
-        """Move the line to the face, in the plane of the eyes."""
-        set_pose(self._line, (nose_m + _OUTLINE_MIDDLE_M).tolist())
-
-    def fit(self, size: float) -> None:
-        """Scale the line to the measured size of the face."""
-        self._line.scale = (size, 0.8 * size, 1.12 * size)
-
-    def remove(self) -> None:
-        """Do nothing: the line is removed with the face's frame."""
-
-
 class _FaceView:
-    """Face in the scene, with its name and parts: a person, or marks on a person.
+    """Person in the scene, with a name and the parts of the face."""
 
-    marks: whether the world draws the person, so that the detected face is only marked
-    """
-
-    def __init__(self, scene: viser.SceneApi, face: Face, *, marks: bool) -> None:
+    def __init__(self, scene: viser.SceneApi, face: Face) -> None:
         self._scene = scene
         self._name = f"/faces/{face.id}"
         self._frame = scene.add_frame(self._name, show_axes=False)
-        self._shape = _Outline(scene, self._name) if marks else _Person(scene, self._name, face)
+        self._shape = _Person(scene, self._name, face)
         self._size = 0.0
         self._parts: list[viser.FrameHandle] = []
         halo, faces = stored_shape("ring").mesh
@@ -168,22 +140,14 @@ class _FaceView:
 
 
 class _BodyView:
-    """Moving body in the scene: a hand or a ball, and its kind.
+    """Moving body in the scene: a hand or a ball, and its kind."""
 
-    marks: whether the world draws the hand or object, so that its detection is only marked
-    """
-
-    def __init__(self, scene: viser.SceneApi, body: SeenBody, *, marks: bool) -> None:
+    def __init__(self, scene: viser.SceneApi, body: SeenBody) -> None:
         name = f"/bodies/{body.id}"
         self._frame = scene.add_frame(name, show_axes=False)
         self.kind = body.kind
         self._shape: viser.GlbHandle | viser.IcosphereHandle
-        if marks:
-            self._shape = scene.add_icosphere(
-                f"{name}/outline", radius=1.0, subdivisions=1, color=_FOUND, wireframe=True,
-                opacity=0.5, cast_shadow=False,
-            )  # fmt: skip
-        elif body.kind == "hand":
+        if body.kind == "hand":
             data = painted_glb(part_of(0, "hand"), SKIN)
             self._shape = scene.add_glb(
                 f"{name}/hand", data, cast_shadow=False, receive_shadow=False
@@ -193,23 +157,21 @@ class _BodyView:
                 f"{name}/ball", radius=1.0, color=_BODY, opacity=0.85, cast_shadow=False
             )
         self._label = scene.add_label(f"{name}/label", body.kind, anchor="bottom-center")
-        self._shade = None if marks else _Shadow(scene, f"/shades/{body.id}", 2.0 * body.radius_m)
+        self._shade = _Shadow(scene, f"/shades/{body.id}", 2.0 * body.radius_m)
 
     def show(self, body: SeenBody) -> None:
         """Move the body; the palm of a hand faces the rig."""
         x, y, z = body.p_world_m
         set_pose(self._frame, body.p_world_m)
         set_rotation(self._frame, rotation_to((-x, -y, 0.0)))
-        if self._shade is not None:
-            self._shade.move_below((x, y, z))
+        self._shade.move_below((x, y, z))
         self._shape.scale = round(body.radius_m, 3)
         set_pose(self._label, (0.0, 0.0, 1.1 * body.radius_m + 0.02))
         self._label.text = body.kind
 
     def remove(self) -> None:
         self._frame.remove()
-        if self._shade is not None:
-            self._shade.remove()
+        self._shade.remove()
 
 
 class PeopleView:
@@ -217,7 +179,6 @@ class PeopleView:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
-        self._as_marks = False
         self._faces: dict[int, _FaceView] = {}
         self._bodies: dict[int, _BodyView] = {}
         self._target = scene.add_frame("/target", show_axes=False)
@@ -226,45 +187,40 @@ class PeopleView:
             "/target/label", "", position=(0.0, 0.0, -0.03), anchor="top-center"
         )
 
-    def mark_only(self, on: bool) -> None:
-        """Draw only marks of detections, or also the people if no world draws them."""
-        if on != self._as_marks:
-            self._as_marks = on
-            while self._faces:
-                self._faces.popitem()[1].remove()
-            while self._bodies:
-                self._bodies.popitem()[1].remove()
+    def show(self, tick: Tick, *, parts: bool = False, people: bool = True) -> None:
+        """Draw the present detections, with parts of faces if selected; remove the others.
 
-    def show(self, tick: Tick, *, parts: bool = False) -> None:
-        """Draw the present detections, with parts of faces if selected; remove the others."""
-        target_m = tick.gaze.gaze_point_world_m
-        faces = {face.id: face for face in (tick.percept.faces if tick.percept else ())}
-        bodies = {body.id: body for body in seen_bodies(tick)}
+        Args:
+            tick: tick of the rig.
+            parts: whether to mark the parts of faces.
+            people: whether to draw people and things, or only the target.
+        """
+        target_m, percept = tick.gaze.gaze_point_world_m, tick.percept if people else None
+        faces = {face.id: face for face in (percept.faces if percept is not None else ())}
+        bodies = {body.id: body for body in (seen_bodies(percept) if percept is not None else ())}
         for gone in self._faces.keys() - faces.keys():
             self._faces.pop(gone).remove()
         for gone in self._bodies.keys() - bodies.keys():
             self._bodies.pop(gone).remove()
         for face in faces.values():
             if face.id not in self._faces:
-                self._faces[face.id] = _FaceView(self._scene, face, marks=self._as_marks)
+                self._faces[face.id] = _FaceView(self._scene, face)
             self._faces[face.id].show(face, target_m, parts)
         for body in bodies.values():
             shown = self._bodies.get(body.id)
             if shown is None or shown.kind != body.kind:
                 if shown is not None:
                     shown.remove()
-                self._bodies[body.id] = _BodyView(self._scene, body, marks=self._as_marks)
+                self._bodies[body.id] = _BodyView(self._scene, body)
             self._bodies[body.id].show(body)
         set_pose(self._target, target_m)
         self._label.text = head_activity(tick).target
 
 
-def seen_bodies(tick: Tick) -> tuple[SeenBody, ...]:
+def seen_bodies(percept: Percept) -> tuple[SeenBody, ...]:
     """Return targets without a visible face: moving objects and people who are turned away."""
-    if tick.percept is None:
-        return ()
-    bodies = tick.percept.bodies
-    faces = {face.id for face in tick.percept.faces}
+    bodies = percept.bodies
+    faces = {face.id for face in percept.faces}
     return tuple(
         SeenBody(
             bodies.ids[i],

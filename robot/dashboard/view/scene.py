@@ -43,11 +43,10 @@ class HeadScene:
         layers = self._layers
         with self._server.atomic():  # browsers receive all changes of a tick together
             self._viewpoints.fit(head)
-            # A simulated world draws its own room and people; then only mark the detections.
             if world is not None:
                 self._world.show(*world)
             self._head.on_table = world is not None
-            self._people.mark_only(world is not None)
             self._head.show(head, sight="sight" in layers, camera="camera" in layers)
-            self._people.show(head.tick, parts="parts" in layers)
-            self._overlays.show(head, layers, self._head.lid_edges)
+            # A simulated world draws its own people.
+            self._people.show(head.tick, parts="parts" in layers, people=world is None)
+            self._overlays.show(head, layers)

@@ -1,6 +1,5 @@
 """The command calibrate face: positions of a person's eyes, mouth and other parts."""
 
-import os
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -49,7 +48,6 @@ from gazerig.robot.control.event_text import group_events
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop import LoopCount, Tick
 from gazerig.robot.control.loop import run as run_loop
-from gazerig.robot.remote.live_server import StopOnlyServer
 
 STILL_SCENE = "sits-still"
 
@@ -142,15 +140,7 @@ def _calibrate(
     scripted = scripted or not sys.stdin.isatty()
     keys = LineKeys(lines) if scripted else TerminalKeys()
     observers = RunObservers(made, options, say, led_by="the terminal")
-    door = StopOnlyServer(
-        made.robot.command,
-        made.clock,
-        {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"},
-        say,
-    )
-    sitting = _CalibrationSession(
-        steering, keys, made.clock.now_s, stopped, scripted, observers, door
-    )
+    sitting = _CalibrationSession(steering, keys, made.clock.now_s, stopped, scripted, observers)
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
     try:
@@ -164,8 +154,6 @@ def _calibrate(
                 say(note)
             closed_last.callback(lambda: observers.close(count))
             observers.open()
-            closed_last.callback(door.close)
-            door.open()
             with keys:
                 count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.update)
             leaving.cause = count.stopped_by
@@ -187,11 +175,10 @@ class _CalibrationSession:
         stopped: Callable[[], str | None],
         scripted: bool,
         observers: RunObservers,
-        door: StopOnlyServer,
     ) -> None:
         self._steering, self._keys, self._now_s = steering, keys, now_s
         self._stopped, self._scripted = stopped, scripted
-        self._observers, self._door = observers, door
+        self._observers = observers
         self._live_line = not scripted and sys.stderr.isatty()
         self._said: tuple[str | None, bool] | None = None
         self._ready_s = self._shown_s = self._seen_s = now_s()
@@ -220,7 +207,6 @@ class _CalibrationSession:
     def update(self, tick: Tick) -> None:
         """Update from a tick, and print instructions for the person."""
         self._observers.update(tick)
-        self._door.update(tick)
         self._tell(self._steering.update(tick))
         for event in group_events(tick.events):
             say(event)
