@@ -39,9 +39,8 @@ class Rig:
         self.stops: list[dict[str, Any]] = []
         self.views: list[tuple[ShowView, str]] = []
         self.answer: Callable[[dict[str, Any]], dict[str, Any]] = lambda asked: DONE
-        with socket.socket() as trial:
-            trial.bind((host, 0))
-            port = trial.getsockname()[1]
+        listener = socket.create_server((host, 0))
+        port = listener.getsockname()[1]
         inside = folder / "page.sock"
         self.server = open_server(inside)
         pairs = socket.socketpair(), socket.socketpair()
@@ -51,7 +50,7 @@ class Rig:
         self.take_picture: Callable[[bytes], bool] = lambda jpeg: False
         self.feed = TickFeed()
         self.door = PageDoor(
-            host, port, inside, [theirs for _, theirs in pairs], TOKEN, self.feed,
+            host, listener, inside, [theirs for _, theirs in pairs], TOKEN, self.feed,
             lambda view, browser: self.views.append((view, browser)),
             lambda jpeg: self.take_picture(jpeg),
         )  # fmt: skip

@@ -2,14 +2,13 @@
 
 from collections.abc import Callable, Iterator
 from functools import cache, partial
-from math import degrees
 
 import numpy as np
 import pytest
 import viser
 from gaze_targets import joints_at
 from msgspec import structs
-from page_feed import shown, visit
+from page_feed import visit
 from viser import transforms
 
 from gazerig.config.load import shipped_path
@@ -147,30 +146,3 @@ def _in_world(view: HeadView, link: str) -> transforms.SE3:
                 turn, np.array(one.frame.position)
             )
     return found
-
-
-def _turned_deg(view: HeadView, link: str) -> float:
-    """Return how far a part of the face is turned about its axis across the head, upwards."""
-    _, y, _ = transforms.SO3(np.array(view.links[link].frame.wxyz)).log()
-    return -degrees(y)
-
-
-def test_a_rig_without_brows_and_jaw_shows_expressions_drawn_only(
-    server: viser.ViserServer,
-) -> None:
-    view, head = HeadView(server.scene), shown()
-
-    def show(after_s: float, *expressed: str) -> float:
-        t_s = head.tick.t_s + after_s
-        tick = structs.replace(head.tick, t_s=t_s)
-        view.show(head._replace(tick=tick, expressed=expressed))
-        return _turned_deg(view, "left_brow_link")
-
-    assert show(0.0, "", "") == _turned_deg(view, "jaw_link") == 0.0
-    # A track comes before the expression beneath it.
-    angles = [show(0.05 * k, "surprised", "happy") for k in range(1, 21)]
-    assert angles[-1] == pytest.approx(18.0, abs=0.1)
-    assert np.all(np.diff(angles) >= 0.0) and max(np.diff([0.0, *angles])) < 6.0  # without a jump
-    assert _turned_deg(view, "right_brow_link") == angles[-1]
-    assert _turned_deg(view, "jaw_link") == pytest.approx(-12.0, abs=0.1)
-    assert show(3.0, "", "neutral") == pytest.approx(0.0, abs=0.01)

@@ -97,12 +97,6 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         assert wait_for(page.notice, "the second notice") == f"the page is there again, at {url}"
         with Visitor(url).open("/api/v1/socket"):
             assert b'"do":"hello"' in ends[2].recv(1 << 16)  # the new one of two for each page
-        # Once more: no more words about it.
-        second = page_here()
-        assert second is not None
-        os.kill(second, signal.SIGKILL)
-        wait_for(lambda: page.started == 3, "the third page")
-        assert page.notice() is None
 
 
 @pytest.mark.parametrize("beats", [True, False])

@@ -1,4 +1,4 @@
-"""With a world the page shows its room and its people, and only marks what the rig has seen."""
+"""With a world the page shows its room and its people, and what the rig has seen only without."""
 
 import numpy as np
 import pytest
@@ -37,23 +37,18 @@ def test_people_of_a_world_are_where_they_are_at_the_time() -> None:
         server.stop()
 
 
-def test_with_a_world_what_was_seen_is_only_marked() -> None:
+def test_with_a_world_what_was_seen_is_not_drawn_again() -> None:
     server = viser.ViserServer(port=0, verbose=False)
     rig = seen("hand")
     drawn = {"/faces/3/head", "/chests/3", "/bodies/7/hand", "/shades/3", "/shade"}
     try:
         people, head = PeopleView(server.scene), HeadView(server.scene)
-        for marked in (False, True, False):
-            people.mark_only(marked)
-            head.on_table = marked
-            people.show(rig.tick)
+        for has_world in (False, True, False):
+            head.on_table = has_world
+            people.show(rig.tick, people=not has_world)
             head.show(rig)
             found = shown(server, "/")
-            assert drawn.isdisjoint(found) if marked else drawn <= found
-            if marked:
-                outline = server.scene._handle_from_node_name["/faces/3/outline"]
-                assert isinstance(outline, viser.MeshHandle)
-                assert outline.scale == pytest.approx((1.0, 0.8, 1.12), abs=0.02)
-            assert ({"/faces/3/outline", "/faces/3/label", "/bodies/7/outline"} <= found) is marked
+            assert drawn.isdisjoint(found) if has_world else drawn <= found
+            assert "/target/point" in found
     finally:
         server.stop()

@@ -35,7 +35,6 @@ from gazerig.robot.dashboard.feed.rig_feed import LiveRig
 from gazerig.robot.dashboard.feed.status_line import StatusLine
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.moved_opponent import has_opponent
-from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.remote.client import rig_name
 from gazerig.robot.remote.live_server import LiveServer, StopOnlyServer
 from gazerig.robot.remote.topics import JointInfo, RigInfo, RunState
@@ -44,8 +43,6 @@ from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
-
-_STATES_PER_FIGURES = 3
 
 
 class RunObservers:
@@ -84,8 +81,6 @@ class RunObservers:
             if isinstance(assembly.scene, AgentScene)
             else None
         )
-        self._states = 0
-        self._figures: LoopFigures | None = None
         self._timing = LoopTiming(assembly.loop.rate_hz)
         self._emulated = options.mock and not led_by
         computed = options.no_pictures or (assembly.scene is not None and not options.pixels)
@@ -167,9 +162,7 @@ class RunObservers:
         """Return the state of the run that is not in ticks."""
         robot, tuning = self._made.robot, self._tuning
         menus = robot.menus()
-        self._states += 1
-        if self._states % _STATES_PER_FIGURES == 1:  # computing them takes half a millisecond
-            self._figures = self._timing.figures()
+        figures = self._timing.figures()
         return RunState(
             menus["behaviour"][0],
             menus["conversation"][0],
@@ -177,8 +170,8 @@ class RunObservers:
             menus.get("expression", ("",))[0],
             health_text(robot.body.bus.health()),
             tuning.version if tuning is not None else 0,
-            self._figures,
-            busy_text(self._figures),
+            figures,
+            busy_text(figures),
             self._scene_start_s(),
         )
 

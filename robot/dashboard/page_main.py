@@ -27,7 +27,7 @@ from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.drivers.process.priority import lower_priority
 from gazerig.robot.control.head_state import head_state
 from gazerig.robot.dashboard.door.admission import page_url
-from gazerig.robot.dashboard.door.page_door import HeadNews, PageDoor
+from gazerig.robot.dashboard.door.page_door import BACKLOG, HeadNews, PageDoor
 from gazerig.robot.dashboard.door.viser_server import open_server
 from gazerig.robot.dashboard.feed.page_process import (
     BEAT,
@@ -47,9 +47,8 @@ from gazerig.robot.remote.topics import PanelContent, RigInfo, RunState
 
 _PAUSE_S = 0.02
 """Pause after a batch of ticks, s: the frame that follows it is then shown with it."""
-_SELDOM_S = 0.33
-"""Time between two states of the run, s."""
-_PANELS_S = 1.0
+_SELDOM_S = 0.5
+"""Time between two states of the run, and of packages' panels, s."""
 _SILENT_AFTER_S = 1.0
 _BEAT_S = 0.5
 _PORTS_TRIED = 100
@@ -58,24 +57,19 @@ _NICENESS = 5  # the control loop has priority on a shared core
 _MOST_FILES = 8192  # a burst of connections must not use all file descriptors
 
 
-def free_port(host: str, port: int) -> int:
-    """Find the first port from this one on that can be bound.
+def listen(host: str, port: int) -> socket.socket:
+    """Listen on the first port from this one on that is free.
 
     Raises:
         OSError: the address does not belong to this machine, or none of the ports is free.
     """
     family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     for candidate in range(port, min(port + _PORTS_TRIED, _PORTS)):
-        with socket.socket(family, socket.SOCK_STREAM) as trial:
-            # Like the server itself: a port in TIME_WAIT is free, one with a listener is not.
-            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                trial.bind((address[0], candidate))
-            except OSError as error:
-                if error.errno != errno.EADDRINUSE:
-                    raise
-            else:
-                return candidate
+        try:
+            return socket.create_server((address[0], candidate), family=family, backlog=BACKLOG)
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise
     raise OSError(errno.EADDRINUSE, f"no port from {port} on is free")
 
 
@@ -95,26 +89,26 @@ class Page:
         words: Message for the terminal, "" if there is none.
 
     Raises:
-        OSError: see ``free_port``.
+        OSError: see ``listen``.
     """
 
     def __init__(
         self, host: str, port: int, token: str, folder: Path, link: MessageLink,
         ends: Sequence[socket.socket],
     ) -> None:  # fmt: skip
-        open_port = free_port(host, port)
+        listener = listen(host, port)
+        open_port = listener.getsockname()[1]
         inside = folder / "page.sock"
         self._link, self._feed, self._clock = link, RigFeed(), RealClock()
         self._server = open_server(inside)
         self._scene = HeadScene(self._server)
         self.door = PageDoor(
-            host, open_port, inside, ends, token, self._feed.ticks, self._scene.change,
+            host, listener, inside, ends, token, self._feed.ticks, self._scene.change,
             self._send_picture,
         )  # fmt: skip
         self._panels = PackagePanels()
-        self._beat_s = self._panels_s = self._run_s = -inf
+        self._beat_s = self._run_s = -inf
         self._rig: RigInfo | None = None
-        self._run: RunState | None = None
         self._number = 0
         self.door.open()
         busy = port not in (0, open_port)  # 0 asks for any port
@@ -158,19 +152,18 @@ class Page:
         if head is None or feed.rig is None:
             return
         now_s = self._clock.now_s()
-        rig, run = None, None
+        topics: list[RigInfo | RunState | PanelContent] = []
         if feed.rig.info != self._rig:
-            rig = self._rig = feed.rig.info
-        if now_s - self._run_s >= _SELDOM_S and (state := feed.run_state()) != self._run:
-            run, self._run, self._run_s = state, state, now_s
-        panels: tuple[PanelContent, ...] = ()
-        if wanted.rig and now_s - self._panels_s >= _PANELS_S:
-            self._panels_s = now_s
-            panels = self._panels.draw(head_state(head.tick))
+            self._rig = feed.rig.info
+            topics.append(self._rig)
+        if now_s - self._run_s >= _SELDOM_S:
+            self._run_s = now_s
+            topics.append(feed.run_state())
+            topics += self._panels.draw(head_state(head.tick)) if wanted.rig else ()
         picture = feed.picture() if wanted.pictures else None
         events = feed.ticks.events(self._number)
         self._number = feed.ticks.number
-        news = HeadNews(head.tick, events, rig, run, picture, panels)
+        news = HeadNews(head.tick, events, tuple(topics), picture)
         self.door.call_soon(self.door.distribute, news)
         self._scene.show(head, feed.shown_world())
 

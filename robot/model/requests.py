@@ -102,7 +102,7 @@ class Fault(Request, frozen=True):
     text: str
 
 
-Layer = Literal["ghost", "sight", "camera", "parts"]
+Layer = Literal["ghost", "sight"]
 Viewpoint = Literal["face", "both", "over its shoulder", "from above"]
 
 
@@ -111,7 +111,7 @@ class ShowView(Request, frozen=True):
 
     Attributes:
         layers: Layers for all browsers, None for no change: ghost of the desired pose, lines of
-            sight, field of the camera, parts of a face.
+            sight.
         look_from: Viewpoint of this browser, None for no change.
     """
 

@@ -8,7 +8,6 @@ found the same, and a missing file when it is missing for several checks.
 """
 
 import contextlib
-import socket
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -24,7 +23,6 @@ from gazerig.robot.control.command_handler import (
     accept_only_stops,
 )
 from gazerig.robot.control.loop import Robot
-from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.reply import CommandTaker
 from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
@@ -153,6 +151,10 @@ class LiveServer:
         changing: Returns the other fields of the status, e.g. {"page": address}.
         paths: Rules for the files that a client of the network may name; None if any.
         voice: Says sounds and texts; None if the head has no voice.
+
+    Attributes:
+        serve: Answers the page's process over a connection.
+        update: Stores the newest tick, for the loop.
     """
 
     def __init__(
@@ -185,6 +187,7 @@ class LiveServer:
         self._page_server = RemoteServer(
             RequestHandler(handler, self._pulse, about, fault, changing, paths), say
         )
+        self.serve, self.update = self._page_server.serve, self._pulse.update
 
     def open(self) -> None:
         """Listen to other programs and watch the files; print a line if listening fails."""
@@ -193,16 +196,6 @@ class LiveServer:
         except SetupError as error:  # the head runs without remote control
             self._say(f"gazerig ctl set and stop cannot find this rig: {error}")
         self._watch.start()
-
-    @property
-    def serve(self) -> Callable[[socket.socket], None]:
-        """Return the function that answers the page's process over a connection."""
-        return self._page_server.serve
-
-    @property
-    def update(self) -> Callable[[Tick], None]:
-        """Return the function that stores the newest tick, for the loop."""
-        return self._pulse.update
 
     def close(self) -> None:
         """Close all connections and stop watching the files."""
@@ -245,6 +238,10 @@ class StopOnlyServer:
         clock: Clock of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         say: Prints a line on the terminal.
+
+    Attributes:
+        serve: Answers the page's process over a connection.
+        update: Stores the newest tick, for the loop.
     """
 
     def __init__(
@@ -255,11 +252,11 @@ class StopOnlyServer:
         say: Callable[[str], None],
     ) -> None:
         self._say = say
-        self._pulse = LoopMonitor(clock)
+        pulse = LoopMonitor(clock)
         only = accept_only_stops(command, _CALIBRATED)
         handler = CommandHandler(only, None, fixed=f"{_CALIBRATED}: its parameters are fixed")
-        self._server = RemoteServer(RequestHandler(handler, self._pulse, about), say)
-        self.serve = self._server.serve
+        self._server = RemoteServer(RequestHandler(handler, pulse, about), say)
+        self.serve, self.update = self._server.serve, pulse.update
 
     def open(self) -> None:
         """Listen to other programs; print a line if that fails."""
@@ -267,10 +264,6 @@ class StopOnlyServer:
             self._server.open()
         except SetupError as error:  # the head runs without remote control
             self._say(f"gazerig stop cannot find this rig: {error}")
-
-    def update(self, tick: Tick) -> None:
-        """Store the newest tick; called by the loop."""
-        self._pulse.update(tick)
 
     def close(self) -> None:
         """Close all connections."""

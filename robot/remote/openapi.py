@@ -99,10 +99,6 @@ def api_description(base: str) -> Schema:
             },
             {"101": {"description": "Open"}, **bad},
         ),
-        "webcam": (
-            "get", "Websocket: JPEGs for the camera of an emulated head", {},
-            {"101": {"description": "Open"}, **bad},
-        ),
         "waveform": (
             "get",
             "Outline of a track's sound, 0..1",

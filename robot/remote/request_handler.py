@@ -11,7 +11,6 @@ from msgspec import structs
 
 from gazerig.robot.control.command_handler import CommandHandler, PathGuard
 from gazerig.robot.control.head_state import HeadReport, head_state
-from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.control.tick_text import camera_conditions
 from gazerig.robot.model.clock import Clock
@@ -46,17 +45,16 @@ class LoopMonitor:
 
     Args:
         clock: Clock of the loop.
+
+    Attributes:
+        update: Stores the newest tick, for the loop.
     """
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._feed = TickFeed()
+        self.update = self._feed.update
         self._never = threading.Event()
-
-    @property
-    def update(self) -> Callable[[Tick], None]:
-        """Return the function that stores the newest tick, for the loop."""
-        return self._feed.update
 
     def wait_for_commands(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
         """Wait until all previous changes are applied; return whether they are.

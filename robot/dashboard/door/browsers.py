@@ -2,7 +2,7 @@
 
 A browser needs a handful of connections. A client that opens hundreds and sends nothing, or sends
 one byte per second, must not prevent others from pressing STOP. So a new connection over the limit
-closes the one that has been idle longest, and a request has a second before it can be closed.
+closes the one that has been idle, or has made its request, longest ago.
 Websockets do not count: each kind has a limit of its own.
 """
 
@@ -18,8 +18,6 @@ from aiohttp.web_protocol import RequestHandler
 
 MOST = 96
 """Largest number of connections of all browsers together, without websockets."""
-RESERVE = 64
-"""Number of further connections that are younger than a second."""
 IDLE_S = 15.0
 """Longest time of a connection without a request, s."""
 BUSY_S = 20.0
@@ -27,7 +25,6 @@ BUSY_S = 20.0
 _LOOK_EVERY_S = 1.0
 _TRIM_AFTER_S = 0.02
 _BEGINS_WITHIN_S = 5.0
-_YOUNG_S = 1.0
 _DIGITS = 4
 
 
@@ -68,7 +65,7 @@ class _ConnectionState:
 
     def __init__(self, since_s: float) -> None:
         self.since_s = since_s
-        self.begun = self.busy = self.lasting = False
+        self.busy = self.lasting = False
 
 
 class Connections:
@@ -98,17 +95,18 @@ class Connections:
         return len(self._server.connections)
 
     def _trim(self) -> None:
+        """Close those over the limit that are idle or busy longest, and forget those that ended."""
         self._trimming = False
-        self._forget_gone()
-        young_s = asyncio.get_running_loop().time() - _YOUNG_S
-        counted = [
-            (one.since_s > young_s, one.busy, one.since_s, handler)
-            for handler, one in self._states.items()
-            if one.begun and not one.lasting
-        ]
-        counted.sort(key=lambda one: one[:3])
-        too_many, old = len(counted) - MOST, sum(not young for young, *_ in counted)
-        for *_, handler in counted[: max(0, min(too_many, old), too_many - RESERVE)]:
+        now_s = asyncio.get_running_loop().time()
+        for handler, state in tuple(self._states.items()):
+            if handler.transport is None and now_s - state.since_s > _BEGINS_WITHIN_S:
+                del self._states[handler]
+        counted = sorted(
+            (state.since_s, number, handler)
+            for number, (handler, state) in enumerate(self._states.items())
+            if handler.transport is not None and not state.lasting
+        )
+        for _, _, handler in counted[: max(0, len(counted) - MOST)]:
             self._end(handler)
 
     @contextmanager
@@ -119,7 +117,7 @@ class Connections:
             yield
             return
         loop = asyncio.get_running_loop()
-        state.begun, state.busy, state.since_s = True, True, loop.time()
+        state.busy, state.since_s = True, loop.time()
         try:
             yield
         finally:
@@ -146,13 +144,3 @@ class Connections:
         del self._states[handler]
         if handler.transport is not None:
             handler.transport.abort()
-
-    def _forget_gone(self) -> None:
-        """Remove connections that have ended; a new one appears after a moment."""
-        known = set(self._server.connections)
-        now_s = asyncio.get_running_loop().time()
-        for handler, state in tuple(self._states.items()):
-            if handler in known:
-                state.begun = True
-            elif state.begun or now_s - state.since_s > _BEGINS_WITHIN_S:
-                del self._states[handler]

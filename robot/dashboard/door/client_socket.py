@@ -16,7 +16,8 @@ from gazerig.robot.remote.excess import STOPPED
 from gazerig.robot.remote.topics import ShownPicture
 
 NO_OUTCOME = {name for name, kind in COMMANDS.items() if kind in REPEATED}
-_CONTROLS = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))
+CONTROLS = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))
+"""Verbs of the commands that give their client control of gaze or joints."""
 _MOST_QUEUED, _MOST_OUT = 16, 256
 _REPORT_S = 0.25
 """Time in which dropped messages are counted for one refusal, s."""
@@ -132,7 +133,7 @@ class ClientSocket:
     def hold(self, message: Mapping[str, object], reply: CommandReply) -> None:
         """Record what an accepted message controls until it is no longer renewed."""
         talks = message["do"] == "talk"
-        if talks or message["do"] in _CONTROLS:
+        if talks or message["do"] in CONTROLS:
             starts = message.get("state") != "idle" if talks else bool(reply.control_number)
             # A pointer controls the gaze only while it moves.
             lasts = message.get("stay") or message.get("pointer")
@@ -173,8 +174,3 @@ class ClientSocket:
 def tag_of(message: Mapping[str, object]) -> dict[str, object]:
     """Return the tag of a message, which its answer has, too."""
     return {"tag": message["tag"]} if "tag" in message else {}
-
-
-def takes_control(message: Mapping[str, object]) -> bool:
-    """Return whether a message gives its client control of gaze or joints."""
-    return message.get("do") in _CONTROLS

@@ -35,12 +35,12 @@ from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.dashboard.door.admission import API, Admission
 from gazerig.robot.dashboard.door.browsers import Connections, TabLimits, browser_name
 from gazerig.robot.dashboard.door.client_socket import (
+    CONTROLS,
     NO_OUTCOME,
     ClientSocket,
     Visitor,
     Wishes,
     tag_of,
-    takes_control,
 )
 from gazerig.robot.dashboard.door.page_files import PageFiles
 from gazerig.robot.dashboard.door.rig_link import BUSY, Answer, RigLink
@@ -52,7 +52,7 @@ from gazerig.robot.dashboard.door.sockets import (
     until_one_ends,
 )
 from gazerig.robot.dashboard.door.viser_server import VIEW, ViewProxy, view_client
-from gazerig.robot.dashboard.door.waveforms import Waveforms
+from gazerig.robot.dashboard.door.waveforms import waveform
 from gazerig.robot.model.commands import HEARTBEAT_S, ClientCommand, Resume, Stop
 from gazerig.robot.model.outcome import command_outcome
 from gazerig.robot.model.reply import CommandReply
@@ -78,18 +78,19 @@ UNCONFIRMED = (
 )
 _PER_S, _BURST = 50.0, 100.0
 _ALL_PER_S, _ALL_BURST = 100.0, 200.0
-_READ_S = 5.0
+_READ_S, _LOOK_S = 5.0, 0.04
 _MOST_RESTS = 10
 """Stops are received for so many times REST_S while more of a client's data waits to be read."""
 _WHO_CHARACTERS = 60
 _TAG_CHARACTERS = 100
-_OPEN_TIMEOUT_S = 20.0
+BACKLOG = 512
 _CLOSE_TIMEOUT_S = 3.0
 _DAY_S = 86400
 _NEWEST = 10**15
 """Number greater than that of any event."""
 _ENDS = (aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSING, aiohttp.WSMsgType.CLOSED,
          aiohttp.WSMsgType.ERROR)  # fmt: skip
+_TOPICS: Mapping[type, str] = {RigInfo: "rig", RunState: "run", PanelContent: "panel"}
 _STATUS = {"ok": 200, "refused": 409, "failed": 503}
 _HEADERS = {
     "X-Frame-Options": "DENY",  # no other page may cover the buttons
@@ -119,16 +120,14 @@ class HeadNews(NamedTuple):
     """What is new of the head; None and () for what is not.
 
     tick: The newest tick.
-    panels: Contents of the panels of packages.
+    topics: The rig, the run and the contents of packages' panels.
     silent_s: Time without a tick if the rig is silent, else 0.
     """
 
     tick: Tick | None = None
     events: tuple[HeadEvent, ...] = ()
-    rig: RigInfo | None = None
-    run: RunState | None = None
+    topics: tuple[RigInfo | RunState | PanelContent, ...] = ()
     picture: ShownPicture | None = None
-    panels: tuple[PanelContent, ...] = ()
     silent_s: float = 0.0
 
 
@@ -210,7 +209,7 @@ class PageDoor:
     def __init__(
         self,
         host: str,
-        port: int,
+        listener: socket,
         inside: Path,
         ends: Sequence[socket],
         token: str,
@@ -222,7 +221,7 @@ class PageDoor:
 
         Args:
             host: the address
-            port: a free port of that address
+            listener: socket that listens there
             inside: address of viser's server
             ends: connections to the rig, see ``RigLink``
             token: what a client must show
@@ -231,38 +230,26 @@ class PageDoor:
             picture: receives pictures of browsers' own cameras; returns False if it does not accept
                 them
         """
-        self._host, self._port, self._inside = host, port, inside
-        self._token = token
+        self._listener, self._inside, self._token = listener, inside, token
+        port = listener.getsockname()[1]
         self._feed, self._show_view = feed, show_view
         self._cookie = f"gazerig_{port}"  # cookies are shared by all ports
         self._name_cookie = f"{self._cookie}_browser"
         self.admission = Admission(host, port, token, self._cookie, _WHERE)
         self._rig = RigLink(ends)
-        self._waves = Waveforms(self._rig)
         self._clients: set[ClientSocket] = set()
-        self._outcomes: dict[asyncio.Future[tuple[str, str]], CommandReply] = {}
-        self._lasting: dict[str, str] = {}
+        self._lasting: dict[tuple[type, str], str] = {}
         self._rate = TokenBucket(_ALL_PER_S, _ALL_BURST)
         self._limits = TabLimits(MOST_CLIENTS)
         self._websockets = 0
         self._loop = asyncio.new_event_loop()
         self.webcam, self._webcams = WebcamSocket(self._loop.time, picture), TabLimits(2)
         self._over = asyncio.Event()
-        self._opened = threading.Event()
-        self._failed: OSError | None = None
         self._thread = threading.Thread(target=self._run, name="page door", daemon=True)
 
     def open(self) -> None:
-        """Listen.
-
-        Raises:
-            OSError: it is not possible to listen on the address.
-        """
+        """Start to serve."""
         self._thread.start()
-        if not self._opened.wait(_OPEN_TIMEOUT_S):
-            raise OSError("the page's door did not open in time")
-        if self._failed is not None:
-            raise self._failed
 
     def call_soon(self, do: Callable[..., object], *words: object) -> None:
         """Let the thread that serves the clients call a function.
@@ -307,19 +294,9 @@ class PageDoor:
         self._connections = Connections(runner.server)
         async with view_client(self._inside) as client:
             self._view = ViewProxy(client, self._connections, _HEADERS)
-            try:
-                listener = await self._loop.create_server(
-                    self._connections.accept,
-                    self._host,
-                    self._port,
-                    reuse_address=True,
-                    backlog=512,
-                )
-            except OSError as error:
-                self._failed = error
-                return
-            finally:
-                self._opened.set()
+            listener = await self._loop.create_server(
+                self._connections.accept, sock=self._listener, backlog=BACKLOG
+            )
             await until_one_ends(self._over.wait(), self._connections.watch(), self._rig.run())
             self._over.set()
             listener.close()
@@ -337,18 +314,10 @@ class PageDoor:
                 client.add_state(text, now_s)
             for client in self._clients:
                 client.add_progress(progress)
-            for outcome, reply in tuple(self._outcomes.items()):
-                end = command_outcome(reply, progress)
-                if end is not None and not outcome.done():
-                    outcome.set_result(end)
         events = [_line(event=event) for event in news.events]
-        topics = {
-            **({"rig": _line(rig=news.rig)} if news.rig is not None else {}),
-            **({"run": _line(run=news.run)} if news.run is not None else {}),
-            **{f"panel {panel.title}": _line(panel=panel) for panel in news.panels},
-        }
-        self._lasting |= topics
-        texts = list(topics.values())
+        texts = [_line(**{_TOPICS[type(topic)]: topic}) for topic in news.topics]
+        for topic, text in zip(news.topics, texts, strict=True):
+            self._lasting[type(topic), getattr(topic, "title", "")] = text
         silent = [_line(silent=news.silent_s)] if news.silent_s else []
         for client in self._clients:
             wishes = client.wishes
@@ -411,7 +380,7 @@ class PageDoor:
                 case "GET", "webcam":
                     return await self._webcam(request)
                 case "GET", "waveform":
-                    wave = await self._waves.get(request.query.get("track", ""))
+                    wave = await waveform(self._rig, request.query.get("track", ""))
                     if not wave:
                         raise MessageRefused("no track of this name has a sound", 404)
                     return _answer({"ok": wave}, 200)
@@ -441,10 +410,10 @@ class PageDoor:
             raise MessageRefused(UNCONFIRMED, 409)
         if message.get("do") != "stop" and not self._is_within_rate():
             raise MessageRefused(BUSY, 429)
-        ends = "seconds" if message.get("do") == "talk" else "for_s"
-        if (ends == "seconds" or takes_control(message)) and message.get(ends) is not None:
-            # The order ends after its duration; a request has no connection that could be lost.
-            message["stay"] = True
+        verb = message.get("do")
+        if verb in (*CONTROLS, "talk"):
+            # An order with a duration ends after it; a request has no connection to be lost.
+            message["stay"] = message.get("stay") or any(map(message.get, ("for_s", "seconds")))
         answer = await self._ask(message, visitor)
         match answer:
             case {"ok": {"reply": dict(reply)}} if wait_s and message["do"] not in NO_OUTCOME:
@@ -456,20 +425,16 @@ class PageDoor:
         self, message: Mapping[str, Any], reply: CommandReply, wait_s: float
     ) -> dict[str, object]:
         """Wait for the outcome of an order, and renew its control meanwhile."""
-        outcome: asyncio.Future[tuple[str, str]] = self._loop.create_future()
-        self._outcomes[outcome] = reply
         renewing = reply.control_number and not message.get("stay")
-        end_s = self._loop.time() + wait_s
-        try:
-            while (left_s := end_s - self._loop.time()) > 0.0:
-                await asyncio.wait([outcome], timeout=min(0.25 * HEARTBEAT_S, left_s))
-                if outcome.done():
-                    how, why = outcome.result()
-                    return {"outcome": how, "why": why}
-                if renewing:
-                    await self._rig.ask({"do": "renew", "who": message["who"]})
-        finally:
-            del self._outcomes[outcome]
+        begin_s = renewed_s = self._loop.time()
+        while (now_s := self._loop.time()) - begin_s < wait_s:
+            end = command_outcome(reply, self._feed.progress())
+            if end is not None:
+                return {"outcome": end[0], "why": end[1]}
+            if renewing and now_s - renewed_s > 0.25 * HEARTBEAT_S:
+                renewed_s = now_s
+                await self._rig.ask({"do": "renew", "who": message["who"]})
+            await asyncio.sleep(_LOOK_S)
         return {"outcome": "timed out", "why": ""}
 
     async def _ask(self, message: Mapping[str, Any], visitor: Visitor) -> Answer:

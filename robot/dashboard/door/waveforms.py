@@ -1,4 +1,4 @@
-"""Outlines of the sounds of tracks, each read once."""
+"""Outlines of the sounds of tracks."""
 
 import asyncio
 from collections.abc import Sequence
@@ -11,25 +11,11 @@ from gazerig.robot.dashboard.door.rig_link import RigLink
 BINS = 160
 
 
-class Waveforms:
-    """Outlines of sounds, read in a thread.
-
-    Args:
-        rig: names the file of a track's sound.
-    """
-
-    def __init__(self, rig: RigLink) -> None:
-        self._rig = rig
-        self._found: dict[str, Sequence[float]] = {}
-
-    async def get(self, track: str) -> Sequence[float]:
-        """Return the outline of a track's sound, () without one or if it cannot be read."""
-        answer = await self._rig.ask({"do": "tracks"})
-        infos = answer.get("ok", ())
-        path = next((info["sound"] for info in infos if info["name"] == track), "")
-        if path and path not in self._found:
-            self._found[path] = await asyncio.to_thread(_read, path)
-        return self._found.get(path, ())
+async def waveform(rig: RigLink, track: str) -> Sequence[float]:
+    """Return the outline of a track's sound, () without one or if it cannot be read."""
+    infos = (await rig.ask({"do": "tracks"})).get("ok", ())
+    path = next((info["sound"] for info in infos if info["name"] == track), "")
+    return await asyncio.to_thread(_read, path) if path else ()
 
 
 def _read(path: str) -> Sequence[float]:

@@ -62,7 +62,6 @@ class PageProcess:
 
     dropped: ticks that the page did not accept
     started: number of starts of the page; its feed starts again when this changes
-    gone: whether it has ended and is not restarted
     """
 
     def __init__(
@@ -91,9 +90,7 @@ class PageProcess:
         self._clock = RealClock()
         self._began_s = self._check_s = self._silent_s = 0.0
         self._wait_s = _AGAIN_AFTER_S
-        self._mourned = self._welcomed = False
         self.started = 0
-        self.gone = False
         self._errors: BinaryIO | None = None
         self._folder: str | None = None
         self._url: str | None = None
@@ -206,8 +203,7 @@ class PageProcess:
             self._url, self._silent_s = url, 0.0
             self._port = int(urlsplit(url).port or self._port)
             self.started += 1
-            if self._mourned and not self._welcomed:
-                self._welcomed = True
+            if self.started > 1:
                 self._notices.append(f"the page is there again, at {url}")
         elif kind == NOTICE:
             self._notices.append(body.decode())
@@ -226,16 +222,13 @@ class PageProcess:
                 code = process.wait(_CLOSE_TIMEOUT_S)
             except subprocess.TimeoutExpired:  # it has closed its link but hangs
                 code = None
-        self.gone = code == CANNOT_OPEN
+        gone = code == CANNOT_OPEN
         if self._clock.now_s() - self._began_s > _WELL_AFTER_S:
-            self._wait_s, self._mourned, self._welcomed = _AGAIN_AFTER_S, False, False
-        if not self._mourned:
-            then = "start it again to see the page" if self.gone else "it is started again"
-            self._notices.append(f"the page has stopped ({text}); the rig runs on, {then}")
-        self._mourned = True
-        if self.gone:
-            return
-        threading.Thread(target=self._restart, name="page start", daemon=True).start()
+            self._wait_s = _AGAIN_AFTER_S
+        then = "start it again to see the page" if gone else "it is started again"
+        self._notices.append(f"the page has stopped ({text}); the rig runs on, {then}")
+        if not gone:
+            threading.Thread(target=self._restart, name="page start", daemon=True).start()
 
     def _restart(self) -> None:
         wait_s, self._wait_s = self._wait_s, min(2.0 * self._wait_s, _AGAIN_LATEST_S)

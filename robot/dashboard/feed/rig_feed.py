@@ -6,7 +6,7 @@ is computed here, at the page's rate.
 
 import pickle
 import time
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import replace
 from math import inf
 from typing import NamedTuple
@@ -17,16 +17,14 @@ from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.drivers.process.passed_image import PassedImage, receive, take_image
 from gazerig.drivers.types import Detections
-from gazerig.gaze.types import Percept
+from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.control.tick import Tick, TickRecord
 from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.control.tick_stream import decode, encode
 from gazerig.robot.control.tick_text import perception_text
-from gazerig.robot.dashboard.feed.gaze_history import GazeHistory
 from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES
 from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
 from gazerig.robot.description.build import RigShape
-from gazerig.robot.model.control_source import playing
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import Kinematics
@@ -35,6 +33,8 @@ from gazerig.robot.remote.topics import RigInfo, RunState, ShownPicture
 
 TICKS, RIG, STATE, DETECTED = b"t", b"g", b"a", b"d"
 """First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, and a frame."""
+_KEPT = 400
+"""Number of gaze points that are kept for frames which arrive late: those of two seconds."""
 _DRAWING_SHARE = 0.1
 """Largest share of a processor for drawing images of a simulated camera that delivers none."""
 
@@ -69,11 +69,10 @@ class ShownWorld(NamedTuple):
 
 
 class ShownHead(NamedTuple):
-    """A rig in one tick; expressed: the present track and expression, "" for none."""
+    """A rig in one tick."""
 
     tick: Tick
     rig: ShownRig
-    expressed: tuple[str, str] = ("", "")
 
 
 class ShownFrame(NamedTuple):
@@ -132,7 +131,7 @@ class RigFeed:
         self._run = RunState()
         self._unanswered: Counter[str] = Counter()
         self._poses: PoseHistory | None = None
-        self._gaze = GazeHistory()
+        self._gaze: deque[tuple[float, Vec3]] = deque(maxlen=_KEPT)
         self._percept: Percept | None = None
         self._found: Detections | None = None
         self._new_frame = False
@@ -183,7 +182,7 @@ class RigFeed:
             tick = structs.replace(record.tick, detections=self._found, percept=self._percept)
             self._unanswered.update(tick.joints.missing)
             self._poses.remember(tick.t_s, tick.pose.head_rad, tick.pose.base_rad)
-            self._gaze.add(tick.t_s, tick.gaze.gaze_point_world_m)
+            self._gaze.append((tick.t_s, tick.gaze.gaze_point_world_m))
             self.ticks.update(tick)
 
     def run_state(self) -> RunState:
@@ -203,10 +202,7 @@ class RigFeed:
         tick, rig = self.ticks.newest, self.rig
         if tick is None or rig is None:
             return None
-        track = playing(tick.tracks)
-        return ShownHead(
-            tick, rig.shown, (track.name if track is not None else "", self._run.expression)
-        )
+        return ShownHead(tick, rig.shown)
 
     def shown_world(self) -> ShownWorld | None:
         """Return the simulated world to be shown; None without one, or before its data."""
@@ -239,4 +235,5 @@ class RigFeed:
         # The page's process encodes; the control loop's imports this module too, without OpenCV.
         from gazerig.robot.dashboard.feed.camera_picture import camera_picture
 
-        return camera_picture(found, lens, R, p_m, self._gaze.at(found.captured_s))
+        _, point_m = min(self._gaze, key=lambda one: abs(one[0] - found.captured_s))
+        return camera_picture(found, lens, R, p_m, point_m)

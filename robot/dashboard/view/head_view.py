@@ -1,7 +1,6 @@
 """Draw the rig's head on the page as measured: the links of its description, and lines of sight."""
 
-from collections.abc import Mapping
-from math import dist, exp, radians
+from math import dist, radians
 from typing import NamedTuple
 
 import numpy as np
@@ -10,18 +9,8 @@ import viser
 from gazerig.gaze.angles import compose, rotate_back, rotation, sub, turn_about
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.dashboard.feed.rig_feed import ShownHead
-from gazerig.robot.dashboard.view.glb import (
-    CLOTH,
-    EYE,
-    FLAT,
-    PLASTIC,
-    SKIN,
-    Finish,
-    glow_disc,
-    painted_glb,
-)
+from gazerig.robot.dashboard.view.glb import FINISHES, FLAT, glow_disc, painted_glb
 from gazerig.robot.dashboard.view.scene_node import set_pose
-from gazerig.robot.description import links
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import CAMERA, Description
 from gazerig.robot.description.mesh import Colour
@@ -32,7 +21,6 @@ from gazerig.robot.description.parts import (
     measures_of,
 )
 from gazerig.robot.model.frames import quaternion
-from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS
 
 _SIGHT: dict[str, Colour] = {
@@ -41,34 +29,12 @@ _SIGHT: dict[str, Colour] = {
     "pursue": (60, 150, 255),
 }
 _AHEAD = np.array((((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),))
-_FINISHES: Mapping[links.Finish, Finish] = {
-    "skin": SKIN,
-    "plastic": PLASTIC,
-    "cloth": CLOTH,
-    "eye": EYE,
-    "dark": FLAT,
-}
 _SHADE = 4.4
 """Radius of the shade below the shoulders, in distances between the eyes."""
 _LIT_OPEN = 0.7
 """Opening for which upper lids are lit: their usual one."""
 _LIT_LOWER_LID: Mat3 = rotation((0.0, radians(12.0), 0.0))
 """Rotation of lower lids for the lighting, as if a little higher; otherwise they look tired."""
-
-
-_FACES_DEG: Mapping[str, tuple[float, float]] = {
-    "happy": (6.0, 4.0),
-    "sad": (-10.0, 0.0),
-    "surprised": (18.0, 12.0),
-    "angry": (-16.0, 0.0),
-    "sleepy": (-4.0, 3.0),
-    "laugh": (5.0, 9.0),
-}
-"""Brows up and jaw down in an expression or a track of this name, as in the rig "expressive"."""
-_DRAWN_ONLY = ("left_brow", "right_brow", "jaw")
-"""Joints that are drawn even if the rig does not have them."""
-_FACE_TAU_S = 0.15
-"""Time constant of joints that are drawn only."""
 
 
 class _Node(NamedTuple):
@@ -95,21 +61,14 @@ class HeadView:
         self._shade = self._add("/shade", painted_glb(glow_disc((20, 24, 34, 140)), FLAT))
         self._sights: list[viser.LineSegmentsHandle] = []
         self._colour = _SIGHT["fixate"]
-        self._face_rad, self._face_s = (0.0, 0.0), 0.0
 
     def _add(self, name: str, data: bytes) -> viser.GlbHandle:
         return self._scene.add_glb(name, data, cast_shadow=False, receive_shadow=False)
 
-    def show(self, head: ShownHead, *, sight: bool = False, camera: bool = False) -> None:
-        """Move all parts to their measured positions.
-
-        Args:
-            head: the rig in a tick.
-            sight: whether to show the lines of sight.
-            camera: whether to show the camera's housing, which otherwise does not cover the face.
-        """
+    def show(self, head: ShownHead, *, sight: bool = False) -> None:
+        """Move all parts to their measured positions; ``sight``: show the lines of sight."""
         tick, pose, names = head.tick, head.tick.pose, head.rig.kinematics.names
-        shape = with_shown_face(head.rig.shape)
+        shape = with_shown_lids(head.rig.shape)
         if shape != self._drawn:  # the geometry has changed
             self._drawn = shape
             self._draw(describe(shape), shape)
@@ -119,14 +78,10 @@ class HeadView:
         angles |= lid_angles(
             shape, (pose.lid_left, pose.lid_right), (pose.lower_left, pose.lower_right)
         )
-        drawn = zip(_DRAWN_ONLY, self._blend_face(head), strict=True)
-        angles |= {name: angle for name, angle in drawn if name not in names}
         for link in description.links:
             if link.joint is not None:
                 R = compose(link.R, turn_about(link.joint.axis, angles[link.joint.name]))
                 set_pose(self.links[link.name].frame, link.p_m, quaternion(R))
-        for look in self.links[CAMERA].looks:
-            look.visible = camera
         self._shade.visible = not self.on_table
         colour = _SIGHT.get(tick.gaze.phase, _SIGHT["fixate"])
         for line, p_world_m in zip(self._sights, eyes_m(head), strict=True):
@@ -138,19 +93,6 @@ class HeadView:
             if colour != self._colour:
                 line.colors = np.array(colour, np.uint8)
         self._colour = colour
-
-    def _blend_face(self, head: ShownHead) -> tuple[float, float, float]:
-        """Return the angles of brows and jaw that are only drawn, in radians."""
-        t_s = head.tick.t_s
-        share = 1.0 - exp(-max(0.0, t_s - self._face_s) / _FACE_TAU_S)
-        self._face_s = t_s
-        known = (_FACES_DEG[name] for name in head.expressed if name in _FACES_DEG)
-        goal = next(known, (0.0, 0.0))
-        brows, jaw = (
-            now + share * (radians(to) - now) for now, to in zip(self._face_rad, goal, strict=True)
-        )
-        self._face_rad = brows, jaw
-        return brows, brows, jaw
 
     def _draw(self, description: Description, shape: RigShape) -> None:
         """Draw a rig; if it has the same links, draw only those that look different."""
@@ -178,7 +120,8 @@ class HeadView:
         for link in description.links:
             node = self.links[link.name]
             set_pose(node.frame, link.p_m, quaternion(link.R))
-            if before is not None and before.link(link.name).visuals == link.visuals:
+            same = before is not None and before.link(link.name).visuals == link.visuals
+            if same or link.name == CAMERA:  # the camera's housing would cover the face
                 continue
             while node.looks:
                 node.looks.pop().remove()
@@ -187,7 +130,7 @@ class HeadView:
                 moved = link.joint.name if link.joint is not None else ""
                 if look.name.endswith("still_lid") or "lower_lid" in moved:
                     R_lit = _LIT_LOWER_LID
-                data = painted_glb(look.painted(), _FINISHES[look.finish], np.array(R_lit))
+                data = painted_glb(look.painted(), FINISHES[look.finish], np.array(R_lit))
                 handle = self._add(f"{paths[link.name]}/look_{look.name}", data)
                 handle.position, handle.wxyz = look.p_m, quaternion(look.R)
                 node.looks.append(handle)
@@ -237,14 +180,8 @@ def head_dimensions(head: ShownHead) -> HeadMeasures:
 _LID_RAD = {"upper": radians(74.0), "lower": radians(22.0)}
 """Rotation of shown lids from closed to open, about that of a person. Servos of a small head move
 its lids less, so that the head would always look sleepy."""
-_JOINT = JointParams(1, "xl330-m077", -90.0, 90.0, 600.0, 10_000.0)
 
 
-def with_shown_face(shape: RigShape) -> RigShape:
-    """Return a rig whose lids have the shown rotation, and whose brows and jaw move.
-
-    Do not add joints to a rig with its own meshes.
-    """
-    drawn = {} if shape.meshes else dict.fromkeys(_DRAWN_ONLY, _JOINT)
-    shape = shape._replace(joints=drawn | dict(shape.joints))
+def with_shown_lids(shape: RigShape) -> RigShape:
+    """Return a rig whose lids have the shown rotation."""
     return shape._replace(lids={name: (0.0, _LID_RAD[name.split("_")[1]]) for name in shape.lids})

@@ -4,9 +4,9 @@ import viser
 
 from gazerig.robot.dashboard.door.viser_server import browser_of
 from gazerig.robot.dashboard.feed.rig_feed import ShownHead, ShownWorld
+from gazerig.robot.dashboard.view.ghost import CommandedPoseView
 from gazerig.robot.dashboard.view.glb import add_lights
 from gazerig.robot.dashboard.view.head_view import HeadView
-from gazerig.robot.dashboard.view.overlays import OverlayPanel
 from gazerig.robot.dashboard.view.people import PeopleView
 from gazerig.robot.dashboard.view.viewpoints import Viewpoints
 from gazerig.robot.dashboard.view.world_view import WorldView
@@ -25,7 +25,7 @@ class HeadScene:
         self._head = HeadView(server.scene)
         self._people = PeopleView(server.scene)
         self._world = WorldView(server.scene)
-        self._overlays = OverlayPanel(server.scene)
+        self._ghost = CommandedPoseView(server.scene)
         self._layers: tuple[Layer, ...] = ()
         self._drawn = False
 
@@ -46,7 +46,7 @@ class HeadScene:
             if world is not None:
                 self._world.show(*world)
             self._head.on_table = world is not None
-            self._head.show(head, sight="sight" in layers, camera="camera" in layers)
+            self._head.show(head, sight="sight" in layers)
             # A simulated world draws its own people.
-            self._people.show(head.tick, parts="parts" in layers, people=world is None)
-            self._overlays.show(head, layers)
+            self._people.show(head.tick, people=world is None)
+            self._ghost.show(head if "ghost" in layers else None)

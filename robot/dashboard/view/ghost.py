@@ -1,7 +1,6 @@
-"""Layers of the page's scene around the rig: desired pose, camera, fields of the eyes."""
+"""Ghost of the desired pose in the page's scene."""
 
-from collections.abc import Container
-from math import atan, radians, tan
+from math import radians
 
 import numpy as np
 import viser
@@ -13,64 +12,7 @@ from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose
 from gazerig.robot.description.mesh import Colour, Mesh, stored_shape
 from gazerig.robot.description.parts import EYE_RADIUS, SIDES, measures_of
 from gazerig.robot.model.frames import quaternion
-from gazerig.robot.model.requests import Layer
 from gazerig.robot.model.types import JointState
-
-
-class OverlayPanel:
-    """Layers of the scene."""
-
-    def __init__(self, scene: viser.SceneApi) -> None:
-        self._commanded_pose = CommandedPoseView(scene)
-        self._camera = CameraField(scene)
-
-    def show(self, head: ShownHead, layers: Container[Layer]) -> None:
-        """Draw the selected layers and remove the others."""
-        self._commanded_pose.show(head if "ghost" in layers else None)
-        self._camera.show(head if "camera" in layers else None)
-
-
-_CAMERA: Colour = (120, 128, 140)
-_DEPTH_M = 0.12
-"""Distance of the drawn frame from the camera, m."""
-
-
-class CameraField:
-    """Camera as a pyramid with the angles of its image."""
-
-    def __init__(self, scene: viser.SceneApi) -> None:
-        self._scene = scene
-        self._shape: tuple[float, float] | None = None
-        self._frustum: viser.CameraFrustumHandle | None = None
-
-    def show(self, head: ShownHead | None) -> None:
-        """Move it to the camera; hide it without a head or before the first frame."""
-        found = head.tick.detections if head is not None else None
-        if head is None or found is None:
-            if self._frustum is not None:
-                self._frustum.visible = False
-            return
-        pose, across = head.tick.pose, head.rig.horizontal_rad
-        if found.lens is not None:
-            across = 2.0 * atan(0.5 * found.width_px / found.lens.fx_px)
-        shape = (round(across, 4), round(found.width_px / found.height_px, 4))
-        R, p_m = head.rig.mount.pose(pose.R_world_head, pose.p_world_head_m)
-        if self._frustum is None or shape != self._shape:
-            horizontal_rad, aspect = self._shape = shape
-            self._frustum = self._scene.add_camera_frustum(  # replaces one of another shape
-                "/camera",
-                fov=2.0 * atan(tan(horizontal_rad / 2.0) / aspect),
-                aspect=aspect,
-                scale=_DEPTH_M,
-                thickness=1.0,
-                thickness_units="screen",
-                color=_CAMERA,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
-        self._frustum.visible = True
-        set_pose(self._frustum, p_m, quaternion(R))
-
 
 _GHOST: Colour = (70, 110, 255)
 _SIGHT = 5.6  # length of its lines of sight, in distances between the eyes
