@@ -30,7 +30,9 @@ from gazerig.robot.remote.topics import JointInfo, Picture, RigInfo, RunState, S
 
 YOU = "browser 1a2b"
 LIMITS = JointInfo(-1.0, 1.0, 55.0, 65.0, 4.5, 8.4, 0.4)
-RIG = RigInfo("desk", "/tmp/desk.yaml", False, "", False, "", "", dict.fromkeys(GAZE_JOINTS, LIMITS))
+RIG = RigInfo(
+    "desk", "/tmp/desk.yaml", False, "", False, "", "", dict.fromkeys(GAZE_JOINTS, LIMITS)
+)
 IN_TIME = LoopFigures(200.0, 0.1, 0.5, 1.0, 0, 0, 10.0)
 RUN = RunState("wait", "none", "shy", "", "bus ok", 1, IN_TIME)
 AHEAD = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
@@ -124,7 +126,9 @@ class Stub:
         return socket
 
     async def _serve_request(self, request: web.Request) -> web.Response:
-        return web.Response(text=self._handle(await request.json()), content_type="application/json")
+        return web.Response(
+            text=self._handle(await request.json()), content_type="application/json"
+        )
 
     def _handle(self, asked: dict[str, Any]) -> str:
         tag = asked.pop("tag", None)

@@ -34,7 +34,9 @@ def opened(tab: Browser, url: str) -> Person:
     """Open the page, and wait until its scripts have come."""
     tab.go(url)
     person = Person(tab)
-    wait_for(lambda: person.run("document.querySelectorAll('#drawer .field').length > 20"), "the panels")
+    wait_for(
+        lambda: person.run("document.querySelectorAll('#drawer .field').length > 20"), "the panels"
+    )
     return person
 
 
@@ -82,7 +84,9 @@ def test_stop_and_space_work_without_any_other_script(tab: Browser) -> None:
         wait_for(lambda: stopped(person.space), "a stop by the space bar over the view")
 
 
-def test_resuming_asks_about_the_hand_that_may_be_in_the_mechanism(page: tuple[Stub, Person]) -> None:
+def test_resuming_asks_about_the_hand_that_may_be_in_the_mechanism(
+    page: tuple[Stub, Person],
+) -> None:
     stub, person = page
     guessed = {name: replace(one, estimated=True) for name, one in stub.state.joints.items()}
     stub.show(stopped=f"STOP was pressed on the page ({YOU})", level="torque_off", joints=guessed)
@@ -90,16 +94,23 @@ def test_resuming_asks_about_the_hand_that_may_be_in_the_mechanism(page: tuple[S
     wait_for(lambda: person.reads("Fingers out?", "jump to their places"), "the question")
     stub.show(stopped="STOP was pressed on the page (browser 9z9z)")
     person.click(saying("Resume …"))
-    wait_for(lambda: person.reads("Not stopped here", "Is no hand in the mechanism?"), "the other question")
+    wait_for(
+        lambda: person.reads("Not stopped here", "Is no hand in the mechanism?"),
+        "the other question",
+    )
     assert stub.orders("resume") == []
     person.click(saying("Yes, resume"))
     wait_for(lambda: stub.orders("resume") == [{"do": "resume", "confirmed": True}], "the order")
 
 
-def test_what_no_longer_comes_is_grey_and_stop_says_that_it_cannot_work(page: tuple[Stub, Person]) -> None:
+def test_what_no_longer_comes_is_grey_and_stop_says_that_it_cannot_work(
+    page: tuple[Stub, Person],
+) -> None:
     stub, person = page
     stub.send("picture", PICTURE, GREY)
-    wait_for(lambda: person.reads("as it was") and person.reads("STOP does nothing here"), "the words")
+    wait_for(
+        lambda: person.reads("as it was") and person.reads("STOP does nothing here"), "the words"
+    )
     grey = "getComputedStyle(document.querySelector('{}')).filter.includes('grayscale')"
     assert person.run(grey.format("#camera canvas")) and person.run(grey.format("#view"))
     stub.show()
@@ -149,7 +160,10 @@ def test_the_first_panel_says_in_words_what_and_why(page: tuple[Stub, Person]) -
 def test_the_head_looks_at_the_pointer_over_the_view(page: tuple[Stub, Person]) -> None:
     stub, person = page
     person.click("document.querySelector('#pointer')")
-    box = cast(dict[str, float], person.run("document.querySelector('#view').getBoundingClientRect().toJSON()"))
+    box = cast(
+        dict[str, float],
+        person.run("document.querySelector('#view').getBoundingClientRect().toJSON()"),
+    )
 
     def looked_at(across: float, down: float) -> list[float]:
         """Point at a place of the view, 0..1, and return where the head is to look."""
@@ -181,16 +195,22 @@ def test_only_a_head_in_a_ring_is_offered_to_box(page: tuple[Stub, Person]) -> N
     wait_for(lambda: person.reads("wink left", "bold"), "the choices")
     assert not person.reads("attack") and not person.reads("boxer")
     stub.send("rig", replace(RIG, opponent=True))
-    wait_for(lambda: person.reads("attack", "guard", "boxer", "move the opponent"), "the boxer's choices")
+    wait_for(
+        lambda: person.reads("attack", "guard", "boxer", "move the opponent"), "the boxer's choices"
+    )
 
 
-def test_a_refused_value_is_put_back_and_anothers_change_is_shown(page: tuple[Stub, Person]) -> None:
+def test_a_refused_value_is_put_back_and_anothers_change_is_shown(
+    page: tuple[Stub, Person],
+) -> None:
     stub, person = page
     key = "gaze.lids.blinks_per_min"
     values = dict(cast(dict[str, Any], stub.usual["get"]))
     person.open("Tune")
     number = beside("blinks", "input[type=number]")
-    stub.answer = lambda asked: {"refused": "blinks <b>too</b> many"} if asked["do"] == "set" else None
+    stub.answer = lambda asked: (
+        {"refused": "blinks <b>too</b> many"} if asked["do"] == "set" else None
+    )
     person.fill(number, "31")
     person.run(f"{number}.blur()")
     wait_for(lambda: stub.orders("set") == [{"do": "set", "changes": {key: 31}}], "the change")
@@ -215,7 +235,9 @@ def test_a_track_plays_on_a_timeline_with_its_sound_and_cues(page: tuple[Stub, P
     stub.show(tracks=(playing,), control_source=ControlSource("track", "ann", "wave"))
     wait_for(lambda: person.reads("wave: started by ann"), "the track")
     # The sound's outline is half as high as its row: ink in the middle of the row, none above.
-    ink = "document.querySelector('canvas.track').getContext('2d').getImageData({}, 1, 1).data[3] > 0"
+    ink = (
+        "document.querySelector('canvas.track').getContext('2d').getImageData({}, 1, 1).data[3] > 0"
+    )
     wait_for(lambda: person.run(ink.format("201, 31")), "the sound")
     assert not person.run(ink.format("201, 22"))
     person.click(saying("end"))
