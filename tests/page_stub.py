@@ -21,7 +21,7 @@ from msgspec.structs import replace
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.robot.control.head_state import HeadState, head_state
+from gazerig.robot.control.head_state import head_state
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.dashboard.door.page_files import PageFiles
