@@ -268,12 +268,12 @@ class RunObservers:
         with self._report_errors("the voice"):
             if self._voice is not None:
                 self._voice.close()
-        with self._report_errors("the remote control"):
-            if self._server is not None:
-                self._server.close()
         with self._report_errors("the page"):
             if self._page is not None:
                 self._page.close()
+        with self._report_errors("the remote control"):
+            if self._server is not None:
+                self._server.close()
         with self._report_errors("the recording"):
             if self._recorder is not None:
                 self._say(self._recorder.close(count.stopped_by, self._made.sent_bytes_digest()))

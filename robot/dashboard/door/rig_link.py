@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from gazerig.robot.dashboard.door.sockets import until_one_ends
 from gazerig.robot.model.requests import SLOW
 from gazerig.robot.remote.excess import TOO_MANY
 from gazerig.robot.remote.socket_io import ANSWER_BYTES
@@ -74,9 +75,8 @@ class RigLink:
         self._stop: asyncio.Future[Answer] | None = None
 
     async def run(self) -> None:
-        """Receive answers until cancelled."""
-        await asyncio.gather(self._orders.run(), self._slow.run())
-        await asyncio.Event().wait()  # the page serves its files on
+        """Receive answers until the rig closes a connection: then the page must start again."""
+        await until_one_ends(self._orders.run(), self._slow.run())
 
     async def ask(self, request: Mapping[str, object]) -> Answer:
         """Send a request; return the rig's answer, "failed" without one."""

@@ -74,11 +74,12 @@ class PageProcess:
     ) -> None:
         """Prepare a page for an address and port; if the port is busy, the next one is used.
 
-        serve: answers the requests of the page's users; None: there is no rig
+        serve: answers the requests of the page's users; None: nobody does
         on_picture: called with each picture of a browser's own camera; None: they are dropped
         token: what browsers and programs must show, "" for a new one
         """
-        self._serve, self._on_picture = serve, on_picture
+        self._unserved: list[socket.socket] = []
+        self._serve, self._on_picture = serve or self._unserved.append, on_picture
         self._host = host
         self._port = port
         self._token = token or secrets.token_urlsafe(_TOKEN_BYTES)
@@ -130,11 +131,8 @@ class PageProcess:
             for end in (*links.child_sockets, *theirs):
                 end.close()
         self._began_s = self._clock.now_s()
-        for end, _ in (orders, slow):
-            if self._serve is None:
-                end.close()
-            else:
-                self._serve(end)
+        self._serve(orders[0])
+        self._serve(slow[0])
         self.join(*links.parent_ends)
 
     def join(self, link: MessageLink) -> None:
