@@ -168,7 +168,7 @@ export function textField({ name, value = "", hint = "", enterOnly = false }, se
   };
 }
 
-export function checkbox({ name, value = false, hint = "" }, send) {
+export function checkbox({ name, value = false, hint = "" }, send = () => {}) {
   const id = newId(), box = make("input", { id, type: "checkbox", checked: value });
   describe(box, hint);
   box.addEventListener("change", () => send(box.checked));

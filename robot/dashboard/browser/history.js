@@ -54,7 +54,7 @@ on("state", (state) => {
 
 /** Store a movement of the eyes when it ends. */
 function end(kind, t_s, direction_rad) {
-  if (!begun[kind]) return;
+  if (!begun[kind]?.direction_rad) return;
   const size_deg = degrees(angleBetween(begun[kind].direction_rad, direction_rad));
   movements.push({ kind, start_s: begun[kind].t_s, end_s: t_s, size_deg });
   begun[kind] = null;

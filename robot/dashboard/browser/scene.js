@@ -14,8 +14,6 @@ const PICTURE = {
 const SCENE = {
   ghost: "ghost of the desired pose",
   sight: "lines of sight",
-  camera: "what the camera covers",
-  parts: "the eight parts of a face",
 };
 const VIEWS = ["face", "both", "over its shoulder", "from above"];
 

@@ -11,7 +11,7 @@
   const EARLY_MS = 4; // pictures come at the refresh of the display
   const COARSE = 0.6, FINE = 1.5; // pixels of the canvas, per pixel of the page
   const MUCH = 0.1; // share of the picture
-  const REST_MS = 600;
+  const REST_MS = 400;
 
   function drawsInSoftware() {
     const gl = document.createElement("canvas").getContext("webgl2");
@@ -63,7 +63,7 @@
   // --- the part that has changed ----------------------------------------------------------
 
   const WHOLE_MS = 2000; // a change that is not noticed here is drawn by then
-  const STILL_PX = 0.3; // nobody sees a smaller motion
+  const STILL_PX = 0.5; // of the page; nobody sees a smaller motion, and servos report steps like it
   const EDGE_PX = 3;
   const drawn = new Map(); // object -> how it was drawn: {pose, look, corners, box}
   let camera = "", size = "", wholeAt = 0, hidden = [];
@@ -83,6 +83,7 @@
     const matrices = [...eye.matrixWorld.elements, ...eye.projectionMatrix.elements];
     const turned = matrices.join() !== camera;
     const whole = turned || size !== `${width} x ${height}` || performance.now() - wholeAt > WHOLE_MS;
+    const ratio = renderer.getPixelRatio();
     const part = [1, 1, -1, -1], changed = [1, 1, -1, -1], now = new Set();
     scene.traverseVisible((object) => {
       if (!object.geometry || object.material?.visible === false) return;
@@ -92,7 +93,7 @@
       const same = before?.look === look;
       if (same && before.pose === pose && object.frustumCulled && !whole) return;
       const corners = cornersOf(object, eye);
-      const still = same && isStill(before.corners, corners, width, height);
+      const still = same && isStill(before.corners, corners, width / ratio, height / ratio);
       if (still && !whole) return;
       const box = boxOf(corners);
       for (const area of still ? [part] : [part, changed]) {
@@ -116,7 +117,6 @@
       hidden.push([object, object.layers.mask]);
       object.layers.mask = 0;
     }
-    const ratio = renderer.getPixelRatio();
     const pixel = (share, size, edge) =>
       Math.min(size, Math.max(0, Math.round((share + 1) / 2 * size) + edge)) / ratio;
     const x = pixel(part[0], width, -EDGE_PX), y = pixel(part[1], height, -EDGE_PX);

@@ -27,9 +27,8 @@ export function activity(state, since_s) {
   const lasting = `, for ${duration(Math.max(0, state.t_s - since_s))}`;
   const person = people.find(({ id }) => id === personOf(gaze));
   if (!person) return state.headline + lasting;
-  const at = gaze.part ? ` (${gaze.part})` : "";
   const who = person.speaks ? ", who speaks" : person.looks_at_head ? ", who looks at it" : "";
-  return `looks at person ${person.id}${at}${who}${lasting}`;
+  return `looks at person ${person.id}${who}${lasting}`;
 }
 
 const BECAUSE = {
@@ -44,7 +43,7 @@ const LEAST = 0.005, SHARE = 0.1; // of a term that is mentioned, absolute and o
 /** Why the head looks there, with its strongest reasons: "it moves, and the behaviour wait prefers it". */
 export function reason(state, run, count = 3) {
   const [first] = state.saliences;
-  if (isLed(state) || !first) return state.gaze.reason;
+  if (isLed(state) || first?.kind !== state.gaze.kind) return state.gaze.reason;
   const most = Math.max(...Object.keys(BECAUSE).map((term) => first[term]));
   const moves = Object.entries(BECAUSE)
     .filter(([term]) => first[term] >= Math.max(LEAST, SHARE * most))
