@@ -22,7 +22,7 @@ _MOST_WAITING = 48
 """Largest number of requests that wait for an answer; the rig would refuse more than 64."""
 _SLOW = SLOW | {"parameters", "get", "unsaved", "characters", "tracks"}
 _ANSWER_S, _SLOW_S = 10.0, 40.0
-_STOP_S = 1.0
+_STOP_S = 1.5
 
 
 class _Connection:
