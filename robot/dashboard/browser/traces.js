@@ -8,14 +8,6 @@ const SPANS = { "3 s": 3, "10 s": 10, "30 s": 30 };
 const LEAST_DEG = 10, MOST_POINTS = 300;
 const LINES = [["desired", "—"], ["commanded", "—"], ["measured", "—"]];
 
-const eye = (side) => [
-  [`${side} eye, yaw, + left`, `${side}_eye_pan`],
-  ["both eyes, yaw, + left", "eyes_pan"],
-  [`${side} eye, pitch, + up`, `${side}_eye_tilt`],
-  ["both eyes, pitch, + up", "eyes_tilt"],
-  [`${side} upper lid, + open`, `${side}_upper_lid`],
-  [`${side} lower lid, + open`, `${side}_lower_lid`],
-];
 const LIDS = [
   ["upper lids, + open", "left_upper_lid", "right_upper_lid"],
   ["lower lids, + open", "left_lower_lid", "right_lower_lid"],
@@ -32,8 +24,6 @@ const CHARTS = {
     ["head, pitch, + up", "neck_pitch"],
     ...LIDS,
   ],
-  "left eye": eye("left"),
-  "right eye": eye("right"),
   neck: [
     ["neck, yaw, + left", "neck_yaw"],
     ["neck, pitch, + up", "neck_pitch"],
