@@ -249,7 +249,7 @@ def test_who_hangs_while_leading_gives_control_back(rig: Rig) -> None:
 def test_stop_goes_through_and_who_stopped_may_resume(rig: Rig) -> None:
     with rig.dial() as end:
         ask(end, do="stop", why="a hand", who="a show", tag="s")
-        assert heard(end, "tag", "s") == {"ok": {"notes": []}, "tag": "s"}
+        assert "ok" in heard(end, "tag", "s")
         assert rig.client.status()["stopped"] == "a hand"
         time.sleep(2.1)
         with rig.dial() as other:  # of the same host, and a name can be chosen
@@ -265,6 +265,7 @@ def test_stop_goes_through_and_who_stopped_may_resume(rig: Rig) -> None:
         assert "ok" in heard(end, "tag", "q")
     assert not rig.client.status()["stopped"]
     assert rig.post({"do": "stop"})[0] == 200
+    assert rig.get("/state")[1]["ok"]["state"]["stopped"]  # not older than the answer
     assert rig.client.status()["stopped"]
     time.sleep(2.1)
     assert rig.post({"do": "resume", "confirmed": False})[0] == 409
@@ -358,7 +359,7 @@ def test_a_flood_is_refused_and_a_stop_of_anybody_goes_through(rig: Rig) -> None
             ask(other, do="stop", why="another", tag=1)
             assert "ok" in heard(other, "tag", 1)
         answers = [json.loads(flood.recv(timeout=PATIENCE_S))]
-        while {"ok": {"notes": []}, "tag": "s"} not in answers:
+        while not ("ok" in answers[-1] and answers[-1].get("tag") == "s"):
             answers.append(json.loads(flood.recv(timeout=PATIENCE_S)))
         assert any("too many requests" in one.get("refused", "") for one in answers)
     ticks = rig.ticks()

@@ -7,7 +7,6 @@ the state of the head and returns HTML without scripts, for a section of the dra
 from html import escape
 from typing import Any
 
-from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import PAGE_PANEL, describe_error, registrations
 from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.remote.topics import PanelContent
@@ -17,23 +16,17 @@ class PackagePanels:
     """The panels of all packages; one that raises an exception shows the reason and is dropped."""
 
     def __init__(self) -> None:
-        self._panels: dict[str, Any] = {}
-        self._failed: list[PanelContent] = []
-        for one in registrations(PAGE_PANEL):
-            try:
-                self._panels[one.name] = one.load()
-            except PluginError as error:
-                self._failed.append(PanelContent(one.name, escape(str(error))))
+        self._panels = list(registrations(PAGE_PANEL))
 
     def draw(self, state: HeadState) -> tuple[PanelContent, ...]:
         """Return the contents of all panels."""
-        failed, self._failed = self._failed, []
-        contents = failed
-        for title, panel in tuple(self._panels.items()):
+        contents = []
+        for panel in tuple(self._panels):
             try:
-                html = str(panel(state))
+                draw: Any = panel.load()
+                html = str(draw(state))
             except Exception as error:  # code of a package may raise anything
-                del self._panels[title]
+                self._panels.remove(panel)
                 html = f"the panel has failed: {escape(describe_error(error))}"
-            contents.append(PanelContent(title, html))
+            contents.append(PanelContent(panel.name, html))
         return tuple(contents)

@@ -2,7 +2,7 @@
 
 A browser needs a handful of connections. A client that opens hundreds and sends nothing, or sends
 one byte per second, must not prevent others from pressing STOP. So a new connection over the limit
-closes the one that has been idle, or has made its request, longest ago.
+closes the one that has been idle longest, and a request has a second before it can be closed.
 Websockets do not count: each kind has a limit of its own.
 """
 
@@ -18,6 +18,8 @@ from aiohttp.web_protocol import RequestHandler
 
 MOST = 96
 """Largest number of connections of all browsers together, without websockets."""
+RESERVE = 64
+"""Number of further connections that are younger than a second."""
 IDLE_S = 15.0
 """Longest time of a connection without a request, s."""
 BUSY_S = 20.0
@@ -25,6 +27,7 @@ BUSY_S = 20.0
 _LOOK_EVERY_S = 1.0
 _TRIM_AFTER_S = 0.02
 _BEGINS_WITHIN_S = 5.0
+_YOUNG_S = 1.0
 _DIGITS = 4
 
 
@@ -101,12 +104,14 @@ class Connections:
         for handler, state in tuple(self._states.items()):
             if handler.transport is None and now_s - state.since_s > _BEGINS_WITHIN_S:
                 del self._states[handler]
-        counted = sorted(
-            (state.since_s, number, handler)
-            for number, (handler, state) in enumerate(self._states.items())
+        counted = [
+            (state.since_s > now_s - _YOUNG_S, state.busy, state.since_s, handler)
+            for handler, state in self._states.items()
             if handler.transport is not None and not state.lasting
-        )
-        for _, _, handler in counted[: max(0, len(counted) - MOST)]:
+        ]
+        counted.sort(key=lambda one: one[:3])
+        too_many, old = len(counted) - MOST, sum(not young for young, *_ in counted)
+        for *_, handler in counted[: max(0, min(too_many, old), too_many - RESERVE)]:
             self._end(handler)
 
     @contextmanager

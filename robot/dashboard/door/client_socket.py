@@ -125,7 +125,7 @@ class ClientSocket:
                 reply = msgspec.convert(found, CommandReply)
                 if message["do"] not in NO_OUTCOME:
                     self._not_before_s, self._state = reply.t_s, ""
-                    if "tag" in message:
+                    if "tag" in message and message["do"] != "stop":
                         self._open.append((message["tag"], reply))
                 self.hold(message, reply)
         self.queue_message(answer)

@@ -78,7 +78,8 @@ UNCONFIRMED = (
 )
 _PER_S, _BURST = 50.0, 100.0
 _ALL_PER_S, _ALL_BURST = 100.0, 200.0
-_READ_S, _LOOK_S = 5.0, 0.04
+_READ_S, _LOOK_S, _LOOKS = 5.0, 0.04, 10
+_AT_ONCE = NO_OUTCOME | {"stop"}
 _MOST_RESTS = 10
 """Stops are received for so many times REST_S while more of a client's data waits to be read."""
 _WHO_CHARACTERS = 60
@@ -241,7 +242,7 @@ class PageDoor:
         self._lasting: dict[tuple[type, str], str] = {}
         self._rate = TokenBucket(_ALL_PER_S, _ALL_BURST)
         self._limits = TabLimits(MOST_CLIENTS)
-        self._websockets = 0
+        self._websockets, self._replied_s = 0, 0.0
         self._loop = asyncio.new_event_loop()
         self.webcam, self._webcams = WebcamSocket(self._loop.time, picture), TabLimits(2)
         self._over = asyncio.Event()
@@ -372,7 +373,7 @@ class PageDoor:
             match request.method, request.path.removeprefix(f"{BASE}/"):
                 case "GET", "state":
                     after = int(parse_number(request, "after", 0, _NEWEST, _NEWEST))
-                    return _answer({"ok": self._report(State(after))}, 200)
+                    return _answer({"ok": await self._report(after)}, 200)
                 case "POST", "do":
                     return await self._post(request)
                 case "GET", "socket":
@@ -393,10 +394,15 @@ class PageDoor:
         except MessageRefused as error:
             return _answer({"refused": str(error)}, error.status)
 
-    def _report(self, asked: State) -> HeadReport:
-        tick = self._feed.newest
+    async def _report(self, after: int) -> HeadReport:
+        """Return the newest state, which is not older than the last answer to an order."""
+        for _ in range(_LOOKS):
+            tick = self._feed.newest
+            if tick is None or tick.t_s >= self._replied_s:
+                break
+            await asyncio.sleep(_LOOK_S)
         state = head_state(tick) if tick is not None else None
-        return HeadReport(state, self._feed.events(asked.after), self._feed.number)
+        return HeadReport(state, self._feed.events(after), self._feed.number)
 
     async def _post(self, request: web.Request) -> web.StreamResponse:
         wait_s = parse_number(request, "wait_s", 0.0, MOST_WAIT_S, WAIT_S)
@@ -416,7 +422,7 @@ class PageDoor:
             message["stay"] = message.get("stay") or any(map(message.get, ("for_s", "seconds")))
         answer = await self._ask(message, visitor)
         match answer:
-            case {"ok": {"reply": dict(reply)}} if wait_s and message["do"] not in NO_OUTCOME:
+            case {"ok": {"reply": dict(reply)}} if wait_s and message["do"] not in _AT_ONCE:
                 answer |= await self._outcome(message, msgspec.convert(reply, CommandReply), wait_s)
         status = _STATUS[next(key for key in _STATUS if key in answer)]
         return _answer(answer, 429 if answer.get("refused") == BUSY else status)
@@ -443,21 +449,23 @@ class PageDoor:
             match message.get("do"):
                 case "stop":  # whatever else it says
                     stop = {key: message[key] for key in ("do", "why", "who")}
-                    answer = await self._rig.stop(stop)
-                    # It has no outcome that could be waited for.
-                    done: Answer = {"ok": {"notes": []}}
-                    return (done if "ok" in answer else answer) | tag_of(message)
+                    answer = await self._rig.stop(stop) | tag_of(message)
                 case "state":
                     asked = read_request(_without_tag(message))
                     assert isinstance(asked, State)
-                    return {"ok": self._report(asked)} | tag_of(message)
+                    return {"ok": await self._report(asked.after)} | tag_of(message)
                 case "show_view":
                     view = msgspec.convert(_without_tag(message), ShowView)
                     self._show_view(view, visitor.browser)
                     return {"ok": {"notes": []}} | tag_of(message)
+                case _:
+                    answer = await self._rig.ask(message)
         except ValueError as error:
             return {"refused": str(error)} | tag_of(message)
-        return await self._rig.ask(message)
+        match answer:
+            case {"ok": {"reply": {"t_s": replied_s}}}:
+                self._replied_s = replied_s
+        return answer
 
     def _is_within_rate(self) -> bool:
         return self._rate.take(self._loop.time())

@@ -11,8 +11,7 @@ from gazerig.drivers.camera.shared_slots import MOST_BYTES
 from gazerig.robot.remote.excess import TokenBucket
 
 MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
-"""Rate limit of one browser's messages; dragging with two hands sends about 60 a second."""
-BYTES_PER_S, BYTES_BURST = 1e6, 4e6
+"""Rate limit of one browser's viewpoints."""
 TAKES_S = 20.0
 """Timeout of sending to a browser, s; it reconnects after it is disconnected."""
 _CLOSES_WITHIN_S = 1.0
@@ -23,16 +22,11 @@ Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 async def relay_in(browser: web.WebSocketResponse, inside: Socket) -> None:
     """Relay a browser's messages, at a limited rate."""
-    messages, size = (
-        TokenBucket(MESSAGES_PER_S, MESSAGES_BURST),
-        TokenBucket(BYTES_PER_S, BYTES_BURST),
-    )
-    loop = asyncio.get_running_loop()
+    loop, rate = asyncio.get_running_loop(), TokenBucket(MESSAGES_PER_S, MESSAGES_BURST)
     async for message in browser:
-        if (wait_s := max(messages.wait_s(loop.time()), size.wait_s(loop.time()))) > 0.0:
+        if (wait_s := rate.wait_s(loop.time())) > 0.0:
             await asyncio.sleep(wait_s)
-        messages.take(loop.time())
-        size.take(loop.time(), len(message.data or ""))
+        rate.take(loop.time())
         await _forward(message, inside)
 
 

@@ -33,8 +33,8 @@ BROWSER_HEADER = "X-Gazerig-Browser"
 """Header with the name of a websocket's browser."""
 TO_BROWSER_BYTES = 1 << 25
 """Longest message to a browser, bytes."""
-FROM_BROWSER_BYTES = 1 << 20
-"""Longest message from a browser, bytes; messages of the page's script have a few kB."""
+FROM_BROWSER_BYTES = 1 << 14
+"""Longest message from a browser, bytes; its viewpoint has 300."""
 
 
 def open_server(socket_path: Path) -> viser.ViserServer:
@@ -134,11 +134,8 @@ class ViewProxy:
         """Relay a browser's websocket to the server and back, at the speed of the slower side."""
         if not self._tab_rate.take(asyncio.get_running_loop().time()):
             return web.Response(status=429, text="too many tabs at once\n", headers=self._headers)
-        offered = [
-            word.strip()
-            for word in request.headers.get("Sec-WebSocket-Protocol", "").split(",")
-            if word.strip()
-        ]
+        words = request.headers.get("Sec-WebSocket-Protocol", "")
+        offered = [word.strip() for word in words.split(",") if words]
         browser = web.WebSocketResponse(
             protocols=offered, max_msg_size=FROM_BROWSER_BYTES, compress=False
         )
