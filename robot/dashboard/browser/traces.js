@@ -1,7 +1,7 @@
 // Panel: desired, commanded and measured angles of eyes, head and lids.
 
 import { drawLines } from "/rig/charts.js";
-import { choice, make } from "/rig/elements.js";
+import { buttons, make } from "/rig/elements.js";
 import { trail } from "/rig/history.js";
 
 const SPANS = { "3 s": 3, "10 s": 10, "30 s": 30 };
@@ -37,27 +37,23 @@ export default {
   open: true,
   every_ms: 160,
   build(place) {
-    const what = choice({ name: "show", options: Object.keys(CHARTS) });
-    const span = choice({ name: "of the last", options: Object.keys(SPANS), value: "10 s" });
+    let shown = "yaw", last = "10 s";
+    const what = buttons("show", Object.keys(CHARTS), (name) => { shown = name; });
+    const span = buttons("of the last", Object.keys(SPANS), (name) => { last = name; });
     const key = make("div", { className: "key" }), charts = make("div");
     place.append(what.node, span.node, key, charts);
     return ({ state }) => {
-      const fitting = chartsOf(state.joints);
-      what.offer(Object.keys(fitting));
-      draw(charts, key, state, fitting[what.value] ?? [], SPANS[span.value]);
+      what.show(shown);
+      span.show(last);
+      draw(charts, key, state, chartsOf(shown, state.joints), SPANS[last]);
     };
   },
 };
 
-/** The charts of a rig: with its joints only, none empty. */
-function chartsOf(joints) {
-  const found = {};
-  for (const [name, list] of Object.entries(CHARTS)) {
-    const charts = list.map(([title, ...names]) => [title, names.filter((one) => one in joints)])
-      .filter(([, names]) => names.length);
-    if (charts.length) found[name] = charts;
-  }
-  return found;
+/** The charts of a choice with the rig's joints only, none empty. */
+function chartsOf(choice, joints) {
+  return CHARTS[choice].map(([title, ...names]) => [title, names.filter((one) => one in joints)])
+    .filter(([, names]) => names.length);
 }
 
 function draw(place, key, state, charts, span_s) {

@@ -1,7 +1,7 @@
 // Panel: parameters that a running rig applies; the others are changed in its file.
 
 import { ask, now, on } from "/rig/connection.js";
-import { buttons, checkbox, choice, make, markUnsaved, section, slider, textField } from "/rig/elements.js";
+import { buttons, checkbox, make, markUnsaved, section, slider, textField } from "/rig/elements.js";
 import { order, say } from "/rig/orders.js";
 import { count } from "/rig/words.js";
 
@@ -108,7 +108,7 @@ function controlOf(param, value, name) {
   const hint = hintOf(param);
   const set = (next) => put(key, next);
   if (!optional && kind === "bool") return checkbox({ name, value, hint }, set);
-  if (!optional && kind === "choice") return choice({ name, options: choices, value, hint }, set);
+  if (!optional && kind === "choice") return buttons(name, choices, set, hint);
   const bounded = typeof low === "number" && typeof high === "number";
   const isSlider = !optional && kind === "number" && bounded
     && high - low <= FAR * Math.abs(value || high);
