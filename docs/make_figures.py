@@ -298,7 +298,7 @@ def capture_time() -> None:
     middle.set(title="the same: gaze, over the parts of the face", **step)
     right.set(
         xlim=(-0.2, 2.4),
-        ylim=(0.0, 20.0),
+        ylim=(0.0, 10.0),
         xlabel="s since the walk began",
         ylabel="gaze off the face part, deg",
         title="1 m/s past at 1.5 m",

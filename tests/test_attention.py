@@ -1,4 +1,4 @@
-"""Field of view, eq 1, rules and the winner (Mitake et al.). Checks: docs/checks.md."""
+"""Field of view, eq 1, rules and the winner (Mitake et al.)."""
 
 from collections.abc import Callable
 from itertools import groupby

@@ -1,4 +1,4 @@
-"""Looking away from faces; numbered checks are listed in docs/checks.md."""
+"""Looking away from faces."""
 
 from itertools import pairwise
 from math import atan2, degrees, inf

@@ -134,21 +134,3 @@ def test_files_named_exist() -> None:
                 assert any((base / span).exists() for base in inside), f"{paper.name}: {span}"
             elif re.fullmatch(r"[\w-]+\.(?:py|yaml)", span) and span not in READERS_OWN:
                 assert span in names, f"{paper.name}: {span}"
-
-
-@cache
-def names_of_tests() -> set[str]:
-    """Return the names of all tests."""
-    names: set[str] = set()
-    for path in (ROOT / "tests").rglob("test_*.py"):
-        names |= set(re.findall(r"^def (\w+)", path.read_text(), re.MULTILINE))
-    return names
-
-
-def test_every_numbered_check_listed_is_a_test() -> None:
-    text = (ROOT / "docs/checks.md").read_text("utf-8")
-    listed = [int(number) for number in re.findall(r"^\| E(\d+) \|", text, re.M)]
-    tested = {
-        int(name[6:].split("_")[0]) for name in names_of_tests() if re.match(r"test_e\d+_", name)
-    }
-    assert listed == sorted(tested) and len(listed) >= 19

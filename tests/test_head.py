@@ -1,4 +1,4 @@
-"""Head goal, timing and trajectory. Numbered checks are listed in docs/checks.md."""
+"""Head goal, timing and trajectory."""
 
 from collections.abc import Callable
 from math import degrees, pi, radians

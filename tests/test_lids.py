@@ -1,4 +1,4 @@
-"""Blinks, winks and lids that follow the gaze; numbered checks: docs/checks.md."""
+"""Blinks, winks and lids that follow the gaze."""
 
 from collections.abc import Callable
 from math import cos, radians, sin

@@ -1,7 +1,7 @@
 """Eyes, head and lids together on a body that follows perfectly.
 
-Numbered checks are listed in docs/checks.md. The head's centre of rotation is put
-between the eyes, as in the sources of those numbers, unless a test states otherwise.
+The head's centre of rotation is put between the eyes, as in the sources of the numbers, unless a
+test states otherwise.
 """
 
 from collections.abc import Callable
@@ -250,7 +250,7 @@ def test_it_begins_where_head_and_eyes_are() -> None:
     assert degrees(abs(eye[0] - q[0])) < 3.0 and degrees(abs(eye[1] - q[1])) < 3.0
 
 
-# Eyes and head keep their limits and reach any target. Checks: docs/checks.md
+# Eyes and head keep their limits and reach any target.
 
 
 @settings(max_examples=30)

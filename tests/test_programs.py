@@ -92,7 +92,7 @@ class Rig(NamedTuple):
 @pytest.fixture(scope="module")
 def rig() -> Iterator[Rig]:
     folder = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
-    file = at_rate(folder, "desk", 40.0)
+    file = at_rate(folder, "desk", 20.0)
     address = f"127.0.0.1:{free_port()}"
     with pytest.MonkeyPatch.context() as patch, (folder / "log").open("w") as log:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))

@@ -1,4 +1,4 @@
-"""Saccade profile: eqs 2-6 of Mitake et al. Numbered checks are listed in docs/checks.md."""
+"""Saccade profile: eqs 2-6 of Mitake et al."""
 
 from math import degrees, radians
 

@@ -1,4 +1,4 @@
-"""The Markov walk over face parts (Nakamoto & Tsuruno). Checks are listed in docs/checks.md."""
+"""The Markov walk over face parts (Nakamoto & Tsuruno)."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -16,7 +16,7 @@ LARGEST = {
     "robot/dashboard": 53_330,
     "gazerig": 14_000,
     "doors": 10_260,
-    "features/animation": 6_790,
+    "features/animation": 5_500,
     "features/bringup": 51_600,
     "features/lab": 52_480,
     "features/study": 10_170,

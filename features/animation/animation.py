@@ -13,15 +13,11 @@ from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.track.track import MAX_DURATION_S
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.track_fit import shortest_move_s
 
 Series = tuple[Floats, Floats]
 """Times in seconds and angles in degrees of one joint."""
 MOST_KEYS = 5_000_000
 """Keys of one file: twelve joints, 30 frames a second, for four hours."""
-MOST_CURVES = 10_000
-"""Curves of one file, and columns of a table: a scene with a crowd has hundreds."""
 _MOST_NAMES = 20
 SAMPLE_S = 0.02
 """Interval of the samples of a curve with handles."""
@@ -61,6 +57,17 @@ class JointMap:
         joint, sign = wanted.removeprefix("-"), -1 if wanted.startswith("-") else 1
         return (joint, sign) if joint in self.joints else None
 
+    def require(self, what: str, name: str) -> tuple[str, int]:
+        """Return the joint of a name and the sign of its angles.
+
+        Raises:
+            SetupError: it is no joint; ``what`` states the file and what has the name.
+        """
+        found = self.find(name)
+        if found is None:
+            raise SetupError(f"{what}{name!r} is no joint: {self.hint()}")
+        return found
+
     def hint(self) -> str:
         """Return the remedy for an unknown name."""
         return f"rename it or add --map NAME=JOINT; joints of the rig: {', '.join(self.joints)}"
@@ -84,7 +91,7 @@ def joint_map(rig: Rig, given: Sequence[str]) -> JointMap:
     return JointMap(rig.names, found)
 
 
-def decode(path: Path, data: bytes, kind: type[T], what: str, where: str = "") -> T:
+def decode(path: Path, data: bytes, kind: type[T], what: str) -> T:
     """Return JSON as a checked value.
 
     Args:
@@ -92,7 +99,6 @@ def decode(path: Path, data: bytes, kind: type[T], what: str, where: str = "") -
         data: the JSON text.
         kind: its structure.
         what: name of the format.
-        where: part of the file.
 
     Raises:
         SetupError: it is not JSON, or has another structure; with the place.
@@ -101,7 +107,7 @@ def decode(path: Path, data: bytes, kind: type[T], what: str, where: str = "") -
         return msgspec.json.decode(data, type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise SetupError(
-            f"{path}{where}: {error}: it is truncated or not {what}; export it again"
+            f"{path}: {error}: it is truncated or not {what}; export it again"
         ) from None
 
 
@@ -116,15 +122,17 @@ def check_keys(where: str, times_s: Floats, values: np.ndarray[Any, Any]) -> Non
     Raises:
         SetupError: names the first such key.
     """
+    if not len(times_s):
+        raise SetupError(f"{where}: no keys: export it again")
     finite = np.isfinite(times_s) & np.isfinite(values.reshape(len(times_s), -1)).all(axis=1)
     if not finite.all():
         raise SetupError(f"{where}: key {int(finite.argmin())} is not a number: export it again")
-    if len(times_s) and times_s[-1] > MAX_DURATION_S:
+    if times_s[-1] > MAX_DURATION_S:
         raise SetupError(
             f"{where}: it takes {times_s[-1]:g} s; at most {MAX_DURATION_S:g} s are read: split it"
         )
     steps = np.diff(times_s)
-    if len(times_s) and times_s[0] < 0.0:
+    if times_s[0] < 0.0:
         raise SetupError(f"{where}: key 0 is at {times_s[0]:g} s, before 0: begin at frame 0")
     if (steps <= 0.0).any():
         i = int((steps <= 0.0).argmax())
@@ -147,36 +155,7 @@ def check_count(where: str, count: int, what: str = "keys") -> None:
         )
 
 
-def check_curves(where: str, count: int, what: str = "curves") -> None:
-    """Refuse more curves than any rig has joints.
-
-    Raises:
-        SetupError: states the number and the remedy.
-    """
-    if count > MOST_CURVES:
-        raise SetupError(
-            f"{where}: {count:,} {what}; at most {MOST_CURVES:,} are read: export the rig's "
-            "joints alone"
-        )
-
-
 def listed(names: Collection[str]) -> str:
     """Return names as text, a long list shortened."""
-    more = len(names) - _MOST_NAMES
-    shown = [f"{name:.80}" for name in islice(names, _MOST_NAMES)]
-    return ", ".join(shown + ([f"and {more:,} more"] if more > 0 else []))
-
-
-def hold_steps(times_s: Floats, angles_deg: Floats, limit: JointLimit) -> Series:
-    """Return keys that hold each value until the latest time at which the joint can leave it.
-
-    A servo cannot step. Each step becomes a curve of least jerk that ends at the step's time and
-    uses 80 % of the joint's speed and acceleration.
-    """
-    needed = shortest_move_s(np.abs(np.radians(np.diff(angles_deg))), limit)
-    leave_s = np.maximum(times_s[1:] - np.maximum(needed, SAMPLE_S), times_s[:-1])
-    held = leave_s > times_s[:-1] + SAMPLE_S
-    times = np.concatenate((times_s, leave_s[held]))
-    angles = np.concatenate((angles_deg, angles_deg[:-1][held]))
-    order = np.argsort(times, kind="stable")
-    return times[order], angles[order]
+    shown = ", ".join(f"{name:.80}" for name in islice(names, _MOST_NAMES))
+    return shown + ", ..." * (len(names) > _MOST_NAMES)

@@ -37,17 +37,17 @@ def read_animation(
         data = read_limited(path, LARGEST)
     except OSError as error:
         raise SetupError(f"{path} cannot be read: {error.strerror}") from None
-    if data[:4] == b"glTF" or path.suffix.lower() == ".gltf":
+    if data[:4] == b"glTF":
         found = gltf_reader.read(path, data, rig, names, clip)
+    elif path.suffix.lower() in (".glb", ".gltf", ".fbx", ".bvh", ".blend"):
+        raise SetupError(
+            f"{path} is no GLB: export glTF as .glb, the JSON of Bottango or of Blender's add-on "
+            "Servo Animation, or CSV"
+        )
     elif data.lstrip()[:1] == b"[":
         found = bottango.read(path, data, rig, names, clip)
     elif data.lstrip()[:1] == b"{":
         found = servo_positions.read(path, data, rig, names, centre_deg)
-    elif path.suffix.lower() in (".glb", ".json", ".fbx", ".bvh", ".blend"):
-        raise SetupError(
-            f"{path}: its first bytes are neither glTF nor JSON: export glTF (.glb), the JSON of "
-            "Bottango or of Blender's add-on Servo Animation, or CSV"
-        )
     else:
         series = table.read_table(path, data, fps, names)
         hint = radians_hint(abs(angles).max() for _, angles in series.values())

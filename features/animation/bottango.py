@@ -78,10 +78,7 @@ def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Impor
                 curves.setdefault(words[1], []).append(numbers)
     series: dict[str, Series] = {}
     for effector, them in curves.items():
-        found = names.find(effector)
-        if found is None:
-            raise SetupError(f"{path}: effector {effector!r} is no joint: {names.hint()}")
-        joint, sign = found
+        joint, sign = names.require(f"{path}: effector ", effector)
         times, movement = _sample(f"{path}: {effector}", them)
         low, high = rig.joints[joint].min_deg, rig.joints[joint].max_deg
         share = movement if sign > 0 else 1.0 - movement

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from trimesh.transformations import quaternion_from_matrix
+from scipy.spatial.transform import Rotation
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
@@ -19,9 +19,7 @@ from gazerig.features.animation.animation import (
     JointMap,
     Series,
     check_count,
-    check_curves,
     check_keys,
-    hold_steps,
     listed,
 )
 from gazerig.features.animation.glb import Clip, GltfFile
@@ -49,7 +47,6 @@ def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Impor
     """
     file = GltfFile(path, data)
     links = {link.joint.name: link for link in description_of(rig, looks=False).links if link.joint}
-    check_curves(str(path), sum(len(one.channels) for one in file.tree.animations))
     series: dict[str, Series] = {}
     notes: list[str] = []
     ignored: dict[str, None] = {}
@@ -74,11 +71,11 @@ def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Impor
                 joint, sign = found
                 where = f"{path}: {one.name or 'animation'}, {name}"
                 times, angles, off_deg = _read_angles(
-                    file, where, one, channel.sampler, links[joint], rig
+                    file, where, one, channel.sampler, links[joint]
                 )
                 series[joint] = times, sign * angles
                 if off_deg.max() > _OFF_AXIS_DEG:
-                    at_s = times[min(int(off_deg.argmax()), len(times) - 1)]
+                    at_s = times[off_deg.argmax()]
                     notes.append(
                         f"{joint} turns up to {off_deg.max():.1f} deg about other axes (at {at_s:.2f} s), "
                         "which is left out: lock the other axes in the animation program"
@@ -106,35 +103,30 @@ def _listed(file: GltfFile) -> str:
 
 
 def _read_angles(
-    file: GltfFile, where: str, clip: Clip, sampler: int, link: Link, rig: Rig
+    file: GltfFile, where: str, clip: Clip, sampler: int, link: Link
 ) -> tuple[Floats, Floats, Floats]:
     """Return times, angles in degrees, and the rotation about other axes in degrees."""
     if not 0 <= sampler < len(clip.samplers):
         raise SetupError(f"{where}: no sampler {sampler}: export it again")
     found = clip.samplers[sampler]
     spline = found.interpolation == "CUBICSPLINE"
+    if not spline and found.interpolation != "LINEAR":
+        raise SetupError(
+            f"{where}: its interpolation is {found.interpolation!r:.30}, but servos cannot step: use "
+            "linear or Bezier keys"
+        )
     count = file.item("accessors", found.input).count
     check_count(where, count)
     expected = 3 * count if spline else count
-    if count < 1 or file.item("accessors", found.output).count != expected:
-        raise SetupError(f"{where}: needs {expected} rotations for {count} times: export it again")
     times, rotations = file.values(found.input)[:, 0], file.values(found.output)
-    if rotations.shape[1] != 4:
-        raise SetupError(f"{where}: its rotations are no quaternions: export it again")
+    if rotations.shape != (expected, 4):
+        raise SetupError(f"{where}: needs {expected} quaternions: export it again")
     check_keys(where, times, rotations.reshape(count, -1))
     if spline:
         times, rotations = _sample_spline(times, rotations.reshape(count, 3, 4))
     if (np.linalg.norm(rotations, axis=1) < 1e-6).any():
         raise SetupError(f"{where}: a rotation is zero: export it again")
-    angles, off_deg = joint_angles(link, rotations)
-    if found.interpolation == "STEP":
-        assert link.joint is not None
-        times, angles = hold_steps(times, angles, rig.joints[link.joint.name].limit())
-    elif found.interpolation not in ("LINEAR", "CUBICSPLINE"):
-        raise SetupError(
-            f"{where}: interpolation {found.interpolation!r:.30} is unknown: use LINEAR"
-        )
-    return times, angles, off_deg
+    return times, *joint_angles(link, rotations)
 
 
 def _sample_spline(times_s: Floats, keys: Floats) -> tuple[Floats, Floats]:
@@ -162,21 +154,10 @@ def joint_angles(link: Link, rotations: Floats) -> tuple[Floats, Floats]:
         The angles about the joint's axis, without jumps, and the remaining rotations.
     """
     assert link.joint is not None
-    q = rotations / np.linalg.norm(rotations, axis=1, keepdims=True)
-    rest = rest_quaternion(link)
-    w0, v0 = rest[0], -rest[1:]  # conjugate
-    w = w0 * q[:, 3] - q[:, :3] @ v0
-    v = w0 * q[:, :3] + q[:, 3:] * v0 + np.cross(v0, q[:, :3])
-    along = v @ np.array(link.joint.axis)
+    rest = Rotation.from_matrix(link.R)
+    turned = (rest.inv() * Rotation.from_quat(rotations)).as_quat()
+    along, w = turned[:, :3] @ np.array(link.joint.axis), turned[:, 3]
     angles = np.unwrap(2.0 * np.arctan2(along, w))
     angles -= 2.0 * np.pi * np.round(angles[0] / (2.0 * np.pi))
     off = 2.0 * np.arccos(np.clip(np.hypot(along, w), 0.0, 1.0))
     return np.degrees(angles), np.degrees(off)
-
-
-def rest_quaternion(link: Link) -> Floats:
-    """Return the rotation w, x, y, z of a joint's node at angle 0."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = link.R
-    found: Floats = quaternion_from_matrix(matrix)  # type: ignore[no-untyped-call]
-    return found

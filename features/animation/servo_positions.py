@@ -7,7 +7,7 @@ and by servo id the name of the bone and one whole number per frame, in the unit
 from pathlib import Path
 
 import numpy as np
-from msgspec import UNSET, Struct, UnsetType
+from msgspec import Struct
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
@@ -29,7 +29,7 @@ class _ServoCurve(Struct):
 
 class _File(Struct):
     fps: float
-    servos: dict[str, _ServoCurve] | UnsetType = UNSET
+    servos: dict[str, _ServoCurve]
 
 
 def read(
@@ -48,26 +48,17 @@ def read(
     Raises:
         SetupError: the file is invalid, or a bone is no joint.
     """
-    file = decode(path, data, _File, "a file of Blender's add-on Servo Animation")
-    if isinstance(file.servos, UnsetType):
-        raise SetupError(
-            f"{path}: no servos: it is not a file of Blender's add-on Servo Animation, or one of "
-            "before version 2; export it with the present add-on"
-        )
+    file = decode(path, data, _File, "a file of Blender's add-on Servo Animation 2")
     if not 1.0 <= file.fps <= 1000.0:
         raise SetupError(f"{path}: fps is {file.fps:g}; it must be within 1 and 1000")
     check_count(str(path), sum(len(servo.positions) for servo in file.servos.values()))
     series: dict[str, Series] = {}
     for key, servo in file.servos.items():
-        found = names.find(servo.name)
-        if found is None:
-            raise SetupError(f"{path}: servos.{key}: no joint {servo.name!r}: {names.hint()}")
-        if not servo.positions:
-            raise SetupError(f"{path}: servos.{key} ({servo.name}): no positions; export it again")
-        joint, sign = found
+        where = f"{path}: servos.{key}: "
+        joint, sign = names.require(where, servo.name)
         positions = np.array(servo.positions)
         times = np.arange(len(positions)) / file.fps
-        check_keys(f"{path}: servos.{key} ({servo.name})", times, positions)
+        check_keys(f"{where}{servo.name}", times, positions)
         if centre_deg is None:
             angles = _angles_deg(path, rig, joint, positions)
         else:

@@ -264,7 +264,7 @@ def endpoint(end: Vec3, start: Vec3, eye: Vec3, rng: np.random.Generator) -> Vec
 _TRIES = 12
 _LEAST_RAD, _MOST_RAD = radians(1.15), radians(1.7)
 """Sizes of re-fixations; smaller ones are hidden by servo steps and play."""
-_AFTER_S, _SPREAD_S = 0.35, 1.1
+_AFTER_S, _SPREAD_S = 0.5, 1.1
 """Shortest rest of the gaze before a re-fixation, and the random time by which it is extended."""
 
 

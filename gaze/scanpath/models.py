@@ -56,7 +56,7 @@ class ScanpathModel(Protocol):
         ...
 
 
-SHORTEST_S = 0.14
+SHORTEST_S = 0.145
 """Shortest rest on a part, from landing to departure; longer ones are distributed above it. Also
 shortest rest after a saccade that catches up with the part."""
 _SPOT_WIDTH_M = 0.06

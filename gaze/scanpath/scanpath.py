@@ -91,7 +91,7 @@ class ScanpathParams:
     transition_matrix: Annotated[str, "name of a shipped transition matrix or path of a YAML file"] = "people"
     law: Annotated[Literal["people", "literal"],
         "people: an observer who enters a face at the nearest eye or the nose, has a preferred spot, looks at the mouth that speaks, rests "
-        "for .14 s or more, and takes parts of a far face as one; literal: the walk as printed"] = "people"
+        "for .145 s or more, and takes parts of a far face as one; literal: the walk as printed"] = "people"
     spot_height_mm: Annotated[float, Bounds(-100, 100),
         "height of the observer's preferred spot on a face above that of most people, which is just below the eyes"] = 0.0
     rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by this: with 2 the gaze wanders twice as fast"] = 1.0

@@ -124,8 +124,9 @@ class FrameLocator:
             for person in found.people
             if not any(_is_face_of(person, face) for face in inside)
         ]
-        largest = nlargest(_MOST_THINGS, found.blobs, _swept_m)
-        things = [_thing(blob, intrinsics) for blob in largest]
+        things = [
+            _thing(blob, intrinsics) for blob in nlargest(_MOST_THINGS, found.blobs, _swept_m)
+        ]
         return LocatedFrame(
             intrinsics,
             tuple([face for face in faces if face is not None]),

@@ -11,6 +11,9 @@ from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
 from gazerig.robot.cli.tracks import FolderOption, print_track_fit
 
+_TOLERANCE_DEG = 0.3
+"""Distance of a curve from dense samples; servos show no less."""
+
 app = typer.Typer()
 
 
@@ -50,12 +53,6 @@ def import_track(
         float | None,
         typer.Option(min=1.0, max=1000.0, help="Frames per second, for tables of frame numbers."),
     ] = None,
-    tolerance: Annotated[
-        float,
-        typer.Option(
-            metavar="DEG", min=0.01, max=10.0, help="Distance of the curve from dense samples."
-        ),
-    ] = 0.3,
     owns: Annotated[
         bool | None,
         typer.Option(
@@ -80,7 +77,7 @@ def import_track(
             loaded,
             found.series,
             f"from {file.name}",
-            tolerance_deg=tolerance,
+            tolerance_deg=_TOLERANCE_DEG,
             owned=found.poses if owns is None else owns,
         )
         for note in (*found.notes, *made.notes):
