@@ -54,6 +54,9 @@ MEASURE = """(() => {
   for (const e of document.querySelectorAll('#drawer, #drawer > section, #notices, header')) {
     if (seen(e) && e.scrollWidth > e.clientWidth + 1) faults.push(`${name(e)} is too wide`);
   }
+  for (const e of document.querySelectorAll('#headline')) {
+    if (e.scrollHeight > e.clientHeight + 2) faults.push(`${name(e)} is not shown whole`);
+  }
   const words = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (words.nextNode()) {
     const e = words.currentNode.parentElement;
@@ -118,7 +121,10 @@ LOST = "the servo bus is lost: /dev/ttyUSB0 is not there"
 HEADLINES = {
     "awake": "looks at person 1 (mouth)",
     "stopped": f"stopped: {STOP}; the torque is off",
-    "led by a click": "ann at 192.168.1.20 makes it look at 0.9 0.1 0.25, for 5 min",
+    "led by a click": (
+        "a program with a long name at 192.168.1.20 makes it look at 0.9 0.1 0.25, for 5 min; 12 deg "
+        "off: yaw 30 of 42 deg"
+    ),
     "bus lost": f"the torque is off: {LOST}",
     "busy": "looks at person 1 (mouth)",
 }

@@ -222,6 +222,8 @@ def test_a_refused_value_is_put_back_and_anothers_change_is_shown(
     marked = beside("● blinks", "input[type=number]")
     wait_for(lambda: person.run(f"{marked}?.value") == "23", "the other's value, marked")
     wait_for(lambda: person.reads("1 not saved"), "the count")
+    person.click(saying("save"))
+    wait_for(lambda: stub.orders("save") == [{"do": "save", "path": None}], "the order to save")
 
 
 def test_a_track_plays_on_a_timeline_with_its_sound_and_cues(page: tuple[Stub, Person]) -> None:
@@ -240,7 +242,7 @@ def test_a_track_plays_on_a_timeline_with_its_sound_and_cues(page: tuple[Stub, P
     )
     wait_for(lambda: person.run(ink.format("201, 31")), "the sound")
     assert not person.run(ink.format("201, 22"))
-    person.click(saying("end"))
+    person.click("document.querySelector('#drawer-play [data-choice=none]')")
     wait_for(lambda: stub.orders("end_track") == [{"do": "end_track", "track": ""}], "the end")
 
 

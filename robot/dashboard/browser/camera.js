@@ -11,12 +11,11 @@ const STALE_MS = 2500, AGE_MS = 500;
 const PICTURE_EVERY_MS = 700; // without a picture for this long the newest state is shown
 const KEPT_S = 2;
 const LATEST_S = 0.8; // a moment older than this is not kept while the eyes are under way
-const HEAT_S = 12, HEAT_PX = 24;
 const STEP = 0.04; // of the cross that the arrow keys move
 const WIDTH = 640;
 
 /** Layers over the picture, chosen in the drawer Watch. */
-export const layers = { gaze: true, faces: false, heat: false };
+export const layers = { gaze: true, faces: false };
 
 const canvas = make("canvas", { tabIndex: 0, className: "pick", width: WIDTH, height: 400 });
 const mark = make("span", { className: "mark", hidden: true });
@@ -90,7 +89,6 @@ function draw(bitmap) {
   if (bitmap) pen.drawImage(bitmap, 0, 0, width, height);
   pen.setTransform(scale, 0, 0, scale, 0, 0); // from here on in pixels of the full picture
   const thin = 1 / scale;
-  if (layers.heat) drawHeat(pen, thin);
   if (layers.faces) drawFindings(pen, thin);
   if (layers.gaze && picture.gaze_px) drawRing(pen, thin * Math.max(0.5, width / WIDTH));
   pen.setTransform(1, 0, 0, 1, 0, 0);
@@ -138,32 +136,6 @@ function drawFindings(pen, px) {
     pen.fillStyle = MOVING;
     pen.fillText(kind, x - radius_px, Math.max(14 * px, y - radius_px - 4 * px));
   }
-}
-
-const looked = []; // gaze points of the last seconds: [t_s, point]
-
-on("state", ({ t_s, gaze }) => {
-  if (t_s < looked.at(-1)?.[0]) looked.length = 0;
-  looked.push([t_s, gaze.point_m]);
-  while (looked[0][0] < t_s - HEAT_S) looked.shift();
-});
-
-function drawHeat(pen, px) {
-  const { R_world_camera: R, p_world_camera_m: p, lens } = picture;
-  if (!R || !lens) return;
-  pen.globalCompositeOperation = "screen";
-  for (const [, point] of looked) {
-    const away = point.map((value, i) => value - p[i]);
-    const [right, down, ahead] = [0, 1, 2].map((i) => R[0][i] * away[0] + R[1][i] * away[1] + R[2][i] * away[2]);
-    if (ahead <= 0) continue;
-    const x = lens.cx_px + (lens.fx_px * right) / ahead, y = lens.cy_px + (lens.fy_px * down) / ahead;
-    const glow = pen.createRadialGradient(x, y, 0, x, y, HEAT_PX * px);
-    glow.addColorStop(0, "rgb(255 120 20 / .12)");
-    glow.addColorStop(1, "rgb(120 0 80 / 0)");
-    pen.fillStyle = glow;
-    pen.fillRect(x - HEAT_PX * px, y - HEAT_PX * px, 2 * HEAT_PX * px, 2 * HEAT_PX * px);
-  }
-  pen.globalCompositeOperation = "source-over";
 }
 
 setInterval(() => {

@@ -18,10 +18,16 @@ export function onChoices(handle) {
   handlers.push(handle);
 }
 
-async function read() {
-  const [menus, tracks, characters] = await Promise.all(
+let known = "";
+
+async function read(rig) {
+  const answers = await Promise.all(
     ["menus", "tracks", "characters"].map((verb) => ask({ do: verb }).catch(() => null)),
   );
+  const text = JSON.stringify([answers, rig]);
+  if (text === known) return; // keep a button that is being pressed
+  known = text;
+  const [menus, tracks, characters] = answers;
   choices.menus = menus ?? {};
   choices.tracks = Object.fromEntries((tracks ?? []).map((track) => [track.name, track]));
   choices.characters = characters ?? [];

@@ -179,27 +179,6 @@ export function checkbox({ name, value = false, hint = "" }, send = () => {}) {
   };
 }
 
-/** Menu; the values of the options are texts. */
-export function choice({ name, options, value = options[0], hint = "" }, send = () => {}) {
-  const id = newId(), menu = make("select", { id });
-  describe(menu, hint);
-  const offer = (next) => {
-    if (next.join() === [...menu.options].map((one) => one.value).join()) return;
-    const before = menu.value;
-    menu.replaceChildren(...next.map((one) => make("option", { value: one, textContent: one })));
-    if (next.includes(before)) menu.value = before;
-  };
-  offer(options);
-  menu.value = value;
-  menu.addEventListener("change", () => send(menu.value));
-  return {
-    node: make("div", { className: "field" }, label(name, id), menu),
-    show(next) { menu.value = next; },
-    offer,
-    get value() { return menu.value; },
-  };
-}
-
 /** Row of buttons, of which `show` marks the present one; title: text above, "" for none. */
 export function buttons(title, options, send, hint = "") {
   const row = make("div", { className: "buttons" });
@@ -207,7 +186,7 @@ export function buttons(title, options, send, hint = "") {
   node.setAttribute("role", "group");
   if (title) {
     const id = newId();
-    node.prepend(make("div", { className: "label", id, textContent: title }));
+    node.prepend(make("div", { className: "label", id }, make("span", { className: "unsaved" }), title));
     node.setAttribute("aria-labelledby", id);
   }
   for (const option of options) {

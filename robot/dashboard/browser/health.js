@@ -8,6 +8,9 @@ const OLD_S = 0.15; // age of a servo's last answer
 const OLD_FRAME_S = 0.5; // the guard stops the neck at three times that age
 const HARD_LOAD = 0.9, LATE_SHARE = 0.5;
 const QUIET = ["torque off", "limp, as idle"];
+const SERVO_NOTE = "amber: the guard slows the joint down; red: the joint is stopped, or the servo is "
+  + "silent or at fault. silent: ticks without an answer. no feedback: the servo reports neither "
+  + "position nor load; a joint that jams or a rod that came off is not noticed";
 
 export default {
   drawer: "health",
@@ -19,7 +22,7 @@ export default {
       place.replaceChildren(
         guard(state),
         heading("servos"), ...feedback(state), servos(state, run, rig),
-        note(servoNote(state)), make("div", {}, run.health),
+        note(SERVO_NOTE), make("div", {}, run.health),
         heading("loop"), ...timing(run.timing),
         heading("camera"), frame(state), make("div", {}, perception(run)),
       );
@@ -57,14 +60,6 @@ function feedback({ joints }) {
   const where = loose ? `; ${loose === guessed.length ? "all" : loose} without torque: may be anywhere` : "";
   return [make("div", { className: "warn", textContent:
     `${guessed.length} of ${count(all.length, "joint")} without feedback: shown where they should be${where}` })];
-}
-
-function servoNote({ joints }) {
-  const guessed = Object.values(joints).some((joint) => joint.estimated);
-  return "amber: the guard slows the joint down; red: the joint is stopped, or the servo is silent or at "
-    + "fault. silent: ticks without an answer"
-    + (guessed ? ". no feedback: the servo reports neither position nor load; a joint that jams or a rod "
-      + "that came off is not noticed" : "");
 }
 
 function servos({ joints }, { unanswered }, rig) {

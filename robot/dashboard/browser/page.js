@@ -35,7 +35,7 @@ function title(state) {
 onShown((shown) => {
   const led = isLed(shown);
   write($("#headline"), shown.headline);
-  const why = led || shown.headline === shown.gaze.reason ? "" : reason(shown, now.run, 1);
+  const why = led || shown.level === "torque_off" ? "" : reason(shown, now.run, 1);
   write($("#control"), now.rig?.led_by ? `led by ${now.rig.led_by}: only STOP works here` : why);
   // A change of control is read out; the target changes three times a second.
   const lasting = / for \d.*$/;

@@ -2,11 +2,11 @@
 
 import { prepare } from "/rig/charts.js";
 import { choices, onChoices } from "/rig/choices.js";
-import { buttons, checkbox, choice, heading, make, note, section, slider } from "/rig/elements.js";
+import { buttons, checkbox, heading, make, note, section, slider } from "/rig/elements.js";
 import { order } from "/rig/orders.js";
 import { spaced } from "/rig/words.js";
 
-const NONE = "none", ALL = "all";
+const NONE = "none"; // ends all tracks
 const FINISHED = "finished"; // the end reason of a track at its own end
 const WAVE = 22, BAR = 7, TOP = 20, HIGH = TOP + WAVE + BAR + 22;
 
@@ -19,12 +19,8 @@ export default {
       (value) => { speed = value; });
     const loop = checkbox({ name: "loop", hint: "repeat until it is ended" });
     const timeline = make("div"), top = make("div");
-    const which = choice({ name: "track", options: [ALL] });
-    const end = buttons("", ["end"], () => order(
-      { do: "end_track", track: which.value === ALL ? "" : which.value },
-    ));
     const all = section("all tracks", false);
-    place.append(top, pace.node, loop.node, timeline, which.node, end.node, all.node);
+    place.append(top, pace.node, loop.node, timeline, all.node);
     onChoices(() => {
       const names = (choices.menus.track ?? []).filter((name) => name !== NONE).toSorted();
       row = buttons("play", [NONE, ...names], (name) => order(name === NONE
@@ -35,8 +31,6 @@ export default {
     return ({ state }) => {
       const playing = state.tracks.filter((track) => !track.end_reason);
       row?.show(playing.at(-1)?.name ?? NONE);
-      which.offer([ALL, ...new Set(playing.map(({ name }) => name))]);
-      which.node.hidden = end.node.hidden = !playing.length;
       draw(timeline, state.tracks);
     };
   },

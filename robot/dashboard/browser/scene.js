@@ -9,7 +9,6 @@ import { order } from "/rig/orders.js";
 const PICTURE = {
   gaze: "picture: where the head looks",
   faces: "picture: faces and what moves, as found",
-  heat: "picture: where the head has looked",
 };
 const SCENE = {
   ghost: "ghost of the desired pose",

@@ -1,21 +1,13 @@
 // Panel: desired, commanded and measured angles of eyes, head and lids.
 
 import { drawLines } from "/rig/charts.js";
-import { choice, make } from "/rig/elements.js";
+import { buttons, make } from "/rig/elements.js";
 import { trail } from "/rig/history.js";
 
 const SPANS = { "3 s": 3, "10 s": 10, "30 s": 30 };
 const LEAST_DEG = 10, MOST_POINTS = 300;
 const LINES = [["desired", "—"], ["commanded", "—"], ["measured", "—"]];
 
-const eye = (side) => [
-  [`${side} eye, yaw, + left`, `${side}_eye_pan`],
-  ["both eyes, yaw, + left", "eyes_pan"],
-  [`${side} eye, pitch, + up`, `${side}_eye_tilt`],
-  ["both eyes, pitch, + up", "eyes_tilt"],
-  [`${side} upper lid, + open`, `${side}_upper_lid`],
-  [`${side} lower lid, + open`, `${side}_lower_lid`],
-];
 const LIDS = [
   ["upper lids, + open", "left_upper_lid", "right_upper_lid"],
   ["lower lids, + open", "left_lower_lid", "right_lower_lid"],
@@ -32,8 +24,6 @@ const CHARTS = {
     ["head, pitch, + up", "neck_pitch"],
     ...LIDS,
   ],
-  "left eye": eye("left"),
-  "right eye": eye("right"),
   neck: [
     ["neck, yaw, + left", "neck_yaw"],
     ["neck, pitch, + up", "neck_pitch"],
@@ -47,27 +37,23 @@ export default {
   open: true,
   every_ms: 160,
   build(place) {
-    const what = choice({ name: "show", options: Object.keys(CHARTS) });
-    const span = choice({ name: "of the last", options: Object.keys(SPANS), value: "10 s" });
+    let shown = "yaw", last = "10 s";
+    const what = buttons("show", Object.keys(CHARTS), (name) => { shown = name; });
+    const span = buttons("of the last", Object.keys(SPANS), (name) => { last = name; });
     const key = make("div", { className: "key" }), charts = make("div");
     place.append(what.node, span.node, key, charts);
     return ({ state }) => {
-      const fitting = chartsOf(state.joints);
-      what.offer(Object.keys(fitting));
-      draw(charts, key, state, fitting[what.value] ?? [], SPANS[span.value]);
+      what.show(shown);
+      span.show(last);
+      draw(charts, key, state, chartsOf(shown, state.joints), SPANS[last]);
     };
   },
 };
 
-/** The charts of a rig: with its joints only, none empty. */
-function chartsOf(joints) {
-  const found = {};
-  for (const [name, list] of Object.entries(CHARTS)) {
-    const charts = list.map(([title, ...names]) => [title, names.filter((one) => one in joints)])
-      .filter(([, names]) => names.length);
-    if (charts.length) found[name] = charts;
-  }
-  return found;
+/** The charts of a choice with the rig's joints only, none empty. */
+function chartsOf(choice, joints) {
+  return CHARTS[choice].map(([title, ...names]) => [title, names.filter((one) => one in joints)])
+    .filter(([, names]) => names.length);
 }
 
 function draw(place, key, state, charts, span_s) {

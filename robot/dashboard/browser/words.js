@@ -27,7 +27,7 @@ export function activity(state, since_s) {
   const lasting = `, for ${duration(Math.max(0, state.t_s - since_s))}`;
   const person = people.find(({ id }) => id === personOf(gaze));
   if (!person) return state.headline + lasting;
-  const who = person.speaks ? ", who speaks" : person.looks_at_head ? ", who looks at it" : "";
+  const who = person.speaks ? ", who speaks" : person.looks_at_head ? ", who looks back" : "";
   return `looks at person ${person.id}${who}${lasting}`;
 }
 
@@ -65,17 +65,11 @@ function listed(parts) {
 /** What limits have changed of an order, "" if nothing; reply: a CommandReply. */
 export function limits(reply) {
   if (reply.track) return trackLimits(reply.track);
-  const joints = (reply.joints ?? []).filter((joint) => joint.reason).map(jointLimit).join("; ");
+  const joints = (reply.joints ?? []).filter((one) => one.reason)
+    .map((one) => `${spaced(one.joint)}: ${one.reason}`).join("; ");
   if (!reply.asked_m) return joints;
   const off = degrees(reply.error_rad ?? 0);
   return off < 1 ? "" : `it looks ${off.toFixed(0)} deg off${joints && `: ${joints}`}`;
-}
-
-function jointLimit({ joint, reason: why, low_rad, high_rad, done_rad, asked_rad }) {
-  if (low_rad === high_rad) return `${spaced(joint)}: ${why}`;
-  const [done, asked, low, high] = [done_rad, asked_rad, low_rad, high_rad].map(degrees);
-  return `${spaced(joint)} stays at ${done.toFixed(1)} of ${asked.toFixed(1)} deg `
-    + `(${why}, ${low.toFixed(0)} to ${high.toFixed(0)})`;
 }
 
 function trackLimits({ name, slowed_by, slow_joint, reduced_joints, left_out }) {
