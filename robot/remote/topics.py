@@ -5,8 +5,6 @@ from typing import NamedTuple
 
 from msgspec import Struct
 
-from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.types import LoopFigures
 
 Pixel = tuple[float, float]
@@ -116,9 +114,6 @@ class Picture(Struct, frozen=True):
         width_px, height_px: Size of the full frame; the JPEG may be smaller.
         gaze_px: Gaze point at the exposure, None if it is behind the camera.
         faces, people, things: What was detected.
-        R_world_camera: Rotation of the camera: x right, y down, z ahead.
-        p_world_camera_m: Its position.
-        lens: Focal lengths, principal point and distortion.
         conditions: Conditions that impair the picture, each with its remedy.
     """
 
@@ -130,9 +125,6 @@ class Picture(Struct, frozen=True):
     faces: tuple[SeenFace, ...]
     people: tuple[SeenPerson, ...]
     things: tuple[SeenThing, ...]
-    R_world_camera: Mat3
-    p_world_camera_m: Vec3
-    lens: Intrinsics
     conditions: tuple[str, ...] = ()
 
 

@@ -57,9 +57,6 @@ def camera_picture(
             for one in found.people
         ),
         _things(found, lens),
-        R,
-        p_m,
-        lens,
         found.conditions,
     )  # fmt: skip
     return ShownPicture(picture, encode(_shrink(found)))
