@@ -20,7 +20,6 @@ from msgspec.structs import replace
 
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.robot.control.head_state import head_state
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.track_choices import TrackInfo
@@ -35,11 +34,8 @@ RIG = RigInfo(
 )
 IN_TIME = LoopFigures(200.0, 0.1, 0.5, 1.0, 0, 0, 10.0)
 RUN = RunState("wait", "none", "shy", "", "bus ok", 1, IN_TIME)
-AHEAD = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
-"""A camera that looks along the x axis."""
 PICTURE = Picture(
     1, 0.0, 640, 400, (320.0, 200.0), (SeenFace((260.0, 120.0, 120.0, 150.0), (), 0.9),), (), (),
-    AHEAD, (0.0, 0.0, 0.1), Intrinsics(500.0, 500.0, 319.5, 199.5),
 )  # fmt: skip
 TRACKS = (
     TrackInfo("nod", "says yes", 1.2, layers=("head",)),

@@ -11,7 +11,7 @@ const FREE = "look freely", AHEAD = "look straight ahead";
 const LISTED_ELSEWHERE = ["track", "expression", "conversation"];
 
 /** Buttons that free the gaze, or hold it. */
-function gazeButtons() {
+export function gazeButtons() {
   return buttons("target", [FREE, AHEAD], (choice) => {
     held.clear();
     order(choice === FREE ? { do: "look_at", p_world_m: null }
