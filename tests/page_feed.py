@@ -39,7 +39,7 @@ def info(made: Assembly) -> RigInfo:
     """Return what is constant of a rig with emulated servos."""
     joint = JointInfo(-0.6, 0.6, 55.0, 65.0, 4.8, 6.7, 0.5)
     names = made.shown_rig().kinematics.names
-    return RigInfo("desk", "/rigs/desk.yaml", True, "", False, "", "", dict.fromkeys(names, joint))
+    return RigInfo("desk", "/rigs/desk.yaml", True, False, "", "", dict.fromkeys(names, joint))
 
 
 def shown(name: str = "desk", **changes: Any) -> ShownHead:

@@ -59,7 +59,6 @@ class RunObservers:
         recorder: records the run.
         browse: opens the page in the user's browser.
         voice: Says sounds and texts; it is closed with the observers.
-        led_by: Who leads the head instead of the page, which can then only stop and resume it.
     """
 
     def __init__(
@@ -70,11 +69,10 @@ class RunObservers:
         status: Callable[[str], None] | None = None,
         tuning: ParamStore | None = None,
         recorder: "Recorder | None" = None,
-        led_by: str = "",
         browse: Callable[[str], object] | None = None,
         voice: RunVoice | None = None,
     ) -> None:
-        self._led_by, self._by_browser, self._voice = led_by, False, voice
+        self._by_browser, self._voice = False, voice
         self._made, self._fast, self._say = assembly, options.fast, say
         self._agent = (
             MockAgent(assembly.robot.command, assembly.scene, self._scene_start_s)
@@ -82,7 +80,7 @@ class RunObservers:
             else None
         )
         self._timing = LoopTiming(assembly.loop.rate_hz)
-        self._emulated = options.mock and not led_by
+        self._emulated = options.mock
         computed = options.no_pictures or (assembly.scene is not None and not options.pixels)
         self._detector = "" if computed else str(detector_status(assembly.live_params.rig.detector))
         self._choice = level_text(options.computer) if options.computer is not None else ""
@@ -148,7 +146,6 @@ class RunObservers:
                 rig.name,
                 str(tuning.path) if tuning is not None else "",
                 self._emulated,
-                self._led_by,
                 has_opponent(shapes),
                 self._detector,
                 self._choice,

@@ -35,9 +35,7 @@ class RigInfo(Struct, frozen=True):
     Attributes:
         name: Name of the rig.
         path: File that save writes, "" without one.
-        emulated: Whether its servos are emulated and not being calibrated.
-        led_by: Who leads the head instead of the network's clients, which can then only stop and
-            resume it; "" usually.
+        emulated: Whether its servos are emulated.
         opponent: Whether a boxing world has an opponent that a person can move.
         detector: Detector of faces and people, and what it lacks; "" if none runs.
         choice: Settings chosen for this computer, in one line; "" if nothing was measured.
@@ -47,7 +45,6 @@ class RigInfo(Struct, frozen=True):
     name: str
     path: str
     emulated: bool
-    led_by: str
     opponent: bool
     detector: str
     choice: str

@@ -36,7 +36,7 @@ onShown((shown) => {
   const led = isLed(shown);
   write($("#headline"), shown.headline);
   const why = led || shown.level === "torque_off" ? "" : reason(shown, now.run, 1);
-  write($("#control"), now.rig?.led_by ? `led by ${now.rig.led_by}: only STOP works here` : why);
+  write($("#control"), why);
   // A change of control is read out; the target changes three times a second.
   const lasting = / for \d.*$/;
   write($("#announced"), led ? shown.headline.replace(lasting, "") : "");
@@ -78,7 +78,6 @@ const WITH_LIDS = ["wink", "surprised", "sleepy"];
 /** Why the rig cannot do what a button means, "" if it can. */
 function refusal(name) {
   const { menus } = choices;
-  if (now.rig?.led_by) return `not while ${now.rig.led_by} leads the head`;
   if (!now.rig || !Object.keys(menus).length) return "";
   if (!menus.track) return "not while a calibration is under way";
   const lids = Object.keys(now.rig.joints).some((joint) => joint.includes("lid"));
