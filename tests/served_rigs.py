@@ -46,5 +46,6 @@ def rig_files(folder: Path) -> dict[str, str]:
 
 def hide_real_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let bring-up see none of this computer's ports."""
-    ports = pytest.importorskip("gazerig.features.bringup.cli.ports")
-    monkeypatch.setattr(ports, "serial_ports", lambda: ())
+    for name in ("ports", "scan"):
+        module = pytest.importorskip(f"gazerig.features.bringup.cli.{name}")
+        monkeypatch.setattr(module, "serial_ports", lambda: ())

@@ -123,10 +123,10 @@ def test_a_command_works_as_it_is_written(
         assert typed(*shlex.split(words)) == 0, capfd.readouterr().err
 
 
-@pytest.mark.parametrize("words", ["doctor --mock --fix", "setup maker --mock"])
+@pytest.mark.parametrize("words", ["doctor --mock --fix"])
 def test_a_paper_shows_what_is_printed(words: str, capfd: pytest.CaptureFixture[str]) -> None:
     [block] = [block for block in blocks("") if f"$ gazerig {words}\n" in block.text]
-    typed(*shlex.split(words))  # setup ends where standard input does
+    typed(*shlex.split(words))
     reported = "".join(capfd.readouterr())
     printed = [" ".join(line.split()) for line in reported.splitlines()]
     for line in block.text.split("$ gazerig")[1].splitlines()[1:]:

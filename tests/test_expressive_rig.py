@@ -22,16 +22,16 @@ NAMES = (
 )  # fmt: skip
 
 
-def test_a_jaw_is_calibrated_by_motion(tmp_path: Path) -> None:
+def test_a_jaw_is_calibrated_by_hand(tmp_path: Path) -> None:
     pytest.importorskip("gazerig.features.bringup")
     rig = tmp_path / "face.yaml"
     text = shipped_path("rigs", "expressive").read_text()
     rig.write_text(text)
     done = invoked(
-        "calibrate", "joints", str(rig), "--joint", "jaw", "--by", "motion", "--mock", "--dry-run",
-        "--answers", answers_in(tmp_path, *["yes"] * 6),
+        "calibrate", "joints", str(rig), "--joint", "jaw", "--mock", "--dry-run",
+        "--answers", answers_in(tmp_path, "turn 300", "", "turn -500", "", "", "y"),
     )  # fmt: skip
-    assert "did jaw just go to its POSITIVE end?" in done.out + done.err
+    assert "turn jaw to its POSITIVE end" in done.out + done.err
     assert "joints.jaw.zero_step" in done.out + done.err, done
 
 

@@ -6,8 +6,6 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from feedback_rows import rows
@@ -31,7 +29,6 @@ from gazerig.robot.guardian.heartbeat import (
     Heartbeat,
 )
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
-from gazerig.robot.model.joint import JointParams
 
 PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 
@@ -62,29 +59,6 @@ def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
             assert time.monotonic() < end_s
             time.sleep(0.01)
         assert it.limp_after_s(it.strike(signal.SIGKILL), PATIENCE_S) is not None
-
-
-def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
-    access = pytest.importorskip("gazerig.features.bringup.calibration.smart_servo_access")
-    params = access.StopSearchParams()
-    rig, guardian = StsRig(), Unattended()
-    rig.port.setBaudRate(1_000_000)
-    joint = JointParams(
-        id=1, model="sts3215", zero_step=2048, min_deg=-40.0, max_deg=40.0,
-        max_speed_deg_s=200.0, max_accel_deg_s2=5000.0,
-    )  # fmt: skip
-    clock: Any = SimpleNamespace(now_s=lambda: rig.now_s, sleep_until=rig.sleep_until)
-    servo = access.SmartServoAccess("eye", joint, rig.port, clock, lambda: None, guardian)
-    servo.check()
-    assert not guardian.other.is_armed(0)
-    servo.enable_torque(params)
-    assert guardian.other.is_armed(0) and rig.get(1, TORQUE_ENABLE)
-    servo.go(params, 2060)
-    guardian.other.set_state(0, RELEASING)
-    with pytest.raises(ServoFault, match="did not run"):
-        servo.go(params, 2020)
-    servo.restore()
-    assert not guardian.other.is_armed(0) and not rig.get(1, TORQUE_ENABLE)
 
 
 # --- which ports

@@ -5,7 +5,6 @@ from math import sin
 
 import numpy as np
 
-from gazerig.features.world.body_shape import grid
 from gazerig.gaze.types import Vec3
 from gazerig.robot.dashboard.feed.world_shapes import WorldPart
 from gazerig.robot.description.mesh import Mesh, Painted, paint
@@ -17,9 +16,9 @@ LEAVES_S = 60.0
 
 
 def _plane(corner: Vec3, u: Vec3, v: Vec3) -> Mesh:
-    share = np.linspace(0.0, 1.0, 9)
-    points = np.array(corner) + share[:, None, None] * np.array(u) + share[:, None] * np.array(v)
-    return grid(points, closed=False)
+    along, up = np.array(u), np.array(v)
+    points = np.array(corner) + (0.0 * up, up, along + up, along)
+    return Mesh(points, np.array(((0, 1, 2), (0, 2, 3)), np.uint32))
 
 
 def _chequered(mesh: Mesh) -> Painted:

@@ -62,7 +62,7 @@ def _looking(from_m: np.ndarray, to_m: np.ndarray) -> np.ndarray:
 
 def _picture(moment: Moment) -> np.ndarray:
     figures = Figures(shipped_world(moment.world), 1)
-    model = world_model(figures, [rig_in_world(load_rig("desk"))]).mj
+    model = world_model(figures, rig_in_world(load_rig("desk"))).mj
     data = mujoco.MjData(model)
     for joint, angle in moment.neck.items():
         data.qpos[model.joint(joint).qposadr[0]] = angle
@@ -74,7 +74,7 @@ def _picture(moment: Moment) -> np.ndarray:
     from_m = np.array(moment.from_m)
     seen = renderer.render(data, lens, _looking(from_m, np.array(moment.to_m)), from_m)
     renderer.close()
-    return cv2.resize(seen.image[:, :, ::-1], _SIZE, interpolation=cv2.INTER_AREA)
+    return cv2.resize(seen[:, :, ::-1], _SIZE, interpolation=cv2.INTER_AREA)
 
 
 def main() -> None:

@@ -13,7 +13,6 @@ SCAN = CommandEntry(
                 "scan --port /dev/ttyUSB0",
                 "who answers on this port, of any kind, at every baud rate",
             ),
-            ("scan --port /dev/ttyUSB0 --kind feetech", "Feetech servos only"),
         )
     },
 )
@@ -72,8 +71,8 @@ RECORD_TRACK = CommandEntry(
         "record-track": (
             ("record-track my.yaml greeting", "torque off; move the head by hand, Enter ends it"),
             (
-                "record-track my.yaml mouth --live --joints jaw --play turn",
-                "of a running head: your jaw to a track of the neck",
+                "record-track my.yaml mouth --live --joint jaw",
+                "of a running head: your jaw to a track of the neck that plays",
             ),
         )
     },

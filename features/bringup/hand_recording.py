@@ -1,6 +1,6 @@
 """Recording of joints at regular times: of a limp head moved by hand, or of a running head."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from math import degrees
 from typing import NamedTuple
 
@@ -85,57 +85,60 @@ def record_hand_motion(
         on = [name for name, seen in row.servos.items() if seen is not None and seen.torque]
         if on:
             raise SetupError(f"the torque of {on[0]} came on: another program moves the head")
-        angles = {name: seen and seen.position_deg for name, seen in row.servos.items()}
-        return row.at_s, angles
+        angles = {
+            name: None if seen is None else seen.position_deg for name, seen in row.servos.items()
+        }
+        return row.t_s, angles
 
     return _record(measure, clock, stopped, seconds)
 
 
 def record_live(
     read: Callable[[], HeadState],
-    joints: Sequence[str],
+    joints: Collection[str],
     clock: Clock,
     stopped: Callable[[], str | None],
     seconds: float,
-    track: int = 0,
 ) -> HandRecording:
-    """Record the commanded angles of joints of a running head; it sends no command.
+    """Record the commanded angles of a running head; it sends no command.
+
+    The end of the tracks that play at its start, a stop or the loss of the head ends it.
 
     Args:
-        read: returns the newest tick.
-        joints: names of the joints.
+        read: returns the newest tick; raises DriverError when the head is lost.
+        joints: names of the joints; none: all that no track owns.
         clock: clock of the samples.
         stopped: returns why to end, None before.
         seconds: longest time.
-        track: number of the track whose end ends the recording; 0 for none.
-
-    Raises:
-        DriverError: the head did not answer at the start; later, what was recorded is returned.
     """
-    last: list[Row] = []
-    ends: list[str] = []
+    last = read()
+    running = [one for one in last.tracks if not one.end_reason]
+    owned = {joint for one in running for joint in one.owns}
+    joints = joints or [name for name in last.joints if name not in owned]
+    unknown = [name for name in joints if name not in last.joints]
+    if unknown:
+        raise SetupError(f"no joint {unknown[0]!r}; joints of the head: {', '.join(last.joints)}")
+    numbers, reason = {one.number for one in running}, ""
 
     def measure() -> Row:
+        nonlocal last, reason
         try:
-            state = read()
+            last = read()
         except DriverError as error:
-            if not last:
-                raise
-            ends.append(str(error))
-            return last[0]
-        if state.stopped:
-            ends.append(f"the head was stopped: {state.stopped}")
-        ends.extend(
-            f"{one.name}: {one.end_reason}"
-            for one in state.tracks
-            if one.number == track and one.end_reason
-        )
-        last[:] = [
-            (state.t_s, {name: degrees(state.joints[name].commanded_rad) for name in joints})
-        ]
-        return last[0]
+            reason = str(error)
+        return last.t_s, {name: degrees(last.joints[name].commanded_rad) for name in joints}
 
-    return _record(measure, clock, lambda: stopped() or next(iter(ends), None), seconds)
+    def over() -> str | None:
+        if last.stopped:
+            return f"the head was stopped: {last.stopped}"
+        ended = [
+            f"{one.name}: {one.end_reason}"
+            for one in last.tracks
+            if one.end_reason and one.number in numbers
+        ]
+        return stopped() or reason or next(iter(ended), None)
+
+    return _record(measure, clock, over, seconds)
 
 
 def _record(
@@ -152,15 +155,13 @@ def _record(
         slot = max(slot + 1, int((clock.now_s() - start_s) * RATE_HZ))
         clock.sleep_until(start_s + slot / RATE_HZ)
     series, left_out = {}, []
-    for name in rows[0][1] if rows else ():
-        pairs = [
-            (at_s - rows[0][0], angle) for at_s, row in rows if (angle := row[name]) is not None
-        ]
-        if len(pairs) <= _LEAST_SHARE * len(rows):
+    for name in rows[0][1]:
+        pairs = [(t_s - rows[0][0], row[name]) for t_s, row in rows if row[name] is not None]
+        times, angles = np.array(pairs, dtype=np.float64).reshape(-1, 2).T
+        if len(times) <= _LEAST_SHARE * len(rows):
             left_out.append(name)
         else:
-            times, angles = zip(*pairs, strict=True)
-            series[name] = np.array(times), np.array(angles)
+            series[name] = times, angles
     if not series:
         raise DriverError("no servo answered: check power, cable, ids and baud rate")
     return HandRecording(series, tuple(left_out), ended_by or "the time is over")

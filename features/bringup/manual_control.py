@@ -1,4 +1,4 @@
-"""Slow motion of a rig, joint by joint or together, for bring-up and for users' programs.
+"""Slow motion of a rig, joint by joint or together.
 
 It uses neither camera nor attention. Every goal passes the guard, and the caller receives the
 applied result:
@@ -7,7 +7,7 @@ applied result:
     control.start()
     try:
         moved = control.jog("neck_yaw", 20.0)
-        print(moved.of("neck_yaw"))
+        print(moved.joints["neck_yaw"])
     finally:
         control.stop()
 
@@ -16,35 +16,41 @@ stay at their last goal, or lose their torque if a guardian watches them
 (gazerig.robot.guardian, after .4 s), and the next call continues from there.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from math import degrees, isfinite, radians, sqrt
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.minimum_jerk import Quintic
-from gazerig.params import Bounds
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.command_choices import refuse_out_of_range
-from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.power_down import Again
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.safety.guard import Guard
 
 PASSING = ("starting slowly", "too hard", "too fast")
 """Reasons about the approach to a goal, which can still be reached."""
 
-_STILL_DEG_S = 2.0
+RATE_HZ = 100.0
+"""Goals per second."""
+SPEED_DEG_S = 20.0
+
+_ACCEL_DEG_S2 = 100.0
+_NEAR_RAD = radians(2.0)  # a nearer joint has arrived
+_STILL_RAD_S = radians(2.0)
+_TIMEOUT_S = 2.0  # time to come near after the way is over
+# Peaks of a fifth-order polynomial from rest to rest, in distance/time and distance/time^2.
+_PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
 
 
 class JointMove(NamedTuple):
     """Result of a movement for one joint, in degrees.
 
     desired, commanded: the goal, and the final command of the guard
-    measured: present angle; error: measured minus desired
+    measured: present angle
     reasons: the guard's reasons for differences; empty without differences
     estimated: whether its servo has no sensor, so that measured follows from the goal and its speed
     """
@@ -54,12 +60,7 @@ class JointMove(NamedTuple):
     commanded: float
     measured: float
     reasons: tuple[str, ...]
-    estimated: bool = False
-
-    @property
-    def error(self) -> float:
-        """Return the distance of the joint from its goal."""
-        return self.measured - self.desired
+    estimated: bool
 
     def __str__(self) -> str:
         """Write one line."""
@@ -84,14 +85,12 @@ class MoveResult(NamedTuple):
 
     end_reason: "arrived", "held back" (by the guard), "not there in time", "torque_off", or the
         reason given by ``stopped``
-    level: the guard's last level; events: reports of the bus during it
-    last: the last exchange
+    events: reports of the bus during it; last: the last exchange
     """
 
     end_reason: str
     seconds: float
-    joints: tuple[JointMove, ...]
-    level: Level
+    joints: dict[str, JointMove]
     events: tuple[str, ...]
     last: Step
 
@@ -102,105 +101,17 @@ class MoveResult(NamedTuple):
 
     def __str__(self) -> str:
         """Write the result, with the reasons by joint."""
-        reasons = [f"{part.joint}: {', '.join(part.reasons)}" for part in self.remarkable_joints()]
+        reasons = [
+            f"{part.joint}: {', '.join(part.reasons)}"
+            for part in self.joints.values()
+            if part.reasons
+        ]
         return f"{self.end_reason} ({'; '.join(reasons)})" if reasons else self.end_reason
-
-    def joint_move(self, joint: str) -> JointMove:
-        """Return one joint's result."""
-        return next(part for part in self.joints if part.joint == joint)
-
-    def remarkable_joints(self) -> tuple[JointMove, ...]:
-        """Return the joints with reasons."""
-        return tuple(part for part in self.joints if part.reasons)
-
-
-class GuardReasons:
-    """Reasons of the guard by joint, in order of occurrence, each once."""
-
-    def __init__(self) -> None:
-        self._by_joint: dict[str, dict[str, None]] = {}
-
-    def add(self, guard_result: GuardResult) -> None:
-        """Add the reasons of a guard result, except those about the approach to a goal."""
-        for line in guard_result.reasons:
-            joint, _, reason = line.partition(": ")
-            if reason not in PASSING:
-                self._by_joint.setdefault(joint, {})[reason] = None
-
-    def joint_reasons(self, joint: str) -> tuple[str, ...]:
-        """Return the reasons of one joint, including those of all joints."""
-        return (*self._by_joint.get(joint, {}), *self._by_joint.get("all", {}))
-
-
-def move_result(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[JointMove, ...]:
-    """Return every joint's result of a movement."""
-    guard_result, joints = step.guard_result, step.joints
-    has_feedback = joints.measured or (True,) * len(guard_result.joints)
-    rows = zip(
-        guard_result.joints,
-        desired,
-        guard_result.command_rad,
-        joints.position_rad,
-        has_feedback,
-        strict=True,
-    )
-    return tuple(
-        JointMove(
-            name, degrees(asked), degrees(let), degrees(at), notes.joint_reasons(name), not tells
-        )
-        for name, asked, let, at, tells in rows
-    )
-
-
-def rest_result(
-    step: Step, desired: JointAngles, moving: Iterable[int], near_rad: float
-) -> str | None:
-    """Return the result for joints at rest: at their goals or held back; None while they move."""
-    joints, command = step.joints, step.guard_result.command_rad
-    held = False
-    for i in moving:
-        at = joints.position_rad[i]
-        if abs(joints.velocity_rad_s[i]) > radians(_STILL_DEG_S):
-            return None
-        if abs(at - desired[i]) <= near_rad:
-            continue
-        passing = any(
-            f"{step.guard_result.joints[i]}: {reason}" in step.guard_result.reasons
-            for reason in PASSING
-        )
-        if passing or abs(at - command[i]) > near_rad:
-            return None
-        held = True
-    return "held back" if held else "arrived"
 
 
 def _deg(angle: float) -> str:
     """Format an angle, with zero without a sign."""
     return f"{round(angle, 1) + 0.0:.1f}"
-
-
-_PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
-"""Peaks of a fifth-order polynomial from rest to rest, in distance/time and distance/time^2."""
-
-
-@dataclass(frozen=True)
-class JogParams:
-    """Speed of a slow move, and criteria for a reached goal."""
-
-    # fmt: off
-    speed_deg_s: Annotated[float, Bounds(0.5, 200), "top speed on the way; the guard's gentle speed holds as well"] = 20.0
-    accel_deg_s2: Annotated[float, Bounds(5, 5000), "top acceleration"] = 100.0
-    rate_hz: Annotated[float, Bounds(20, 500), "goals a second"] = 100.0
-    near_deg: Annotated[float, Bounds(0.1, 20), "nearer is arrived"] = 2.0
-    timeout_s: Annotated[float, Bounds(0.1, 30), "time to come near after the way is over"] = 2.0
-    # fmt: on
-
-
-DesiredPose = Callable[[JointState, float, float], JointAngles]
-"""Returns the desired pose for measured joints, the time, and the time since the last step."""
-
-Done = Callable[[Step], str | None]
-"""Returns the reason of the end, None while the motion continues."""
 
 
 def no_reason() -> str | None:
@@ -215,7 +126,7 @@ class ManualControl:
         body: the joints of one rig.
         guard: guard of the same rig.
         clock: clock of the host, or a simulated one with the emulated bus.
-        params: speed of the motion.
+        speed_deg_s: top speed on the way; the guard's gentle speed holds as well.
         stopped: called at every step; returns why to stop, None without a reason.
         watch: receives every step.
     """
@@ -225,33 +136,26 @@ class ManualControl:
         body: Body,
         guard: Guard,
         clock: Clock,
-        params: JogParams | None = None,
+        speed_deg_s: float = SPEED_DEG_S,
         stopped: Callable[[], str | None] = no_reason,
         watch: Callable[[Step], None] | None = None,
     ) -> None:
         self.body = body
         self._guard = guard
         self._clock = clock
-        self._params = params if params is not None else JogParams()
+        self._speed_deg_s = speed_deg_s
         self._stopped = stopped
         self._watch = watch
         self._goal: JointAngles = ()
-        self._said: list[str] = []
 
-    @property
-    def goal_rad(self) -> JointAngles:
-        """Return the active goals."""
-        return self._goal
-
-    def start(self) -> JointAngles:
-        """Open the bus and switch torque on at the present pose; return the active goals.
+    def start(self) -> None:
+        """Open the bus and switch torque on at the present pose.
 
         Raises:
             SetupError: port or servos are not as configured.
         """
         self._goal = self.body.start(self._clock)
         self._guard.reset(self._clock.now_s(), self._goal)
-        return self._goal
 
     def stop(self) -> tuple[str, ...]:
         """Switch torque off and close the bus; return the bus's messages."""
@@ -275,29 +179,26 @@ class ManualControl:
             SetupError: the joint does not exist, or an angle is not a number.
             DriverError: the bus has disappeared.
         """
-        names = self.body.names
-        refuse_unknown(angles_deg, names)
+        names, start = self.body.names, self._goal
+        for name, angle in angles_deg.items():
+            _refuse_unknown(name, angle, names)
         desired = tuple(
             radians(angles_deg[name]) if name in angles_deg else held
-            for name, held in zip(names, self._goal, strict=True)
+            for name, held in zip(names, start, strict=True)
         )
-        moving = tuple(i for i, name in enumerate(names) if name in angles_deg)
-        start_s = self._clock.now_s()
-        ways = [Quintic((g, 0.0, 0.0), w, 1.0) for g, w in zip(self._goal, desired, strict=True)]
-        far = max((abs(desired[i] - self._goal[i]) for i in moving), default=0.0)
-        takes_s = duration_s(far, self._params)
+        far_deg = max((degrees(abs(a - b)) for a, b in zip(desired, start, strict=True)), default=0)
+        slow_s = _PEAK_SPEED * far_deg / self._speed_deg_s
+        way_s = max(0.05, slow_s, sqrt(_PEAK_ACCEL * far_deg / _ACCEL_DEG_S2))
+        ways = [Quintic((a, 0.0, 0.0), b, 1.0) for a, b in zip(start, desired, strict=True)]
+        moving = [i for i, name in enumerate(names) if name in angles_deg]
 
-        def on_the_way(_: JointState, t_s: float, __: float) -> JointAngles:
-            share = min(1.0, (t_s - start_s) / takes_s)
-            return tuple(way.state_at(share)[0] for way in ways)
+        def on_the_way(passed_s: float) -> JointAngles:
+            return tuple(way.state_at(min(1.0, passed_s / way_s))[0] for way in ways)
 
-        def there(step: Step) -> str | None:
-            if step.t_s - start_s < takes_s:
-                return None
-            return rest_result(step, desired, moving, radians(self._params.near_deg))
+        def is_there(step: Step, passed_s: float) -> str | None:
+            return None if passed_s < way_s else _rest_result(step, desired, moving)
 
-        longest_s = takes_s + self._params.timeout_s
-        return self.follow(on_the_way, there, longest_s, desired, gently=True)
+        return self._follow(on_the_way, is_there, way_s + _TIMEOUT_S, desired, gently=True)
 
     def hold(self, seconds: float) -> MoveResult:
         """Hold the present goals for a time.
@@ -305,10 +206,11 @@ class ManualControl:
         Raises:
             DriverError: the bus has disappeared.
         """
-        goal, end_s = self._goal, self._clock.now_s() + seconds
-        return self.follow(
-            lambda *_: goal, lambda s: "arrived" if s.t_s >= end_s else None, seconds
-        )
+        goal = self._goal
+        return self._follow(
+            lambda _: goal, lambda _, passed_s: "arrived" if passed_s >= seconds else None, seconds,
+            goal,
+        )  # fmt: skip
 
     def park(
         self, angles_deg: Mapping[str, float], stopped: Callable[[], str | None] = no_reason
@@ -326,58 +228,76 @@ class ManualControl:
         finally:
             self._stopped = before
 
-    def follow(
+    def _follow(
         self,
-        desired: DesiredPose,
-        done: Done,
+        desired_at: Callable[[float], JointAngles],
+        done: Callable[[Step, float], str | None],
         longest_s: float,
-        ends_on: JointAngles | None = None,
+        ends_on: JointAngles,
         gently: bool = False,
     ) -> MoveResult:
-        """Send desired poses through the guard until ``done`` returns the reason of the end.
+        """Send desired poses through the guard until there is a reason to end.
 
+        desired_at: returns the pose at a time since the start, s
+        done: returns the reason of the end for a step and that time, None to continue
         longest_s: time after which the motion ends with "not there in time"
-        ends_on: pose with which the result is compared; None: the last one
+        ends_on: pose with which the result is compared
         gently: whether the guard moves slowly throughout, not only at the start
-
-        Raises:
-            DriverError: the bus has disappeared.
         """
-        clock, period = self._clock, 1.0 / self._params.rate_hz
-        start_s = last_s = clock.now_s()
-        slot, notes, events = 0, GuardReasons(), list(self.body.bus.events())
-        while True:
-            slot = max(slot + 1, int((clock.now_s() - start_s) / period))
-            clock.sleep_until(start_s + slot * period)
+        clock, start_s, slot = self._clock, self._clock.now_s(), 0
+        reasons: dict[str, dict[str, None]] = {}
+        events, ended = list(self.body.bus.events()), None
+        while ended is None:
+            slot = max(slot + 1, int((clock.now_s() - start_s) * RATE_HZ))
+            clock.sleep_until(start_s + slot / RATE_HZ)
             if gently:
                 self._guard.start_gently()
             t_s = clock.now_s()
-            joints = self.body.read(t_s)
-            wanted = desired(joints, t_s, t_s - last_s)
+            passed_s = t_s - start_s
+            joints, desired = self.body.read(t_s), desired_at(passed_s)
             # No camera is used here, so no frame can be too old.
-            guard_result = self._guard.check(wanted, joints, 0.0, t_s)
-            self.body.write(guard_result.command_rad)
-            step, last_s = Step(t_s, wanted, guard_result, joints), t_s
+            result = self._guard.check(desired, joints, 0.0, t_s)
+            self.body.write(result.command_rad)
+            self._goal, step = result.command_rad, Step(t_s, desired, result, joints)
             if self._watch is not None:
-                try:
-                    self._watch(step)
-                except Exception as error:
-                    self._watch = None
-                    self._said.append(failure_text("who watches", error))
-            notes.add(step.guard_result)
+                self._watch(step)
+            for line in result.reasons:
+                joint, _, reason = line.partition(": ")
+                if reason not in PASSING:
+                    reasons.setdefault(joint, {})[reason] = None
             events += self.body.bus.events()
-            ended = done(step) or self._stopped()
-            ended = "torque_off" if step.guard_result.level == "torque_off" else ended
-            if ended is None and step.t_s - start_s >= longest_s:
+            ended = done(step, passed_s) or self._stopped()
+            if result.level == "torque_off":
+                ended = "torque_off"
+            elif ended is None and passed_s >= longest_s:
                 ended = "not there in time"
-            if ended is not None:
-                break
-        self._goal = step.guard_result.command_rad
-        applied = move_result(step, step.desired_rad if ends_on is None else ends_on, notes)
-        level = step.guard_result.level
-        events += self._said
-        self._said.clear()
-        return MoveResult(ended, step.t_s - start_s, applied, level, tuple(events), step)
+        measured = joints.measured or (True,) * len(result.joints)
+        rows = zip(result.joints, ends_on, self._goal, joints.position_rad, measured, strict=True)
+        moves = {
+            name: JointMove(
+                name, degrees(wanted), degrees(goal), degrees(at),
+                (*reasons.get(name, {}), *reasons.get("all", {})), not has_sensor,
+            )
+            for name, wanted, goal, at, has_sensor in rows
+        }  # fmt: skip
+        return MoveResult(ended, passed_s, moves, tuple(events), step)
+
+
+def _rest_result(step: Step, desired: JointAngles, moving: Sequence[int]) -> str | None:
+    """Return the result for joints at rest: at their goals or held back; None while they move."""
+    joints, result, held = step.joints, step.guard_result, False
+    for i in moving:
+        at = joints.position_rad[i]
+        if abs(joints.velocity_rad_s[i]) > _STILL_RAD_S:
+            return None
+        if abs(at - desired[i]) <= _NEAR_RAD:
+            continue
+        if abs(at - result.command_rad[i]) > _NEAR_RAD or any(
+            f"{result.joints[i]}: {reason}" in result.reasons for reason in PASSING
+        ):
+            return None
+        held = True
+    return "held back" if held else "arrived"
 
 
 def park_slowly(control: ManualControl, park_deg: Mapping[str, float], again: Again) -> str:
@@ -386,35 +306,22 @@ def park_slowly(control: ManualControl, park_deg: Mapping[str, float], again: Ag
     return "parked" if moved.arrived else f"not parked ({moved})"
 
 
-def duration_s(distance_rad: float, params: JogParams) -> float:
-    """Return the time of a move from rest to rest within speed and acceleration."""
-    far = degrees(abs(distance_rad))
-    slow = _PEAK_SPEED * far / params.speed_deg_s
-    return max(0.05, slow, sqrt(_PEAK_ACCEL * far / params.accel_deg_s2))
-
-
-def refuse_unknown(angles_deg: Mapping[str, float], joints: tuple[str, ...]) -> None:
-    """Refuse unknown joints, and angles that are not numbers.
-
-    Raises:
-        SetupError: the message lists the available joints.
-    """
-    for name, angle in angles_deg.items():
-        if name not in joints:
-            raise SetupError(f"no joint {name!r}; available: {', '.join(joints)}")
-        if not isfinite(angle):
-            raise SetupError(f"{name}: {angle} is not an angle in degrees")
+def _refuse_unknown(joint: str, angle_deg: float, joints: Sequence[str]) -> None:
+    if joint not in joints:
+        raise SetupError(f"no joint {joint!r}; available: {', '.join(joints)}")
+    if not isfinite(angle_deg):
+        raise SetupError(f"{joint}: {angle_deg} is not an angle in degrees")
 
 
 def refuse_angle(
-    joint: str, angle_deg: float, joints: tuple[str, ...], limits: Sequence[JointLimit]
+    joint: str, angle_deg: float, joints: Sequence[str], limits: Sequence[JointLimit]
 ) -> None:
-    """Refuse an angle outside a joint's range, before anything moves.
+    """Refuse an unknown joint, or an angle outside its range, before anything moves.
 
     Raises:
-        SetupError: with the range.
+        SetupError: with the joints or the range.
     """
-    refuse_unknown({joint: angle_deg}, joints)
+    _refuse_unknown(joint, angle_deg, joints)
     try:
         refuse_out_of_range(Jog(((joint, radians(angle_deg)),)), joints, limits)
     except ValueError as error:

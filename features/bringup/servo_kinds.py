@@ -7,47 +7,14 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import SERVOS, BusKind
-from gazerig.drivers.dynamixel import control_table as dynamixel
 from gazerig.drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
-from gazerig.drivers.errors import SetupError
-from gazerig.drivers.feetech import memory_table as feetech
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
 from gazerig.drivers.feetech.family import FEETECH_SCS
+from gazerig.drivers.feetech.memory_table import SET_MIDDLE
 from gazerig.drivers.servo_bus.family import Family
 
 Tell = Callable[[str], None]
 """Receives a short text about the present step."""
-
-
-class Setting(NamedTuple):
-    """Register that must have a value for calibration; ``mask`` selects its bits."""
-
-    register: str
-    value: int
-    mask: int = ~0
-
-    def apply_to(self, now: int) -> int:
-        """Return the correct value of the register, whose present value is ``now``."""
-        return now & ~self.mask | self.value & self.mask
-
-
-class CalibrationRegisters(NamedTuple):
-    """Registers for the calibration and gentle motion of one servo of a kind.
-
-    settings: settings without which its steps have another meaning
-    offset: register that shifts its position; offset_usable: whether the servo applies it
-    full_drive: a register, and the register of its largest value, which is restored
-    gentle_drive: returns the register values for a share of full drive and a speed in steps/s;
-        reads registers by name
-    load: present current as a fraction of the stall current, by the name of the model
-    """
-
-    settings: tuple[Setting, ...]
-    offset: str
-    offset_usable: bool
-    full_drive: tuple[str, str] | None
-    gentle_drive: Callable[[Callable[[str], int], float, float], dict[str, int]]
-    load: Callable[[str, int], float]
 
 
 class ServoKind(NamedTuple):
@@ -55,9 +22,6 @@ class ServoKind(NamedTuple):
 
     title: common name
     family: properties for the engine
-    no_reply: checks if no servo answers
-    notes: notes about all servos of the kind
-    calibration: None if this program does not move a single servo of the kind
     set_middle: value of Torque Enable that makes the present position the middle, None if the kind
         does not support it
     """
@@ -65,91 +29,12 @@ class ServoKind(NamedTuple):
     name: BusKind
     title: str
     family: Family
-    no_reply: str
-    notes: tuple[str, ...]
-    calibration: CalibrationRegisters | None
     set_middle: int | None = None
 
 
-GENTLE_ACCELERATION = 10
-"""1000 steps/s2, so that a search is at full speed within a tenth of a second."""
-
-
-def _gentle_dynamixel(
-    value: Callable[[str], int], strength: float, speed_steps_s: float
-) -> dict[str, int]:
-    return {
-        "goal_pwm": max(1, round(value("pwm_limit") * strength)),
-        "profile_acceleration": 0,
-        "profile_velocity": max(1, round(speed_steps_s / dynamixel.VELOCITY_UNIT_STEPS_S)),
-    }
-
-
-def _gentle_feetech(
-    value: Callable[[str], int], strength: float, speed_steps_s: float
-) -> dict[str, int]:
-    return {
-        "torque_limit": max(1, round(feetech.TORQUE_FULL * strength)),
-        "goal_time": 0,
-        "goal_speed": FEETECH_FAMILY.speed_units(speed_steps_s),
-        "acceleration": GENTLE_ACCELERATION,
-    }
-
-
-DYNAMIXEL = ServoKind(
-    name="dynamixel",
-    title="Dynamixel",
-    family=DYNAMIXEL_FAMILY,
-    no_reply="is the servo supply on? does each servo's LED flash once when it comes on? is the "
-    "adaptor's plug the TTL one (3 pins), and the first cable in?",
-    notes=(),
-    calibration=CalibrationRegisters(
-        settings=(Setting("operating_mode", 3), Setting("drive_mode", 0)),
-        offset="homing_offset",
-        offset_usable=False,
-        full_drive=("goal_pwm", "pwm_limit"),
-        gentle_drive=_gentle_dynamixel,
-        # Present Current, or Present Load for a model with that register.
-        load=lambda model, current: current * dynamixel.MODELS[model].load_unit,
-    ),
-)
-
-FEETECH = ServoKind(
-    name="feetech",
-    title="Feetech STS",
-    family=FEETECH_FAMILY,
-    no_reply="is the servo supply on, and its voltage that of the servos (7.4 or 12 V)? is the "
-    "first cable in, and the adaptor's jumper set to USB?",
-    notes=(
-        "an STS has no bus watchdog: if the cable or the computer dies it holds its last goal; "
-        "keep the switch of the servo supply at hand",
-    ),
-    calibration=CalibrationRegisters(
-        settings=(
-            Setting("operating_mode", 0),
-            Setting("phase", 0, feetech.MULTI_TURN),
-            Setting("angular_resolution", 1),
-        ),
-        offset="position_offset",
-        offset_usable=True,
-        full_drive=None,
-        gentle_drive=_gentle_feetech,
-        load=lambda model, current: (
-            current * feetech.CURRENT_UNIT_MA / 1000.0 / feetech.MODELS[model].stall_current_a
-        ),
-    ),
-    set_middle=feetech.SET_MIDDLE,
-)
-
-SCS = FEETECH._replace(
-    title="Feetech SCS",
-    family=FEETECH_SCS,
-    no_reply="is the servo supply on, and its voltage that of the servos (6 V)? is the first "
-    "cable in, and the adaptor's jumper set to USB?",
-    notes=tuple(note.replace("STS", "SCS") for note in FEETECH.notes),
-    calibration=None,
-    set_middle=None,
-)
+DYNAMIXEL = ServoKind("dynamixel", "Dynamixel", DYNAMIXEL_FAMILY)
+FEETECH = ServoKind("feetech", "Feetech STS", FEETECH_FAMILY, SET_MIDDLE)
+SCS = ServoKind("feetech", "Feetech SCS", FEETECH_SCS)
 
 KINDS: dict[str, ServoKind] = {kind.name: kind for kind in (DYNAMIXEL, FEETECH)}
 """Kinds by the name of a bus kind in a rig's YAML."""
@@ -158,12 +43,5 @@ _KIND_OF = {kind.family.name: kind for kind in (*KINDS.values(), SCS)}
 
 
 def servo_kind(model: str) -> ServoKind:
-    """Return the kind of a servo by its model.
-
-    Raises:
-        SetupError: the model is not a smart servo.
-    """
-    kind = _KIND_OF.get(SERVOS[model].family)
-    if kind is None:
-        raise SetupError(f"{model} is no servo that answers: name a joint with a smart servo")
-    return kind
+    """Return the kind of a smart servo by its model."""
+    return _KIND_OF[SERVOS[model].family]

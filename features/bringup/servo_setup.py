@@ -1,19 +1,16 @@
-"""Search for a new servo, alone or in a chain, and assignment of its id and baud rate.
+"""Search for a new servo, and assignment of its id and baud rate.
 
-A servo is connected alone, or it is the factory-new spare of the only servo that a chain misses:
-two servos with the same id appear as one, and both would receive the new id.
-
-Id and baud rate take effect immediately, after the status packet of their own write. The id comes
-first: in a chain the servo is alone at the factory's baud rate, but perhaps not with its id at the
-chain's. If the memory has a lock, they are written with it open; otherwise they would be lost at
-the next power-off. It is closed under the new id and at the new rate. Sources: ROBOTIS e-Manual;
-Feetech memory table STS3215.
+A servo is connected alone: two servos with the same id appear as one, and both would receive the
+new id. Id and baud rate take effect immediately, after the status packet of their own write. If the
+memory has a lock, they are written with it open; otherwise they would be lost at the next
+power-off. It is closed under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech
+memory table STS3215.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from gazerig.drivers.bus.servo_models import servo_label
+from gazerig.drivers.bus.servo_models import FAMILY_OF, servo_label
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (
@@ -33,108 +30,71 @@ FACTORY_ID = 1
 
 
 class Answers(NamedTuple):
-    """Servos that answered; one of several with the same id twice.
+    """Answers at one baud rate.
 
-    spoilt_bauds: baud rates at which bytes came that were no answers, or two servos share an id
+    junk: bytes that are not part of an answer; shared_ids: ids that two servos seem to have
     """
 
-    found: Sequence[FoundServo]
-    spoilt_bauds: Sequence[int]
+    found: tuple[FoundServo, ...] = ()
+    junk: int = 0
+    shared_ids: tuple[int, ...] = ()
+
+    @property
+    def is_spoilt(self) -> bool:
+        """Return whether two servos may have answered at the same time."""
+        return bool(self.junk or self.shared_ids)
 
 
-Spare = tuple[FoundServo, ServoConfig]
-"""A factory-new servo, and the setup of the missing one that it replaces."""
+def search_rate(
+    port: BusPort, kind: ServoKind, baud: int, thorough: bool = False
+) -> Answers | None:
+    """Find all connected servos at a baud rate, None if the adaptor does not support it.
 
-
-class SetupResult(NamedTuple):
-    """Result for one servo: its state before and now, and the written values."""
-
-    before: FoundServo
-    after: FoundServo
-    changes: tuple[str, ...]
-
-
-def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
-    """List all baud rates, the most likely ones first."""
-    return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.baud_rates)))
-
-
-def search_rates(
-    port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell, thorough: bool = False
-) -> Answers:
-    """Find all connected servos at some baud rates.
-
-    thorough: read every id at the first rates even if no servo answers a broadcast ping
+    thorough: read every id even if no servo answers a broadcast ping
 
     Raises:
         PortError: the port cannot be opened.
         BusLost: it has disappeared.
     """
-    family, found, spoilt = kind.family, list[FoundServo](), list[int]()
+    family = kind.family
+    if not port.setBaudRate(baud):
+        return None
+    if not thorough and not has_any_reply(port, family):
+        return Answers()
+    found, junk = scan_ids(port, family, baud)
+    tables = {one.id: FAMILY_OF.get(one.model, family) for one in found}
+    twice = {i for i in tables if [one.id for one in found].count(i) > 1}
+    shared = (i for i, table in tables.items() if count_corrupt(port, table, i) >= SHARED)
+    return Answers(found, junk, tuple(sorted({*twice, *shared})))
+
+
+def search_rates(
+    port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell, thorough: bool = False
+) -> dict[int, Answers]:
+    """Find all connected servos at some baud rates; return the answers by rate.
+
+    thorough: see ``search_rate``; only until a servo has answered
+    """
+    found: dict[int, Answers] = {}
     for baud in bauds:
         tell(f"asking at {baud} bit/s")
-        quick = not thorough or bool(found)
-        if not port.setBaudRate(baud) or (quick and not has_any_reply(port, family)):
-            continue
-        answers, junk = scan_ids(port, family, baud)
-        each = dict.fromkeys(answers)
-        shared = [one for one in each if count_corrupt(port, family, one.id) >= SHARED]
-        found += [*answers, *shared]
-        spoilt += [baud] if junk or shared else []
-    return Answers(found, spoilt)
+        wanted = thorough and not any(one.found for one in found.values())
+        found[baud] = search_rate(port, kind, baud, wanted) or Answers()
+    return found
 
 
-def find_spare(
-    port: BusPort,
-    kind: ServoKind,
-    chain: Sequence[ServoConfig],
-    baud: int,
-    found: Sequence[FoundServo],
-) -> Spare | None:
-    """Return the factory-new servo that replaces the only missing one of a chain.
-
-    None if not exactly one is missing, or not exactly one other servo answers and is such a one.
-    If its assignment was interrupted, it has its id at the factory's baud rate.
-
-    Args:
-        port: open port.
-        kind: kind of the servos.
-        chain: setups of all servos of the chain.
-        baud: baud rate of the chain.
-        found: servos that answered, at all rates.
-    """
-    wanted = {setup.id: setup for setup in chain}
-    present = {one.id for one in found if one.baud == baud}
-    missing = [setup for setup in chain if setup.id not in present]
-    others = [one for one in found if one.baud != baud or one.id not in wanted]
-    if (len(missing), len(others)) != (1, 1):
-        return None
-    (setup,), (spare,) = missing, others
-    new = spare.baud == kind.family.factory_baud and spare.id in (FACTORY_ID, setup.id)
-    fits = spare.number == kind.family.models[setup.model].number
-    if not (new and fits and port.setBaudRate(baud)):
-        return None
-    # An answer of the missing one may only have been lost, or spoilt by another with its id.
-    is_silent = ping(port, kind.family, setup.id, baud) is None
-    is_free = is_silent and not count_corrupt(port, kind.family, setup.id, SHARED)
-    return (spare, setup) if is_free else None
-
-
-def find_alone(answers: Answers, where: str) -> FoundServo:
+def find_alone(answers: Mapping[int, Answers], where: str) -> FoundServo:
     """Return the only servo that answered on the port ``where``.
 
     Raises:
         ServoMissing: no servo or more than one answered.
     """
-    found, spoilt_bauds = answers
-    if len(found) > 1:
-        named = [f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found]
-        crowd = f"{len(named)} servos answer: {', '.join(named)}"
-        twice = [name for name in named if named.count(name) > 1]
-        if twice:
-            crowd = f"two servos answer as {twice[0]}"
-        raise ServoMissing(f"{where}: {crowd}: connect one servo alone")
-    if not found and spoilt_bauds:
+    found = [servo for one in answers.values() for servo in one.found]
+    named = [f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found]
+    named += [f"two as id {i}" for one in answers.values() for i in one.shared_ids]
+    if len(named) > 1:
+        raise ServoMissing(f"{where}: several servos answer: {', '.join(named)}: connect one alone")
+    if not found and any(one.is_spoilt for one in answers.values()):
         raise ServoMissing(
             f"{where}: answers in pieces only: connect one servo alone, and check its plug"
         )
@@ -160,8 +120,10 @@ def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: 
 
 def assign_servo(
     port: BusPort, kind: ServoKind, found: FoundServo, setup: ServoConfig, baud: int, tell: Tell
-) -> SetupResult:
+) -> tuple[FoundServo, list[str]]:
     """Assign the id of a joint and the bus's baud rate to the servo, and verify them.
+
+    Returns the servo as it answers then, and the written values.
 
     Its torque is switched off. The message of every failure has the present id and rate.
 
@@ -172,74 +134,60 @@ def assign_servo(
         BusLost: the port has disappeared.
     """
     refuse_model(found, kind, setup, port.port_name)
-    return _Assignment(port, kind, found).carry_out(setup.id, baud, tell)
+    line, family, done = Transactions(port, kind.family), kind.family, list[str]()
+    now_id, now_baud = found.id, found.baud
 
-
-class _Assignment:
-    """Assignment of id and baud rate to one servo alone on a line."""
-
-    def __init__(self, port: BusPort, kind: ServoKind, found: FoundServo) -> None:
-        self._port, self._kind, self._found = port, kind, found
-        self._line = Transactions(port, kind.family)
-        self._id, self._baud = found.id, found.baud
-        self._done: list[str] = []
-
-    def carry_out(self, servo_id: int, baud: int, tell: Tell) -> SetupResult:
-        """Write the differences, and verify that the servo answers with them."""
-        line, kind = self._line, self._kind
-        self._open(self._found.baud)
-        # It then replies to every instruction.
-        line.write_all((self._id,), "status_return_level", [kind.family.answer_level])
-        if line.read(self._id, "torque_enable"):
-            if not line.write(self._id, "torque_enable", 0):
-                raise self._refusal("let its torque go")
-            self._done.append("torque 1 -> 0")
-        if self._id != servo_id:
-            tell(f"id {self._id} -> {servo_id}")
-            self._unlock()
-            written = line.write(self._id, "id", servo_id)
-            # The confirmation may arrive from either id, or be lost.
-            if not written and ping(self._port, kind.family, servo_id, self._baud) is None:
-                raise self._refusal(f"take the id {servo_id}")
-            self._done.append(f"id {self._id} -> {servo_id}")
-            self._id = servo_id
-        rate = kind.family.baud_rates.index(baud)
-        if self._baud != baud or line.read(self._id, "baud_rate") != rate:
-            tell(f"baud rate {self._baud} -> {baud}")
-            self._unlock()
-            # Silence may only be a lost confirmation.
-            if not line.write(self._id, "baud_rate", rate) and line.refusal:
-                raise self._refusal(f"take {baud} bit/s")
-            self._done.append(f"baud rate {self._baud} -> {baud} bit/s")
-            self._baud = baud
-            self._open(baud)
-        seen = ping(self._port, kind.family, self._id, self._baud)
-        if seen is None or seen.number != self._found.number:
-            raise ServoMissing(
-                f"{self._port.port_name}: the servo does not answer as id {self._id} at "
-                f"{self._baud} bit/s: gazerig scan finds it"
-            )
-        if kind.family.lock_register is not None and not line.write(
-            self._id, kind.family.lock_register, 1
-        ):
-            raise self._refusal("close its lock")
-        return SetupResult(self._found, seen, tuple(self._done))
-
-    def _unlock(self) -> None:
-        lock = self._kind.family.lock_register
-        if lock is not None and not self._line.write(self._id, lock, 0):
-            raise self._refusal("open its lock")
-
-    def _open(self, baud: int) -> None:
-        if not self._port.setBaudRate(baud):
-            raise PortError(
-                f"{self._port.port_name} cannot run at {baud} bit/s: choose another rate"
+    def require(confirmed: bool, what: str) -> None:
+        if not confirmed:
+            reason = f"error {line.refusal}" if line.refusal else "no answer"
+            raise ServoFault(
+                f"{port.port_name}: the servo does not {what} ({reason}); it answered last as id "
+                f"{now_id} at {now_baud} bit/s: switch its power off and on and try again"
             )
 
-    def _refusal(self, what: str) -> ServoFault:
-        refusal = self._line.refusal
-        reason = f"error {refusal}" if refusal else "no answer"
-        return ServoFault(
-            f"{self._port.port_name}: the servo does not {what} ({reason}); it answered last as id "
-            f"{self._id} at {self._baud} bit/s: switch its power off and on and try again"
+    def lock(value: int, what: str) -> None:
+        if family.lock_register is not None:
+            require(line.write(now_id, family.lock_register, value), what)
+
+    open_at(port, now_baud)
+    # It then replies to every instruction.
+    line.write_all((now_id,), "status_return_level", [family.answer_level])
+    if line.read(now_id, "torque_enable"):
+        require(line.write(now_id, "torque_enable", 0), "let its torque go")
+        done.append("torque 1 -> 0")
+    if now_id != setup.id:
+        tell(f"id {now_id} -> {setup.id}")
+        lock(0, "open its lock")
+        # The confirmation may arrive from either id, or be lost.
+        confirmed = line.write(now_id, "id", setup.id)
+        confirmed = confirmed or ping(port, family, setup.id, now_baud) is not None
+        require(confirmed, f"take the id {setup.id}")
+        done.append(f"id {now_id} -> {setup.id}")
+        now_id = setup.id
+    rate = family.baud_rates.index(baud)
+    if now_baud != baud or line.read(now_id, "baud_rate") != rate:
+        tell(f"baud rate {now_baud} -> {baud}")
+        lock(0, "open its lock")
+        # Silence may only be a lost confirmation.
+        require(line.write(now_id, "baud_rate", rate) or not line.refusal, f"take {baud} bit/s")
+        done.append(f"baud rate {now_baud} -> {baud} bit/s")
+        now_baud = baud
+        open_at(port, baud)
+    seen = ping(port, family, now_id, now_baud)
+    if seen is None or seen.number != found.number:
+        raise ServoMissing(
+            f"{port.port_name}: the servo does not answer as id {now_id} at {now_baud} bit/s: "
+            "gazerig scan finds it"
         )
+    lock(1, "close its lock")
+    return seen, done
+
+
+def open_at(port: BusPort, baud: int) -> None:
+    """Open a port at a baud rate.
+
+    Raises:
+        PortError: it cannot be opened, or does not support the rate.
+    """
+    if not port.setBaudRate(baud):
+        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose another rate")

@@ -7,29 +7,27 @@ Opening a bus for motion sets its servos up, which is a write; a monitor only re
 
 from collections.abc import Callable, Collection, Mapping
 from math import degrees
-from typing import NamedTuple, Protocol
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from gazerig.drivers.bus.servo_models import US_STEPS
-from gazerig.drivers.maestro.board import MOST_INPUT, MaestroBoard, MaestroParams
-from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
+from gazerig.drivers.hobby_board.board import Board
+from gazerig.drivers.maestro.board import MOST_INPUT
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.features.bringup.servo_kinds import ServoKind
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointParams
 
-LIVE = (
-    "torque_enable",
-    "goal_position",
-    "present_velocity",
-    "present_position",
-    "present_input_voltage",
-    "present_temperature",
+_LIVE = (
+    *("torque_enable", "goal_position", "present_velocity", "present_position"),
+    *("present_input_voltage", "present_temperature"),
 )
 """Registers that are read from every smart servo; errors and load have other names."""
 
 
-class Telemetry(NamedTuple):
+class Telemetry(Struct, frozen=True, kw_only=True):
     """Present values of one servo; None for values that its kind does not have.
 
     goal_deg, position_deg, velocity_deg_s: at the joint; steps are those of the servo
@@ -39,123 +37,86 @@ class Telemetry(NamedTuple):
     pulse_us: pulse width of a hobby servo, 0 for no pulses
     """
 
-    goal_deg: float | None
-    goal_steps: int | None
-    position_deg: float | None
-    position_steps: int | None
-    velocity_deg_s: float | None
-    load: float | None
-    temperature_c: int | None
-    voltage_v: float | None
     torque: bool
-    errors: tuple[str, ...]
+    errors: tuple[str, ...] = ()
     measured: bool = True
+    goal_deg: float | None = None
+    goal_steps: int | None = None
+    position_deg: float | None = None
+    position_steps: int | None = None
+    velocity_deg_s: float | None = None
+    load: float | None = None
+    temperature_c: int | None = None
+    voltage_v: float | None = None
     pulse_us: float | None = None
 
 
-class TelemetryReader(Protocol):
-    """Reads the servos of one line, and writes nothing."""
-
-    def read(self, joint: JointParams) -> Telemetry | None:
-        """Read a joint's servo; None if it does not reply.
-
-        Raises:
-            BusLost: the port has disappeared.
-        """
-        ...
-
-
-class SmartServoTelemetry:
-    """Reads smart servos without retries, because the next reading follows soon.
-
-    Args:
-        port: open at the servos' baud rate.
-        kind: the kind of all servos on it.
-    """
-
-    def __init__(self, port: BusPort, kind: ServoKind) -> None:
-        self._line, self._kind = Transactions(port, kind.family), kind
-        self._line.tries = 1
-        self._names = (*LIVE, kind.family.error_register, kind.family.effort_register)
-
-    def read(self, joint: JointParams) -> Telemetry | None:
-        """Read a joint's servo; see TelemetryReader."""
-        values = self._line.read_many(joint.id, self._names)
-        whole = {name: value for name, value in values.items() if value is not None}
-        return telemetry_of(self._kind, joint, whole) if len(whole) == len(values) else None
-
-
-def telemetry_of(kind: ServoKind, joint: JointParams, values: Mapping[str, int]) -> Telemetry:
-    """Return a servo's registers, by name, in units of its joint."""
-    family, effort = kind.family, values[kind.family.effort_register]
-    goal, position = values["goal_position"], values["present_position"]
-    velocity_steps_s = values["present_velocity"] * family.velocity_unit_steps_s
-    return Telemetry(
-        degrees(joint.angle_rad(goal)),
-        goal,
-        degrees(joint.angle_rad(position)),
-        position,
-        degrees(velocity_steps_s * joint.make_linkage().rate_rad(position)),
-        effort * family.models[joint.model].load_unit,
-        values["present_temperature"],
-        values["present_input_voltage"] / 10.0,
-        values["torque_enable"] == 1,
-        family.name_errors(values[family.error_register]),
-    )
-
-
-class MaestroTelemetry:
-    """Reads only the pulses of the channels of a Maestro."""
-
-    def __init__(self, port: BusPort, params: MaestroParams) -> None:
-        self._board = MaestroBoard(port, params)
-
-    def read(self, joint: JointParams) -> Telemetry | None:
-        """Read a joint's pulse; see TelemetryReader."""
-        found = self._board.read_pulses((joint.id,))
-        return None if found is None else pulse_telemetry(joint, found[0])
-
-
-class Pca9685Telemetry:
-    """Reads only the pulses of the channels of PCA9685 boards."""
-
-    def __init__(self, port: BusPort, params: Pca9685Params) -> None:
-        self._board = Pca9685Board(port, params)
-
-    def read(self, joint: JointParams) -> Telemetry | None:
-        """Read a joint's pulse; see TelemetryReader."""
-        found = self._board.read_pulses((joint.id,))
-        return None if found is None else pulse_telemetry(joint, found[0])
-
-
-def pulse_telemetry(joint: JointParams, pulse_steps: int) -> Telemetry:
-    """Return the telemetry of a joint's pulse; 0 is no pulse: the servo does not hold."""
-    if 0 < pulse_steps <= MOST_INPUT:
-        return Telemetry(*_UNTOLD, False, ("its channel is an input",), False, None)
-    at = degrees(joint.angle_rad(pulse_steps)) if pulse_steps else None
-    us = pulse_steps / US_STEPS
-    return Telemetry(None, None, at, *_UNTOLD[3:], pulse_steps > 0, (), False, us)
-
-
-_UNTOLD = (None,) * 8
-
-
-_DIGITS = {"goal_deg": 2, "position_deg": 2, "velocity_deg_s": 1, "load": 3}
-
-
-class TelemetrySample(NamedTuple):
+class TelemetrySample(Struct, frozen=True):
     """One reading of all servos.
 
-    at_s, took_s: time and duration of the reading
+    t_s, took_s: time since the start of the monitor, and duration of the reading
     servos: telemetry by joint; None if the servo did not answer
-    request_count, unanswered: queries since the start, and those without an answer
+    asked, unanswered: queries since the start, and those without an answer
     """
 
-    at_s: float
+    t_s: float
     took_s: float
-    servos: Mapping[str, Telemetry | None]
-    request_count: int
+    servos: dict[str, Telemetry | None]
+    asked: int
     unanswered: int
+
+
+TelemetryReader = Callable[[JointParams], Telemetry | None]
+"""Reads a joint's servo, None if it does not reply; raises BusLost if the port has disappeared."""
+
+
+def smart_servo_reader(port: BusPort, kind: ServoKind) -> TelemetryReader:
+    """Return a reader of smart servos, without retries, because the next reading follows soon.
+
+    port: open at the servos' baud rate; kind: the kind of all servos on it
+    """
+    line, family = Transactions(port, kind.family), kind.family
+    line.tries = 1
+
+    def read(joint: JointParams) -> Telemetry | None:
+        names = (*_LIVE, family.error_register, family.effort_register)
+        found = line.read_many(joint.id, names)
+        values = {name: value for name, value in found.items() if value is not None}
+        if len(values) < len(found):
+            return None
+        position = values["present_position"]
+        velocity_steps_s = values["present_velocity"] * family.velocity_unit_steps_s
+        return Telemetry(
+            torque=values["torque_enable"] == 1,
+            errors=family.name_errors(values[family.error_register]),
+            goal_deg=degrees(joint.angle_rad(values["goal_position"])),
+            goal_steps=values["goal_position"],
+            position_deg=degrees(joint.angle_rad(position)),
+            position_steps=position,
+            velocity_deg_s=degrees(velocity_steps_s * joint.make_linkage().rate_rad(position)),
+            load=values[family.effort_register] * family.models[joint.model].load_unit,
+            temperature_c=values["present_temperature"],
+            voltage_v=values["present_input_voltage"] / 10.0,
+        )
+
+    return read
+
+
+def board_reader(board: Board) -> TelemetryReader:
+    """Return a reader of the pulses of a board's channels; nothing else is read."""
+
+    def read(joint: JointParams) -> Telemetry | None:
+        found = board.read_pulses((joint.id,))
+        if found is None:
+            return None
+        pulse = found[0]
+        if 0 < pulse <= MOST_INPUT:
+            return Telemetry(torque=False, errors=("its channel is an input",), measured=False)
+        at = degrees(joint.angle_rad(pulse)) if pulse else None
+        us = pulse / US_STEPS
+        return Telemetry(torque=pulse > 0, measured=False, position_deg=at, pulse_us=us)
+
+    return read
 
 
 class Monitor:
@@ -176,9 +137,8 @@ class Monitor:
         pairs: Collection[CouplingParams] = (),
     ) -> None:
         self._pairs = tuple(pairs)
-        self._readers = dict(readers)
-        self._joints = dict(joints)
-        self._now_s = now_s
+        self._readers, self._joints = dict(readers), dict(joints)
+        self._now_s, self._start_s = now_s, now_s()
         self._asked = self._unanswered = 0
 
     def sample(self) -> TelemetrySample:
@@ -187,57 +147,33 @@ class Monitor:
         Raises:
             BusLost: a port has disappeared.
         """
-        start_s = self._now_s()
-        servos = {name: self._readers[one.bus].read(one) for name, one in self._joints.items()}
+        began_s = self._now_s()
+        servos = {name: self._readers[one.bus](one) for name, one in self._joints.items()}
         self._asked += len(servos)
         self._unanswered += sum(one is None for one in servos.values())
         for pair in self._pairs:
-            one, other = joint_telemetry(pair, servos[pair.first], servos[pair.second])
-            servos[pair.first], servos[pair.second] = one, other
-        end_s = self._now_s()
-        return TelemetrySample(end_s, end_s - start_s, servos, self._asked, self._unanswered)
+            servos |= _joint_telemetry(pair, servos[pair.first], servos[pair.second])
+        now_s = self._now_s()
+        return TelemetrySample(
+            now_s - self._start_s, now_s - began_s, servos, self._asked, self._unanswered
+        )
 
 
-def joint_telemetry(
+def _joint_telemetry(
     pair: CouplingParams, one: Telemetry | None, other: Telemetry | None
-) -> tuple[Telemetry | None, Telemetry | None]:
+) -> dict[str, Telemetry | None]:
     """Return the telemetry of two coupled servos with the angles of their joints.
 
     If either is missing, the angles of both joints are unknown.
     """
-    goals = _joint_deg(pair, one and one.goal_deg, other and other.goal_deg)
-    at = _joint_deg(pair, one and one.position_deg, other and other.position_deg)
-    speeds = _joint_deg(pair, one and one.velocity_deg_s, other and other.velocity_deg_s)
-    return (
-        one and one._replace(goal_deg=goals[0], position_deg=at[0], velocity_deg_s=speeds[0]),
-        other and other._replace(goal_deg=goals[1], position_deg=at[1], velocity_deg_s=speeds[1]),
-    )
-
-
-def _joint_deg(
-    pair: CouplingParams, one: float | None, other: float | None
-) -> tuple[float | None, float | None]:
-    if one is None or other is None:
-        return None, None
-    return pair.joint_rad((one, other))
-
-
-def as_json(sample: TelemetrySample, start_s: float) -> dict[str, object]:
-    """Return a sample as plain values, times in seconds since the start."""
-    joints: dict[str, dict[str, object] | None] = {}
-    for name, seen in sample.servos.items():
-        joints[name] = values = None if seen is None else seen._asdict()
-        if seen is None or values is None:
-            continue
-        for key, digits in _DIGITS.items():
-            if values[key] is not None:
-                values[key] = round(values[key], digits)
-        if seen.measured:
-            del values["pulse_us"]  # smart servos have no pulses
+    both: list[dict[str, float | None]] = [{}, {}]
+    for key in ("goal_deg", "position_deg", "velocity_deg_s"):
+        first, second = getattr(one, key, None), getattr(other, key, None)
+        angles: tuple[float | None, float | None] = None, None
+        if first is not None and second is not None:
+            angles = pair.joint_rad((first, second))
+        both[0][key], both[1][key] = angles
     return {
-        "t_s": round(sample.at_s - start_s, 3),
-        "took_ms": round(1e3 * sample.took_s, 1),
-        "asked": sample.request_count,
-        "unanswered": sample.unanswered,
-        "joints": joints,
+        pair.first: one and replace(one, **both[0]),
+        pair.second: other and replace(other, **both[1]),
     }

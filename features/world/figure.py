@@ -14,9 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gazerig.features.world import object_handover
-from gazerig.features.world.body_motion import SEGMENTS as SEGMENTS
-from gazerig.features.world.body_motion import SIDES as SIDES
-from gazerig.features.world.body_motion import BodyMotion, arm_poses
+from gazerig.features.world.body_motion import SEGMENTS, SIDES, BodyMotion, arm_poses
 from gazerig.features.world.gait import RATE_HZ
 from gazerig.features.world.measures import Measures, measures
 from gazerig.features.world.motions import FIST_M, Frame, fist_pose
@@ -169,10 +167,8 @@ class Figures:
 
     def _boxer_over(self, rows: Sequence[OpponentRow]) -> Floats:
         """Return the boxer's segments (rows, n, 7) as the person moves them."""
-        found, body = (
-            np.repeat(self._guard[None], len(rows), axis=0),
-            self.measures[self.boxer or ""],
-        )
+        found = np.repeat(self._guard[None], len(rows), axis=0)
+        body = self.measures[self.boxer or ""]
         shift = np.array([(*row.body_m, 0.0) for row in rows])
         found[:, :, :3] += shift[:, None]
         R = rotation_matrix(self._guard[_SEGMENT["torso"], 3:])

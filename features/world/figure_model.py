@@ -5,16 +5,19 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from gazerig.features.world.body_shape import ball_shape, body_segments, cup_shape
-from gazerig.features.world.figure import SEGMENTS, Figures
-from gazerig.features.world.measures import Measures
+from gazerig.features.world.body_motion import SEGMENTS
+from gazerig.features.world.figure import Figures
+from gazerig.features.world.measures import ADULT_M, Measures
 from gazerig.gaze.angles import scale
-from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh
-from gazerig.robot.description.people import part_of
+from gazerig.gaze.types import Floats
+from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh, stored_shape
+from gazerig.robot.description.people import SHIRTS, part_of
 from gazerig.robot.description.texture import add_texture
 
 SOLID_GROUP = 3
 """Group of the collision shapes, which pictures do not show."""
+_GREY = 128.0
+"""Colour of stored shapes that are dyed."""
 _SPECULAR, _SHININESS = 0.12, 0.2
 
 
@@ -36,19 +39,44 @@ def figure_shapes(figures: Figures) -> dict[str, Painted]:
     """Return the shape of every segment and thing in its own frame, in the order of the names."""
     found: dict[str, Painted] = {}
     for number, (name, person) in enumerate(figures.script.people.items()):
-        body = figures.measures[name]
-        k = body.head_scale
+        body, shirt = figures.measures[name], np.array(SHIRTS[number % len(SHIRTS)], float)
         head = merge_meshes([part_of(person.look, part) for part in ("head", "face", "mouth")])
-        parts = {"head": move_mesh(head, scale(body.skull_m, -1.0), k)}
+        parts = {"head": move_mesh(head, scale(body.skull_m, -1.0), body.head_scale)}
         for part in ("lips", "eye", "lid"):
-            shape = move_mesh(part_of(person.look, part), scale=k)
-            names = (part,) if part == "lips" else (f"left_{part}", f"right_{part}")
-            parts |= dict.fromkeys(names, shape)
-        parts |= body_segments(body, person.look, number, person.gloves)
-        found |= {f"{name}/{segment}": parts[segment] for segment in SEGMENTS}
+            parts[part] = move_mesh(part_of(person.look, part), scale=body.head_scale)
+        parts |= _below_the_head(person.look, shirt, body.stature_m / ADULT_M, person.gloves)
+        for segment in SEGMENTS:
+            either = segment.removeprefix("left_").removeprefix("right_")
+            found[f"{name}/{segment}"] = parts[segment if segment in parts else either]
     for name, thing in figures.script.things.items():
-        found[f"thing/{name}"] = cup_shape() if thing.kind == "cup" else ball_shape()
+        found[f"thing/{name}"] = stored_shape("cup" if thing.kind == "cup" else "striped_ball")
     return found
+
+
+def _below_the_head(look: int, shirt: Floats, k: float, gloves: bool) -> dict[str, Painted]:
+    """Return the segments of a body by their names, those without a side for both.
+
+    Args:
+        look: its look.
+        shirt: colour of its shirt.
+        k: its size relative to an adult's.
+        gloves: whether it wears boxing gloves.
+    """
+    hand = part_of(look, "hanging_hand")
+    colours = {"torso": shirt, "upper_arm": shirt, "throat": part_of(look, "neck").colours[0]}
+    colours["forearm"] = hand.colours[0] if gloves else shirt
+    parts = {
+        name: move_mesh(stored_shape(name), scale=k)
+        for name in ("torso", "throat", "pelvis", "upper_arm", "forearm", "thigh", "shank", "shoe")
+    }
+    for name, colour in colours.items():
+        shades = parts[name].colours + (colour - _GREY)
+        parts[name] = parts[name]._replace(colours=np.clip(shades, 0.0, 255.0))
+    parts["neck"], parts["foot"] = parts["throat"], parts["shoe"]
+    right = move_mesh(stored_shape("glove") if gloves else hand, scale=k)
+    parts["right_hand"] = right
+    parts["left_hand"] = move_mesh(right, scale=(1.0, -1.0, 1.0))
+    return parts
 
 
 class PeoplePlacer:
@@ -57,10 +85,7 @@ class PeoplePlacer:
     def __init__(self, model: Any, figures: Figures) -> None:
         self._figures = figures
         rows = [int(model.body_mocapid[model.body(name).id]) for name in figures.names]
-        self._rows: Any = np.array(rows)
-        first = rows[0] if rows else 0
-        if rows == list(range(first, first + len(rows))):  # a slice is quicker
-            self._rows = slice(first, first + len(rows))
+        self._rows = np.array(rows, np.intp)
 
     def place(self, data: Any, t_s: float) -> None:
         """Set all poses for a time of the script."""
@@ -99,7 +124,7 @@ def add_mesh(spec: Any, body: Any, name: str, shape: Painted) -> None:
 
 def _add_solid(node: Any, segment: str, body: Measures, gloves: bool) -> None:
     """Add the collision shape of a segment; small segments have none."""
-    k = body.stature_m / 1.72
+    k = body.stature_m / ADULT_M
     part = segment.split("_", 1)[-1]
     capsules = {
         "upper_arm": (body.upper_arm_m, 0.045 * k),

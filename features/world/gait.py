@@ -6,7 +6,7 @@ stairs.
 """
 
 from collections.abc import Mapping, Sequence
-from math import atan2, ceil
+from math import atan2, ceil, degrees
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from gazerig.features.world.room import (
     WALK_ENDS_S,
     WALK_STARTS_S,
     Place,
+    standing_point,
     way_points,
 )
 from gazerig.features.world.time_profiles import moving_average, smooth_bump, smooth_rise
@@ -57,12 +58,10 @@ class _Path:
     def __init__(self, t_s: Floats, start: Place, places: Mapping[str, Place]) -> None:
         self.t_s, self.places, self.at = t_s, places, start
         rows = len(t_s)
-        x, y = start.ahead(SEAT_AHEAD_M) if start.seat_m is not None else (start.x_m, start.y_m)
-        self.way = np.tile((x, y), (rows, 1))
+        self.way = np.tile(standing_point(start), (rows, 1))
         self.heading = np.full(rows, start.facing_rad)
-        sitting = start.seat_m is not None
-        self.seated = np.full(rows, 1.0 if sitting else 0.0)
-        self.seat_m = np.full(rows, start.seat_m if start.seat_m is not None else 0.0)
+        self.seated = np.full(rows, 0.0 if start.seat_m is None else 1.0)
+        self.seat_m = np.full(rows, start.seat_m or 0.0)
         self.stretches: list[tuple[float, float]] = []  # begin and end of steps, s
 
     def add(self, one: TimedAct) -> None:
@@ -91,7 +90,7 @@ class _Path:
                 y += act.ahead_m * s + act.left_m * c
         elif one.target is not None:
             facing = _nearest_angle(atan2(one.target[1] - y, one.target[0] - x), facing)
-        self.at = Place(x, y, facing)
+        self.at = Place(x, y, degrees(facing))
         self.way[rows] = self.way[rows] + share[rows, None] * ((x, y) - self.way[rows])
         self.heading[rows] += share[rows] * (facing - self.heading[rows])
         self.stretches.append((start_s, end_s))
@@ -201,11 +200,8 @@ class _Feet:
         heading, side = float(self.heading[row]), 1.0 - 2.0 * foot
         ahead, aside, out = 0.0, side * self.half, side * 0.10
         if self.boxes:
-            ahead, aside, out = (
-                side * _BOX_STANCE_M,
-                1.25 * aside,
-                (0.15, -1.0)[foot] * _BOX_OUT_RAD,
-            )
+            ahead, aside = side * _BOX_STANCE_M, 1.25 * aside
+            out = (0.15, -1.0)[foot] * _BOX_OUT_RAD
         c, s = np.cos(heading), np.sin(heading)
         place = self.way[row] + (ahead * c - aside * s, ahead * s + aside * c)
         return place, heading + out

@@ -1,7 +1,7 @@
 """OpenGL without a display: EGL or OSMesa, whichever works here.
 
-MuJoCo renders through one of three libraries. Machines differ in which one is installed, and each
-library reports failures differently, so all are tried and every failure is reported.
+MuJoCo renders through one of several libraries. Machines differ in which one is installed, and each
+library reports failures differently, so both are tried and every failure is reported.
 """
 
 import os
@@ -10,19 +10,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from types import ModuleType
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 from gazerig.drivers.errors import SetupError, install_command
 
-Backend = Literal["egl", "osmesa", "glfw"]
-
-_PACKAGES: dict[Backend, str] = {
-    "egl": "libegl1 libgl1-mesa-dri",
-    "osmesa": "libosmesa6",
-    "glfw": "a display: xvfb-run",
-}
-_OFF = ("disable", "disabled", "off", "false", "0")
-_chosen: Backend | None = None  # the first that worked: a process loads OpenGL only once
+_PACKAGES = {"egl": "libegl1 libgl1-mesa-dri", "osmesa": "libosmesa6"}
+_chosen = ""  # the first that worked: a process loads OpenGL only once
 
 Made = TypeVar("Made")
 
@@ -31,8 +24,8 @@ class NoRenderer(SetupError):
     """No library can render here; the message lists what was tried and why each failed."""
 
 
-def open_context(make: Callable[[], Made]) -> tuple[Backend, Any, Made]:
-    """Return the first library, its context, and what was made while the context was current.
+def open_context(make: Callable[[], Made]) -> tuple[Any, Made]:
+    """Return a context of the first library that works, and what was made while it was current.
 
     If the user has set MUJOCO_GL, only that library is tried.
 
@@ -43,14 +36,11 @@ def open_context(make: Callable[[], Made]) -> tuple[Backend, Any, Made]:
         NoRenderer: none works.
     """
     global _chosen
-    why: dict[Backend, str] = {}
-    for backend in _candidates():
+    wanted, why = os.environ.get("MUJOCO_GL") or _chosen, dict[str, str]()
+    for backend in (wanted,) if wanted else _PACKAGES:
         # MuJoCo reads the variable again when it looks for the library's functions.
         with _environment("MUJOCO_GL", backend):
             try:
-                shown = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-                if backend == "glfw" and not shown:
-                    raise RuntimeError("there is no display")
                 context = import_module(f"mujoco.{backend}").GLContext(64, 64)
                 try:
                     # No longer than necessary: another thread may render
@@ -64,11 +54,12 @@ def open_context(make: Callable[[], Made]) -> tuple[Backend, Any, Made]:
                 _forget_opengl()
                 continue
         _chosen = backend
-        return backend, context, made
+        return context, made
     tried = "; ".join(f"{backend}: {reason}" for backend, reason in why.items())
-    packages = " or ".join(_PACKAGES[backend] for backend in why if backend != "glfw")
-    cure = f"apt install {packages}" if packages else _PACKAGES["glfw"]
-    raise NoRenderer(f"no pictures of a world: nothing here can render ({tried}); cure: {cure}")
+    raise NoRenderer(
+        f"no pictures of a world: nothing here can render ({tried}); cure: apt install "
+        f"{' or '.join(_PACKAGES.values())}, or run with --no-pictures"
+    )
 
 
 def render_in_calling_thread() -> None:
@@ -114,35 +105,14 @@ def _environment(name: str, value: str) -> Iterator[None]:
             os.environ[name] = before
 
 
-def _candidates() -> tuple[Backend, ...]:
-    """Return the libraries to try, best first."""
-    wanted = os.environ.get("MUJOCO_GL", "").strip().lower()
-    if wanted in _OFF:
-        raise NoRenderer(f"no pictures of a world: MUJOCO_GL={wanted} forbids to render")
-    if wanted in _PACKAGES:
-        return (wanted,)
-    if wanted:
-        raise NoRenderer(
-            f"no pictures of a world: MUJOCO_GL is egl, osmesa, glfw or off, not {wanted!r}"
-        )
-    return (_chosen,) if _chosen is not None else ("egl", "osmesa", "glfw")
-
-
 def _forget_opengl() -> None:
     """Unload PyOpenGL, which binds itself to the first library that it loads."""
     for name in [*sys.modules]:
         if name.split(".")[0] == "OpenGL" or name.startswith(("mujoco.egl", "mujoco.osmesa")):
             del sys.modules[name]
-    if os.environ.get("PYOPENGL_PLATFORM") in ("egl", "osmesa") and not _OWN_PLATFORM:
-        del os.environ["PYOPENGL_PLATFORM"]
-
-
-_OWN_PLATFORM = "PYOPENGL_PLATFORM" in os.environ
+    os.environ.pop("PYOPENGL_PLATFORM", None)
 
 
 def _one_line(error: Exception) -> str:
     """Return an error as one short line."""
-    if isinstance(error, AttributeError) and "NoneType" in str(error):
-        return "its library is not here"  # PyOpenGL's own message names neither
-    text = " ".join(str(error).split()) or type(error).__name__
-    return text if len(text) <= 160 else f"{text[:157]}..."
+    return " ".join(str(error).split())[:160] or type(error).__name__

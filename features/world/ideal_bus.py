@@ -33,7 +33,7 @@ class IdealShaft:
         self._unit = 4096.0 / steps_per_turn
         self._x = axis.position()
         self._v = 0.0
-        axis.build(ROTOR_KG_M2, FRICTION_NM, 0.0)
+        axis.build(ROTOR_KG_M2, FRICTION_NM)
 
     @property
     def place_steps(self) -> float:

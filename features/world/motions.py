@@ -3,7 +3,7 @@
 A hand is defined by its wrist and the directions of its fingers and palm; the elbow follows.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -111,113 +111,82 @@ def _oscillation(t_s: Floats, start_s: float, rate_hz: float, phase: float) -> F
     return np.sin(2.0 * np.pi * rate_hz * (t_s - start_s) + phase)[:, None]
 
 
-def _wave(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
-    swing = _oscillation(t_s, one.start_s, 1.5, 0.0)
-    to = unit((target - frame.shoulder_m) * (1.0, 1.0, 0.0))
-    aside = frame.side * frame.left
-    wrist = frame.shoulder_m + 0.24 * to + (0.15 + 0.09 * swing) * aside + 0.10 * UP
-    return HandPose(wrist, UP + 0.35 * swing * aside, to, 0.7 * aside - UP)
+def act_pose(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
+    """Return the poses of a hand in an act.
+
+    Args:
+        frame: position of the body.
+        one: the act.
+        t_s: times of the rows.
+        target: its target (n, 3).
+        now: poses of the hand without it.
+    """
+    shoulder, aside = frame.shoulder_m, frame.side * frame.left
+    to = unit(target - shoulder)
+    level = unit((target - shoulder) * (1.0, 1.0, 0.0))
+    match one.act.do:
+        case "wave":
+            swing = _oscillation(t_s, one.start_s, 1.5, 0.0)
+            wrist = shoulder + 0.24 * level + (0.15 + 0.09 * swing) * aside + 0.10 * UP
+            return HandPose(wrist, UP + 0.35 * swing * aside, level, 0.7 * aside - UP)
+        case "gesture":
+            phase = 0.9 * frame.side
+            beat = _oscillation(t_s, one.start_s, 1.3, phase)
+            slow = _oscillation(t_s, one.start_s, 0.45, 2.0 * phase)
+            wrist = _point(frame, shoulder, 0.27, 0.02, -0.27)
+            wrist = wrist + (0.035 * beat + 0.025 * slow) * UP + 0.05 * slow * aside
+            return HandPose(
+                wrist,
+                _direction(frame, 1.0, -0.15, 0.35),
+                _direction(frame, 0.1, -0.8, 0.5),
+                _direction(frame, -0.2, 0.6, -1.0),
+            )
+        case "point":
+            wrist = shoulder + 0.94 * frame.body.arm_m * to
+            palm = _direction(frame, 0.0, -0.4, -1.0)
+            return HandPose(wrist, to, palm, _direction(frame, 0.0, 0.4, -1.0))
+        case "reach":
+            palm = _direction(frame, 0.1, -0.7, -0.8)
+            return HandPose(target - FIST_M * to, to, palm, _direction(frame, 0.0, 0.6, -1.0))
+        case "pass":
+            fingers = unit(to * (1.0, 1.0, 0.2) + 0.3 * frame.ahead)
+            palm = _direction(frame, 0.2, -1.0, 0.0)
+            return HandPose(target - FIST_M * to, fingers, palm, _direction(frame, 0.0, 0.7, -1.0))
+        case "push":
+            lasts_s = one.end_s - one.start_s
+            begins_s, each_s = one.start_s + 0.35 * lasts_s, 0.25 * lasts_s
+            press = there_and_back(t_s, begins_s, each_s, 0.1, each_s)
+            middle = target + _FOREHEAD - level * (PUSH_FROM_M - PUSH_BY_M * press[:, None])
+            fingers = unit(UP + 0.6 * level)
+            pole = _direction(frame, 0.0, 0.7, -1.0)
+            return HandPose(middle - FIST_M * fingers, fingers, level - 0.4 * UP, pole)
+        case "punch":
+            return _punch(frame, target - PUNCH_ENDS_M * to - FIST_M * to, to)
+        case "feint":
+            return now._replace(wrist_m=_point(frame, now.wrist_m, 0.06, 0.15, 0.05))
+        case _:  # an open guard
+            return HandPose(
+                _point(frame, shoulder, 0.20, 0.14, -0.36),
+                _direction(frame, 0.9, -0.1, 0.1),
+                _direction(frame, 0.0, -1.0, -0.2),
+                _direction(frame, -0.8, 0.6, -0.8),
+            )
 
 
-def _gesture(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
-    phase = 0.9 * frame.side
-    beat, slow = (
-        _oscillation(t_s, one.start_s, 1.3, phase),
-        _oscillation(t_s, one.start_s, 0.45, 2.0 * phase),
-    )
-    wrist = _point(frame, frame.shoulder_m, 0.27, 0.02, -0.27)
-    wrist = wrist + (0.035 * beat + 0.025 * slow) * UP + 0.05 * slow * frame.side * frame.left
-    return HandPose(
-        wrist,
-        _direction(frame, 1.0, -0.15, 0.35),
-        _direction(frame, 0.1, -0.8, 0.5),
-        _direction(frame, -0.2, 0.6, -1.0),
-    )
-
-
-def _point_at(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
-    to = unit(target - frame.shoulder_m)
-    wrist = frame.shoulder_m + 0.94 * frame.body.arm_m * to
-    return HandPose(
-        wrist, to, _direction(frame, 0.0, -0.4, -1.0), _direction(frame, 0.0, 0.4, -1.0)
-    )
-
-
-def _reach(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
-    to = unit(target - frame.shoulder_m)
-    return HandPose(
-        target - FIST_M * to,
-        to,
-        _direction(frame, 0.1, -0.7, -0.8),
-        _direction(frame, 0.0, 0.6, -1.0),
-    )
-
-
-def _pass(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
-    to = unit(target - frame.shoulder_m)
-    fingers = unit(to * (1.0, 1.0, 0.2) + 0.3 * frame.ahead)
-    palm = _direction(frame, 0.2, -1.0, 0.0)
-    return HandPose(target - FIST_M * to, fingers, palm, _direction(frame, 0.0, 0.7, -1.0))
-
-
-def _push(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
-    lasts_s = one.end_s - one.start_s
-    level = unit((target - frame.shoulder_m) * (1.0, 1.0, 0.0))
-    press = there_and_back(t_s, one.start_s + 0.35 * lasts_s, 0.25 * lasts_s, 0.1, 0.25 * lasts_s)
-    middle = target + _FOREHEAD - level * (PUSH_FROM_M - PUSH_BY_M * press[:, None])
-    fingers = unit(UP + 0.6 * level)
-    return HandPose(
-        middle - FIST_M * fingers, fingers, level - 0.4 * UP, _direction(frame, 0.0, 0.7, -1.0)
-    )
-
-
-def _punch(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
-    to = unit(target - frame.shoulder_m)
-    middle = target - PUNCH_ENDS_M * to
-    return HandPose(
-        middle - FIST_M * to,
-        to,
-        _direction(frame, 0.0, -0.2, -1.0),
-        _direction(frame, 0.0, 0.6, -0.8),
-    )
-
-
-def _feint(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
-    return now._replace(wrist_m=_point(frame, now.wrist_m, 0.06, 0.15, 0.05))
-
-
-def _open(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
-    return HandPose(
-        _point(frame, frame.shoulder_m, 0.20, 0.14, -0.36),
-        _direction(frame, 0.9, -0.1, 0.1),
-        _direction(frame, 0.0, -1.0, -0.2),
-        _direction(frame, -0.8, 0.6, -0.8),
-    )
+def _punch(frame: Frame, wrist_m: Floats, to: Floats) -> HandPose:
+    """Return a stretched punch in a direction."""
+    palm = _direction(frame, 0.0, -0.2, -1.0)
+    return HandPose(wrist_m, to, palm, _direction(frame, 0.0, 0.6, -0.8))
 
 
 def fist_pose(frame: Frame, wrist_m: Floats, out: Floats) -> HandPose:
     """Return a fist at a position, from the guard (out 0) to a stretched punch (out 1), (n,)."""
     one = np.ones(len(wrist_m))
     guard = resting_pose(frame, PostureShares(0.0 * one, one, 0.0 * one), 0.0 * one, boxes=True)
-    to = unit(wrist_m - frame.shoulder_m)
-    punch = HandPose(
-        wrist_m, to, _direction(frame, 0.0, -0.2, -1.0), _direction(frame, 0.0, 0.6, -0.8)
-    )
+    punch = _punch(frame, wrist_m, unit(wrist_m - frame.shoulder_m))
     return guard._replace(wrist_m=wrist_m).towards(punch, out)
 
 
-_Motion = Callable[[Frame, TimedAct, Floats, Floats, HandPose], HandPose]
-_MOTIONS: Mapping[str, _Motion] = {
-    "wave": _wave,
-    "gesture": _gesture,
-    "point": _point_at,
-    "reach": _reach,
-    "pass": _pass,
-    "push": _push,
-    "punch": _punch,
-    "feint": _feint,
-    "open_guard": _open,
-}
 OUT_S: Mapping[str, tuple[float, float]] = {
     "punch": (0.42, 0.5),
     "feint": (0.5, 0.5),
@@ -248,7 +217,7 @@ def hand_pose(
     now = rest
     for one, target in zip(acts, at, strict=True):
         share = act_share(one, t_s)
-        now = now.towards(_MOTIONS[one.act.do](frame, one, t_s, target, now), share)
+        now = now.towards(act_pose(frame, one, t_s, target, now), share)
         # A raised hand passes in front of the body, not through it.
         wide = 0.12 if one.act.do not in ("punch", "feint") else 0.0
         bow = wide * 4.0 * share * (1.0 - share) * (1.0 - 0.5 * smooth_rise(share))
@@ -258,7 +227,7 @@ def hand_pose(
 
 def moves_arm(one: TimedAct) -> bool:
     """Return whether an act moves a hand."""
-    return one.act.do in _MOTIONS
+    return one.act.do in OUT_S
 
 
 def twist_rad(t_s: Floats, acts: Sequence[TimedAct]) -> Floats:

@@ -29,16 +29,24 @@ class Holder(NamedTuple):
 def holders(script: SceneScript, timelines: Timelines, thing: str) -> list[Holder]:
     """Return the successive holders of a thing; it changes hands in the middle of a pass."""
     first = script.things[thing]
-    found = [Holder(0.0, first.held_by, first.side)]
-    passes = [
-        (0.5 * (one.start_s + one.end_s), one.act)
-        for acts in timelines.values()
-        for one in acts
+    return [
+        Holder(0.0, first.held_by, first.side),
+        *(
+            Holder(0.5 * (one.start_s + one.end_s), one.act.to, _OTHER[one.act.side])
+            for one, _, _ in _passes(timelines, thing)
+        ),
+    ]
+
+
+def _passes(timelines: Timelines, thing: str) -> list[tuple[TimedAct, str, int]]:
+    """Return the passes of a thing in the order of time, with the giver and the act's number."""
+    found = [
+        (one, name, i)
+        for name, acts in timelines.items()
+        for i, one in enumerate(acts)
         if one.act.do == "pass" and one.act.thing == thing
     ]
-    for middle_s, act in sorted(passes, key=lambda one: one[0]):
-        found.append(Holder(middle_s, act.to, _OTHER[act.side]))
-    return found
+    return sorted(found, key=lambda found: found[0].start_s)
 
 
 def receiving_acts(timelines: Timelines, name: str) -> list[TimedAct]:
@@ -90,16 +98,9 @@ def thing_poses(
 def handover_faults(script: SceneScript, timelines: Timelines) -> Iterator[Fault]:
     """Yield passes by a person who does not hold the thing, and things that end in another hand."""
     for thing, first in script.things.items():
-        holder = first.held_by
-        passes = sorted(
-            (one.start_s, name, i, one.act)
-            for name, acts in timelines.items()
-            for i, one in enumerate(acts)
-            if one.act.do == "pass" and one.act.thing == thing
-        )
-        side: str = first.side
-        for _, name, i, act in passes:
-            key = f"people.{name}.acts.{i}"
+        holder, side = first.held_by, first.side
+        for one, name, i in _passes(timelines, thing):
+            key, act = f"people.{name}.acts.{i}", one.act
             if name != holder:
                 yield f"{key}.thing", f"{holder} holds {thing} then; let {holder} pass it"
             elif act.side != side:

@@ -7,16 +7,16 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.errors import SetupError
 from gazerig.errors import Error
 from gazerig.features.world.figure_model import PeoplePlacer
 from gazerig.features.world.ideal_bus import IdealShaft
 from gazerig.features.world.joint_play import JointPlay
-from gazerig.features.world.model import RigIndices, WorldModel
+from gazerig.features.world.model import PREFIX, WorldModel
 from gazerig.features.world.rig_in_world import ServoInWorld
 from gazerig.features.world.shaft import ShaftAxis, WorldHobbyServo, WorldShaft
+from gazerig.features.world.state_file import WorldState
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import Emulated, PluginLine, ShaftMakers, build
+from gazerig.sim_mock.devices import Emulated, ShaftMakers, build
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
 from gazerig.sim_mock.smart_servo.physics import MS_S, Motor, Physics
 from gazerig.sim_mock.smart_servo.shaft import Shaft, create_shaft, whole_ms
@@ -39,17 +39,6 @@ _UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.m
 
 class WorldUnstable(Error):
     """Divergence of the numbers of a world; its joint angles are no longer valid."""
-
-
-class WorldState(NamedTuple):
-    """State of a world; a picture needs only this and the script of the people.
-
-    t_s: time since the start of the script of its people, 0 before
-    qpos: positions of its joints as MuJoCo orders them, shape (nq,)
-    """
-
-    t_s: float
-    qpos: NDArray[np.float64]
 
 
 class _Push(NamedTuple):
@@ -85,15 +74,12 @@ class World:
         self._shafts: list[WorldShaft | IdealShaft] = []
         self._lead_rad = np.zeros(model.mj.nq)
         self._play: JointPlay | None = None
-        self._actuators: slice | NDArray[np.intp] = slice(0, 0)
+        self._actuators = np.zeros(0, np.intp)
         self._pushes: list[_Push] = []
-        figures = model.figures
-        self._people = None if figures is None else PeoplePlacer(model.mj, figures)
-        if self._people is not None:
-            self._people.place(self._data, 0.0)
-        for rig in model.rigs:
-            for name, angle in rig.rig.start_rad.items():
-                self._data.qpos[rig.qpos[name]] = angle
+        self._people = PeoplePlacer(model.mj, model.figures)
+        self._people.place(self._data, 0.0)
+        for name, angle in model.rig.rig.start_rad.items():
+            self._data.qpos[model.rig.qpos[name]] = angle
         mujoco.mj_forward(self._mj, self._data)
 
     # --- devices
@@ -103,18 +89,12 @@ class World:
 
         Raises:
             ValueError: the device is impossible.
-            SetupError: the device comes from a plugin package.
         """
-        if isinstance(line, PluginLine):
-            raise SetupError(
-                f"a bus of kind {line.kind} has no servos that a world could move: leave --world out"
-            )
-        indices = self.model.rigs[0]
-        own = {one.id: one for one in indices.rig.servos if one.bus == bus}
+        own = {one.id: one for one in self.model.rig.rig.servos if one.bus == bus}
 
         def axis(servo_id: int) -> ShaftAxis | None:
             servo = own.get(servo_id)
-            return None if servo is None else self._axis(indices, servo)
+            return None if servo is None else self._axis(servo)
 
         def shaft(servo_id: int, model: Motor, physics: Physics, position_steps: float) -> Shaft:
             at = axis(servo_id)
@@ -143,16 +123,14 @@ class World:
 
     def ideal_shafts(self) -> tuple[IdealShaft, ...]:
         """Return shafts without servos, in the order of the rig's servos."""
-        indices = self.model.rigs[0]
-        shafts = tuple(
-            IdealShaft(self._axis(indices, one), one.steps_per_turn) for one in indices.rig.servos
-        )
+        servos = self.model.rig.rig.servos
+        shafts = tuple(IdealShaft(self._axis(one), one.steps_per_turn) for one in servos)
         self._shafts += shafts
         self._join()
         return shafts
 
-    def _axis(self, indices: RigIndices, servo: ServoInWorld) -> ShaftAxis:
-        return ShaftAxis(self._mj, self._data, self._lead_rad, indices, servo)
+    def _axis(self, servo: ServoInWorld) -> ShaftAxis:
+        return ShaftAxis(self._mj, self._data, self._lead_rad, self.model.rig, servo)
 
     def _join(self) -> None:
         """Move all shafts from now on."""
@@ -161,11 +139,7 @@ class World:
             play_rad |= one.axis.play_rad
         if play_rad:
             self._play = JointPlay(self._mj, self._data, self._lead_rad, play_rad)
-        numbers = [one.axis.actuator for one in self._shafts]
-        first = min(numbers, default=0)
-        self._actuators = np.array(numbers, dtype=np.intp)
-        if numbers == list(range(first, first + len(numbers))):  # a slice is quicker
-            self._actuators = slice(first, first + len(numbers))
+        self._actuators = np.array([one.axis.actuator for one in self._shafts], dtype=np.intp)
         # Let MuJoCo update the constants that depend on inertias: shafts now have rotors.
         kept = np.array(self._data.qpos), np.array(self._data.qvel)
         mujoco.mj_setConst(self._mj, self._data)
@@ -216,7 +190,7 @@ class World:
                 lever = data.xpos[push.body] - data.xipos[push.body]
                 wrenches[push.body, :3] += push.force_n
                 wrenches[push.body, 3:] += np.cross(lever, push.force_n)
-        if self._people is not None and self._ms % PEOPLE_MS == 0:
+        if self._ms % PEOPLE_MS == 0:
             self._people.place(data, self._script_s())
         play = self._play
         if play is not None:
@@ -268,35 +242,16 @@ class World:
         Raises:
             ValueError: the body does not exist.
         """
-        number = self._body(body)
-        if number < 0:
-            names = self.model.rigs[0].names
-            bodies = [self._mj.body(i).name for i in range(1, self._mj.nbody)]
-            own = [name[len(names) :] for name in bodies if name.startswith(names)]
+        names = [self._mj.body(i).name for i in range(self._mj.nbody)]
+        own = {name[len(PREFIX) :]: i for i, name in enumerate(names) if name.startswith(PREFIX)}
+        if body not in own:
             raise ValueError(f"no body {body!r}: there is {', '.join(own)}")
-        self._pushes.append(_Push(number, np.array(force_n), self._ms + round(for_s * 1000.0)))
-
-    def _body(self, body: str) -> int:
-        """Return the number of a body of the rig, -1 if it does not exist."""
-        name = self.model.rigs[0].names + body
-        return int(mujoco.mj_name2id(self._mj, mujoco.mjtObj.mjOBJ_BODY, name))
-
-    def move(self, body: str, p_m: tuple[float, float, float]) -> None:
-        """Move a mocap body of a user's world to a position; it pushes bodies that it touches.
-
-        Raises:
-            ValueError: the body does not exist.
-        """
-        number = mujoco.mj_name2id(self._mj, mujoco.mjtObj.mjOBJ_BODY, body)
-        place = int(self._mj.body_mocapid[number]) if number >= 0 else -1
-        if place < 0:
-            raise ValueError(f'no body {body!r} with mocap="true"')
-        self._data.mocap_pos[place] = p_m
+        self._pushes.append(_Push(own[body], np.array(force_n), self._ms + round(for_s * 1000.0)))
 
     def state(self) -> WorldState:
         """Return the current state."""
-        return WorldState(self._script_s(), np.array(self._data.qpos))
+        return WorldState(self._ms / 1e3, self._script_s(), np.array(self._data.qpos))
 
     def joints_rad(self) -> dict[str, float]:
         """Return the current true joint angles of the rig."""
-        return {n: float(self._data.qpos[at]) for n, at in self.model.rigs[0].qpos.items()}
+        return {n: float(self._data.qpos[at]) for n, at in self.model.rig.qpos.items()}

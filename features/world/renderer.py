@@ -4,11 +4,9 @@ The camera is the program's own pinhole (gazerig.drivers.camera.pinhole), includ
 point; gazerig.sim_mock.cameras.rendered adds the effects of the sensor.
 """
 
-import threading
 import weakref
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,10 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import ImageArray
-from gazerig.features.world.gl_context import Backend, open_context
+from gazerig.features.world.gl_context import open_context
 from gazerig.gaze.angles import add, compose, rotate
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.params import Bounds
 from gazerig.robot.description.links import IDENTITY, ORIGIN
 from gazerig.robot.model.scene_view import PinholeView
 
@@ -30,20 +27,22 @@ _UNSEEN = 5  # a group of geoms that is not drawn
 _SHADOWS_REACH_M = 1.5  # behind the camera
 
 
-@dataclass(frozen=True)
-class RendererParams:
-    """Content of the pictures; each item costs time."""
+class RendererParams(NamedTuple):
+    """Quality of the pictures, which costs time.
 
-    # fmt: off
-    shadow_px: Annotated[int, Bounds(0, 8192), "side of the shadow map; 0: no shadows"] = 512
-    samples: Annotated[int, Bounds(0, 16), "samples a pixel against jagged edges; 0: one"] = 4
-    reflections: Annotated[bool, "shiny floors and tables mirror what stands on them"] = False
-    skybox: Annotated[bool, "there is a sky outside the windows"] = True
-    # fmt: on
+    shadow_px: side of the shadow map, 0: no shadows
+    samples: samples per pixel against jagged edges, 0: one
+    """
+
+    shadow_px: int = 512
+    samples: int = 4
+
+
+DEFAULT_QUALITY = RendererParams()
 
 
 class Renderer:
-    """Renderer of one model; several threads may use it, one at a time.
+    """Renderer of pictures of one model and size.
 
     Raises:
         NoRenderer: nothing on this machine can render.
@@ -54,12 +53,10 @@ class Renderer:
         model: mujoco.MjModel,
         width_px: int,
         height_px: int,
-        params: RendererParams | None = None,
+        params: RendererParams = DEFAULT_QUALITY,
         hidden: Collection[str] = (),
     ) -> None:
-        params = params or RendererParams()
         self._model = model
-        self._lock = threading.Lock()
         self._size = width_px, height_px
         model.vis.quality.shadowsize = params.shadow_px
         model.vis.quality.offsamples = params.samples
@@ -70,27 +67,19 @@ class Renderer:
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, made)
             return made
 
-        self.backend: Backend
-        self.backend, self._context, self._mjr = open_context(make)
+        self._context, self._mjr = open_context(make)
         self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 64)
         self._option, self._free = mujoco.MjvOption(), mujoco.MjvCamera()
-        flags, names = self._scene.flags, mujoco.mjtRndFlag
-        flags[names.mjRND_SHADOW] = params.shadow_px > 0
-        flags[names.mjRND_REFLECTION] = params.reflections
-        flags[names.mjRND_SKYBOX] = params.skybox
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = params.shadow_px > 0
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         self._groups = model.geom_group.copy()
         self._groups[_geoms_of(model, hidden)] = _UNSEEN
         self._shadows = params.shadow_px > 0
         self._finalizer = weakref.finalize(self, _free, self._context, self._mjr)
 
     def render(
-        self,
-        data: mujoco.MjData,
-        lens: Intrinsics,
-        R: ArrayLike,
-        p_m: ArrayLike,
-        size_px: tuple[int, int] | None = None,
+        self, data: mujoco.MjData, lens: Intrinsics, R: ArrayLike, p_m: ArrayLike
     ) -> ImageArray:
         """Return the picture of a camera, without the lens's distortion.
 
@@ -99,47 +88,30 @@ class Renderer:
             lens: lens for pictures of this size.
             R: (3, 3) rotation of the camera in the world, its axes optical.
             p_m: (3,) position of the camera in the world.
-            size_px: width and height; None: the largest.
-
-        Raises:
-            ValueError: the picture is larger than the renderer's largest, or the renderer is
-                closed.
         """
-        width, height = size_px or self._size
-        if width > self._size[0] or height > self._size[1]:
-            raise ValueError(
-                f"a picture of {width} x {height} does not fit into {self._size[0]} x "
-                f"{self._size[1]}"
-            )
+        width, height = self._size
         rect = mujoco.MjrRect(0, 0, width, height)
         rgb = np.empty((height, width, 3), np.uint8)
-        with self._lock:
-            if not self._finalizer.alive:
-                raise ValueError("the renderer is closed")
-            turn, place = np.asarray(R, float), np.asarray(p_m, float)
-            # Geoms completely outside the picture are hidden: MuJoCo would draw all their
-            # triangles.
-            sides, model = _sides(lens, width, height), self._model
-            camera = (data.geom_xpos - place) @ turn
-            out = (camera @ sides.T > model.geom_rbound[:, None]).any(axis=1)
-            if self._shadows:  # a geom outside the picture may cast a shadow into it
-                out = camera[:, 2] < -_SHADOWS_REACH_M - model.geom_rbound
-            out &= model.geom_rbound > 0.0  # a plane has no size
-            model.geom_group[:] = np.where(out, _UNSEEN, self._groups)
-            mujoco.mjv_updateScene(
-                self._model, data, self._option, None, self._free, _ALL, self._scene
-            )
-            self._model.geom_group[:] = self._groups
-            self._look(lens, turn, place, width, height)
-            with self._context.as_current():
-                mujoco.mjr_render(rect, self._scene, self._mjr)
-                mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
+        turn, place = np.asarray(R, float), np.asarray(p_m, float)
+        # Geoms completely outside the picture are hidden: MuJoCo would draw all their triangles.
+        sides, model = _sides(lens, width, height), self._model
+        camera = (data.geom_xpos - place) @ turn
+        out = (camera @ sides.T > model.geom_rbound[:, None]).any(axis=1)
+        if self._shadows:  # a geom outside the picture may cast a shadow into it
+            out = camera[:, 2] < -_SHADOWS_REACH_M - model.geom_rbound
+        out &= model.geom_rbound > 0.0  # a plane has no size
+        model.geom_group[:] = np.where(out, _UNSEEN, self._groups)
+        mujoco.mjv_updateScene(model, data, self._option, None, self._free, _ALL, self._scene)
+        model.geom_group[:] = self._groups
+        self._look(lens, turn, place, width, height)
+        with self._context.as_current():
+            mujoco.mjr_render(rect, self._scene, self._mjr)
+            mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
         return np.ascontiguousarray(rgb[::-1, :, ::-1])
 
     def close(self) -> None:
         """Free all resources; safe to call twice."""
-        with self._lock:
-            self._finalizer()
+        self._finalizer()
 
     def _look(
         self,
@@ -202,8 +174,7 @@ PlaceBodies = Callable[[mujoco.MjData, float], None]
 class WorldPicture:
     """SceneView of a world: sets all poses for a time, and renders.
 
-    The renderer is created with the first picture, in the process and thread that requests it, and
-    created again for a larger picture.
+    The renderer is created with the first picture, in the process and thread that requests it.
 
     Args:
         model: the world.
@@ -219,40 +190,31 @@ class WorldPicture:
         self,
         model: mujoco.MjModel,
         place: PlaceBodies,
-        params: RendererParams | None = None,
+        params: RendererParams = DEFAULT_QUALITY,
         hidden: Collection[str] = (),
         R_world_base: Mat3 = IDENTITY,
         p_world_base_m: Vec3 = ORIGIN,
     ) -> None:
         self._base = R_world_base, p_world_base_m
         self._model, self._place, self._hidden = model, place, hidden
-        self._params = params or RendererParams()
+        self._params = params
         self._data = mujoco.MjData(model)
         self._renderer: Renderer | None = None
-        self._size = 0, 0
-
-    @property
-    def backend(self) -> str:
-        """Return the name of the rendering library, "" before the first picture."""
-        return self._renderer.backend if self._renderer is not None else ""
 
     def draw(self, seen_by: PinholeView) -> ImageArray:
-        """Return a picture; see ``SceneView.draw``."""
+        """Return a picture, all of one size; see ``SceneView.draw``."""
         t_s, lens, size_px, R, p_m = seen_by
         self._place(self._data, t_s)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
-        if self._renderer is None or size_px[0] > self._size[0] or size_px[1] > self._size[1]:
-            wide, high = max(size_px[0], self._size[0]), max(size_px[1], self._size[1])
-            self.close()
-            self._renderer = Renderer(self._model, wide, high, self._params, self._hidden)
-            self._size = wide, high
+        if self._renderer is None:
+            self._renderer = Renderer(self._model, *size_px, self._params, self._hidden)
         R_world_base, p_world_base_m = self._base
         R, p_m = compose(R_world_base, R), add(p_world_base_m, rotate(R_world_base, p_m))
-        return self._renderer.render(self._data, lens, R, p_m, size_px)
+        return self._renderer.render(self._data, lens, R, p_m)
 
     def close(self) -> None:
         """Free the renderer; safe to call twice."""
         if self._renderer is not None:
             self._renderer.close()
-        self._renderer, self._size = None, (0, 0)
+        self._renderer = None

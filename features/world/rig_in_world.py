@@ -3,66 +3,30 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import LinearLinkage, Linkage
 
-RELINEARISE_RAD = 0.003
-"""A coupling is linearised again after a joint has turned this far. The error of the servo's
-position is less than 1e-5 rad with any rods of a neck."""
 
+class Transmission(NamedTuple):
+    """Transmission between a servo and the joints that it helps to turn.
 
-class JointTransmission:
-    """Transmission of a servo that turns one joint; line: of a linear transmission, else None."""
-
-    def __init__(self, linkage: Linkage) -> None:
-        self._linkage = linkage
-        self.line = linkage.line
-
-    def at(self, joints_rad: Sequence[float]) -> tuple[float, tuple[float, ...]]:
-        """Return the servo's position in steps, and the steps per radian of the joint."""
-        if self.line is not None:
-            return self.line.zero + self.line.slope * joints_rad[0], (self.line.slope,)
-        steps = self._linkage.steps(joints_rad[0])
-        return steps, (1.0 / self._linkage.rate_rad(steps),)
-
-
-class PairTransmission:
-    """Transmission of one of two servos that turn two joints together.
-
-    Args:
-        coupling: coupling of the pair.
-        index: 0 for servo a, 1 for servo b.
-        linkage: between the servo's steps and its angle in the coupling.
+    linkage: between the servo's steps and its angle, or that of its only joint
+    ratios: turns of the servo for one turn of each joint
     """
 
-    def __init__(self, coupling: CouplingParams, index: int, linkage: Linkage) -> None:
-        self._coupling, self._index, self._linkage = coupling, index, linkage
-        self.line: LinearLinkage | None = None
-        self._at_rad: tuple[float, float] | None = None
-        self._steps = 0.0
-        self._slopes = (0.0, 0.0)
+    linkage: Linkage
+    ratios: tuple[float, ...] = (1.0,)
+
+    @property
+    def line(self) -> LinearLinkage | None:
+        """Return the line of a linear transmission to one joint, otherwise None."""
+        return self.linkage.line if len(self.ratios) == 1 else None
 
     def at(self, joints_rad: Sequence[float]) -> tuple[float, tuple[float, ...]]:
         """Return the servo's position in steps, and the steps per radian of each joint."""
-        first, second = joints_rad
-        before = self._at_rad
-        if before is None or max(abs(first - before[0]), abs(second - before[1])) > RELINEARISE_RAD:
-            self._linearise((first, second))
-            before = self._at_rad or (first, second)
-        a, b = self._slopes
-        return self._steps + a * (first - before[0]) + b * (second - before[1]), self._slopes
-
-    def _linearise(self, joints_rad: tuple[float, float]) -> None:
-        shaft_rad = self._coupling.servo_rad(joints_rad)[self._index]
-        rates = self._coupling.rates[self._index]
-        self._steps = self._linkage.steps(shaft_rad)
-        slope = 1.0 / self._linkage.rate_rad(self._steps)
-        self._slopes = slope * rates[0], slope * rates[1]
-        self._at_rad = joints_rad
-
-
-Transmission = JointTransmission | PairTransmission
-"""Transmission from one servo to the joints that it helps to turn."""
+        angle = sum(ratio * rad for ratio, rad in zip(self.ratios, joints_rad, strict=True))
+        steps, line = self.linkage.steps(angle), self.linkage.line
+        slope = 1.0 / self.linkage.rate_rad(steps) if line is None else line.slope
+        return steps, tuple(slope * ratio for ratio in self.ratios)
 
 
 class ServoInWorld(NamedTuple):

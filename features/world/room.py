@@ -4,25 +4,28 @@ Places are on the floor, in the world's axes: the neck base of the first head is
 """
 
 from collections.abc import Mapping, Sequence
-from math import atan2, cos, pi, radians, sin
+from functools import cache
+from math import atan2, cos, radians, sin
 from pathlib import Path
-from typing import NamedTuple
 
+import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from gazerig.gaze.types import Floats
 from gazerig.sim_mock.scenes.script import SceneScript
 
 HOME = Path(__file__).parent
-"""The folder with ``worlds``, the shipped scripts."""
+"""The folder with ``worlds``, the shipped scripts, and ``rooms``."""
 
 Point = tuple[float, float]
 
 
-class Place(NamedTuple):
+class Place(msgspec.Struct, frozen=True):
     """Place of a person: on the floor, or on a seat.
 
-    x_m, y_m: position of the centre of the hips; facing_rad: direction of a person there
+    x_m, y_m: position of the centre of the hips
+    facing_deg: direction of a person there, None towards the head
     seat_m: height of the seat above the floor, None without a seat
     approach: points that a walk from the room's middle passes before it
     outside: whether it is behind a door, where several people wait unseen
@@ -31,23 +34,22 @@ class Place(NamedTuple):
 
     x_m: float
     y_m: float
-    facing_rad: float
+    facing_deg: float | None = None
     seat_m: float | None = None
     approach: tuple[Point, ...] = ()
     outside: bool = False
     height_m: float = 1.3
 
+    @property
+    def facing_rad(self) -> float:
+        """Return the direction of a person there."""
+        if self.facing_deg is None:
+            return atan2(-self.y_m, -self.x_m)
+        return radians(self.facing_deg)
+
     def ahead(self, by_m: float) -> Point:
         """Return the point at a distance ahead of the place."""
         return self.x_m + by_m * cos(self.facing_rad), self.y_m + by_m * sin(self.facing_rad)
-
-
-def _to_head(x_m: float, y_m: float) -> float:
-    return atan2(-y_m, -x_m)
-
-
-def _chair(x_m: float, y_m: float, seat_m: float, *approach: Point) -> Place:
-    return Place(x_m, y_m, _to_head(x_m, y_m), seat_m, approach)
 
 
 _WAITING_M = 0.6
@@ -55,65 +57,29 @@ SEAT_AHEAD_M = 0.40
 """Distance in front of a seat's centre from which a person sits down."""
 WALK_STARTS_S, WALK_ENDS_S = 0.6, 0.8
 """Durations of the turns before and after a walk."""
-SEAT_M, SOFA_M = 0.45, 0.41
-"""Seat heights of a chair and of the sofa under a seated person."""
 
-LIVING_ROOM: Mapping[str, Place] = {
-    "door": Place(0.75, 3.55, 0.0, None, ((1.55, 2.35), (1.55, 3.30)), True),
-    "chair_left": _chair(1.16, 0.44, SEAT_M, (0.62, 1.0), (0.62, 0.55)),
-    "chair_right": _chair(1.16, -0.44, SEAT_M, (0.62, -1.0), (0.62, -0.55)),
-    "sofa_left": Place(2.62, 0.33, pi, SOFA_M, ((2.02, 0.95),)),
-    "sofa_right": Place(2.62, -0.33, pi, SOFA_M, ((2.02, -0.95),)),
-    "front": Place(0.95, 0.0, pi, None, ((0.80, 1.00),)),
-    "behind": Place(1.74, 0.02, pi, None, ((2.0, 1.00),)),
-    "window": Place(1.60, -1.90, radians(140.0), None, ((1.75, -1.2),)),
-    "shelf": Place(2.30, 1.75, radians(215.0), None, ()),
-}
-GYM: Mapping[str, Place] = {
-    "corner": Place(1.08, 0.0, pi),
-    "left": Place(1.05, 0.30, _to_head(1.05, 0.30)),
-    "right": Place(1.05, -0.30, _to_head(1.05, -0.30)),
-    "rope": Place(2.60, 0.9, _to_head(2.60, 0.9)),
-    "behind_left": Place(-0.75, 0.75, 0.0),
-    "behind_right": Place(-0.75, -0.75, 0.0),
-}
-HALL: Mapping[str, Place] = {
-    "entrance": Place(2.1, 4.3, 0.0, None, ((3.45, 3.0), (3.45, 4.2)), True),
-    "exit": Place(2.1, -4.3, 0.0, None, ((3.45, -3.0), (3.45, -4.2)), True),
-    "front": Place(1.05, 0.0, pi),
-    "front_left": Place(1.15, 0.55, _to_head(1.15, 0.55)),
-    "front_right": Place(1.15, -0.55, _to_head(1.15, -0.55)),
-    "close": Place(0.56, 0.0, pi),
-    "lane_left": Place(2.9, 1.3, -pi / 2),
-    "lane_right": Place(2.9, -1.3, -pi / 2),
-    "middle": Place(2.0, 0.05, pi),
-    "far_right": Place(3.4, -1.3, 0.2),
-    "poster": Place(5.5, -2.3, pi, height_m=1.75),
-    "middle_left": Place(2.3, 1.0, _to_head(2.3, 1.0)),
-    "middle_right": Place(2.3, -0.8, _to_head(2.3, -0.8)),
-}
-ROOMS: Mapping[str, Mapping[str, Place]] = {
-    "living-room": LIVING_ROOM,
-    "gym": GYM,
-    "hall": HALL,
-}
-"""The places of each room by name."""
+
+@cache
+def _room_places(room: str) -> Mapping[str, Place]:
+    """Return the places of a room by name."""
+    text = (HOME / "rooms" / f"{room}.yaml").read_bytes()
+    return msgspec.yaml.decode(text, type=dict[str, Place])
 
 
 def places_of(script: SceneScript) -> dict[str, Place]:
     """Return all places of a world: those of its room, replaced or extended by its own."""
     own = {
-        name: Place(one.x_m, one.y_m, radians(one.facing_deg), height_m=one.height_m)
+        name: Place(one.x_m, one.y_m, one.facing_deg, height_m=one.height_m)
         for name, one in script.places.items()
     }
-    return {**ROOMS[script.room], **own}
+    return {**_room_places(script.room), **own}
 
 
 def places_for(script: SceneScript, name: str) -> dict[str, Place]:
     """Return all places as one person uses them: people who wait outside form a row."""
     row = _WAITING_M * list(script.people).index(name)
     return {
-        key: place._replace(x_m=place.ahead(-row)[0], y_m=place.ahead(-row)[1])
+        key: replace(place, x_m=place.ahead(-row)[0], y_m=place.ahead(-row)[1])
         if place.outside
         else place
         for key, place in places_of(script).items()

@@ -66,15 +66,14 @@ class ServedWorld:
         self._clock_s = clock_s
         self.commands = frozenset(COMMANDS.verbs)
         self.world = World(spec.compile(), clock_s)
-        if spec.figures is not None:
-            spec.figures.share()
+        spec.figures.share()
         self._writer = StateWriter(state, self.world.state().qpos.size)
         self._due_ms = 0
         self._begun = False
 
     def joints(self) -> dict[str, int]:
         """Return the indices of the rig's joints in a state."""
-        return self.world.model.rigs[0].qpos
+        return self.world.model.rig.qpos
 
     def device(self, bus: BusSettings) -> Device:
         """Return an emulated device whose servos move the joints of the world's rig."""
@@ -105,6 +104,5 @@ class ServedWorld:
             return
         self.world.advance(now_ms)
         if self._begun:
-            state = self.world.state()
-            self._writer.write(now_ms / 1e3, state.t_s, state.qpos)
+            self._writer.write(self.world.state())
         self._due_ms = now_ms + PUBLISH_MS

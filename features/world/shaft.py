@@ -78,8 +78,7 @@ class ShaftAxis:
         self._dof = tuple(rig.dof[name] for name in servo.joints)
         self._wrap = int(mj.tendon_adr[self._tendon])
         self._unit = STEPS_PER_TURN / servo.steps_per_turn
-        self._load_nm = self._friction_nm = 0.0
-        self._applied_nm = [0.0] * len(self._dof)
+        self._friction_nm = 0.0
         _, self._slopes = servo.transmission.at(self._angles(data.qpos))
         line = servo.transmission.line
         self.slope = None if line is None else self._unit * line.slope
@@ -110,8 +109,6 @@ class ShaftAxis:
         rad = shaft_rad_of(self._servo.steps_per_turn)
         for nth, slope in enumerate(self._slopes):
             self._mj.wrap_prm[self._wrap + nth] = rad * slope
-        if self._load_nm:
-            self._apply_load()
 
     # --- on demand
 
@@ -135,15 +132,12 @@ class ShaftAxis:
             angle = self._data.qpos[at] + share * slope
             self._data.qpos[at] = min(max(angle, low), high)
 
-    def build(
-        self, rotor_kg_m2: float, friction_nm: float, viscous_nm_s: float, play_steps: float = 0.0
-    ) -> None:
+    def build(self, rotor_kg_m2: float, friction_nm: float, play_steps: float = 0.0) -> None:
         """Set the properties of a servo's motor and gear at its shaft.
 
         Args:
             rotor_kg_m2: inertia of the rotor behind its gear.
             friction_nm: dry friction.
-            viscous_nm_s: viscous friction, torque per rad/s.
             play_steps: half of the play between the shaft and the joint of its entry.
         """
         if play_steps:
@@ -153,7 +147,7 @@ class ShaftAxis:
         self._mj.tendon_armature[self._tendon] = rotor_kg_m2
         self._friction_nm = friction_nm
         self.jam(False)
-        self.damp(viscous_nm_s)
+        self.damp(0.0)
 
     def damp(self, nm_s: float) -> None:
         """Set the damping torque per rad/s of the shaft."""
@@ -162,18 +156,6 @@ class ShaftAxis:
     def jam(self, stuck: bool) -> None:
         """Jam the shaft at its position, or free it."""
         self._mj.tendon_frictionloss[self._tendon] = JAM_NM if stuck else self._friction_nm
-
-    def load(self, nm: float) -> None:
-        """Apply a constant torque to the shaft."""
-        self._load_nm = nm
-        self._apply_load()
-
-    def _apply_load(self) -> None:
-        """Apply the load to the joints, on which another servo's load may act, too."""
-        rad = shaft_rad_of(self._servo.steps_per_turn)
-        before, self._applied_nm = self._applied_nm, [self._load_nm * rad * s for s in self._slopes]
-        for at, now, earlier in zip(self._dof, self._applied_nm, before, strict=True):
-            self._data.qfrc_applied[at] += now - earlier
 
 
 class WorldShaft(Shaft):
@@ -201,7 +183,7 @@ class WorldShaft(Shaft):
         super().__init__(model, physics, axis.position())
         self._induced_nm_s = stall * self._built.rate * SPEED_UNIT
         rotor = physics.rotor_s * stall / top_rad_s
-        axis.build(rotor, stall * physics.coulomb_share, 0.0, self._built.play)
+        axis.build(rotor, stall * physics.coulomb_share, self._built.play)
         self._brake()
 
     @property

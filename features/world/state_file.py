@@ -6,7 +6,6 @@ so a restarted process finds it as well, and a killed process cannot leave a loc
 """
 
 import mmap
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,12 +16,12 @@ from gazerig.gaze.types import Floats
 _HEADER = 3  # count of states, numbers in a state, host's time at the start of the world
 
 
-class HostState(NamedTuple):
-    """State of a world and its time.
+class WorldState(NamedTuple):
+    """State of a world; a picture needs only this and the script of the people.
 
     Attributes:
-        host_s: time of the host's monotonic clock.
-        t_s: the world's own time, seconds from its start.
+        host_s: time of the clock on which the world is simulated.
+        t_s: time since the start of the script of its people, 0 before.
         qpos: all coordinates of its joints, in MuJoCo's order.
     """
 
@@ -43,13 +42,12 @@ class StateWriter:
         self._rows = self._numbers[_HEADER:].reshape(2, size + 2)
         self._count = 0
 
-    def write(self, host_s: float, t_s: float, qpos: Sequence[float] | Floats) -> None:
+    def write(self, state: WorldState) -> None:
         """Write the newest state."""
         row = self._rows[self._count % 2]
-        row[0], row[1] = host_s, t_s
-        row[2:] = qpos
+        row[0], row[1], row[2:] = state
         self._count += 1
-        self._numbers[2] = host_s - t_s
+        self._numbers[2] = state.host_s - state.t_s
         self._numbers[0] = self._count
 
 
@@ -76,11 +74,11 @@ class StateReader:
         """Return the host's time at the start of the world, None before the first state."""
         return float(self._numbers[2]) if self.count else None
 
-    def newest(self) -> HostState | None:
+    def newest(self) -> WorldState | None:
         """Return the newest state, None before the first."""
         while count := self.count:
             row = self._rows[(count - 1) % 2].copy()
             # If two states were written in the meantime, the copy may mix both.
             if self.count <= count:
-                return HostState(float(row[0]), float(row[1]), row[2:])
+                return WorldState(float(row[0]), float(row[1]), row[2:])
         return None

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from gazerig.features.world.figure import SIDES, Figures
+from gazerig.features.world.body_motion import SIDES
+from gazerig.features.world.figure import Figures
 from gazerig.features.world.motions import FIST_M, OUT_S
 from gazerig.features.world.opponent_motion import Opponent
 from gazerig.features.world.rotations import rotation_matrix, rotation_vector

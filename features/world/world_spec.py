@@ -11,21 +11,21 @@ if TYPE_CHECKING:
     from gazerig.features.world.model import WorldModel
 
 
-_SPEC, _STATE, _PEOPLE = "world", "state", "people.npy"
-"""Files in the folder of a server: content of the world, newest state, people's motion."""
+_STATE, _PEOPLE = "state", "people.npy"
+"""Files in the folder of a server: newest state, people's motion."""
 
 
 class WorldSpec(NamedTuple):
     """Content of a world: a room, its people and the rig in it.
 
     Attributes:
-        figures: the people, whose script defines the room; None for an empty floor.
-        rigs: the rig; () for a room without one.
+        figures: the people, whose script defines the room.
+        rig: the rig.
         mjcf_file: a user's own world instead of the room.
     """
 
-    figures: Figures | None
-    rigs: tuple[RigInWorld, ...]
+    figures: Figures
+    rig: RigInWorld
     mjcf_file: Path | None = None
 
     def compile(self) -> "WorldModel":
@@ -37,12 +37,10 @@ class WorldSpec(NamedTuple):
         import_mujoco()  # independent of MUJOCO_GL
         from gazerig.features.world.model import world_model
 
-        return world_model(self.figures, self.rigs, self.mjcf_file)
+        return world_model(self.figures, self.rig, self.mjcf_file)
 
     def with_shared_file(self, folder: Path) -> "WorldSpec":
         """Return the same world with its people's motion in a file of the folder."""
-        if self.figures is None:
-            return self
         return self._replace(figures=self.figures.with_shared_file(folder / _PEOPLE))
 
 

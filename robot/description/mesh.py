@@ -6,7 +6,8 @@ vertices are 0..255 in sRGB: red, green, blue, and optionally opacity.
 *shapes.npz* has four arrays for each shape: NAME/vertices, NAME/faces, NAME/colours, NAME/normals.
 Parts of the rig's head are in distances between the eyes; eye, lids and ear have the radius 1, the
 neck radius and length 1, the bust height 1. People, gloves and shoes are in metres, hands have the
-radius 1. The faces of a shape are pairs that form quadrangles.
+radius 1. Segments of bodies are those of an adult of 1.72 m, in metres; shirts and necks are grey.
+The faces of a shape are pairs that form quadrangles.
 """
 
 from collections.abc import Sequence

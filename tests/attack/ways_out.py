@@ -71,13 +71,12 @@ def commands(name: str, rig: str = "") -> dict[str, list[str]]:
     """Return what is typed, by name; each holds the torque on until it is ended."""
     rig = rig or name
     joint = "eyes_pan" if name in BOARDS else "left_eye_pan"
-    by = [] if name in BOARDS else ["--by", "motion"]
     out = ["--out", "/tmp/ways_out_face.yaml"] if rig == name else []
     return {
         "run": ["run", rig, "--scene", "visitor", "--no-page"],
         "jog": ["jog", rig, joint, "8", "--hold", "--yes"],
-        "calibrate": ["calibrate", rig, "--dry-run", "--joint", joint, *by, "--yes"],
-        "calibrate face": ["calibrate", "face", rig, "--scene", "sits-still", "--no-page", *out],
+        "calibrate": ["calibrate", rig, "--dry-run", "--joint", joint, "--yes"],
+        "calibrate face": ["calibrate", "face", rig, "--scene", "sits-still", *out],
         "monitor": ["monitor", rig, "--json"],
     }  # fmt: skip
 

@@ -5,35 +5,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import radians
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
-from gazerig.features.bringup.calibration.camera_calibration import (
+from gazerig.features.bringup.calibration.board_page import PAPERS_MM, write_page
+from gazerig.features.bringup.calibration.board_views import ViewCollector, board_view
+from gazerig.features.bringup.calibration.camera_procedure import neck_angles, neck_steps
+from gazerig.features.bringup.calibration.hand_eye import HandEye, NeckView, camera_on_head
+from gazerig.features.bringup.calibration.lens_calibration import (
     CameraCalibrationRefused,
     LensCalibration,
-    LensCalibrationParams,
     calibrate_lens,
-)
-from gazerig.features.bringup.calibration.camera_procedure import (
-    NeckStepParams,
-    neck_angles,
-    neck_steps,
-)
-from gazerig.features.bringup.calibration.charuco_views import (
-    PAPERS_MM,
-    board_view,
-    write_page,
-)
-from gazerig.features.bringup.calibration.hand_eye import (
-    HandEye,
-    HandEyeParams,
-    NeckView,
-    camera_on_head,
-    turns_deg,
 )
 from gazerig.gaze.types import Angles3
 from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard, DetectedBoard
@@ -68,7 +54,6 @@ def seen_board(
 
 LENS = replace(BOARD_LENS, distortion=(-0.11, 0.06, 0.0008, -0.0006, 0.0))
 GUESS = intrinsics_of_view(radians(69.0), *SIZE)
-VIEWS = 16
 
 
 def corners(
@@ -78,15 +63,14 @@ def corners(
     return seen_board(hand_held_pose(number, BOARD), lens, noise_px, rng)
 
 
-def some_views(noise_px: float = 0.3, count: int = VIEWS) -> list[DetectedBoard]:
+def some_views(noise_px: float = 0.3, count: int = 16) -> list[DetectedBoard]:
     rng = np.random.default_rng(0)
     return [corners(k, noise_px, rng, LENS) for k in range(count)]
 
 
-def calibrated(views: list[DetectedBoard], **params: Any) -> LensCalibration:
+def calibrated(views: list[DetectedBoard]) -> LensCalibration:
     """Calibrate from fewer views than 0.3 px of noise would really ask for."""
-    params.setdefault("most_focal_error_percent", 0.6)
-    return calibrate_lens(views, GUESS, *SIZE, LensCalibrationParams(**params))
+    return calibrate_lens(views, *SIZE, 0.6)
 
 
 def assert_true(found: LensCalibration, true: Intrinsics) -> None:
@@ -113,7 +97,7 @@ def test_lens_from_pictures_is_within_one_percent(seed: int) -> None:
     found = calibrated(views)
     assert_true(found, BOARD_LENS)
     assert found.rms_px == pytest.approx(0.3 * 2**0.5, rel=0.2)
-    assert found.dropped == ()
+    assert found.dropped == 0
 
 
 def test_a_view_that_does_not_fit_is_dropped() -> None:
@@ -123,21 +107,20 @@ def test_a_view_that_does_not_fit_is_dropped() -> None:
     bent = views[7].corners_px + 5.0 * np.sin(views[7].corners_px / 40.0)
     views[7] = views[7]._replace(corners_px=bent)
     found = calibrated(views)
-    assert found.dropped == (7,)
+    assert found.dropped == 1
     assert_true(found, LENS)
 
 
 def flat(view: DetectedBoard) -> bool:
     how = board_view(view, GUESS, *SIZE)
-    return how is not None and abs(how.tilt_right_deg) < 14 and abs(how.tilt_down_deg) < 14
+    return how is not None and how[4:8].max() < 14.0
 
 
 @pytest.mark.parametrize(
-    ("made", "message"),
+    ("made", "missing"),
     [
-        (lambda: [], "show 12 more views"),
-        (lambda: some_views(count=5), "show 7 more views"),
-        (lambda: some_views(count=1) * 20, "19 of them too much like others.*show 11 more"),
+        (lambda: [], "left edge of the image"),
+        (lambda: some_views(count=60)[:9], "show [3-9] more views|edge|tilt|nearer"),
         (lambda: [v for v in some_views(count=90) if flat(v)], "tilt the board"),
         (
             lambda: [v for v in some_views(count=60) if v.corners_px[:, 0].min() > 90.0],
@@ -145,11 +128,25 @@ def flat(view: DetectedBoard) -> bool:
         ),
     ],
 )
-def test_views_that_do_not_show_the_lens_are_refused(
-    made: Callable[[], list[DetectedBoard]], message: str
+def test_views_that_do_not_show_the_lens_are_not_enough(
+    made: Callable[[], list[DetectedBoard]], missing: str
 ) -> None:
-    with pytest.raises(CameraCalibrationRefused, match=message):
-        calibrated(made())
+    collector = ViewCollector(GUESS, *SIZE)
+    for view in made():
+        collector.offer(view)
+    assert re.search(missing, collector.missing)
+
+
+def test_views_that_show_the_lens_are_enough_and_each_is_a_new_one() -> None:
+    collector = ViewCollector(GUESS, *SIZE)
+    views = some_views(count=60)
+    assert collector.offer(None) == "no board seen"
+    assert [collector.offer(view) for view in (views[0], views[0])] == [
+        "", "too much like a view before",
+    ]  # fmt: skip
+    for view in views:
+        collector.offer(view)
+    assert collector.missing == "" and 12 <= len(collector.views) < len(views)
 
 
 def test_corners_that_jump_about_are_refused_with_the_number() -> None:
@@ -199,7 +196,6 @@ def test_boards_that_cannot_be_are_refused(
 
 
 CAMERA = CameraParams()
-FEW = NeckStepParams(frames=2, timeout_s=1.0)
 
 
 class MovedNeck:
@@ -217,6 +213,7 @@ class MovedNeck:
     def rest(self, seconds: float) -> None:
         self.clock.sleep_until(self.clock.now_s() + seconds)
 
+    @property
     def angles(self) -> Angles3:
         assert self.scene.head_rad is not None
         return self.scene.head_rad
@@ -237,9 +234,8 @@ def test_a_head_that_looks_around_finds_its_camera(scene: BoardScene, neck: Move
     angles = neck_angles(RANGES, BOARD_LENS, 640, 400)[:12]
     now_s = neck.clock.now_s
     steps = list(
-        neck_steps(neck, lambda: scene.look(now_s()), now_s, BOARD, KINEMATICS, angles, FEW)
+        neck_steps(cast(Any, neck), lambda: scene.look(now_s()), now_s, BOARD, KINEMATICS, angles)
     )
-    assert [step.number for step in steps] == list(range(1, 13))
     views = [step.view for step in steps if step.view is not None]
     assert len(views) == 12 and neck.went == [*angles, (0.0, 0.0, 0.0)]
     found = camera_on_head(views, BOARD_LENS, 640).camera_params(replace(CAMERA))
@@ -273,8 +269,8 @@ def neck_views(
     return views
 
 
-def found_in(scene: BoardScene, views: list[NeckView], **params: Any) -> HandEye:
-    return camera_on_head(views, BOARD_LENS, 640, HandEyeParams(**params))
+def found_in(scene: BoardScene, views: list[NeckView]) -> HandEye:
+    return camera_on_head(views, BOARD_LENS, 640)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -283,16 +279,28 @@ def test_turns_about_one_axis_are_refused(axis: int) -> None:
     angles = [
         tuple(a if k == axis else 0.0 for k in range(3)) for a in np.linspace(-0.25, 0.25, 12)
     ]
-    with pytest.raises(CameraCalibrationRefused, match="about one axis and only by 0.0 deg"):
+    with pytest.raises(CameraCalibrationRefused, match="turn the head farther|nods as well"):
         found_in(scene, neck_views(scene, angles))  # type: ignore[arg-type]
 
 
 def test_a_place_that_is_not_sure_is_refused() -> None:
     scene = scene_elsewhere()
-    small = [(0.3 * y, 0.45 * p, 0.3 * r) for y, p, r in planned()]
-    views = neck_views(scene, small, 0.6)
+    small = [(0.3 * y, 0.3 * p, 0.3 * r) for y, p, r in planned()]
     with pytest.raises(CameraCalibrationRefused, match="sure to .* mm and .* deg only"):
-        found_in(scene, views, least_turn_deg=1.0, most_position_std_mm=0.5)
+        found_in(scene, neck_views(scene, small, 0.6))
+
+
+def test_few_views_and_a_joint_with_the_wrong_sign_are_refused() -> None:
+    scene = scene_elsewhere()
+    views = neck_views(scene, planned())
+    with pytest.raises(CameraCalibrationRefused, match="seen from 7 neck angles"):
+        found_in(scene, views[:7])
+    mirrored = [
+        NeckView(*KINEMATICS.head_pose((-yaw, pitch, roll)), view.seen)
+        for (yaw, pitch, roll), view in zip(planned(), views, strict=True)
+    ]
+    with pytest.raises(CameraCalibrationRefused, match="reprojection error"):
+        found_in(scene, mirrored)
 
 
 def test_angles_planned_stay_inside_the_neck_and_turn_about_all_axes() -> None:
@@ -302,5 +310,3 @@ def test_angles_planned_stay_inside_the_neck_and_turn_about_all_axes() -> None:
         assert len(set(angles)) == len(angles) and angles[0] == (0.0, 0.0, 0.0)
         for axis, (low, high) in enumerate(ranges):
             assert all(low <= a[axis] <= high for a in angles)
-    _, second = turns_deg([KINEMATICS.head_pose(a)[0] for a in planned()])
-    assert second > HandEyeParams().least_turn_deg

@@ -7,7 +7,7 @@ from command_line import Invoked, answers_in, invoked
 from commands_started import OnTerminal
 
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.cli.calibration_keys import (
+from gazerig.features.bringup.cli.prompts import (
     split_words,
 )
 from gazerig.robot.control.command_handler import accept_only_stops
@@ -62,7 +62,7 @@ def test_the_offsets_steered_to_are_in_the_rig_file(rig: Path, tmp_path: Path) -
         ((), ("", "q", "n"), 0, "nothing"),
         ((), ("left", "sideways"), 2, "'sideways' is no key: left, right, up"),
         ((), ("", "q"), 2, "no answer left to: write these 1"),
-        (("--camera", "0", "--video", "x.png"), ("q",), 2, "exclude each other"),
+        (("--camera", "0", "--oak"), ("q",), 2, "exclude each other"),
     ],
 )
 def test_nothing_chosen_a_no_or_what_is_wrong_writes_nothing(
@@ -97,7 +97,7 @@ def sitting_at(rig: Path, *words: str) -> OnTerminal:
 # Parking takes a bounded time, in which a starved machine does not reach the end.
 def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
     before = rig.read_bytes()
-    with sitting_at(rig, "--no-page") as sitting:
+    with sitting_at(rig) as sitting:
         sitting.reads("1/8 the tip of your nose: 0 mm")
         sitting.types(b"\x1b[D")
         sitting.reads("5 mm left")

@@ -5,6 +5,7 @@ from functools import cache
 
 import pytest
 from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one
+from msgspec import structs
 from present import present
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
@@ -22,21 +23,14 @@ from gazerig.drivers.pca9685.board import (
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.bus_search import (
-    ORDER,
-    found_servos,
-    plan_search,
-    search_bus,
-)
+from gazerig.features.bringup.cli.scan import ORDER, search_bus
 from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685
-from gazerig.features.bringup.doctor.diagnostics import Diagnostic, Fix, worst_level
-from gazerig.features.bringup.doctor.servo_checks import CHECKS
+from gazerig.features.bringup.doctor.diagnostics import ADVICE, Diagnostic, Fix, worst_level
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, KINDS
 from gazerig.features.bringup.servo_setup import (
     assign_servo,
     find_alone,
-    search_order,
     search_rates,
 )
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -57,7 +51,7 @@ def healthy(name):
         rig.set(1, shutdown=52)  # as from the factory it is worth a note
     found = ping(rig.port, kind.family, 1, BAUD)
     registers = Transactions(rig.port, kind.family)
-    state = read_state(registers, CHECKS[kind.name], rig.setups[0], present(found), False)
+    state = read_state(registers, kind, rig.setups[0], present(found), False)
     assert None not in state.values.values() and worst_level(apply_rules(state)) == "ok"
     return state
 
@@ -69,7 +63,7 @@ def found_as(kind, **other):
 def servo_state(kind, setup=None, found=None, shares_id=False, **values):
     """Return a healthy servo with some registers otherwise."""
     state = healthy(kind.name)
-    return replace(
+    return structs.replace(
         state,
         setup=setup or state.setup,
         found=found or state.found,
@@ -104,7 +98,7 @@ DYNAMIXEL_RULES = [
     (
         {"shutdown": 1},
         "warn",
-        "does not switch off at overheating, electrical shock, overload",
+        "does not switch off at each of overheating, electrical shock, overload (Shutdown 1)",
         "set Shutdown (63) to 53",
     ),
     ({"status_return_level": 1}, "warn", "does not confirm commands", "--fix"),
@@ -172,7 +166,7 @@ def test_nobody(kind):
     rig = Rig(kind)
     rig.command("lose all")
     (only,) = rig.check()
-    assert only.level == "error" and kind.no_reply in only.remedy
+    assert only.level == "error" and ADVICE.families[kind.name].no_reply in only.remedy
 
 
 @each
@@ -285,7 +279,7 @@ def test_a_good_board_and_what_no_board_tells():
     assert "12 channels" in one(findings, "ok", "the board", "answers").what
     assert one(findings, "note", "the servos", "hobby servos report nothing")
     reported = one(findings, "note", "the board", "serial timeout cannot be read")
-    assert "Pololu's program" in reported.remedy and "gazerig setup" in reported.remedy
+    assert "Timeout to 0.5 s" in reported.remedy and "every channel to Off" in reported.remedy
     wide = one(findings, "note", "left_upper_lid (channel 2)", "goes to 900..1800 us")
     assert "Min to 896" in wide.remedy and "cuts goals silently" in wide.what
     assert not any(f.where == "eyes_pan (channel 0)" for f in findings)
@@ -387,7 +381,8 @@ class Bench:
         self.chain.positions_steps()
 
     def find(self):
-        order = search_order(self.kind, BAUD)
+        order = (self.kind.family.factory_baud, *self.kind.family.baud_rates)
+        order = tuple(dict.fromkeys(order))
         answers = search_rates(self.port, self.kind, order, self.reported.append, thorough=True)
         return find_alone(answers, self.port.port_name)
 
@@ -414,12 +409,12 @@ ANYWHERE = [
 @pytest.mark.parametrize(("kind", "servo_id", "baud"), ANYWHERE)
 def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, baud):
     bench = Bench(ServoSpec(servo_id, NECK[kind.name]), baud=baud, kind=kind)
-    result = bench.assign()
-    assert result.before == FoundServo(servo_id, *NUMBER[kind.name], baud, bench.model)
-    assert result.after == FoundServo(7, *NUMBER[kind.name], BAUD, bench.model)
-    assert (f"id {servo_id} -> 7" in result.changes) == (servo_id != 7)
-    assert (f"baud rate {baud} -> {BAUD} bit/s" in result.changes) == (baud != BAUD)
-    assert len(result.changes) == (servo_id != 7) + (baud != BAUD)
+    assert bench.find() == FoundServo(servo_id, *NUMBER[kind.name], baud, bench.model)
+    after, changes = bench.assign()
+    assert after == FoundServo(7, *NUMBER[kind.name], BAUD, bench.model)
+    assert (f"id {servo_id} -> 7" in changes) == (servo_id != 7)
+    assert (f"baud rate {baud} -> {BAUD} bit/s" in changes) == (baud != BAUD)
+    assert len(changes) == (servo_id != 7) + (baud != BAUD)
     (servo,) = bench.chain.servos
     assert (servo.id, servo.torque) == (7, False)
     rate = bench.registers().read(7, "baud_rate")
@@ -440,7 +435,7 @@ def test_a_servo_whose_torque_is_on_is_let_go_first(kind):
     bench = Bench(kind=kind)
     bench.port.setBaudRate(bench.baud)
     assert bench.registers().write(1, "torque_enable", 1)
-    assert bench.assign().changes[0] == "torque 1 -> 0"
+    assert bench.assign()[1][0] == "torque 1 -> 0"
     assert not bench.chain[7].torque
 
 
@@ -450,7 +445,7 @@ def test_a_servo_whose_torque_is_on_is_let_go_first(kind):
     [
         ((1,), "lose all", "no servo answers at any baud rate"),
         ((1,), "truncate all 5", "in pieces only"),
-        ((1, 2), "clear", "2 servos answer: id 1 .* id 2 .*: connect"),
+        ((1, 2), "clear", "several servos answer: id 1 .* id 2 .*: connect"),
         ((1, 1), "clear", "alone"),
     ],
 )
@@ -523,13 +518,10 @@ def test_a_lost_confirmation_does_not_matter(address):
 
     bench = Bench()
     bench.port = Lossy(bench.chain)
-    assert bench.assign().after == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
+    assert bench.assign()[0] == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
 
 
 # --- Searching a port for every kind: servos are found, and none is moved or changed
-
-
-FEW = (1_000_000, 57_600)
 
 
 class Line:
@@ -542,8 +534,8 @@ class Line:
     def tap(self, data):
         self.sent += data
 
-    def search(self, rates=FEW, usb="", kinds=ORDER, thorough=False):
-        return list(search_bus(self.port, usb, plan_search(usb, kinds, rates), thorough))
+    def search(self, kinds=ORDER, thorough=False):
+        return list(search_bus(self.port, kinds, thorough))
 
 
 # --- a board is never sent what moves it
@@ -560,21 +552,10 @@ def test_a_board_is_recognised_before_anything_could_move_it(board):
     board.exchange(bytes.fromhex("8403102F"))
     before = [one["target"] for one in board.faults.reports()]
     line = Line(board)
-    rounds = line.search(rates=None)
+    rounds = line.search()
     assert rounds[-1].board is not None and {one.kind for one in rounds} == {"maestro"}
     assert b"\xff" not in line.sent
     assert [one["target"] for one in board.faults.reports()] == before
-
-
-def test_a_port_of_pololu_is_never_sent_servo_packets_even_where_nobody_answers():
-    board = build_board(12, lambda: 0.0)
-    board.faults.command("lose all")
-    line = Line(board)
-    (only,) = line.search(usb=MINI, rates=None)
-    assert only.board is None and line.sent and b"\xff" not in line.sent
-    for kind in ("dynamixel", "feetech"):
-        assert plan_search(MINI, (kind,), None) == ()
-    assert plan_search(MICRO, ORDER, (1_000_000,)) == (("maestro", 115_200),)
 
 
 # --- servos of each kind hear the other's packets and are left as they are
@@ -596,7 +577,7 @@ def test_no_packet_changes_dynamixel_servos():
     assert bytes.fromhex("FFFF0104020009") in line.sent  # an STS packet went over the line
     assert [memory(servo) for servo in chain.servos] == before
     assert chain.positions_steps() == places
-    assert not any(one.found for one in rounds if one.kind == "feetech")
+    assert not any(one.has_answer for one in rounds if one.kind == "feetech")
 
 
 def test_no_packet_changes_sts_servos():
@@ -604,9 +585,8 @@ def test_no_packet_changes_sts_servos():
     before = [chain[i].read(0, 56) for i in (1, 49, 253)]
     places = chain.positions_steps()
     rounds = Line(chain).search(thorough=True)
-    assert {(kind, servo.id) for kind, servo in found_servos(rounds)} == {
-        ("feetech", 1), ("feetech", 49), ("feetech", 253),
-    }  # fmt: skip
+    found = {(one.kind, servo.id) for one in rounds if one.answers for servo in one.answers.found}
+    assert found == {("feetech", 1), ("feetech", 49), ("feetech", 253)}
     assert [chain[i].read(0, 56) for i in (1, 49, 253)] == before
     assert chain.positions_steps() == places
-    assert not any(one.found for one in rounds if one.kind == "dynamixel")
+    assert not any(one.has_answer for one in rounds if one.kind == "dynamixel")

@@ -17,13 +17,9 @@ from gazerig.features.bringup.calibration.face_steering import (
     ORDER,
     STALE_S,
     STEPS_MM,
-    WAIT_S,
     FaceCalibration,
     FaceSteering,
     Key,
-    apply_key,
-    changed_places,
-    initial_calibration,
     point_world_m,
 )
 from gazerig.features.bringup.cli.calibrate.face import exact_gaze
@@ -40,43 +36,43 @@ KEYS = st.lists(st.sampled_from(get_args(Key)), max_size=60)
 
 
 def after(*keys: Key) -> FaceCalibration:
-    state = initial_calibration({})
+    state = FaceCalibration({})
     for key in keys:
-        state = apply_key(state, key)
+        state.apply(key)
     return state
 
 
 @given(KEYS)
 def test_no_keys_lead_off_the_face_or_out_of_its_plane(keys: list[Key]) -> None:
-    state = initial_calibration({})
+    state = FaceCalibration({})
     for key in keys:
-        state = apply_key(state, key)
+        state.apply(key)
     for part in ORDER:
-        x, y, z = state.place_mm(part)
+        x, y, z = state.places_mm[part]
         assert x == pytest.approx(PARTS_FACE_M[part][0] * 1e3)
         assert abs(y) <= FARTHEST_MM and abs(z) <= FARTHEST_MM
     assert state.step_mm in STEPS_MM
-    assert {key.partition(".")[2] for key in changed_places(state)} == set(state.adjusted_parts)
+    assert {key.partition(".")[2] for key in state.changed_places()} == set(state.adjusted_parts)
 
 
 def test_left_is_the_owners_left_and_up_is_up_whatever_the_face_does() -> None:
-    state = apply_key(apply_key(initial_calibration({}), "left"), "up")
+    state = after("left", "up")
     assert state.moved_mm("N") == (5.0, 5.0)
     # A face that looks back at the robot has its left at the world's -y.
     facing = rotation((radians(180.0), 0.0, 0.0))
-    x, y, z = point_world_m(state.place_mm("N"), (1.0, 0.0, 0.2), facing)
+    x, y, z = point_world_m(state.places_mm["N"], (1.0, 0.0, 0.2), facing)
     assert (x, y, z) == pytest.approx((1.0, -0.005, 0.205))
     # Lying on its right shoulder, the owner's left is up in the world.
     lying = compose(facing, rotation((0.0, 0.0, radians(90.0))))
-    x, y, z = point_world_m(state.place_mm("N"), (1.0, 0.0, 0.2), lying)
+    x, y, z = point_world_m(state.places_mm["N"], (1.0, 0.0, 0.2), lying)
     assert z == pytest.approx(0.205) and abs(y) == pytest.approx(0.005)
 
 
 def test_back_and_skip_take_a_choice_back() -> None:
     state = after("left", "enter", "back", "skip")
-    assert changed_places(state) == {} and state.place_mm("N") == (0.0, 0.0, 0.0)
+    assert state.changed_places() == {} and state.places_mm["N"] == (0.0, 0.0, 0.0)
     state = after("left", "enter", "back", "left", "enter")
-    assert changed_places(state) == {"face_parts_mm.N": (0.0, 10.0, 0.0)}
+    assert state.changed_places() == {"face_parts_mm.N": (0.0, 10.0, 0.0)}
     assert after("back").part == "N"
 
 
@@ -93,7 +89,7 @@ def face(number: int, x: float, y: float = 0.0, yaw: float = 3.1) -> Face:
 
 
 def steering() -> FaceSteering:
-    return FaceSteering(initial_calibration({}), TOP_DOWN, REST)
+    return FaceSteering(FaceCalibration({}), TOP_DOWN, REST)
 
 
 def chosen(made: FaceSteering, t_s: float, *faces: Face, captured_s: float | None = None) -> Target:
@@ -114,7 +110,7 @@ def test_of_several_faces_the_nearest_and_then_the_same() -> None:
 def test_the_part_goes_with_the_face_and_the_head_with_its_centre() -> None:
     made = steering()
     chosen(made, 0.0, face(1, 1.0))
-    assert made.press("left", 0.0) is None
+    assert made.press("left") is None
     for yaw in (2.6, 3.1, 3.6):
         there = face(1, 0.9, 0.2, yaw)
         target = chosen(made, 0.1, there)
@@ -127,9 +123,9 @@ def test_a_stale_picture_shows_nobody_and_keys_wait() -> None:
     made = steering()
     chosen(made, 1.0, face(1, 1.0))
     assert chosen(made, 2.0, face(1, 1.0), captured_s=1.9 - STALE_S).kind == "rest"
-    assert "no face is seen" in (made.press("left", 2.0) or "")
-    assert made.state == initial_calibration({}) and not made.is_aimed
-    assert made.press("end", 2.0) is None and made.state.part is None
+    assert "no face is seen" in (made.press("left") or "")
+    assert made.state.places_mm == FaceCalibration({}).places_mm and not made.is_aimed
+    assert made.press("end") is None and made.state.part is None
 
 
 # --- what the eyes of an emulated rig do
@@ -137,7 +133,7 @@ def test_a_stale_picture_shows_nobody_and_keys_wait() -> None:
 
 @pytest.fixture
 def steered(desk_rig: Rig) -> FaceSteering:
-    return FaceSteering(initial_calibration({}), TopDown(desk_rig.gaze.top_down), REST)
+    return FaceSteering(FaceCalibration({}), TopDown(desk_rig.gaze.top_down), REST)
 
 
 @pytest.fixture
@@ -155,7 +151,7 @@ def ticks(made: Assembly, steered: FaceSteering, seconds: float) -> Tick:
         made.clock.sleep_until(start_s + slot / 200)
         t_s = made.clock.now_s()
         tick = made.robot.tick(t_s, t_s - last_s)
-        assert steered.update(tick) is None
+        steered.update(tick)
         last_s = t_s
     assert tick is not None
     return tick
@@ -170,29 +166,30 @@ def test_both_eyes_meet_the_true_place_of_the_part_on_the_face(
     ticks(made, steered, 1.5)
     for _ in range(3):
         for key in ("left", "up", "up"):
-            assert steered.press(key, made.clock.now_s()) is None
+            assert steered.press(key) is None
         part = steered.state.part
         assert part is not None
         true = point_world_m(
-            steered.state.place_mm(part), person.p_world_face_m, rotation((yaw, pitch, 0.0))
+            steered.state.places_mm[part], person.p_world_face_m, rotation((yaw, pitch, 0.0))
         )
         pose = ticks(made, steered, 0.6).pose
         left = angle_between(line_of_sight(pose, True), sub(true, pose.p_world_eye_left_m))
         right = angle_between(line_of_sight(pose, False), sub(true, pose.p_world_eye_right_m))
         assert steered.is_aimed and degrees(max(left, right)) < AIMED_DEG
-        steered.press("enter", made.clock.now_s())
+        steered.press("enter")
         ticks(made, steered, 0.1)
         assert part in steered.state.adjusted_parts and steered.state.part != part
 
 
-def test_an_enter_is_dropped_with_a_reason_where_the_eyes_never_come(
+def test_an_enter_is_refused_while_the_eyes_are_elsewhere(
     made: Assembly, steered: FaceSteering
 ) -> None:
     made.robot.start(made.clock)
     tick = ticks(made, steered, 1.0)
-    steered.press("enter", tick.t_s)
     # Eyes that are measured elsewhere, whatever their command.
     aside = replace(tick.pose, eye_left_rad=(0.3, 0.0))
-    assert steered.update(replace(tick, t_s=tick.t_s + 0.1, pose=aside)) is None
-    why = steered.update(replace(tick, t_s=tick.t_s + WAIT_S + 0.1, pose=aside))
+    steered.update(replace(tick, pose=aside))
+    why = steered.press("enter")
     assert why is not None and "not taken" in why and steered.state.part == "N"
+    steered.update(tick)
+    assert steered.press("enter") is None and steered.state.part == "LE"

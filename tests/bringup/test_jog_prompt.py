@@ -10,25 +10,24 @@ from commands_started import OnTerminal
 from stand_in import StandIn
 
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.cli.jog_prompt import TerminalJogger
-from gazerig.features.bringup.cli.prompts import Lines
+from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
 
 
 def test_lines_move_a_servo_until_enter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    moves: list[tuple[str, float]] = []
+    moves: list[float] = []
     servo: Any = StandIn()
-    servo.move_by_us = lambda us: moves.append(("by", us))
-    servo.move_to_us = lambda us: moves.append(("to", us))
+    servo.place_us = 1500.0
+    servo.aim = moves.append
     servo.live = lambda: "here"
     lines = answers_in(tmp_path, "+40", "-12.5", "1480", "left", "nan", "")
-    TerminalJogger(Lines(Path(lines)), lambda: None, False).steer("move it", servo)
-    assert moves == [("by", 40.0), ("by", -12.5), ("to", 1480.0)]
+    TerminalPerson(Lines(Path(lines)), lambda: None, False).steer("move it", servo)
+    assert moves == [1540.0, 1487.5, 1480.0]
     assert capsys.readouterr().err.count("moves it by so many us") == 2
 
 
 def test_keys_steer_a_hobby_servo_at_the_terminal(rigs: dict[str, str]) -> None:
     rig = rigs["maker"]
-    words = (rig, "--mock", "--yes", "--joint", "eyes_tilt", "--more", "0", "--margin", "0")
+    words = (rig, "--mock", "--yes", "--joint", "eyes_tilt", "--margin", "0")
     with OnTerminal("calibrate", *words) as terminal:
         terminal.reads("shall it begin? [1510]")
         terminal.types(b"\n")
@@ -55,9 +54,12 @@ def test_keys_steer_a_hobby_servo_at_the_terminal(rigs: dict[str, str]) -> None:
         terminal.types(b"\r")
         terminal.reads("at 1480 us: how many degrees")
         terminal.types(b"-7\n")
+        # Half-way between each two marks, with the angle that it proposes.
+        terminal.reads("eyes_tilt at 1505 us: how many degrees")
+        terminal.types(b"-3\n")
+        terminal.reads("eyes_tilt at 1555 us: how many degrees")
+        terminal.types(b"\n")
         terminal.reads("written into")
-    assert load_rig(rig).joints["eyes_tilt"].transmission_points == (
-        (-7, 1480),
-        (0, 1530),
-        (8, 1580),
-    )
+    points = load_rig(rig).joints["eyes_tilt"].transmission_points
+    assert points[:3] == ((-7, 1480), (-3, 1505), (0, 1530))
+    assert points[3] == (pytest.approx(4.0, abs=0.3), 1555) and points[4] == (8, 1580)

@@ -15,11 +15,12 @@ from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.servo_bus.settings import write_settings
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.features.bringup.calibration.endstop_search import (
-    STEPS_PER_DEG,
-    StopSearchParams,
+from gazerig.features.bringup.calibration.hobby_calibration import (
+    PULSES_US,
+    SPEED_US_S,
+    HobbyServoAccess,
+    calibrate_by_marks,
 )
-from gazerig.features.bringup.calibration.hobby_access import SPEED_US_S, HobbyServoAccess
 from gazerig.features.bringup.calibration.joint_calibration import (
     CalibrationRefused,
     Marks,
@@ -27,14 +28,7 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     joint_calibration,
     with_calibration,
 )
-from gazerig.features.bringup.calibration.joint_procedure import (
-    calibrate_by_hand,
-    calibrate_by_motion,
-)
-from gazerig.features.bringup.calibration.linkage_calibration import (
-    HobbyMarker,
-    calibrate_by_marks,
-)
+from gazerig.features.bringup.calibration.joint_procedure import calibrate_by_hand
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
     SmartServoAccess,
@@ -49,18 +43,14 @@ from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 STS = JointParams(3, "sts3215", -35.0, 35.0, 300.0, 20000.0)
-GENTLY = StopSearchParams()
-FREE = (-1e9, 1e9)
 
 
 class Bench:
-    """One emulated servo between stops, and a person with a script."""
+    """One emulated servo, and a person with a script."""
 
-    def __init__(
-        self, joint: JointParams, start: int = 2100, stops: tuple[float, float] = FREE
-    ) -> None:
+    def __init__(self, joint: JointParams, start: int = 2100) -> None:
         self.clock = SimulatedClock()
-        physics = Physics(stop_low_steps=stops[0], stop_high_steps=stops[1])
+        physics = Physics(stop_low_steps=-1e9, stop_high_steps=1e9)
         spec = ServoSpec(joint.id, joint.model, start, physics=physics)
         build = build_feetech if joint is STS else build_dynamixel
         self.chain = build([spec], self.clock.now_s)
@@ -68,14 +58,10 @@ class Bench:
         self.port.setBaudRate(1_000_000)
         self.kind = servo_kind(joint.model)
         self.registers = Transactions(self.port, self.kind.family)
-        self.why: str | None = None
         self.id = joint.id
         self.script: list[int] = []
         self.said: list[str] = []
-        self.agreed = True
-        self.joint = SmartServoAccess(
-            "left_eye_pan", joint, self.port, self.clock, lambda: self.why
-        )
+        self.joint = SmartServoAccess("left_eye_pan", joint, self.port, self.clock.now_s)
 
     def get(self, register: str) -> int:
         value = self.registers.read(self.id, register)
@@ -84,9 +70,6 @@ class Bench:
 
     def put(self, register: str, value: int) -> None:
         write_settings(self.registers, self.id, {register: value})
-
-    def limits(self) -> tuple[int, int]:
-        return self.get("min_position_limit"), self.get("max_position_limit")
 
     def command(self, text: str) -> None:
         self.port.faults.command(text.format(id=self.id))
@@ -109,13 +92,15 @@ class Bench:
             self.clock.sleep_until(self.clock.now_s() + 0.04)
             live()
 
-    def agrees(self, question: str, live: Callable[[], str]) -> bool:
-        self.said.append(question)
-        live()
-        return self.agreed
+    def steer(self, question: str, servo: HobbyServoAccess) -> None:
+        raise AssertionError(question)
+
+    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        raise AssertionError(question)
 
 
 TURN = 4096
+STEPS_PER_DEG = TURN / 360.0
 
 
 # --- following a position over the seam
@@ -135,7 +120,6 @@ def test_a_position_is_followed_over_the_seam_however_it_is_reported(
         true += move
         reported = true % TURN if wraps else true
         assert track.see(reported, i * 0.05) == true
-    assert track.steps == true
 
 
 def test_turning_unseen_is_refused_when_its_way_is_unknown() -> None:
@@ -177,7 +161,7 @@ def test_what_is_found_is_what_is_there_or_it_is_refused(
         return
     assert inside
     assert found.zero_step == zero and found.sign == sign
-    made = with_calibration(joint, found)
+    made = with_calibration("left_eye_pan", joint, found)
     for angle, end in ((found.max_deg, ends[0]), (found.min_deg, ends[1])):
         short_steps = (end - made.steps(radians(angle))) * (1 if angle > 0 else -1) * sign
         assert margin <= short_steps / (ratio * STEPS_PER_DEG) + 0.1 / ratio
@@ -185,10 +169,6 @@ def test_what_is_found_is_what_is_there_or_it_is_refused(
 
 
 # --- Calibrating one emulated joint by hand or by motion; refused joints
-
-
-STOPS = (1700.0, 2500.0)
-each = pytest.mark.parametrize("joint", [EYE, STS], ids=["dynamixel", "feetech"])
 
 
 def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> None:
@@ -205,85 +185,6 @@ def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> Non
     bench.script = [600, -1200, 600]
     found = calibrate_by_hand(bench.joint, bench, 2.0)
     assert found.zero_step == pytest.approx(2048, abs=4) and found.max_deg > 45.0
-
-
-# --- driven
-
-
-@each
-def test_by_motion_finds_the_stops_and_puts_everything_back(joint: JointParams) -> None:
-    bench = Bench(joint, 2100, STOPS)
-    bench.put("min_position_limit", 2000)
-    bench.put("max_position_limit", 2200)
-    names = (
-        ("torque_limit", "goal_speed", "acceleration", "lock")
-        if joint is STS
-        else ("goal_pwm", "profile_acceleration", "profile_velocity", "bus_watchdog")
-    )
-    before = [bench.get(name) for name in names]
-    found = calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
-    assert found.sign == 1 and found.zero_step == pytest.approx(2100, abs=8)
-    assert found.max_deg == pytest.approx(400 / STEPS_PER_DEG - 2.0, abs=1.0)
-    assert found.min_deg == pytest.approx(-400 / STEPS_PER_DEG + 2.0, abs=1.0)
-    assert bench.get("torque_enable") == 0
-    assert bench.limits() == (2000, 2200) and [bench.get(name) for name in names] == before
-    pushed = [float(line.split("pushed for ")[1].split()[0]) for line in bench.said if "pu" in line]
-    assert len(pushed) == 2 and max(pushed) <= 500.0
-
-
-def test_by_motion_the_person_says_which_way_it_went() -> None:
-    bench = Bench(EYE, 2100, STOPS)
-    bench.agreed = False
-    assert calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle").sign == -1
-
-
-def test_by_motion_without_a_stop_before_the_seam_is_refused() -> None:
-    bench = Bench(EYE, 3900, (3000.0, 1e9))
-    with pytest.raises(CalibrationRefused, match="end of the servo's turn"):
-        calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
-    assert bench.get("torque_enable") == 0
-
-
-@each
-def test_by_motion_a_stop_that_is_asked_for_lets_go_at_once(joint: JointParams) -> None:
-    bench = Bench(joint, 2100, STOPS)
-    bench.why = "SIGINT"
-    with pytest.raises(CalibrationStopped, match="SIGINT"):
-        calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
-    assert bench.get("torque_enable") == 0
-    if joint is STS:
-        assert bench.get("torque_limit") == 1000
-    else:
-        assert bench.get("bus_watchdog") == 0
-
-
-def test_by_motion_is_slow_and_weak() -> None:
-    bench = Bench(EYE, 2100, STOPS)
-    bench.joint.enable_torque(GENTLY)
-    assert bench.get("goal_pwm") == round(0.3 * bench.get("pwm_limit"))
-    assert 0 < bench.get("profile_velocity") <= 2.0 * 15.0 * STEPS_PER_DEG / 15.6 + 1
-    assert bench.get("bus_watchdog") == 15
-    start, seen = bench.clock.now_s(), []
-    real = bench.joint.position
-
-    def position() -> tuple[int, float]:
-        seen.append(real())
-        return seen[-1]
-
-    bench.joint.position = position  # type: ignore[method-assign]
-    bench.joint.find_stop(GENTLY, 1)
-    way = [(p, t) for p, t in seen if t > start + 1.0]
-    speed = (way[60][0] - way[0][0]) / (way[60][1] - way[0][1]) / STEPS_PER_DEG
-    assert 10.0 < speed < 20.0
-    bench.joint.restore()
-
-
-def test_a_servo_that_restarts_on_the_way_has_met_no_stop() -> None:
-    bench = Bench(STS, 2100, (1000.0, 3000.0))
-    bench.joint.enable_torque(GENTLY)
-    bench.chain.faults.command(f"brown-out {STS.id}")
-    with pytest.raises((ServoFault, BusLost)):
-        bench.joint.find_stop(GENTLY, 1)
 
 
 # --- refused
@@ -310,12 +211,15 @@ def test_a_servo_that_suffers_or_is_silent_is_named(
         bench.joint.position()
 
 
-def test_a_joint_that_a_hand_took_over_the_seam_is_not_driven() -> None:
-    bench = Bench(EYE, 4000)
-    bench.chain.find_servo(1).turn(200)
-    with pytest.raises(ServoMissing, match="turned over the seam"):
-        bench.joint.enable_torque(GENTLY)
-    assert bench.get("torque_enable") == 0
+def test_a_servo_in_another_mode_or_with_an_offset_is_not_calibrated() -> None:
+    bench = Bench(EYE)
+    bench.put("operating_mode", 4)
+    with pytest.raises(ServoFault, match=r"not in position mode .* --fix"):
+        bench.joint.check()
+    bench = Bench(EYE)
+    bench.put("homing_offset", -200)
+    with pytest.raises(ServoFault, match="Homing Offset -200"):
+        bench.joint.check()
 
 
 # --- measured by eye
@@ -328,7 +232,7 @@ class LinkageBench:
     at a question for one.
     """
 
-    def __init__(self, name: str, *answers: str, pulses: tuple[float, float] = (500, 2500)) -> None:
+    def __init__(self, name: str, *answers: str) -> None:
         made = EmulatedRig(load_rig("maker"))
         rig, self.clock, self.port = made.rig, made.clock, made.ports[""]
         self.board: Any = made.devices[""]
@@ -343,9 +247,8 @@ class LinkageBench:
             rig.bus.maestro,
             self.clock,
             lambda: self.why,
-            pulses,
+            self,
         )
-        self.placer = HobbyMarker(self.hobby, self)
 
     def place_us(self) -> float:
         """Return the true position of the shaft."""
@@ -357,13 +260,13 @@ class LinkageBench:
         target: int = self.board.faults.reports()[self.channel]["target"]
         return target
 
-    def measure(self, margin: float = 2.0, more: int = 0):
+    def measure(self, margin: float = 2.0):
         try:
-            return calibrate_by_marks(self.placer, self, margin, more)
+            return calibrate_by_marks(self.hobby, self, margin)
         finally:
             self.hobby.disable()
 
-    # gazerig.features.bringup.calibration.linkage_calibration.Jogger
+    # gazerig.features.bringup.calibration.joint_procedure.Operator
 
     def tell(self, line: str) -> None:
         self.said.append(line)
@@ -371,13 +274,10 @@ class LinkageBench:
     def wait(self, question: str, live: Callable[[], str]) -> None:
         raise AssertionError(question)
 
-    def agrees(self, question: str, live: Callable[[], str]) -> bool:
-        raise AssertionError(question)
-
-    def steer(self, question: str, servo: HobbyMarker) -> None:
+    def steer(self, question: str, servo: HobbyServoAccess) -> None:
         self.said.append(question)
         while answer := self._next():
-            (servo.move_by_us if answer[0] in "+-" else servo.move_to_us)(float(answer))
+            servo.aim(float(answer) + (servo.place_us if answer[0] in "+-" else 0.0))
             servo.live()
 
     def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
@@ -393,38 +293,40 @@ class LinkageBench:
 
 
 def test_eyes_are_measured_and_their_pulses_end() -> None:
-    bench = LinkageBench("eyes_pan", "", "", "1800", "", "25", "1210", "", "-24")
+    bench = LinkageBench("eyes_pan", "", "", "1800", "", "25", "1210", "", "-24", "-11", "12")
     made = bench.measure()
-    assert made.transmission_points == ((-24.0, 1210.0), (0.0, 1500.0), (25.0, 1800.0))
+    assert made.transmission_points == (
+        (-24.0, 1210.0), (-11.0, 1355.0), (0.0, 1500.0), (12.0, 1650.0), (25.0, 1800.0),
+    )  # fmt: skip
     assert (made.min_deg, made.max_deg) == (-22.0, 23.0)
     assert bench.pulse() == 0 and bench.place_us() == pytest.approx(1500.0, abs=6.0)
     assert any("Keep your fingers out" in line for line in bench.said)
 
 
 def test_a_channel_that_gives_pulses_does_not_jump(maker_rig: Rig) -> None:
-    bench = LinkageBench("eyes_pan", "", "1550", "", "", "1450", "", "")
+    bench = LinkageBench("eyes_pan")
     bench.port.setBaudRate(115_200)
     bench.port.write(MaestroParams(crc=maker_rig.bus.maestro.crc).targets({0: 1534 * 4}))
     bench.clock.sleep_until(1.0)
     before = bench.place_us()
-    bench.hobby.open()
-    assert bench.hobby.begin(2000.0) == 1534.0
+    bench.hobby.begin()
+    assert bench.hobby.place_us == 1534.0
     bench.clock.sleep_until(2.0)
     assert bench.place_us() == pytest.approx(before, abs=1.0)
 
 
-def test_it_moves_slowly_and_never_outside_what_was_asked() -> None:
-    bench = LinkageBench("eyes_pan", pulses=(1400.0, 1700.0))
-    bench.hobby.open()
-    bench.hobby.begin(1500.0)
+def test_it_moves_slowly_and_never_outside_the_pulses_of_a_servo() -> None:
+    bench = LinkageBench("eyes_pan", "1700")
+    bench.hobby.begin()
     bench.clock.sleep_until(bench.clock.now_s() + 0.5)
-    assert bench.hobby.aim(2400.0) == 1700.0
+    assert bench.hobby.aim(2900.0) == PULSES_US[1] and bench.hobby.aim(100.0) == PULSES_US[0]
+    bench.hobby.aim(1900.0)
     start_s, start_us = bench.clock.now_s(), bench.place_us()
     while not bench.hobby.look():
         way_us = bench.place_us() - start_us
         assert way_us <= SPEED_US_S * (bench.clock.now_s() - start_s + 0.05)
-    assert bench.hobby.arrive() == 1700.0
-    assert bench.place_us() == pytest.approx(1700.0, abs=6.0)
+    assert bench.hobby.move_to(1900.0) == 1900.0
+    assert bench.place_us() == pytest.approx(1900.0, abs=6.0)
 
 
 @pytest.mark.parametrize("why", ["SIGINT", "q"])
@@ -439,13 +341,12 @@ def test_whoever_ends_it_gets_a_limp_servo(why: str) -> None:
 
 
 def test_a_board_that_falls_silent_or_is_not_there_is_named() -> None:
-    bench = LinkageBench("eyes_pan")
-    bench.hobby.open()
-    bench.hobby.begin(1500.0)
+    bench = LinkageBench("eyes_pan", "1500")
+    bench.hobby.begin()
     bench.port.faults.command("lose all")
     with pytest.raises(BusLost, match="does not answer"):
-        bench.hobby.arrive()
+        bench.hobby.move_to(1600.0)
     silent = LinkageBench("eyes_pan")
     silent.port.faults.command("lose all")
     with pytest.raises(ServoMissing):
-        silent.hobby.open()
+        silent.hobby.begin()

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig
-from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step
+from gazerig.features.bringup.manual_control import ManualControl, Step
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.control.body import Body
@@ -37,7 +37,7 @@ class Bench(EmulatedRig):
             Body(rig_bus(rig, self.ports), rig.joints, park_rad(rig)),
             guard,
             self.clock,
-            JogParams(speed_deg_s=speed_deg_s),
+            speed_deg_s,
             lambda: self.why,
             self.note,
         )
@@ -76,9 +76,9 @@ def test_one_joint_moves_and_the_others_hold(bench: Bench) -> None:
     moved = bench.control.jog("neck_yaw", 20.0)
     after = bench.where()
     assert moved.arrived
-    assert moved.joint_move("neck_yaw").error == pytest.approx(0.0, abs=2.0)
+    assert moved.joints["neck_yaw"].measured == pytest.approx(20.0, abs=2.0)
     assert after.pop("neck_yaw") == pytest.approx(20.0, abs=2.0)
-    assert moved.joint_move("neck_yaw").reasons == ()
+    assert moved.joints["neck_yaw"].reasons == ()
     del before["neck_yaw"]
     assert after == pytest.approx(before, abs=0.5)
 
@@ -107,7 +107,7 @@ def test_no_goal_is_faster_than_asked_nor_outside_the_range(
 
 def test_out_of_range_is_held_back_at_the_limit_and_says_so(bench: Bench) -> None:
     moved = bench.control.pose({"left_eye_pan": 50.0})
-    part = moved.joint_move("left_eye_pan")
+    part = moved.joints["left_eye_pan"]
     assert not moved.arrived and moved.end_reason == "held back"
     assert part.desired == pytest.approx(50.0) and part.commanded == pytest.approx(35.0)
     assert part.reasons == ("out of range",)
@@ -128,10 +128,10 @@ def test_a_joint_that_cannot_is_named_and_not_pushed(
     bench.at[bench.clock.now_s() + after_s] = fault
     before = bench.where()["neck_yaw"]
     moved = bench.control.jog("neck_yaw", 30.0)
-    part = moved.joint_move("neck_yaw")
+    part = moved.joints["neck_yaw"]
     assert not moved.arrived and moved.end_reason == end_reason
     assert any(reason in one for one in part.reasons)
-    assert (moved.level == "torque_off") == (end_reason == "torque_off")
+    assert (moved.last.guard_result.level == "torque_off") == (end_reason == "torque_off")
     assert part.commanded == pytest.approx(before, abs=15.0)
     assert bench.where()["neck_yaw"] < 10.0
 

@@ -7,6 +7,7 @@ from math import pi, sin
 from pathlib import Path
 from typing import Any, cast
 
+import msgspec
 import numpy as np
 import pytest
 from emulated_rig import EmulatedRig
@@ -16,16 +17,16 @@ from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
+from gazerig.features.bringup.cli.monitor import reader_of
 from gazerig.features.bringup.hand_recording import record_hand_motion, switch_off
 from gazerig.features.bringup.servo_kinds import KINDS
 from gazerig.features.bringup.telemetry import (
     Monitor,
     Telemetry,
     TelemetrySample,
-    as_json,
+    smart_servo_reader,
 )
-from gazerig.robot.app.bus_wiring import bus_names
+from gazerig.robot.app.bus_wiring import bus_names, joints_on
 from gazerig.robot.app.track_file import TOLERANCE_DEG, track_text, write_track
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.mass_params import HeadMassParams, MassParams
@@ -70,10 +71,7 @@ class Bench(EmulatedRig):
         for name in bus_names(rig):
             config, port = rig.bus_named(name), self.ports[name]
             port.setBaudRate(config.section.baud)
-            board = BOARDS.get(config.kind)
-            readers[name] = (
-                board(port, config) if board else SmartServoTelemetry(port, KINDS[config.kind])
-            )
+            readers[name] = reader_of(port, config, rig.joints[joints_on(rig, name)[0]].model)
         joints = {name: rig.joints[name] for name in rig.names}
         self.monitor = Monitor(readers, joints, self.clock.now_s)
 
@@ -125,10 +123,10 @@ def test_a_silent_servo_is_none_and_counted(kind: str) -> None:
     bench.monitor.sample()
     sample = bench.monitor.sample()
     assert sample.servos["neck_yaw"] is None and sample.servos["left_eye_pan"] is not None
-    assert (sample.request_count, sample.unanswered) == (2 * len(bench.rig.names), 2)
-    reported = json.loads(json.dumps(as_json(sample, 0.0)))
-    assert reported["joints"]["neck_yaw"] is None and reported["unanswered"] == 2
-    assert reported["joints"]["left_eye_pan"]["position_steps"] == 2100
+    assert (sample.asked, sample.unanswered) == (2 * len(bench.rig.names), 2)
+    reported = json.loads(msgspec.json.encode(sample))
+    assert reported["servos"]["neck_yaw"] is None and reported["unanswered"] == 2
+    assert reported["servos"]["left_eye_pan"]["position_steps"] == 2100
     bench.command("clear")
     assert bench.monitor.sample().servos["neck_yaw"] is not None
 
@@ -171,7 +169,7 @@ class HandBench:
         self.rig = EmulatedRig(replace(rig, mass=balanced))
         self.port = self.rig.ports[""]
         self.port.setBaudRate(rig.bus.section.baud)
-        reader = SmartServoTelemetry(self.port, KINDS["dynamixel"])
+        reader = smart_servo_reader(self.port, KINDS["dynamixel"])
         self.monitor = Monitor({"": reader}, rig.joints, self.rig.clock.now_s)
         self._at: dict[str, float] = {}
 

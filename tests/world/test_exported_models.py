@@ -39,7 +39,7 @@ def stall_torque_nm(bench: WorldBench, joint: str, angle_deg: float) -> float:
         (board,) = bench.devices.values()
         board.channels[params.id].set_target(steps)
     bench.pass_ms(200)
-    at = bench.world.model.rigs[0].dof[joint]
+    at = bench.world.model.rig.dof[joint]
     return float(bench.world._data.qfrc_actuator[at])
 
 

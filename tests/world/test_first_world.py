@@ -27,7 +27,7 @@ def test_the_room_where_it_can_be_rendered(
     name: str, level: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(first_world, "find_spec", lambda name: object())
-    monkeypatch.setattr(first_world, "open_context", lambda make: ("egl", Free(), name))
+    monkeypatch.setattr(first_world, "open_context", lambda make: (Free(), name))
     main()
     assert capsys.readouterr() == (f"--computer {level} {ROOM}\n", "")
 

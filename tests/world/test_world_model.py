@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from described_rigs import SHIPPED
+from world_rigs import NOBODY
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
@@ -17,7 +18,7 @@ def model_with(name: str, path: Path | None = None) -> Any:
     """Return a world with a rig in it, of a file or empty."""
     from gazerig.features.world.model import world_model
 
-    return world_model(None, [rig_in_world(load_rig(name), looks=False)], path)
+    return world_model(NOBODY, rig_in_world(load_rig(name), looks=False), path)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -26,7 +27,7 @@ def test_every_shipped_rig_stands_in_a_world_at_its_first_angles(name: str) -> N
     from gazerig.features.world.physics import World
 
     world = World(model_with(name), lambda: 0.0)
-    (placed,) = world.model.rigs
+    placed = world.model.rig
     assert set(placed.qpos) == set(load_rig(name).names) == set(placed.tendon)
     assert world.joints_rad() == rig_in_world(load_rig(name), looks=False).start_rad
 
@@ -49,7 +50,7 @@ def test_a_users_world_carries_the_head_at_its_site(mujoco: Any, tmp_path: Path)
 def test_a_rig_knows_where_its_neck_base_stands(tmp_path: Path) -> None:
     """A site may be turned."""
     sites = '<site name="gazerig" pos="1 2 3" euler="0 0 90"/>'
-    (first,) = model_with("desk", _world_file(tmp_path, sites)).rigs
+    first = model_with("desk", _world_file(tmp_path, sites)).rig
     assert first.p_world_base_m == pytest.approx((1.0, 2.0, 3.0))
     assert [*first.R_world_base[0], *first.R_world_base[1]] == pytest.approx([0, -1, 0, 1, 0, 0])
 
@@ -61,26 +62,17 @@ def test_a_users_world_without_a_place_for_the_head_is_refused(tmp_path: Path) -
         model_with("desk", path)
 
 
-def test_a_users_world_that_has_the_rigs_joints_is_used_as_it_is(tmp_path: Path) -> None:
-    """Its bodies are the head; the servos turn its joints."""
-    names = load_rig("minimal").names
-    joints = "".join(f'<body><joint name="{name}"/><geom size=".01"/></body>' for name in names)
-    path = _world_file(tmp_path, joints)
-    model = model_with("minimal", path)
-    assert model.mj.nbody == 1 + len(names) and model.mj.nu == len(names)
-
-
-UNUSABLE = (
-    ("", "read"),
+@pytest.mark.parametrize(
+    ("text", "why"),
     (
-        '<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody>'
-        '<site name="gazerig"/></worldbody></mujoco>',
-        "build",
+        ("", "read"),
+        (
+            '<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody>'
+            '<site name="gazerig"/></worldbody></mujoco>',
+            "build",
+        ),
     ),
 )
-
-
-@pytest.mark.parametrize(("text", "why"), UNUSABLE)
 def test_a_users_world_that_cannot_be_used_is_one_line(tmp_path: Path, text: str, why: str) -> None:
     """MuJoCo's own message follows."""
     path = tmp_path / "own.xml"

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from world_scripts import WORLDS, shipped_world
 
-from gazerig.features.world.figure import SEGMENTS, Figures
+from gazerig.features.world.body_motion import SEGMENTS
+from gazerig.features.world.figure import Figures
 from gazerig.features.world.timeline import HEAD_M
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.gaze.types import Floats
@@ -235,19 +236,16 @@ def owner(model: Any, geom: int) -> str:
 
 @pytest.mark.parametrize("name", WORLDS)
 def test_people_stay_out_of_the_furniture_and_of_each_other(mujoco: Any, name: str) -> None:
-    from gazerig.features.world.figure_model import PeoplePlacer, add_people
-    from gazerig.features.world.room_model import add_room
+    from gazerig.features.world.figure_model import PeoplePlacer
+    from gazerig.features.world.model import world_spec
 
     figures = Figures(shipped_world(name), 1)
-    spec = mujoco.MjSpec()
-    add_room(spec, figures.script)
-    add_people(spec, figures)
-    model = spec.compile()
+    model = world_spec(figures, None).compile()
     data = mujoco.MjData(model)
     people = PeoplePlacer(model, figures)
     owners = [owner(model, i) for i in range(model.ngeom)]
     solid = [i for i in range(model.ngeom) if model.geom_contype[i] and "/" in owners[i]]
-    room = [i for i in range(model.ngeom) if owners[i] == "room"]
+    room = [i for i in range(model.ngeom) if owners[i] in ("room", "stand")]
     whose = np.array([one.split("/")[0] for one in owners])
     bound = model.geom_rbound
     half_m = 3.4 if figures.script.room == "hall" else 2.6

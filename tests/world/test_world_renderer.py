@@ -59,7 +59,7 @@ class Balls:
         def place(data: Any, t_s: float) -> None:
             data.mocap_pos[:] = POINTS
 
-        params = RendererParams(shadow_px=0, skybox=False)
+        params = RendererParams(shadow_px=0)
         self.picture = WorldPicture(model, place, params, (), R_world_base, p_world_base_m)
 
 
@@ -115,7 +115,7 @@ def test_what_is_beside_the_picture_is_left_out_and_nothing_else() -> None:
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{xml}</worldbody></mujoco>")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    renderer = Renderer(model, *SIZE, RendererParams(shadow_px=0, samples=0, skybox=False))
+    renderer = Renderer(model, *SIZE, RendererParams(shadow_px=0, samples=0))
     for R, p_m in POSES:
         seen = renderer.render(data, LENS, R, p_m)
         model.geom_rbound[:] = 99.0  # as if everything reached into the picture
@@ -137,7 +137,7 @@ def test_the_head_that_carries_the_camera_does_not_see_itself() -> None:
     )
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    params = RendererParams(shadow_px=0, skybox=False)
+    params = RendererParams(shadow_px=0)
     for hidden, lit in (((), True), (("head",), False)):
         renderer = Renderer(model, *SIZE, params, hidden)
         assert bool(renderer.render(data, LENS, *POSES[0]).any()) == lit
@@ -180,12 +180,12 @@ def pictures(renders: None) -> list[tuple[ImageArray, Floats]]:
 def pictures_of(look: int) -> Iterator[tuple[ImageArray, Floats]]:
     from gazerig.features.world.figure import Figures
     from gazerig.features.world.figure_model import PeoplePlacer
-    from gazerig.features.world.model import world_model
+    from gazerig.features.world.model import world_spec
     from gazerig.features.world.renderer import WorldPicture
     from gazerig.features.world.world_scene import WorldScene
 
     figures = Figures(SceneScript({"ann": PersonScript("front", look)}, round_s=12.0), 1)
-    model: Any = world_model(figures, ()).mj
+    model: Any = world_spec(figures, None).compile()
     picture = WorldPicture(model, PeoplePlacer(model, figures).place)
     for t_s, away_m, aside in (
         (2.0, 1.0, 0.3),

@@ -6,21 +6,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fakes.runs import record, ticks
+from fakes.runs import record
 from present import present
 from rendering import why_not
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.worker import CameraWorker
-from gazerig.drivers.errors import SetupError
 from gazerig.features.world.gl_context import NoRenderer
 from gazerig.features.world.opponent_motion import HOLD_S, MAX_M_S, MAX_M_S2, TAKE_S, OpponentMotion
 from gazerig.features.world.run.poses import RigInState, WorldPoses
-from gazerig.features.world.run.run_world import RunWorld, world_of, world_scene
-from gazerig.features.world.run.sight import WorldCamera
+from gazerig.features.world.run.run_world import world_of, world_scene
+from gazerig.features.world.run.sight import ComputedCamera
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import Assembly, assemble, with_options
+from gazerig.robot.app.camera_factory import frame_locator
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
@@ -30,8 +29,6 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import MoveOpponent
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.recording.read import RunRecording
-from gazerig.sim_mock.cameras.detections import SceneCamera
-from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.pty.line import BusSettings
 
 simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
@@ -56,20 +53,12 @@ def test_a_head_in_a_world_finds_the_person_there() -> None:
     assert made.figures["joint_faults"] == {}
 
 
-def test_without_a_renderer_it_goes_on_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(make: object) -> object:
-        raise NoRenderer("no pictures of a world: egl: it is missing")
-
-    monkeypatch.setattr("gazerig.features.world.renderer.open_context", fail)
-    made = assemble(load_rig("desk"), replace(FAST, no_pictures=False))
-    try:
-        assert isinstance(made.robot.camera, SceneCamera)
-        made.robot.start(made.clock)
-        (tick,) = ticks(made, 1)
-        assert any("egl: it is missing; detections are computed" in one for one in tick.events)
-        made.robot.stop()
-    finally:
-        made.close()
+def test_without_a_renderer_the_run_ends_with_the_reason_and_the_remedy(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "none")
+    with pytest.raises(NoRenderer, match=r"No module named 'mujoco\.none'.*--no-pictures"):
+        assemble(load_rig("desk"), replace(FAST, no_pictures=False))
 
 
 def test_a_recorded_run_can_be_done_again_to_the_same_bytes(tmp_path: Path) -> None:
@@ -107,11 +96,9 @@ class Host:
         from gazerig.features.world.served_world import ServedWorld
 
         self.rig = load_rig("minimal")
-        world = world_of(self.rig, RunOptions(mock=True, world="living-room"))
-        assert world is not None
-        self.world: RunWorld = world
+        self.world = world_of(self.rig, RunOptions(mock=True, world="living-room"))
         self.t_s = 100.0
-        self.served = ServedWorld(world.spec, folder / "state", lambda: self.t_s)
+        self.served = ServedWorld(self.world.spec, folder / "state", lambda: self.t_s)
         for name, line in emulated_lines(self.rig).items():
             self.served.device(BusSettings(line, name))
         joints = RigInState(rig_kinematics(self.rig), self.served.joints())
@@ -151,45 +138,17 @@ def test_the_state_is_that_of_physics(host: Host) -> None:
         assert host.poses.state.qpos[at] == pytest.approx(truly[name], abs=1e-3)
 
 
-class Broken(CameraWorker):
-    """A camera's process in which nothing can render."""
-
-    def __init__(self, error: SetupError) -> None:
-        self.error = error
-
-    def open(self) -> None:
-        raise self.error
-
-    def close(self) -> None:
-        pass
-
-    def events(self) -> tuple[str, ...]:
-        return ()
-
-
-def camera(host: Host, error: SetupError | None) -> WorldCamera:
-    def ideal(begin_s: float) -> SceneCamera:
-        return SceneCamera(
-            FrameParams(), host.world.scene, CameraMount(host.rig.camera),
-            host.poses.head, np.random.default_rng(1), begins_s=begin_s,
-        )  # fmt: skip
-
-    return WorldCamera(None if error is None else Broken(error), ideal, host.poses)
-
-
-@pytest.mark.parametrize("error", [None, NoRenderer("egl: it is missing")])
-def test_without_pictures_detections_are_those_of_the_same_people(
-    host: Host, error: SetupError | None
-) -> None:
-    seen = camera(host, error)
+def test_without_pictures_detections_begin_with_the_script(host: Host) -> None:
+    mount, rng = CameraMount(host.rig.camera), np.random.default_rng(1)
+    locate = frame_locator(host.rig.camera)
+    seen = ComputedCamera(host.world.scene, mount, 69.0, host.poses, rng, locate)
     seen.open()
-    assert (("egl: it is missing" in " ".join(seen.events())) is True) == (error is not None)
-    assert seen.latest(host.t_s) is None  # the script has not begun
+    assert seen.latest(host.t_s) is None and seen.start_s is None
     host.serve(0.02, heard=True)
+    seen.latest(host.t_s)
     found = seen.latest(host.t_s + 0.2)
     assert seen.start_s == host.poses.begin_s
-    assert found is None or found.image is None
-    seen.close()
+    assert found is not None and found.image is None
 
 
 # --- A boxer whose fist a person moves: limits, take-over and return, score, and a repeated run

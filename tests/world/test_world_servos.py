@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from mixed_rig import mixed_rig
 from test_coupling import COUPLING
-from world_rigs import WorldBench, arm, read, write
+from world_rigs import NOBODY, WorldBench, arm, read, write
 
 from gazerig.config.schema import load_rig
 from gazerig.features.world.run.run_world import rig_in_world
@@ -85,7 +85,7 @@ def test_the_neck_goes_limp_and_falls_when_its_load_is_heavier_than_friction() -
     bench = _armed("desk", "neck_pitch")
     servo = bench.servos["neck_pitch"]
     before = servo.position_steps
-    servo.shaft.axis.load(-0.15)
+    bench.world._data.qfrc_applied[servo.shaft.axis.dof] = -0.15
     bench.pass_ms(300)
     held = servo.position_steps
     assert abs(held - before) < 40 and servo.shaft.effort > 0.05
@@ -287,7 +287,7 @@ def test_a_server_passes_a_push_on_to_its_world_and_everything_else_to_its_servo
     tmp_path: Path,
 ) -> None:
     """``gazerig ctl fault`` orders both."""
-    spec = WorldSpec(None, (rig_in_world(load_rig("desk"), looks=False),))
+    spec = WorldSpec(NOBODY, rig_in_world(load_rig("desk"), looks=False))
     (line,) = emulated_lines(load_rig("desk")).values()
     around = SentWorld(spec, tmp_path)
     server = Server(ServerSettings((BusSettings(line),), True, around), lambda text: None)

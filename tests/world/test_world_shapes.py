@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 
 from gazerig.config.load import shipped_path
-from gazerig.config.schema import load_rig
-from gazerig.features.world.rig_in_world import RigInWorld
 from gazerig.features.world.room import HOME
-from gazerig.features.world.run.run_world import rig_in_world, world_scene
-from gazerig.features.world.shapes import SpecShapes, shapes_of
-from gazerig.features.world.world_spec import WorldSpec
+from gazerig.features.world.run.run_world import world_scene
+from gazerig.features.world.shapes import SpecShapes
 from gazerig.robot.dashboard.feed.world_shapes import WorldPart
 from gazerig.robot.description.mesh import Painted
 from gazerig.robot.description.texture import TexturedMesh
@@ -28,13 +25,8 @@ MOST_TRIANGLES, MOST_BYTES = 150_000, 3_000_000
 
 
 @cache
-def desk() -> RigInWorld:
-    return rig_in_world(load_rig("desk"))
-
-
-@cache
 def shapes(world: str) -> SpecShapes:
-    return shapes_of(WorldSpec(world_scene(world, 0).figures, (desk(),)))
+    return SpecShapes(world_scene(world, 0).figures)
 
 
 @cache
@@ -67,9 +59,10 @@ def _vertices(part: WorldPart) -> np.ndarray:
 
 def test_everybody_is_where_mujoco_has_them(mujoco: Any) -> None:
     from gazerig.features.world.figure_model import PeoplePlacer
+    from gazerig.features.world.model import world_spec
 
     found = pickle.loads(pickle.dumps(shapes("conversation")))
-    figures, model = found.spec.figures, found.spec.compile().mj
+    figures, model = found.figures, world_spec(found.figures, None).compile()
     data = mujoco.MjData(model)
     assert [part.name for part in found.parts() if part.moves] == list(figures.names)
     for world_s in (0.0, 12.34, 100.0):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gazerig.features.world.state_file import StateReader, StateWriter
+from gazerig.features.world.state_file import StateReader, StateWriter, WorldState
 
 
 def test_states_are_never_mixed(tmp_path: Path) -> None:
@@ -17,7 +17,7 @@ def test_states_are_never_mixed(tmp_path: Path) -> None:
     def write() -> None:
         k = 0.0
         while not over.is_set():
-            writer.write(k, k, np.full(64, k))
+            writer.write(WorldState(k, k, np.full(64, k)))
             k += 1.0
 
     thread = threading.Thread(target=write)

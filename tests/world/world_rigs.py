@@ -4,9 +4,13 @@ from pathlib import Path
 from typing import Any
 
 from gazerig.config.schema import Rig, load_rig
+from gazerig.features.world.figure import Figures
 from gazerig.features.world.run.run_world import rig_in_world
 from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.scenes.script import SceneScript
+
+NOBODY = Figures(SceneScript({}, "none"))
 
 
 class WorldBench:
@@ -19,7 +23,7 @@ class WorldBench:
         self.now_s = 0.0
         self.rig = load_rig(rig) if isinstance(rig, str) else rig
         self.world = World(
-            world_model(None, [rig_in_world(self.rig, looks=False)], mjcf_file), lambda: self.now_s
+            world_model(NOBODY, rig_in_world(self.rig, looks=False), mjcf_file), lambda: self.now_s
         )
         lines = emulated_lines(self.rig)
         self.devices: dict[str, Any] = {

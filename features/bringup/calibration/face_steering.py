@@ -6,8 +6,7 @@ direction of a gaze can be judged: a part moves in the face's plane, to its owne
 its distance out of the face does not change.
 
 Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up;
-millimetres. The offsets are in that frame, so they are valid for every pose of the face. All code
-before ``FaceSteering`` is pure: from keys and poses to values.
+millimetres. The offsets are in that frame, so they are valid for every pose of the face.
 
 ``FaceSteering`` chooses the target instead of attention: one part of the nearest face, located with
 the face's full pose at every tick, so the person may move while judging. It is followed by the
@@ -15,11 +14,10 @@ oculomotor model, without refixations and scatter, the guard and the servos.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from math import degrees, inf
 from typing import Literal
 
-from gazerig.gaze.angles import add, norm, rotate, sub
+from gazerig.gaze.angles import add, norm, rotate, scale, sub
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Face, GazeState, Mat3, Percept, Target, Vec3
 from gazerig.robot.control.tick import Tick
@@ -56,98 +54,75 @@ _WAYS: Mapping[str, tuple[float, float]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
 class FaceCalibration:
-    """Progress of a calibration.
+    """Progress of a calibration: positions of the parts in the face frame, moved by keys.
 
-    starts_mm, places_mm: initial and present position of each part in the face frame
-    part_number: number of the part in ORDER, len(ORDER) after the last
-    adjusted_parts: parts that the gaze seemed to look at
-    step: number of the present step in STEPS_MM
-    is_ended: whether all parts are done
+    Args:
+        own_mm: part -> position in the face frame, as under ``face_parts_mm`` of a rig file; other
+            parts begin at those of an adult's face.
+
+    Attributes:
+        starts_mm, places_mm: Initial and present position of each part in the face frame.
+        part_number: Number of the part in ORDER, len(ORDER) after the last.
+        adjusted_parts: Parts that the gaze seemed to look at.
+        step_mm: Distance by which one key moves the gaze.
     """
 
-    starts_mm: tuple[Vec3, ...]
-    places_mm: tuple[Vec3, ...]
-    part_number: int = 0
-    adjusted_parts: frozenset[str] = frozenset()
-    step: int = 2
-    is_ended: bool = False
+    def __init__(self, own_mm: Mapping[str, Vec3]) -> None:
+        adult = {part: scale(PARTS_FACE_M[part], 1e3) for part in ORDER}
+        self.starts_mm = {part: own_mm.get(part, adult[part]) for part in ORDER}
+        self.places_mm = dict(self.starts_mm)
+        self.part_number = 0
+        self.adjusted_parts: set[str] = set()
+        self.step_mm = STEPS_MM[2]
 
     @property
     def part(self) -> str | None:
         """Return the current part, None at the end."""
-        return None if self.is_ended or self.part_number >= len(ORDER) else ORDER[self.part_number]
-
-    @property
-    def step_mm(self) -> float:
-        """Return the distance by which one key moves the gaze."""
-        return STEPS_MM[self.step]
-
-    def place_mm(self, part: str) -> Vec3:
-        """Return the present position of a part, in the face frame."""
-        return self.places_mm[ORDER.index(part)]
+        return ORDER[self.part_number] if self.part_number < len(ORDER) else None
 
     def moved_mm(self, part: str) -> tuple[float, float]:
         """Return the distances by which a part has been moved to its owner's left and up."""
-        _, y0, z0 = self.starts_mm[ORDER.index(part)]
-        _, y, z = self.place_mm(part)
-        return y - y0, z - z0
+        _, left, up = sub(self.places_mm[part], self.starts_mm[part])
+        return left, up
 
+    def apply(self, key: Key) -> None:
+        """Apply a key; after the end, keys have no effect."""
+        part = self.part
+        if part is None:
+            return
+        match key:
+            case "larger" | "smaller":
+                at = STEPS_MM.index(self.step_mm) + (1 if key == "larger" else -1)
+                self.step_mm = STEPS_MM[max(0, min(len(STEPS_MM) - 1, at))]
+            case "enter":
+                self.adjusted_parts.add(part)
+                self.part_number += 1
+            case "skip":
+                self.places_mm[part] = self.starts_mm[part]
+                self.adjusted_parts.discard(part)
+                self.part_number += 1
+            case "back":
+                self.part_number = max(0, self.part_number - 1)
+            case "end":
+                self.part_number = len(ORDER)
+            case _:
+                x, y, z = self.places_mm[part]
+                left, up = (self.step_mm * way for way in _WAYS[key])
+                self.places_mm[part] = x, _within_face(y, left), _within_face(z, up)
 
-def initial_calibration(own_mm: Mapping[str, Vec3]) -> FaceCalibration:
-    """Return the start: the positions in a rig, or those of an adult's face for other parts.
-
-    own_mm: part -> position in the face frame, as under ``face_parts_mm`` of a rig file
-    """
-    starts = [
-        own_mm[part] if part in own_mm else _round_to_tenths((x * 1e3, y * 1e3, z * 1e3))
-        for part, (x, y, z) in ((part, PARTS_FACE_M[part]) for part in ORDER)
-    ]
-    return FaceCalibration(tuple(starts), tuple(starts))
-
-
-def apply_key(state: FaceCalibration, key: Key) -> FaceCalibration:
-    """Return the state after a key; after the end, keys have no effect."""
-    part = state.part
-    if part is None:
-        return state
-    if key in _WAYS:
-        (x, y, z), (left, up) = state.place_mm(part), _WAYS[key]
-        place = (
-            x,
-            _step_within_range(y, left * state.step_mm),
-            _step_within_range(z, up * state.step_mm),
-        )
-        return _with_place(state, place)
-    match key:
-        case "larger" | "smaller":
-            step = state.step + (1 if key == "larger" else -1)
-            return replace(state, step=max(0, min(len(STEPS_MM) - 1, step)))
-        case "enter":
-            return _next_part(replace(state, adjusted_parts=state.adjusted_parts | {part}))
-        case "skip":
-            left_alone = _with_place(state, state.starts_mm[state.part_number])
-            return _next_part(replace(left_alone, adjusted_parts=state.adjusted_parts - {part}))
-        case "back":
-            return replace(state, part_number=max(0, state.part_number - 1))
-        case _:
-            return replace(state, is_ended=True)
+    def changed_places(self) -> dict[str, Vec3]:
+        """Return the chosen positions as dotted keys of a rig file and values, to 0.1 mm."""
+        return {
+            f"face_parts_mm.{part}": _round_to_tenths(place)
+            for part, place in self.places_mm.items()
+            if part in self.adjusted_parts
+        }
 
 
 def point_world_m(place_mm: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) -> Vec3:
     """Convert a position in the face frame to a point in the world."""
-    x, y, z = place_mm
-    return add(p_world_face_m, rotate(R_world_face, (x / 1e3, y / 1e3, z / 1e3)))
-
-
-def changed_places(state: FaceCalibration) -> dict[str, Vec3]:
-    """Return the chosen positions as dotted keys of a rig file and values, to 0.1 mm."""
-    return {
-        f"face_parts_mm.{part}": _round_to_tenths(state.place_mm(part))
-        for part in ORDER
-        if part in state.adjusted_parts
-    }
+    return add(p_world_face_m, rotate(R_world_face, scale(place_mm, 1e-3)))
 
 
 def _round_to_tenths(place_mm: Vec3) -> Vec3:
@@ -155,24 +130,10 @@ def _round_to_tenths(place_mm: Vec3) -> Vec3:
     return x, y, z
 
 
-def _step_within_range(value: float, by: float) -> float:
+def _within_face(value: float, by: float) -> float:
     # A position stored farther out is kept, but can only be moved inwards.
     far = max(FARTHEST_MM, abs(value))
     return max(-far, min(far, value + by))
-
-
-def _with_place(state: FaceCalibration, place_mm: Vec3) -> FaceCalibration:
-    places = (
-        *state.places_mm[: state.part_number],
-        place_mm,
-        *state.places_mm[state.part_number + 1 :],
-    )
-    return replace(state, places_mm=places)
-
-
-def _next_part(state: FaceCalibration) -> FaceCalibration:
-    at = state.part_number + 1
-    return replace(state, part_number=at, is_ended=at >= len(ORDER))
 
 
 AIMED_DEG = 1.0
@@ -180,9 +141,6 @@ AIMED_DEG = 1.0
 
 STALE_S = 0.4
 """Largest age of an image with a face."""
-
-WAIT_S = 1.5
-"""Time for which an Enter waits for moving eyes."""
 
 _LOST_S = 5.0
 _STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -212,25 +170,21 @@ class FaceSteering:
     ) -> None:
         self._converges = converges
         self.top_down = top_down
-        self._begin = state
-        self._rest = rest_world_m
-        self.reset(0.0)
-
-    def reset(self, t_s: float) -> None:
-        """Reset."""
-        self.state = self._begin
+        self.state = state
+        self._lost_at = self._rest = rest_world_m
         self.face: Face | None = None
         self.error_deg = inf
         self._identity: object = None
         self._shift = 0
-        self._lost_at = self._rest
         self._seen_s = -inf
-        self._entered_s: float | None = None
+
+    def reset(self, t_s: float) -> None:
+        """Keep the progress; the loop calls this at its start."""
 
     @property
     def is_aimed(self) -> bool:
-        """Return whether both eyes are on the part and no key waits."""
-        return self.face is not None and self._entered_s is None and self.error_deg <= AIMED_DEG
+        """Return whether both eyes are on the part."""
+        return self.face is not None and self.error_deg <= AIMED_DEG
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the current part as target, or the rest point while no face is seen."""
@@ -249,60 +203,41 @@ class FaceSteering:
             # At the last face first, and straight ahead after a while.
             lost = t_s - self._seen_s > _LOST_S
             p = self._rest if lost else self._lost_at
-            self._count(("rest", lost))
-            return Target(
-                p, _STILL, t_s, "rest", -1, _PULL, True, None, self._shift, "no face seen"
-            )
+            shift = self._count(("rest", lost))
+            return Target(p, _STILL, t_s, "rest", -1, _PULL, True, None, shift, "no face seen")
         self._seen_s = t_s
-        place = self.state.place_mm(part)
+        place = self.state.places_mm[part]
         p = self._lost_at = point_world_m(place, face.p_world_m, face.R_world_face)
-        self._count((face.id, part, place))
+        shift = self._count((face.id, part, place))
         why = f"steered to this part of face {face.id}"
         return Target(
             p, face.v_world_m_s, percept.captured_s, "part", face.id, _PULL, True, part,
-            self._shift, why, face.p_world_m,
+            shift, why, face.p_world_m,
         )  # fmt: skip
 
-    def press(self, key: Key, t_s: float) -> str | None:
-        """Apply a key; return the reason if that is impossible.
-
-        An Enter takes effect as soon as the eyes are on the part, see ``update``.
-        """
+    def press(self, key: Key) -> str | None:
+        """Apply a key; return the reason if that is impossible."""
         if key != "end" and self.face is None:
             return "no face is seen: keys wait until one is"
-        if key == "enter":
-            self._entered_s = t_s
-            return None
-        self._entered_s = None
-        self.state = apply_key(self.state, key)
+        if key == "enter" and not self.is_aimed:
+            return (
+                "not taken: the eyes are not on the point yet; if they never come, be nearer to "
+                "where the head points"
+            )
+        self.state.apply(key)
         self.error_deg = inf
         return None
 
-    def update(self, tick: Tick) -> str | None:
-        """Measure the gaze; return the reason if a waiting Enter was dropped."""
-        self.error_deg = self._gaze_error_deg(tick)
-        if tick.target.kind != "part" or tick.gaze.phase == "saccade":
-            self.error_deg = inf
-        if self._entered_s is None:
-            return None
-        if self.error_deg <= AIMED_DEG:
-            self._entered_s = None
-            self.state = apply_key(self.state, "enter")
-            self.error_deg = inf
-        elif tick.t_s - self._entered_s > WAIT_S:
-            self._entered_s = None
-            off = self._gaze_error_deg(tick)
-            return (
-                f"not taken: the eyes are {off:.1f} deg off the point, as far as they can turn; "
-                "come before the robot, nearer to where its head points"
-            )
-        return None
+    def update(self, tick: Tick) -> None:
+        """Measure the gaze."""
+        self.error_deg = inf
+        if tick.target.kind == "part" and tick.gaze.phase != "saccade":
+            # The angle between the gaze and the part, as far as the eyes can reach it.
+            error = gaze_error(tick.target.p_world_m, tick.pose, self._converges)
+            self.error_deg = degrees(error.whole)
 
-    def _gaze_error_deg(self, tick: Tick) -> float:
-        """Return the angle between the gaze and the part, as far as the eyes can reach it."""
-        return degrees(gaze_error(tick.target.p_world_m, tick.pose, self._converges).whole)
-
-    def _count(self, identity: object) -> None:
-        """Count a shift whenever the target point changes."""
+    def _count(self, identity: object) -> int:
+        """Return the number of the shift, a new one whenever the target point changes."""
         self._shift += identity != self._identity
         self._identity = identity
+        return self._shift

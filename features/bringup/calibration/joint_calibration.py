@@ -75,10 +75,6 @@ class LinkageFit(NamedTuple):
     max_deg: float
 
 
-Value = int | float | tuple[float, float] | tuple[tuple[float, float], ...]
-"""A value that a calibration writes."""
-
-
 class PositionUnwrapper:
     """Follows a position register over the seam.
 
@@ -89,11 +85,6 @@ class PositionUnwrapper:
     def __init__(self) -> None:
         self._at: int | None = None
         self._seen_s = 0.0
-
-    @property
-    def steps(self) -> int | None:
-        """Return the unwrapped position, in 0..4095 at the first sample; None before it."""
-        return self._at
 
     def see(self, position_steps: int, t_s: float) -> int:
         """Add one sample; return the unwrapped position.
@@ -151,52 +142,73 @@ def joint_calibration(
     """
     steps_per_deg = joint.ratio * STEPS_PER_TURN / 360.0
     low, high = sorted((marks.positive_end, marks.negative_end))
-    at_end = name not in GAZE_JOINTS  # a jaw rests shut, at one of its ends
-    if at_end and low - steps_per_deg <= marks.zero <= high + steps_per_deg:
-        marks = marks._replace(zero=min(max(marks.zero, low), high))
-    travel_deg = (high - low) / steps_per_deg
-    if travel_deg <= SMALLEST_RANGE_DEG:
+    ends = f"steps {low % STEPS_PER_TURN} to {high % STEPS_PER_TURN}"
+    if (high - low) / steps_per_deg <= SMALLEST_RANGE_DEG:
         raise CalibrationRefused(
-            f"{name}: only {travel_deg:.1f} deg are between the two ends, more than "
-            f"{SMALLEST_RANGE_DEG:g} are needed: is this the joint that was turned, "
-            "and is its horn screwed on?"
+            f"{name}: only {(high - low) / steps_per_deg:.1f} deg are between the two ends, more "
+            f"than {SMALLEST_RANGE_DEG:g} are needed: is this the joint that was turned, and is "
+            "its horn screwed on?"
         )
-    _refuse_seam(name, low, high, steps_per_deg, servo_kind(joint.model).set_middle is not None)
-    if not (low < marks.zero < high or (at_end and low <= marks.zero <= high)):
+    if high - low >= STEPS_PER_TURN - 1:
         raise CalibrationRefused(
-            f"{name}: {zero_name(name)} (step {marks.zero % STEPS_PER_TURN}) is not between "
-            f"the ends (steps {low % STEPS_PER_TURN} and {high % STEPS_PER_TURN}): "
-            "mark the three places again"
+            f"{name}: it turns {(high - low) / steps_per_deg:.0f} deg, and its servo counts only "
+            "one turn: give the joint stops, or check its ratio"
         )
+    # A restarted servo counts in the turn 0..4095.
+    if low // STEPS_PER_TURN != high // STEPS_PER_TURN:
+        off = STEPS_PER_TURN // 2 - (low + high) // 2 % STEPS_PER_TURN
+        remedy = (
+            "calibrate again with --set-middle, and the servo calls the middle of the travel 2048"
+            if servo_kind(joint.model).set_middle is not None
+            else "take the horn off, hold the joint in the middle of its travel, turn the servo's "
+            f"shaft by {abs(off) * 360 / STEPS_PER_TURN:.0f} deg towards "
+            f"{'more' if off > 0 else 'fewer'} steps (about 2048), put the horn on again, and "
+            "calibrate again. A Homing Offset is no cure: in position mode some firmware loses it "
+            "by a turn as the torque comes on"
+        )
+        raise CalibrationRefused(
+            f"{name}: its travel ({ends}) crosses the servo's seam from 4095 to 0, where a "
+            f"restarted servo is a whole turn wrong: {remedy}"
+        )
+    zero = marks.zero
+    if name not in GAZE_JOINTS and low - steps_per_deg <= zero <= high + steps_per_deg:
+        zero = min(max(zero, low), high)  # a jaw rests shut, at one of its ends
+    if not low <= zero <= high:
+        raise CalibrationRefused(
+            f"{name}: {zero_name(name)} (step {zero % STEPS_PER_TURN}) is not between the ends "
+            f"({ends}): mark the three places again"
+        )
+    most, least = (abs(end - zero) / steps_per_deg for end in marks[:2])
     sign = 1 if marks.positive_end > marks.negative_end else -1
-    most = abs(marks.positive_end - marks.zero) / steps_per_deg - margin_deg
-    least = abs(marks.negative_end - marks.zero) / steps_per_deg - margin_deg
-    if at_end:
-        most, least = max(0.0, most), max(0.0, least)
-    made = Calibration(
-        marks.zero % STEPS_PER_TURN, sign, 0.0 - round_inwards(least), round_inwards(most)
-    )
-    if name in GAZE_JOINTS and not made.min_deg < 0.0 < made.max_deg:
-        raise CalibrationRefused(
-            f"{name}: straight ahead is within {margin_deg:g} deg of an end (range "
-            f"{made.min_deg:g}..{made.max_deg:g} deg): build the horn in again, or lessen the margin"
-        )
-    if made.max_deg - made.min_deg <= SMALLEST_RANGE_DEG:
-        raise CalibrationRefused(
-            f"{name}: with {margin_deg:g} deg of margin at each end only "
-            f"{made.max_deg - made.min_deg:.1f} deg are left, more than {SMALLEST_RANGE_DEG:g} "
-            "are needed: lessen the margin"
-        )
-    if made.min_deg < -180.0 or made.max_deg > 180.0:
-        raise CalibrationRefused(
-            f"{name}: {made.min_deg:g}..{made.max_deg:g} deg is more than a joint may turn "
-            "(-180..180): check its ratio"
-        )
-    try:
-        with_calibration(joint, made)
-    except ValueError as error:
-        raise CalibrationRefused(f"{name}: {error}: calibrate again") from error
+    made = Calibration(zero % STEPS_PER_TURN, sign, *range_within(name, -least, most, margin_deg))
+    with_calibration(name, joint, made)
     return made
+
+
+def range_within(
+    name: str, low_deg: float, high_deg: float, margin_deg: float
+) -> tuple[float, float]:
+    """Return a joint's range short of its ends; the end at which a jaw rests stays 0.
+
+    Raises:
+        CalibrationRefused: it excludes 0, or is too small or too large.
+    """
+    low, high = (round_inwards(end - margin_deg) for end in (-low_deg, high_deg))
+    if name not in GAZE_JOINTS and low_deg <= 0.0 <= high_deg:
+        low, high = max(low, 0.0), max(high, 0.0)
+    if low < 0.0 or high < 0.0:
+        raise CalibrationRefused(
+            f"{name}: its range of {-low:g}..{high:g} deg, {margin_deg:g} deg short of its ends, "
+            f"does not include {zero_name(name)}, which is 0 deg (of a lid half open): lessen the "
+            "margin, or build the horn in again"
+        )
+    if not SMALLEST_RANGE_DEG < low + high <= 360.0 or max(low, high) > 180.0:
+        raise CalibrationRefused(
+            f"{name}: {low + high:.1f} deg are left between its ends, more than "
+            f"{SMALLEST_RANGE_DEG:g} and at most 180 to each side are possible: mark them farther "
+            "apart, lessen the margin, or check its ratio"
+        )
+    return 0.0 - low, high
 
 
 def round_inwards(angle_deg: float) -> float:
@@ -204,66 +216,31 @@ def round_inwards(angle_deg: float) -> float:
     return floor(angle_deg * 10.0 + 1e-6) / 10.0
 
 
-def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable: bool) -> None:
-    """Refuse a travel outside the turn 0..4095, in which a restarted servo counts.
-
-    settable: whether any position of the servo can be set permanently as its middle
-    """
-    if low // STEPS_PER_TURN == high // STEPS_PER_TURN:
-        return
-    turn_deg = STEPS_PER_TURN / steps_per_deg
-    if high - low >= STEPS_PER_TURN - 1:
-        raise CalibrationRefused(
-            f"{name}: it turns {(high - low) / steps_per_deg:.0f} deg, and its servo counts only "
-            f"one turn ({turn_deg:.0f} deg): give the joint stops, or check its ratio"
-        )
-    if settable:
-        raise CalibrationRefused(
-            f"{name}: its travel (steps {low % STEPS_PER_TURN} to {high % STEPS_PER_TURN}) crosses "
-            "the servo's seam from 4095 to 0, where a restarted servo is a whole turn wrong: "
-            "calibrate again with --set-middle, and the servo calls the middle of the travel 2048"
-        )
-    centre = (low + high) // 2 % STEPS_PER_TURN
-    off = STEPS_PER_TURN // 2 - centre
-    raise CalibrationRefused(
-        f"{name}: its travel (steps {low % STEPS_PER_TURN} to {high % STEPS_PER_TURN}) crosses "
-        "the servo's seam from 4095 to 0, where a restarted servo is a whole turn wrong: take "
-        "the horn off, hold the joint in the middle of its travel, turn the servo's shaft by "
-        f"{abs(off) * 360 / STEPS_PER_TURN:.0f} deg towards {'more' if off > 0 else 'fewer'} "
-        "steps (about 2048), put the horn on again, and calibrate again. A Homing Offset is no "
-        "cure: in position mode some firmware loses it by a turn as the torque comes on"
-    )
-
-
-def with_calibration(joint: JointParams, made: Calibration) -> JointParams:
+def with_calibration(name: str, joint: JointParams, made: Calibration | LinkageFit) -> JointParams:
     """Return the joint with its calibration.
 
     Raises:
-        ValueError: the rules of the joint refuse it.
+        CalibrationRefused: the rules of the joint refuse it.
     """
-    return replace(joint, **made._asdict())
+    try:
+        return replace(joint, **made._asdict())
+    except ValueError as error:
+        raise CalibrationRefused(f"{name}: {error}: calibrate again") from error
 
 
 def rig_changes(
     name: str, joint: JointParams, made: Calibration | LinkageFit, park_deg: Mapping[str, float]
-) -> dict[str, Value]:
+) -> dict[str, object]:
     """Return dotted keys of the rig file and their new values, only those that differ.
 
     Values that depend on the old range also change: a lid's shut and open angles are set to its
     ends, a parking angle outside the new range to the nearer end.
     """
-    wanted: dict[str, Value] = {
+    wanted: dict[str, object] = {
         f"joints.{name}.{key}": value
         for key, value in made._asdict().items()
         if getattr(joint, key) != value
     }
-    places = f"joints.{name}.transmission_points"
-    if isinstance(made, LinkageFit) and places in wanted:
-        # Write whole numbers as integers: 1500 us is not more exact as 1500.0.
-        wanted[places] = tuple(
-            (int(angle) if angle == int(angle) else angle, int(at) if at == int(at) else at)
-            for angle, at in made.transmission_points
-        )
     if is_lid(name):
         key = name.removesuffix("_lid").removesuffix("_upper")
         wanted[f"lid_joints.{key}_deg"] = made.min_deg, made.max_deg

@@ -3,7 +3,7 @@
 import contextlib
 import select
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import inf
 from typing import Annotated
 
@@ -11,41 +11,38 @@ import typer
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.cli.manual_session import holding_rig, holding_text
-from gazerig.features.bringup.cli.ports import MockOption, PortOption, confirm_safe, rig_ports
+from gazerig.features.bringup.cli.ports import (
+    MockOption,
+    PortOption,
+    YesOption,
+    confirm_safe,
+    rig_ports,
+)
 from gazerig.features.bringup.manual_control import (
     PASSING,
-    JogParams,
+    RATE_HZ,
+    SPEED_DEG_S,
     ManualControl,
-    MoveResult,
     Step,
+    park_slowly,
     refuse_angle,
 )
-from gazerig.robot.app.rig_limits import limits
+from gazerig.robot.app.bus_wiring import guarded_rig_bus
+from gazerig.robot.app.rig_limits import limits, park_rad
+from gazerig.robot.app.rig_weight import rest_park_deg
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say, status
+from gazerig.robot.control.body import Body
 from gazerig.robot.control.event_text import group_events
+from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.power_down import PowerDown
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.safety.guard import Guard
 
 app = typer.Typer()
 
 # A number below zero is an argument, not an option.
 _NEGATIVE = {"ignore_unknown_options": True}
-
-SpeedOption = Annotated[
-    float, typer.Option(metavar="DEG_S", min=0.5, max=200.0, help="Top speed on the way.")
-]
-HoldOption = Annotated[
-    bool, typer.Option("--hold", help="Stay there with torque on until Enter or Ctrl-C.")
-]
-YesOption = Annotated[
-    bool, typer.Option("--yes", help="Hobby servos: do not ask; no hand is in the mechanism.")
-]
-NoParkOption = Annotated[
-    bool,
-    typer.Option(
-        "--no-park", help="Switch the torque off at the present pose, without parking first."
-    ),
-]
 
 
 @app.command(cls=RigCommand, context_settings=_NEGATIVE)
@@ -54,82 +51,70 @@ def jog(
     *,
     joint: Annotated[str, typer.Argument(metavar="JOINT", help="A joint, e.g. neck_yaw.")],
     deg: Annotated[float, typer.Argument(metavar="DEG", help="Joint angle in degrees.")],
-    speed: SpeedOption = 20.0,
+    speed: Annotated[
+        float, typer.Option(metavar="DEG_S", min=0.5, max=200.0, help="Top speed on the way.")
+    ] = SPEED_DEG_S,
     seconds: Annotated[float, typer.Option(min=0.0, help="Stay there for S seconds.")] = 1.0,
-    hold: HoldOption = False,
-    no_park: NoParkOption = False,
+    hold: Annotated[
+        bool, typer.Option("--hold", help="Stay there with torque on until Enter or Ctrl-C.")
+    ] = False,
+    no_park: Annotated[
+        bool,
+        typer.Option(
+            "--no-park", help="Switch the torque off at the present pose, without parking first."
+        ),
+    ] = False,
     yes: YesOption = False,
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
     """Move one joint slowly while the others hold: gazerig jog my.yaml neck_yaw 20."""
-    with clear_errors(rig, port, mock):
+    with clear_errors(rig, port, mock):  # before Ctrl-C is only recorded
         loaded = load_rig(rig)
         refuse_angle(joint, deg, loaded.names, limits(loaded.joints))
-    with _manual_control(loaded, rig, mock, port, yes, speed, hold, not no_park) as control:
-        moved = control.jog(joint, deg)
-        _report(moved, (joint,))
-        _hold(control, seconds, hold)
-    _exit_unless(moved.arrived)
-
-
-@contextlib.contextmanager
-def _manual_control(
-    rig: Rig,
-    name: str,
-    mock: bool,
-    port: str | None,
-    yes: bool,
-    speed: float,
-    hold: bool,
-    park: bool,
-) -> Iterator[ManualControl]:
-    """Return a rig that holds its pose; in all cases it ends with the torque off.
-
-    name: name of the rig on the command line, for the commands that messages suggest
-    """
-    without_feedback = [
-        name for name in rig.names if not rig.joints[name].model_facts.measures_position
-    ]
-    if without_feedback and not mock:
-        with clear_errors(name, port):  # before Ctrl-C is only recorded
+        facts = {name: loaded.joints[name].model_facts for name in loaded.names}
+        limp = [name for name, servo in facts.items() if not servo.measures_position]
+        if limp and not mock:
             confirm_safe(
-                f"{', '.join(without_feedback)}: hobby servos without pulses go to their parking "
+                f"{', '.join(limp)}: hobby servos without pulses go to their parking "
                 "place at once, at their own full speed",
                 "take your hands out of the mechanism",
                 "Is no hand in the mechanism?",
                 yes,
             )
     with (
-        clear_errors(name, port, mock),
+        clear_errors(rig, port, mock),
         record_signals() as stopped,
-        rig_ports(rig, mock, port) as wire,
+        rig_ports(loaded, mock, port) as wire,
     ):
-        gentle = rig.guard.soft_start_speed_deg_s
+        gentle = loaded.guard.soft_start_speed_deg_s
         if speed > gentle:
             say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")
-        params = JogParams(speed_deg_s=min(speed, gentle))
-        watch = _StatusLine().show if sys.stderr.isatty() else None
+        watch = _show if sys.stderr.isatty() else None
         by_key = hold and sys.stdin.isatty()
         end = lambda: stopped() or (enter_pressed() if by_key else None)  # noqa: E731
-        with holding_rig(rig, wire.paths, params, end, stopped, park, watch) as control:
+        top = min(speed, gentle)
+        with holding_rig(loaded, wire.paths, top, end, stopped, not no_park, watch) as control:
             _print_events(control.body.bus.events())
-            say(f"{holding_text(rig)}; Ctrl-C switches it off")
-            yield control
+            say(f"{holding_text(loaded)}; Ctrl-C switches it off")
+            moved = control.jog(joint, deg)
+            _print_events(moved.events)
+            for part in moved.joints.values():
+                if part.joint == joint or part.reasons:
+                    say(str(part))
+            say(f"{moved} after {moved.seconds:.1f} s")
+            if hold:
+                say("holding: Enter or Ctrl-C ends it")
+            if hold or seconds > 0.0:
+                _print_events(control.hold(inf if hold else seconds).events)
+    if not moved.arrived:
+        raise typer.Exit(FAULT)
 
 
-class _StatusLine:
-    """Shows the reasons that limit a motion; written only when they change."""
-
-    def __init__(self) -> None:
-        self._shown = ""
-
-    def show(self, step: Step) -> None:
-        reasons = [r for r in step.guard_result.reasons if r.partition(": ")[2] not in PASSING]
-        line = ", ".join(reasons) or "on the way"
-        if line != self._shown:
-            self._shown = line
-            status(line)
+def _show(step: Step) -> None:
+    """Show the reasons that limit a motion."""
+    reasons = [r for r in step.guard_result.reasons if r.partition(": ")[2] not in PASSING]
+    status(", ".join(reasons) or "on the way")
 
 
 def enter_pressed() -> str | None:
@@ -142,28 +127,69 @@ def enter_pressed() -> str | None:
         return "a terminal that is gone"
 
 
-def _hold(control: ManualControl, seconds: float, hold: bool) -> None:
-    if hold:
-        say("holding: Enter or Ctrl-C ends it")
-    if hold or seconds > 0.0:
-        _print_events(control.hold(inf if hold else seconds).events)
-
-
-def _report(moved: MoveResult, asked: tuple[str, ...]) -> None:
-    """Print the result for the commanded joints and those that were limited or failed."""
-    _print_events(moved.events)
-    for applied in moved.joints:
-        if applied.joint in asked or applied.reasons:
-            say(str(applied))
-    say(f"{moved} after {moved.seconds:.1f} s")
-
-
 def _print_events(events: Iterable[str]) -> None:
     """Print the events by servo."""
     for line in group_events(events):
         say(line)
 
 
-def _exit_unless(good: bool) -> None:
-    if not good:
+_UNRELEASED = (
+    ": servos hold their last goal or pulse until their own watchdog stops them, the servo power is "
+    "cut, or the guardian, which tries for 10 s, reaches the port"
+)
+
+
+@contextlib.contextmanager
+def holding_rig(
+    rig: Rig,
+    paths: Mapping[str, str],
+    speed_deg_s: float,
+    stopped: Callable[[], str | None],
+    interrupts: Interrupts,
+    park: bool = True,
+    watch: Callable[[Step], None] | None = None,
+) -> Iterator[ManualControl]:
+    """Switch torque on at the present pose; at the end of the block park, torque off, close.
+
+    Args:
+        rig: the rig to move.
+        paths: paths of the serial ports, by the name of the bus.
+        speed_deg_s: top speed of the motion.
+        stopped: returns why to end a motion, None without a reason.
+        interrupts: requests to end this program.
+        park: whether to park the joints at the end.
+        watch: receives every step.
+
+    Raises:
+        SetupError: port or servos do not match the configuration.
+        typer.Exit: not all servos confirmed the torque-off after a successful block.
+    """
+    body = Body(
+        guarded_rig_bus(rig, paths), rig.joints, park_rad(rig), pairs=rig.couplings.values()
+    )
+    guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=1.0 / RATE_HZ)
+    control = ManualControl(body, guard, RealClock(), speed_deg_s, stopped, watch)
+    with PowerDown(
+        (lambda again: park_slowly(control, rest_park_deg(rig), again)) if park else None,
+        control.stop,
+        say,
+        interrupts,
+        "torque off on all servos",
+        _UNRELEASED,
+    ) as way_out:
+        way_out.switch_on(control.start)
+        yield control
+    if way_out.unreleased:
         raise typer.Exit(FAULT)
+
+
+def holding_text(rig: Rig) -> str:
+    """Return the behaviour of the servos once the torque is on."""
+    hobby = [name for name in rig.names if not rig.joints[name].model_facts.measures_position]
+    texts = []
+    if measured := len(rig.names) - len(hobby):
+        texts.append(f"torque on: {measured} servos hold where they are")
+    if hobby:
+        where = "hobby servos hold where their pulses are (estimated: they report nothing)"
+        texts.append(f"{len(hobby)} {where}")
+    return ", ".join(texts)

@@ -2,22 +2,22 @@
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, NamedTuple
 
 import typer
 
 from gazerig.config.rig import Rig
-from gazerig.drivers.errors import PortError, SetupError
+from gazerig.drivers.errors import SetupError
 from gazerig.drivers.plugins import BUS, find, is_ours
-from gazerig.drivers.serial.list_ports import SerialPort, check_owner, serial_ports, usb_id_of
+from gazerig.drivers.serial.list_ports import check_owner, serial_ports, usb_id_of
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.drivers.types import ServoConfig
+from gazerig.features.bringup.servo_setup import open_at
 from gazerig.robot.app.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.terminal import confirm, say, status
-from gazerig.robot.guardian.guardian import Guardian
 from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.client import PtyBuses
 
@@ -25,23 +25,15 @@ YesOption = Annotated[bool, typer.Option("--yes", help="Answer yes to every ques
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one line of JSON instead of text.")]
 
 
-def list_ports() -> tuple[SerialPort, ...]:
-    """List the serial ports of this computer."""
-    return serial_ports()
-
-
 def usb_id(path: str) -> str:
     """Return the USB vendor and product id of a port, "" if it has none."""
-    return usb_id_of(path, list_ports())
+    return usb_id_of(path, serial_ports())
 
 
 @contextlib.contextmanager
-def unopened_port(path: str, on_traffic: Callable[[], None] | None = None) -> Iterator[BusPort]:
-    """Return a port that is not opened yet, closed again at the end.
-
-    on_traffic: called whenever bytes are sent or waited for
-    """
-    line = port_at_path(path, on_traffic=on_traffic)
+def unopened_port(path: str) -> Iterator[BusPort]:
+    """Return a port that is not opened yet, closed again at the end."""
+    line = port_at_path(path)
     try:
         yield line
     finally:
@@ -53,16 +45,10 @@ def console() -> Console:
     return Console(soft_wrap=True, highlight=False)
 
 
-def progress(line: str) -> None:
-    """Show the present activity, on a terminal only."""
+def progress(line: str = "") -> None:
+    """Show the present activity on a terminal only, nothing without a line."""
     if sys.stderr.isatty():
         status(line)
-
-
-def clear_progress() -> None:
-    """Remove the progress line."""
-    if sys.stderr.isatty():
-        status("")
 
 
 MockOption = Annotated[
@@ -111,7 +97,7 @@ def rig_ports(
     if mock and port is not None:
         raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
     if not mock:
-        paths, here = bus_ports(rig, port), list_ports()
+        paths, here = bus_ports(rig, port), serial_ports()
         for name, path in paths.items():
             check_owner(path, rig.bus_named(name).kind, here)
         yield RigPorts(paths, None)
@@ -135,20 +121,14 @@ def setups_on(rig: Rig, name: str) -> tuple[ServoConfig, ...]:
 
 
 @contextlib.contextmanager
-def open_port(
-    rig: Rig, ports: RigPorts, bus: str, guardian: Guardian | None = None
-) -> Iterator[BusPort]:
+def open_port(rig: Rig, ports: RigPorts, bus: str) -> Iterator[BusPort]:
     """Open the port of the bus of this name at its speed; nothing is sent.
-
-    guardian: receives a heartbeat with every transmission
 
     Raises:
         PortError: it is absent, busy, not permitted, or does not support the speed.
     """
-    baud = rig.bus_named(bus).section.baud
-    with unopened_port(ports.paths[bus], guardian.beat if guardian is not None else None) as port:
-        if not port.setBaudRate(baud):
-            raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose another")
+    with unopened_port(ports.paths[bus]) as port:
+        open_at(port, rig.bus_named(bus).section.baud)
         yield port
 
 

@@ -4,11 +4,16 @@ import os
 import select
 import sys
 from collections.abc import Callable
+from math import isfinite
 from pathlib import Path
+from typing import cast
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
+from gazerig.features.bringup.calibration.face_steering import Key
+from gazerig.features.bringup.calibration.hobby_calibration import HobbyServoAccess
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
+from gazerig.robot.cli.key_input import TerminalInput, split_keys
 from gazerig.robot.cli.terminal import say, status
 
 LOOK_S = 0.03
@@ -18,6 +23,15 @@ HAND_STEPS = 100
 """Steps by which an emulated hand turns a joint between two readings."""
 
 YES, NO = ("y", "yes"), ("n", "no")
+
+STEPS_US = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+FIRST_STEP = 3
+
+KEYS_HELP = (
+    "arrow keys left and right (or a d) move it, up and down change the step, Enter: it is there, "
+    "q ends"
+)
+LINES_HELP = "+20 or -20 moves it by so many us, 1480 to that width, Enter: it is there, q ends"
 
 
 _LARGEST = 1_000_000  # largest size of a file of answers, bytes
@@ -67,6 +81,8 @@ class Lines:
 class TerminalPerson:
     """Asks on the terminal; implements Operator.
 
+    Keys of a terminal take effect when pressed; lines of a file or a pipe are read one by one.
+
     Args:
         lines: source of the answers.
         stopped: returns why to end, None without a reason.
@@ -77,7 +93,6 @@ class TerminalPerson:
         self._lines = lines
         self._stopped = stopped
         self._yes = yes
-        self._live_line = sys.stderr.isatty()
         self.hand: Callable[[int], object] | None = None
         """Turns the present joint by some steps, if it is emulated."""
 
@@ -86,15 +101,52 @@ class TerminalPerson:
         say(line)
 
     def wait(self, question: str, live: Callable[[], str]) -> None:
-        """Return at Enter; see gazerig.features.bringup.calibration.joint_procedure.Operator."""
+        """Return at Enter."""
         self._ask(question, live, ("",))
 
-    def agrees(self, question: str, live: Callable[[], str] | None = None) -> bool:
-        """Return yes or no; see gazerig.features.bringup.calibration.joint_procedure.Operator."""
+    def agrees(self, question: str, live: Callable[[], str] = str) -> bool:
+        """Return yes or no."""
         if self._yes:
             say(f"{question} yes (--yes)")
             return True
-        return self._ask(f"{question} [y/n]", live or str, (*YES, *NO)) in YES
+        return self._ask(f"{question} [y/n]", live, (*YES, *NO)) in YES
+
+    def steer(self, question: str, servo: HobbyServoAccess) -> None:
+        """Return when the servo has the desired position."""
+        if self._lines.is_scripted or not sys.stdin.isatty():
+            say(question)
+            while line := self._line(question, servo.live):
+                us = _number(line)
+                if us is None:
+                    say(f"{line!r}: {LINES_HELP}")
+                else:
+                    servo.aim(servo.place_us + us if line[0] in "+-" else us)
+            return
+        step = FIRST_STEP
+        say(f"{question}; {KEYS_HELP}")
+        with TerminalKeys() as keys:
+            while (key := keys.next()) != "enter":
+                self._look(servo.live, f"; step {STEPS_US[step]:g} us: {KEYS_HELP}")
+                match key:
+                    case None:
+                        select.select([sys.stdin.fileno()], [], [], LOOK_S)
+                    case "end":
+                        raise CalibrationStopped("q")
+                    case "left" | "right":
+                        servo.nudge(STEPS_US[step] if key == "right" else -STEPS_US[step])
+                    case "up" | "larger":
+                        step = min(step + 1, len(STEPS_US) - 1)
+                    case "down" | "smaller":
+                        step = max(step - 1, 0)
+
+    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        """Return the typed number; Enter selects the proposed one."""
+        asked = f"{question} [{proposed:g}]"
+        say(asked)
+        while (line := self._line(asked, live)) and _number(line) is None:
+            say(f"{line!r} is no number: a number, or Enter for {proposed:g}; q ends")
+        number = _number(line)
+        return proposed if number is None else number
 
     def _ask(self, question: str, live: Callable[[], str], accepted: tuple[str, ...]) -> str:
         say(question)
@@ -109,8 +161,7 @@ class TerminalPerson:
                     live()
                 continue
             wanted = "Enter" if accepted == ("",) else "y or n"
-            hand = ", turn STEPS moves the emulated joint" if self.hand is not None else ""
-            say(f"{line!r} is no answer: {wanted} goes on, q ends{hand}")
+            say(f"{line!r} is no answer: {wanted} goes on, q ends")
         return line
 
     def _look(self, live: Callable[[], str], more: str = "") -> None:
@@ -119,7 +170,7 @@ class TerminalPerson:
         if why is not None:
             raise CalibrationStopped(why)
         shown = live()
-        if self._live_line:
+        if sys.stderr.isatty():
             status(f"{shown}{more}")
 
     def _line(self, question: str, live: Callable[[], str]) -> str:
@@ -137,3 +188,69 @@ class TerminalPerson:
                 raise CalibrationStopped("q")
             if line is not None:
                 return line
+
+
+def _number(line: str) -> float | None:
+    """Return a typed number, None if it is none."""
+    try:
+        number = float(line)
+    except ValueError:
+        return None
+    return number if isfinite(number) else None
+
+
+# --- keys
+
+HELP = (
+    "arrow keys or w a s d move the gaze as you see it; + and - the step; Enter: it looks at it; "
+    "n: next, leave this part; b: back; q: end"
+)
+
+_PLAIN: dict[str, Key] = {
+    "w": "up", "a": "left", "s": "down", "d": "right",
+    "+": "larger", "=": "larger", "-": "smaller", "_": "smaller",
+    "\r": "enter", "\n": "enter", "n": "skip", "b": "back", "q": "end",
+}  # fmt: skip
+_WORDS: dict[str, Key] = {"": "enter", **_PLAIN} | {
+    word: word for word in ("enter", "left", "right", "up", "down", "skip", "back", "end")
+}
+
+
+def split_words(text: str) -> tuple[list[Key], str]:
+    """Return the keys in a terminal's input, and an incomplete sequence at its end."""
+    typed, rest = split_keys(text)
+    named = ((one if len(one) > 1 else _PLAIN.get(one.lower())) for one in typed)
+    return [cast(Key, key) for key in named if key is not None], rest
+
+
+def parse_keys(line: str) -> list[Key]:
+    """Parse "left 3", "enter" or an empty line, which is Enter.
+
+    Raises:
+        SetupError: it is not a key; the message lists the keys.
+    """
+    word, _, number = line.strip().lower().partition(" ")
+    number = number.strip() or "1"
+    if word not in _WORDS or not number.isdecimal() or not 0 < int(number) <= 1000:
+        raise SetupError(
+            f"{line!r} is no key: left, right, up, down, +, - with a number of times (left 3), "
+            "enter or an empty line, skip, back, end"
+        )
+    return [_WORDS[word]] * int(number)
+
+
+class TerminalKeys(TerminalInput):
+    """Keys of standard input one by one, within the block."""
+
+    def __init__(self) -> None:
+        self._ready: list[Key] = []
+        self._rest = ""
+
+    def next(self) -> Key | None:
+        """Return the next key, None if none has been pressed."""
+        if not self._ready:
+            text = self.text()
+            if text is None:
+                return "end"
+            self._ready, self._rest = split_words(self._rest + text)
+        return self._ready.pop(0) if self._ready else None

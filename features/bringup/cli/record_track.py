@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -13,10 +12,12 @@ from gazerig.config.schema import load_rig
 from gazerig.config.tracks import track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
+from gazerig.features.bringup.cli.monitor import open_readers
 from gazerig.features.bringup.cli.motion import enter_pressed
 from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
+    YesOption,
     confirm_safe,
     open_port,
     rig_ports,
@@ -28,8 +29,7 @@ from gazerig.features.bringup.hand_recording import (
     record_live,
     switch_off,
 )
-from gazerig.features.bringup.servo_kinds import servo_kind
-from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry
+from gazerig.features.bringup.telemetry import Monitor
 from gazerig.gaze.track.track import MAX_DURATION_S
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.rig_command import RigCommand
@@ -44,7 +44,6 @@ from gazerig.robot.cli.terminal import (
 from gazerig.robot.cli.tracks import FolderOption, print_track_fit
 from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import Play
 from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
@@ -59,16 +58,10 @@ def record_track(
         bool,
         typer.Option("--live", help="Record what moves a running head: page, keys or program."),
     ] = False,
-    joints: Annotated[
-        str,
-        typer.Option(
-            metavar="JOINT,...", help="With --live: joints to record; default: those of no track."
-        ),
-    ] = "",
-    play: Annotated[
-        str,
-        typer.Option(metavar="TRACK", help="With --live: play a track meanwhile, until its end."),
-    ] = "",
+    joint: Annotated[
+        list[str] | None,
+        typer.Option(help="With --live: this joint only; repeatable; default: those of no track."),
+    ] = None,
     which: PidOption = None,
     seconds: Annotated[
         float | None,
@@ -76,9 +69,7 @@ def record_track(
     ] = None,
     folder: FolderOption = Path("."),
     force: ForceOption = False,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="Do not ask: the head is held, torque may go off.")
-    ] = False,
+    yes: YesOption = False,
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
@@ -92,8 +83,7 @@ def record_track(
         with record_signals() as stopped:
             end = lambda: stopped() or (enter_pressed() if sys.stdin.isatty() else None)  # noqa: E731
             if live:
-                wanted = [word.strip() for word in joints.split(",") if word.strip()]
-                recorded = _record_live(which, wanted, play, end, seconds or MAX_DURATION_S)
+                recorded = _record_live(which, joint or [], end, seconds or MAX_DURATION_S)
             else:
                 recorded = _record_hand(loaded, mock, port, yes, end, seconds or LONGEST_S)
             ended = stopped()
@@ -135,26 +125,20 @@ def _record_hand(
         yes,
     )
     clock, there = RealClock(), {one: rig.joints[one] for one in measured}
-    with rig_ports(rig, mock, port) as wire, ExitStack() as ports:
-        readers = {}
+    with rig_ports(rig, mock, port) as wire:
         for bus in dict.fromkeys(joint.bus for joint in there.values()):
-            line = ports.enter_context(open_port(rig, wire, bus))
-            own = {one: joint for one, joint in there.items() if joint.bus == bus}
-            switch_off(own, line)
-            readers[bus] = SmartServoTelemetry(line, servo_kind(next(iter(own.values())).model))
+            with open_port(rig, wire, bus) as line:
+                switch_off({one: joint for one, joint in there.items() if joint.bus == bus}, line)
         say(f"the torque is off and stays off; move the head, Enter ends it (within {seconds:g} s)")
-        watch = Monitor(readers, there, clock.now_s)
-        return record_hand_motion(watch.sample, clock, end, seconds)
+        with open_readers(rig, wire, there) as readers:
+            watch = Monitor(readers, there, clock.now_s)
+            return record_hand_motion(watch.sample, clock, end, seconds)
 
 
 def _record_live(
-    which: str | None,
-    joints: list[str],
-    play: str,
-    end: Callable[[], str | None],
-    seconds: float,
+    which: str | None, joints: list[str], end: Callable[[], str | None], seconds: float
 ) -> HandRecording:
-    """Record joints of a running head, which others move."""
+    """Record a running head, which others move."""
     with RobotClient.connect(which, "record-track") as head:
 
         def read() -> HeadState:
@@ -163,15 +147,5 @@ def _record_live(
                 raise SetupError("the head has just started: its loop is not running yet")
             return state
 
-        there = read()
-        unknown = [one for one in joints if one not in there.joints]
-        if unknown:
-            raise SetupError(
-                f"no joint {unknown[0]!r}; joints of the head: {', '.join(there.joints)}"
-            )
-        track = head.send(Play(play)).track if play else None
-        owned = {joint for one in read().tracks if not one.end_reason for joint in one.owns}
-        wanted = joints or [one for one in there.joints if one not in owned]
-        say(f"recording {', '.join(wanted)}; Enter ends it (within {seconds:g} s)")
-        number = track.number if track else 0
-        return record_live(read, wanted, RealClock(), end, seconds, number)
+        say(f"recording what moves the head; Enter ends it (within {seconds:g} s)")
+        return record_live(read, joints, RealClock(), end, seconds)

@@ -6,14 +6,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 
 from gazerig.config.load import find_file
-from gazerig.config.rig import Rig
-from gazerig.config.save import save
+from gazerig.config.save import propose, save
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.cli.prompts import TerminalPerson
-from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.terminal import say
 
 OutOption = Annotated[
@@ -22,7 +19,6 @@ OutOption = Annotated[
 DryRunOption = Annotated[
     bool, typer.Option("--dry-run", help="Show the changes and write nothing.")
 ]
-AllYesOption = Annotated[bool, typer.Option("--yes", help="Answer yes to every question.")]
 
 
 def refuse_unwritable(rig: str, out: Path | None) -> None:
@@ -40,63 +36,30 @@ def refuse_unwritable(rig: str, out: Path | None) -> None:
 
 
 def write_values(
-    rig: str, values: Mapping[str, Any], out: Path | None, person: TerminalPerson
+    rig: str,
+    values: Mapping[str, Any],
+    out: Path | None,
+    person: TerminalPerson,
+    dry_run: bool = False,
 ) -> None:
-    """Write values after a yes, and print the path of the old file.
+    """Show old and new values; write them after a yes, and print the path of the old file.
 
     Args:
         rig: name of the rig on the command line.
         values: values by the dotted keys of the rig file.
         out: a copy of a shipped rig to write instead, None for the rig itself.
         person: answers the question.
+        dry_run: write nothing.
     """
-    if not values:
-        say("everything is as the rig file says: nothing to write")
-        return
     file = find_file("rigs", rig)
-    where = out or file
-    if not person.agrees(f"write these {len(values)} values into {where}?"):
-        say("nothing written")
-        return
-    saved = save(where, values, datetime.now(), source=out and file)
-    for change in saved.changes:
+    _, _, changes = propose(file, values)
+    for change in changes:
         say(str(change))
-    if not saved.changes:
-        say(f"everything is as {saved.path} says: nothing to write")
-    else:
-        say(f"written into {saved.path}; as it was: {saved.backup or rig}")
-
-
-def show_and_write(
-    rig: str,
-    loaded: Rig,
-    changes: Mapping[str, Any],
-    out: Path | None,
-    dry_run: bool,
-    person: TerminalPerson,
-) -> None:
-    """Show old and new values side by side; write them after a yes, but not with ``dry_run``.
-
-    loaded: rig with the old values; see ``write_values`` for the others
-    """
-    table = Table(caption=f"what was found, against {rig}")
-    for name in ("key", "old", "new"):
-        table.add_column(name, justify="left" if name == "key" else "right", no_wrap=True)
-    for key, new in changes.items():
-        old: Any = loaded
-        for step in key.split("."):
-            old = old.get(step, "-") if isinstance(old, Mapping) else getattr(old, step, "-")
-        style = "bold" if key.endswith("sign") else None
-        table.add_row(key, _text(old), _text(new), style=style)
-    Console().print(table)
-    if not dry_run:
-        write_values(rig, changes, out, person)
-
-
-def _text(value: Any) -> str:
-    """Format a value; the positions of a linkage are on separate lines."""
-    if not isinstance(value, tuple):
-        return f"{value}"
-    if any(isinstance(one, tuple) for one in value):
-        return "\n".join(f"{angle:g} deg: {at:g}" for angle, at in value)
-    return " ".join(f"{v:g}" for v in value)
+    if not changes:
+        say("everything is as the rig file says: nothing to write")
+    elif not dry_run:
+        if person.agrees(f"write these {len(changes)} values into {out or file}?"):
+            saved = save(out or file, values, datetime.now(), source=out and file)
+            say(f"written into {saved.path}; as it was: {saved.backup or rig}")
+        else:
+            say("nothing written")

@@ -1,10 +1,11 @@
-"""The command ``gazerig setup``: each servo gets its id, each board its settings."""
+"""The command ``gazerig setup``: each servo gets its id and baud rate."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
 
+from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import DriverError, SetupError
@@ -15,23 +16,17 @@ from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
     YesOption,
-    clear_progress,
+    bus_label,
     progress,
     refuse_packages,
     rig_ports,
     setups_on,
     unopened_port,
 )
-from gazerig.features.bringup.cli.setup_boards import (
-    SetupTask,
-    press_enter,
-    set_up_maestro,
-    set_up_pca9685,
-)
-from gazerig.features.bringup.servo_kinds import ServoKind, servo_kind
+from gazerig.features.bringup.servo_kinds import KINDS, servo_kind
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.run_bus import CHAINS
-from gazerig.robot.cli.terminal import RigArgument, clear_errors, confirm, say
+from gazerig.robot.cli.terminal import RigArgument, clear_errors, confirm, finish_lines, say
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 app = typer.Typer()
@@ -47,7 +42,7 @@ def setup(
     mock: MockOption = False,
     yes: YesOption = False,
 ) -> None:
-    """Set id and baud rate of the servos, connected one at a time; print a board's settings."""
+    """Set id and baud rate of the servos, connected one at a time."""
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
         refuse_packages(model, "setup")
@@ -56,97 +51,87 @@ def setup(
             if name not in model.names:
                 named = ", ".join(model.names)
                 raise SetupError(f"--joint {name}: unknown; joints are {named}")
-        left: list[str] = []
+        done: set[str] = set()
         for bus in bus_names(model):
-            mine = [one for one in setups_on(model, bus) if one.name in wanted]
-            if mine:
-                task = SetupTask(model, rig, bus, mine, port, mock, yes)
-                if set_up_board := BOARDS.get(model.bus_named(bus).kind):
-                    set_up_board(task)
-                else:
-                    left += _set_up_chain(task)
+            chain = setups_on(model, bus)
+            mine = [one for one in chain if one.name in wanted]
+            if mine and model.bus_named(bus).kind in KINDS:
+                done |= _set_up_chain(model, bus, mine, port, mock, yes)
+            elif mine:
+                say(
+                    f"{bus_label(model, bus)}: channels of a board have no ids; gazerig doctor "
+                    "checks the board, gazerig jog shows which servo is on which channel"
+                )
+                done |= {one.name for one in mine}
+        left = [name for name in wanted if name not in done]
         if left:
             say(f"skipped: {', '.join(left)}")
         say(f"done: {len(wanted) - len(left)} of {len(wanted)}. Next: gazerig doctor")
 
 
-BOARDS: dict[str, Callable[[SetupTask], None]] = {
-    "maestro": set_up_maestro,
-    "pca9685": set_up_pca9685,
-}
-"""Kinds of bus whose servos have no ids."""
-
-
-def _set_up_chain(task: SetupTask) -> list[str]:
-    """Set the servos of one bus up; return the joints that were skipped."""
-    count = len(task.setups)
+def _set_up_chain(
+    rig: Rig, bus: str, setups: Sequence[ServoConfig], port: str | None, mock: bool, yes: bool
+) -> set[str]:
+    """Set the servos of one bus up, each until it is done or skipped; return the joints done."""
+    baud, count, done = rig.bus_named(bus).section.baud, len(setups), set[str]()
     say(
-        f"{task.title}: {count} of {len(task.rig.names)} servos to set up for {task.config.section.baud} "
-        "bit/s. Switch the servo supply off before you plug or unplug one. A new servo in the place "
-        "of the only missing one may be set up in the chain."
+        f"{bus_label(rig, bus)}: {count} of {len(rig.names)} servos to set up for {baud} bit/s. "
+        "Switch the servo supply off before you plug or unplug one."
     )
-    done: set[str] = set()
-    for n, one in enumerate(task.setups, 1):
-        if one.name not in done:
-            label = servo_label(one)
-            say(f"{n} of {count}: connect the {one.model} of {label}, and no other servo")
-            done.update(_set_up_joint(task, one))
-    return [one.name for one in task.setups if one.name not in done]
+    for n, wanted in enumerate(setups, 1):
+        # Factory settings.
+        kind, zero = servo_kind(wanted.model), rig.joints[wanted.name].zero
+        spec = ServoSpec(servo_setup.FACTORY_ID, wanted.model, zero)
+        fresh = {bus: CHAINS[kind.name]((spec,), kind.family.factory_baud)}
+        say(
+            f"{n} of {count}: connect the {wanted.model} of {servo_label(wanted)}, and no other servo"
+        )
+        while yes or not _press_enter().lower().startswith("s"):
+            try:
+                with (
+                    rig_ports(rig, mock, port, fresh) as wired,
+                    unopened_port(wired.paths[bus]) as line,
+                ):
+                    if _set_up(line, wanted, baud, yes):
+                        done.add(wanted.name)
+                break
+            except DriverError as error:
+                if yes:
+                    raise
+                say(f"   {error}")
+    return done
 
 
-def _set_up_joint(task: SetupTask, one: ServoConfig) -> Collection[str]:
-    """Set one joint's servo up; repeat until it is done or skipped; return the joints done."""
-    kind = servo_kind(one.model)
-    # Factory settings.
-    spec = ServoSpec(servo_setup.FACTORY_ID, one.model, task.rig.joints[one.name].zero)
-    fresh = {task.bus: CHAINS[kind.name]((spec,), kind.family.factory_baud)}
+def _press_enter() -> str:
+    """Wait for Enter; return the text typed before it."""
+    finish_lines()
     question = "   Enter: it is connected; s: skip this one; Ctrl-C: end "
-    while True:
-        if not task.yes and press_enter(question).lower().startswith("s"):
-            return ()
-        try:
-            with (
-                rig_ports(task.rig, task.mock, task.port, fresh) as wired,
-                unopened_port(wired.paths[task.bus]) as line,
-            ):
-                return _set_up(line, kind, one, task)
-        except DriverError as error:
-            if task.yes:
-                raise
-            say(f"   {error}")
+    answer = typer.prompt(question, default="", show_default=False, prompt_suffix="", err=True)
+    return str(answer)
 
 
 def _set_up(
-    line: BusPort, kind: ServoKind, wanted: ServoConfig, task: SetupTask
-) -> Collection[str]:
-    """Give the new servo its id and baud rate; return the joints that are done, () if skipped."""
-    baud, chain = task.config.section.baud, setups_on(task.rig, task.bus)
-    order = servo_setup.search_order(kind, baud)
+    line: BusPort,
+    wanted: ServoConfig,
+    baud: int,
+    yes: bool,
+) -> bool:
+    """Give the new servo its id and baud rate; return whether it is done."""
+    kind = servo_kind(wanted.model)
+    # The most likely rates first.
+    order = list(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.baud_rates)))
     answers = servo_setup.search_rates(line, kind, order, progress, thorough=True)
-    clear_progress()
-    spare = servo_setup.find_spare(line, kind, chain, baud, answers.found)
-    joints = [wanted.name]
-    if spare is None or spare[1] not in task.setups:
-        found = servo_setup.find_alone(answers, line.port_name)
-    else:
-        found, wanted = spare
-        joints = [one.name for one in chain]
+    progress()
+    found = servo_setup.find_alone(answers, line.port_name)
+    label = servo_label(wanted)
     firmware = kind.family.format_firmware(found.firmware)
     say(f"   found: {found.model}, firmware {firmware}, id {found.id} at {found.baud} bit/s")
-    if len(joints) > 1:
-        say(
-            f"   all others of the chain answer, so it is for {servo_label(wanted)}; its zero is "
-            f"another: then gazerig calibrate --joint {wanted.name}"
-        )
     servo_setup.refuse_model(found, kind, wanted, line.port_name)
     question = f"   give it id {wanted.id} and {baud} bit/s?"
-    if not task.yes and not confirm(question, default=True, err=True):
-        return ()
-    result = servo_setup.assign_servo(line, kind, found, wanted, baud, progress)
-    clear_progress()
-    done = "; ".join(result.changes) or "nothing to change"
-    say(
-        f"   {servo_label(wanted)}: {done}; answers as id {result.after.id} at "
-        f"{result.after.baud} bit/s"
-    )
-    return joints
+    if not yes and not confirm(question, default=True, err=True):
+        return False
+    after, changes = servo_setup.assign_servo(line, kind, found, wanted, baud, progress)
+    progress()
+    done = "; ".join(changes) or "nothing to change"
+    say(f"   {label}: {done}; answers as id {after.id} at {after.baud} bit/s")
+    return True

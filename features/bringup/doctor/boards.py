@@ -8,7 +8,7 @@ User's Guide (0J40), sections 4.b, 4.e, 5.a and 5.e; NXP, PCA9685 data sheet, re
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from math import ceil, floor
 
 from gazerig.drivers.bus.servo_models import US_STEPS, servo_label
 from gazerig.drivers.errors import ServoMissing
@@ -24,104 +24,19 @@ from gazerig.drivers.maestro.board import (
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
 from gazerig.drivers.serial.port import BusPort, open_port
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic
-from gazerig.features.bringup.maestro_settings import FACTORY_US, wide_range
+from gazerig.features.bringup.doctor.diagnostics import ADVICE, Diagnostic, has_fault
 
 WHERE = "the board"
+BOARDS = ADVICE.boards
 
-TIMEOUT = "serial timeout"
-_BAD_SCRIPT = "its script is at fault: delete it in Pololu's program"
-# fmt: off
-CURES = {
-    "serial signal error": "something was sent at another baud rate, or the line is disturbed: "
-        "check ground and cable",
-    "serial overrun": "the board could not follow: restart it, and report it if it comes again",
-    "serial buffer full": "too much was sent at once: is another program using the board?",
-    "serial CRC error": "check bytes were wrong: set bus.maestro.crc as 'Enable CRC' in Pololu's "
-        "program, check the cable",
-    "serial protocol error":
-        "it was sent what it does not know: another program, another protocol or a disturbed line",
-    TIMEOUT: "no commands came for longer than its timeout, so its channels went home, as they "
-        "should while no program runs",
-    "script stack error": _BAD_SCRIPT,
-    "script call stack error": _BAD_SCRIPT,
-    "script program counter error": _BAD_SCRIPT,
-}
-# fmt: on
-
-# fmt: off
-ADVICE = {
-    "no feedback": Advice("note",
-        "hobby servos report nothing: position, load, temperature and supply cannot be examined"),
-    "beyond": Advice("error", "the board has channels 0..{last} only",
-        "correct its id in the YAML"),
-    "not read": Advice("note",
-        "was not read: others give pulses, and if it did not exist, the board would send them home",
-        "stop the pulses of all servos and look again"),
-    "silent": Advice("error", "the board does not answer about this channel",
-        "does the board have this channel? correct its id, or bus.maestro.channels"),
-    "input": Advice("error", "is an input", "set its channel to Servo in Pololu's program"),
-    "left on": Advice("warn", "gets pulses of {us:g} us though no program runs it", "{remedy}"),
-    "outside": Advice("error", "gets pulses of {us:g} us though no program runs it, outside its "
-        "range {low:g}..{high:g} us", "{remedy}"),
-    "mute": Advice("error", "no Maestro answers", "has it power? take the first of its two USB ports "
-        "(the Command Port), and set it to 'USB Dual Port' in Pololu's program"),
-    "CRC": Advice("error", "wants a check byte (CRC) after every command, the YAML says crc: false",
-        "write bus.maestro.crc: true, or change 'Enable CRC' in Pololu's program"),
-    "no CRC": Advice("error", "wants no CRC, the YAML says crc: true",
-        "write bus.maestro.crc: false, or change 'Enable CRC' in Pololu's program"),
-    "size": Advice("error", "has {size} channels, the YAML says {params.channels}",
-        "write bus.maestro.channels: {size}"),
-    "timeout": Advice("note", "held an error, cleared now: {error}", "{cure}"),
-    "error": Advice("warn", "held an error, cleared now: {error}", "{cure}"),
-    "wide range": Advice("note", "goes to {low:g}..{high:g} us, beyond the "
-        "{factory[0]}..{factory[1]} us of a new board, which cuts goals silently",
-        "set its Min to {range[0]} and its Max to {range[1]} in Pololu's program"),
-}
-# fmt: on
+_FACTORY_US = (992, 2000)
+"""Range of every channel of a new Maestro."""
+_UNIT_US = 16
+"""A Maestro keeps the ends of a range in multiples of this."""
 
 
-class BoardRules(NamedTuple):
-    """Rules that differ between makes.
-
-    highest_input: a channel with at most this pulse is an input; 0: the board has no inputs
-    left_on_remedy, outside_range_remedy: remedies for pulses inside and outside a joint's range
-        that no program sends; {name} is the joint
-    note: properties that no board of the make reports
-    """
-
-    highest_input: int
-    left_on_remedy: str
-    outside_range_remedy: str
-    note: Advice
-
-
-MAESTRO = BoardRules(
-    highest_input=MOST_INPUT,
-    left_on_remedy="gazerig jog ends with its pulses off; for good set 'On startup or error' to Off in "
-    "Pololu's program",
-    outside_range_remedy="switch the servo supply off; set 'On startup or error' to Off in Pololu's program",
-    note=Advice(
-        "note",
-        "its channels' own ranges and its serial timeout cannot be read over the serial line",
-        "gazerig setup lists what to set in Pololu's program, and tries the ranges out with "
-        "the servo supply off; without a timeout servos hold when the program or the cable dies",
-    ),
-)
-PCA9685 = BoardRules(
-    highest_input=0,
-    left_on_remedy="gazerig jog ends with its pulses off",
-    outside_range_remedy="switch the servo supply off, then the board's power off and on",
-    note=Advice(
-        "note",
-        "has no watchdog: when the cable or the computer dies it goes on with its last pulses",
-        "keep the switch of the servo supply at hand",
-    ),
-)
-
-
-def examine_channels(
-    rules: BoardRules,
+def _examine_channels(
+    make: str,
     setups: Sequence[ServoConfig],
     pulses: Mapping[int, int | None],
     channels: int,
@@ -131,7 +46,7 @@ def examine_channels(
     """Return all findings about a board that answers.
 
     Args:
-        rules: rules of its make.
+        make: "maestro" or "pca9685".
         setups: the servos of the rig.
         pulses: pulses by channel, quarter microseconds, 0 for none, None without an answer;
             channels that were not read are missing.
@@ -142,27 +57,26 @@ def examine_channels(
     findings = list(own)
     for setup in setups:
         pulse, where = pulses.get(setup.id), servo_label(setup)
+        facts = {"us": (pulse or 0) / US_STEPS, "last": channels - 1}
+        facts |= {"low": setup.min_steps / US_STEPS, "high": setup.max_steps / US_STEPS}
+        name = ""
         if setup.id >= channels:
-            findings.append(ADVICE["beyond"].at(where, last=channels - 1))
+            name = "beyond"
         elif setup.id not in pulses:
-            findings.append(ADVICE["not read"].at(where))
+            name = "not read"
         elif pulse is None:
-            findings.append(ADVICE["silent"].at(where))
-        elif 0 < pulse <= rules.highest_input:
-            findings.append(ADVICE["input"].at(where))
+            name = "silent"
+        elif make == "maestro" and 0 < pulse <= MOST_INPUT:
+            name = "input"
         elif pulse:
-            us, low, high = (one / US_STEPS for one in (pulse, setup.min_steps, setup.max_steps))
-            inside = low <= us <= high
-            remedy = (rules.left_on_remedy if inside else rules.outside_range_remedy).format(
-                name=setup.name
-            )
-            advice = ADVICE["left on" if inside else "outside"]
-            findings.append(advice.at(where, us=us, low=low, high=high, remedy=remedy))
-    if not any(finding.level in ("warn", "error") for finding in findings):
+            name = "left on" if setup.min_steps <= pulse <= setup.max_steps else "outside"
+        if name:
+            findings.append(BOARDS[name].at(where, **facts))
+    if not has_fault(findings):
         given = sum(1 for pulse in pulses.values() if pulse)
-        well = f"{well}; pulses on {given} of {len(pulses)} channels"
-        findings.insert(0, Diagnostic("ok", well, WHERE))
-    return [*findings, ADVICE["no feedback"].at("the servos"), rules.note.at(WHERE)]
+        text = f"{well}; pulses on {given} of {len(pulses)} channels"
+        findings.insert(0, Diagnostic("ok", text, WHERE))
+    return [*findings, BOARDS["no feedback"].at("the servos"), BOARDS[make].at(WHERE)]
 
 
 # --- Maestro
@@ -185,36 +99,29 @@ def examine_maestro(
     """
     found, size = probe(port, params), USB_CHANNELS.get(usb)
     if found is None:
-        return [ADVICE["mute"].at(WHERE)]
+        return [BOARDS["mute"].at(WHERE)]
     channels = size or params.channels
     line = MaestroBoard(port, replace(params, crc=found.expects_crc))
     pulses = _read_pulses(line, setups, channels, found, size is not None)
-    crc = "on" if found.expects_crc else "off"
-    named = f"{channels} channels{'' if size else ' assumed'}"
-    well = f"answers, CRC {crc}, {named}"
+    crc, wanted = ("on" if on else "off" for on in (found.expects_crc, params.crc))
     own = []
-    if found.expects_crc != params.crc:
-        own.append(ADVICE["CRC" if found.expects_crc else "no CRC"].at(WHERE))
+    if crc != wanted:
+        own.append(BOARDS["crc"].at(WHERE, found=crc, wanted=str(params.crc).lower()))
     if size is not None and size != params.channels:
-        own.append(ADVICE["size"].at(WHERE, size=size, params=params))
+        own.append(BOARDS["size"].at(WHERE, size=size, channels=params.channels))
     for error in found.errors:
         # If a timeout is set, every pause between two programs causes it.
-        advice = ADVICE["timeout" if error == TIMEOUT else "error"]
-        cure = CURES.get(error, "look it up in Pololu's guide")
-        own.append(advice.at(WHERE, error=error, cure=cure))
-    findings = examine_channels(MAESTRO, setups, pulses, channels, own, well)
-    wide = [
-        ADVICE["wide range"].at(
-            servo_label(setup),
-            low=setup.min_steps / US_STEPS,
-            high=setup.max_steps / US_STEPS,
-            factory=FACTORY_US,
-            range=limits,
-        )
-        for setup in setups
-        if (limits := wide_range(setup)) is not None
-    ]
-    return [*findings[:-1], *wide, findings[-1]]
+        advice = BOARDS["timeout" if error == "serial timeout" else "error"]
+        own.append(advice.at(WHERE, error=error, remedy=ADVICE.maestro[error]))
+    for setup in setups:
+        low, high = setup.min_steps / US_STEPS, setup.max_steps / US_STEPS
+        if low < _FACTORY_US[0] or high > _FACTORY_US[1]:
+            least, most = _UNIT_US * floor(low / _UNIT_US), _UNIT_US * ceil(high / _UNIT_US)
+            facts = {"low": low, "high": high, "least": least, "most": most}
+            own.append(BOARDS["wide range"].at(servo_label(setup), **facts))
+    assumed = "" if size else " assumed"
+    well = f"answers, CRC {crc}, {channels} channels{assumed}"
+    return _examine_channels("maestro", setups, pulses, channels, own, well)
 
 
 def _read_pulses(
@@ -254,7 +161,7 @@ def examine_pca9685(
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: it has disappeared.
+        BusLost: the port has disappeared.
     """
     board = Pca9685Board(port, params)
     open_port(port, params.baud)
@@ -274,6 +181,5 @@ def examine_pca9685(
         what, _, remedy = str(error).removeprefix(f"{port.port_name}: ").partition(": ")
         return [*findings, Diagnostic("error", what, WHERE, remedy)]
     read = dict(zip((setup.id for setup in fitting), pulses, strict=True))
-    return examine_channels(
-        PCA9685, fitting, read, params.channels, findings, f"answers at {params.address:#x}"
-    )
+    well = f"answers at {params.address:#x}"
+    return _examine_channels("pca9685", fitting, read, params.channels, findings, well)

@@ -1,19 +1,26 @@
-"""Findings of an examination as values (level, fact, place, remedy), and their texts."""
+"""Findings of an examination as values (level, fact, place, remedy), and the table of their texts.
+
+``advice.yaml`` has the texts, and the settings that a servo of each family should have.
+"""
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from pathlib import Path
+from typing import Literal
+
+import msgspec
 
 from gazerig.robot.control.event_text import format_ranges
 
 Level = Literal["ok", "note", "warn", "error"]
 LEVELS: tuple[Level, ...] = ("ok", "note", "warn", "error")
 
+FIX = "gazerig doctor --fix"
+
 _JOINT = re.compile(r"(\w+) \((servo|channel) (\d+)\)")
 
 
-class Fix(NamedTuple):
+class Fix(msgspec.Struct, frozen=True):
     """Write to one register that repairs a fault and moves nothing.
 
     was: the previous value, None if it could not be read
@@ -30,13 +37,12 @@ class Fix(NamedTuple):
         return f"{self.register.replace('_', ' ')} {was} -> {self.value}"
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnostic:
+class Diagnostic(msgspec.Struct, frozen=True):
     """One finding.
 
     level: ok, note (useful to know), warn (works, but not well), error (does not work)
     what: the fact; where: port, joint or file; remedy: remedy, "" if none is needed
-    fixes: writes that ``--fix`` may apply
+    fixes: writes that ``--fix`` may apply; bus: name of its bus, "" for the main one
     """
 
     level: Level
@@ -44,14 +50,11 @@ class Diagnostic:
     where: str
     remedy: str = ""
     fixes: tuple[Fix, ...] = ()
-
-    def __str__(self) -> str:
-        """Write it on one line."""
-        return f"{self.level}: {self.where}: {self.what}{f': {self.remedy}' if self.remedy else ''}"
+    bus: str = ""
 
 
-class Advice(NamedTuple):
-    """Row of a table of findings; the texts have fields for ``str.format``."""
+class Advice(msgspec.Struct, frozen=True, kw_only=True):
+    """Row of the table of findings; the texts have fields for ``str.format``."""
 
     level: Level
     what: str
@@ -66,9 +69,66 @@ class Advice(NamedTuple):
         return Diagnostic(self.level, what, where, remedy, fixes)
 
 
+class Setting(Advice, frozen=True, kw_only=True):
+    """Setting that a servo should have.
+
+    value: correct value of the register, within ``mask``
+    least, most: values between them are also correct
+    fix: whether ``--fix`` may write it
+    blocks: whether a joint is not calibrated with another value
+    unit: factor for {scaled} in the texts
+    """
+
+    register: str
+    value: int
+    mask: int = ~0
+    least: int | None = None
+    most: int | None = None
+    fix: bool = False
+    blocks: bool = False
+    unit: float = 1.0
+
+    def accepts(self, found: int) -> bool:
+        """Return whether the value of the register is correct."""
+        if self.least is None and self.most is None:
+            return found & self.mask == self.value
+        above = self.least is None or found >= self.least
+        return above and (self.most is None or found <= self.most)
+
+
+class FamilyAdvice(msgspec.Struct, frozen=True):
+    """Properties of a family of servos for the doctor; see ``advice.yaml``."""
+
+    program: str
+    manual: str
+    out_of_voltage: str
+    registers: tuple[str, ...]
+    errors: dict[str, str]
+    settings: tuple[Setting, ...]
+    no_reply: str
+    note: str = ""
+
+
+class _Tables(msgspec.Struct, frozen=True):
+    servos: dict[str, Advice]
+    bus: dict[str, Advice]
+    registers: tuple[str, ...]
+    families: dict[str, FamilyAdvice]
+    maestro: dict[str, str]
+    boards: dict[str, Advice]
+
+
+ADVICE = msgspec.yaml.decode((Path(__file__).parent / "advice.yaml").read_bytes(), type=_Tables)
+
+
 def worst_level(findings: Iterable[Diagnostic]) -> Level:
     """Return the worst level, "ok" without findings."""
     return max((finding.level for finding in findings), key=LEVELS.index, default="ok")
+
+
+def has_fault(findings: Iterable[Diagnostic]) -> bool:
+    """Return whether any finding is more than a note."""
+    return worst_level(findings) in ("warn", "error")
 
 
 def group_findings(findings: Sequence[Diagnostic]) -> list[tuple[Level, str, str, str]]:
@@ -88,18 +148,6 @@ def join_places(places: Sequence[str]) -> str:
         return ", ".join(places)
     names = ", ".join(match[1] for match in found)
     return f"{names} ({nouns.pop()}s {format_ranges([int(match[3]) for match in found])})"
-
-
-def finding_json(finding: Diagnostic, bus: str) -> dict[str, object]:
-    """Return a finding as JSON values; bus: the name of its bus, "" for the main one."""
-    return {
-        "bus": bus,
-        "level": finding.level,
-        "where": finding.where,
-        "what": finding.what,
-        "cure": finding.remedy,
-        "fixes": [fix._asdict() for fix in finding.fixes],
-    }
 
 
 def summarize(findings: Sequence[Diagnostic], rig: str, fixed: bool) -> str:

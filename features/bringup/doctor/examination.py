@@ -1,16 +1,15 @@
 """Examination of a whole bus of a rig: its servos, their baud rates and their faults.
 
-The examination only reads; ``apply_fixes`` writes the fixes of the findings, to servos whose torque
-is off, and moves nothing.
+The examination only reads.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+
+import msgspec
 
 from gazerig.drivers.bus.servo_models import servo_label
-from gazerig.drivers.errors import DriverError, PortError, ServoFault, ServoMissing, SetupError
-from gazerig.drivers.serial.list_ports import SerialPort, persistent_name
+from gazerig.drivers.errors import DriverError
+from gazerig.drivers.serial.list_ports import persistent_name
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (
     ANSWERS,
@@ -21,61 +20,10 @@ from gazerig.drivers.servo_bus.discovery import (
 )
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix
-from gazerig.features.bringup.doctor.servo_checks import CHECKS
+from gazerig.features.bringup.doctor.diagnostics import ADVICE, Diagnostic
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.servo_kinds import ServoKind, Tell
-from gazerig.features.bringup.servo_setup import (
-    Answers,
-    Spare,
-    assign_servo,
-    find_spare,
-    search_rates,
-)
-from gazerig.robot.guardian.guardian import Guardian
-from gazerig.robot.guardian.release_plan import ReleasePlan, describe
-
-# fmt: off
-ADVICE = {
-    "nobody": Advice("error", "no servo answers, at {baud} bit/s or any other rate",
-        "{kind.no_reply} gazerig scan asks other kinds of servos, too"),
-    "elsewhere": Advice("error", "answers at {found.baud} bit/s, the rig's rate is {baud}",
-        "connect it alone and run gazerig setup --joint {setup.name}"),
-    "spare": Advice("error", "does not answer, but a new {setup.model} does (id {found.id} at "
-        "{found.baud} bit/s)", "gazerig doctor --fix gives that one id {setup.id} and {baud} bit/s; "
-        "then gazerig calibrate --joint {setup.name}, as its zero is another"),
-    "pieces": Advice("error", "answers in pieces only: two servos share its id, or a plug is loose",
-        "connect it alone and look with gazerig scan"),
-    "spares": Advice("warn", "at {baud} bit/s answers came in pieces: two new servos with one id?",
-        "connect one of them alone and run gazerig setup"),
-    "silent": Advice("error", "does not answer",
-        "check its two plugs; is its id set? gazerig setup, with it connected alone, reports it"),
-    "new": Advice("warn",
-        "servo {found.id} ({found.model}) answers at {found.baud} bit/s and is none of the missing "
-        "({missing})", "a new one? connect it alone and run gazerig setup"),
-    "stranger": Advice("warn", "servo {found.id} ({found.model}) answers and is not in the YAML",
-        "take it off the bus, or give it the id of a joint with gazerig setup"),
-}
-# fmt: on
-
-
-ADOPT = "id"
-"""Register of the fix that gives a new servo the id and the baud rate of a missing one."""
-
-
-class Presence(NamedTuple):
-    """Servos that answered at the rig's baud rate, by id, and missing ones.
-
-    unexpected: servos that answered but are not in the YAML; elsewhere: at other baud rates
-    shared_ids: ids that two servos seem to share; spare: replaces the only missing servo
-    """
-
-    present: dict[int, FoundServo]
-    missing: tuple[ServoConfig, ...]
-    unexpected: tuple[FoundServo, ...]
-    elsewhere: Answers
-    shared_ids: set[int]
-    spare: Spare | None
+from gazerig.features.bringup.servo_setup import open_at, search_rates
 
 
 def examine_port(port: BusPort, examine: Callable[[], list[Diagnostic]]) -> list[Diagnostic]:
@@ -94,9 +42,9 @@ def examine_port(port: BusPort, examine: Callable[[], list[Diagnostic]]) -> list
     finally:
         port.closePort()
     lasting = persistent_name(device)
-    findings = [PORT_ADVICE["well"].at(device)]
+    findings = [ADVICE.bus["can open"].at(device)]
     if lasting not in (None, device):
-        findings.append(PORT_ADVICE["name"].at(device, name=lasting))
+        findings.append(ADVICE.bus["name"].at(device, name=lasting))
     return [*findings, *behind]
 
 
@@ -116,159 +64,58 @@ def examine_bus(
         PortError: the port cannot be opened.
         BusLost: it has disappeared.
     """
-    presence = find_servos(port, kind, setups, baud, tell)
-    if presence.missing and not presence.present and not presence.elsewhere.found:
-        return [ADVICE["nobody"].at("the bus", baud=baud, kind=kind)]
-    if presence.spare is not None:
-        found, setup = presence.spare
-        fix = Fix(found.id, ADOPT, setup.id, found.id)
+    advice = ADVICE.families[kind.family.name]
+    open_at(port, baud)
+    line = Transactions(port, kind.family)
+    present, shared = _find_present(port, kind, setups, baud, tell)
+    missing = [setup for setup in setups if setup.id not in present]
+    others = [rate for rate in kind.family.baud_rates if rate != baud and missing]
+    answers = search_rates(port, kind, others, tell)
+    open_at(port, baud)
+    elsewhere = {found.id: found for one in answers.values() for found in one.found}
+    if missing and not present and not elsewhere:
+        return [ADVICE.bus["nobody"].at("the bus", baud=baud, no_reply=advice.no_reply)]
+    findings = []
+    for setup in missing:
+        found = elsewhere.pop(setup.id, None)
+        cause = "elsewhere" if found else "pieces" if setup.id in shared else "silent"
         facts = {"setup": setup, "found": found, "baud": baud}
-        findings = [ADVICE["spare"].at(servo_label(setup), fix, **facts)]
-    else:
-        findings = _absences(presence, kind, baud)
-    states, line = [], Transactions(port, kind.family)
-    for setup in setups:
-        if setup.id in presence.present:
+        findings.append(ADVICE.bus[cause].at(servo_label(setup), **facts))
+    named = ", ".join(f"{servo_label(setup)}: {setup.model}" for setup in missing)
+    for found in elsewhere.values():
+        findings.append(ADVICE.bus["new"].at("the bus", found=found, missing=named))
+    factory = kind.family.factory_baud
+    if factory in answers and answers[factory].is_spoilt:
+        findings.append(ADVICE.bus["new ones"].at("the bus", baud=factory))
+    states, known = [], {setup.id: setup for setup in setups}
+    for servo_id, servo in sorted(present.items()):
+        if servo_id in known:
+            setup = known[servo_id]
             tell(f"reading {servo_label(setup)}")
-            found, is_shared = presence.present[setup.id], setup.id in presence.shared_ids
-            states.append(read_state(line, CHECKS[kind.family.name], setup, found, is_shared))
+            states.append(read_state(line, kind, setup, servo, servo_id in shared))
+        else:
+            findings.append(ADVICE.bus["stranger"].at("the bus", found=servo))
     far = find_far({s.setup.name: s.position for s in states if s.position is not None})
     for state in states:
-        findings += apply_rules(replace(state, far=far.get(state.setup.name, "")))
-    if presence.present:
-        findings += [Diagnostic("note", note, "the bus") for note in kind.notes]
+        findings += apply_rules(msgspec.structs.replace(state, far=far.get(state.setup.name, "")))
+    if present and advice.note:
+        findings.append(Diagnostic("note", advice.note, "the bus"))
     return findings
 
 
-def _absences(presence: Presence, kind: ServoKind, baud: int) -> list[Diagnostic]:
-    """Return the findings about missing and unexpected servos without a fitting spare."""
-    at, findings = {found.id: found for found in presence.elsewhere.found}, []
-    for setup in presence.missing:
-        other = at.pop(setup.id, None)
-        cause = "elsewhere" if other else "pieces" if setup.id in presence.shared_ids else "silent"
-        findings.append(ADVICE[cause].at(servo_label(setup), setup=setup, found=other, baud=baud))
-    missing = ", ".join(f"{servo_label(setup)}: {setup.model}" for setup in presence.missing)
-    findings += [ADVICE["new"].at("the bus", found=found, missing=missing) for found in at.values()]
-    if kind.family.factory_baud in presence.elsewhere.spoilt_bauds:
-        findings.append(ADVICE["spares"].at("the bus", baud=kind.family.factory_baud))
-    findings += [ADVICE["stranger"].at("the bus", found=found) for found in presence.unexpected]
-    return findings
-
-
-def find_servos(
+def _find_present(
     port: BusPort, kind: ServoKind, setups: Sequence[ServoConfig], baud: int, tell: Tell
-) -> Presence:
-    """Find the servos on the bus; the port is left open at the rig's baud rate.
-
-    Raises:
-        PortError: the port cannot be opened.
-        BusLost: it has disappeared.
-    """
-    _open(port, baud)
-    answers = [*search_rates(port, kind, (baud,), tell, thorough=True).found]
-    there = {found.id: found for found in answers}
-    shared = {found.id for found in answers if answers.count(found) > 1}
+) -> tuple[dict[int, FoundServo], set[int]]:
+    """Return the servos at the rig's rate by id, and the ids that two servos seem to share."""
+    answers = search_rates(port, kind, (baud,), tell, thorough=True)[baud]
+    present, shared = {found.id: found for found in answers.found}, set(answers.shared_ids)
     for setup in setups:
-        if setup.id not in there:
+        if setup.id not in present:
             tell(f"asking {servo_label(setup)}")
             found = ping(port, kind.family, setup.id, baud)
             if found is not None:
-                there[setup.id] = found
-                answers.append(found)
+                present[setup.id] = found
             tries = ANSWERS if found else 1
             if count_corrupt(port, kind.family, setup.id, tries) >= min(SHARED, tries):
                 shared.add(setup.id)
-    missing = tuple(setup for setup in setups if setup.id not in there)
-    known = {setup.id for setup in setups}
-    strangers = tuple(found for i, found in sorted(there.items()) if i not in known)
-    others = [rate for rate in kind.family.baud_rates if rate != baud and missing]
-    elsewhere = search_rates(port, kind, others, tell)
-    spare = find_spare(port, kind, setups, baud, [*answers, *elsewhere.found])
-    _open(port, baud)
-    return Presence(there, missing, strangers, elsewhere, shared, spare)
-
-
-def _open(port: BusPort, baud: int) -> None:
-    if not port.setBaudRate(baud):
-        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 57600 or 1000000")
-
-
-# --- fixes
-
-
-def apply_fixes(write: Callable[[Fix], str], findings: Iterable[Diagnostic]) -> Iterator[str]:
-    """Write the fixes of the findings, one after the other; yield a line about each.
-
-    write: writes one fix if that is safe; returns "" or the reason why it did not
-
-    Raises:
-        BusLost: the port has disappeared.
-    """
-    for finding in findings:
-        for fix in finding.fixes:
-            why = write(fix)
-            yield f"{finding.where}: {fix}: {f'not done, {why}' if why else 'done'}"
-
-
-def adopt_spare(
-    port: BusPort, kind: ServoKind, fix: Fix, setups: Sequence[ServoConfig], baud: int, tell: Tell
-) -> str:
-    """Give a new servo its id and baud rate; return "" or the reason of a failure.
-
-    Raises:
-        PortError: the adaptor does not support a rate.
-        BusLost: the port has disappeared.
-    """
-    factory_baud = kind.family.factory_baud
-    _open(port, factory_baud)
-    spare = ping(port, kind.family, fix.servo_id, factory_baud)
-    if spare is None:
-        return "the servo does not answer"
-    setup = next(one for one in setups if one.id == fix.value)
-    try:
-        assign_servo(port, kind, spare, setup, baud, tell)
-    except (ServoFault, ServoMissing) as error:
-        return str(error)
-    return ""
-
-
-def is_adoption(finding: Diagnostic) -> bool:
-    """Return whether the fix of a finding gives a new servo its id."""
-    return any(fix.register == ADOPT for fix in finding.fixes)
-
-
-# --- the guardian
-
-
-def examine_guardian(plan: ReleasePlan) -> Diagnostic:
-    """Start a guardian, end it again, and return its planned actions; nothing is sent.
-
-    Args:
-        plan: servos that it would release.
-    """
-    guardian = Guardian((plan,))
-    try:
-        guardian.join(0)
-        guardian.wait_until_ready()
-    except SetupError as error:
-        return Diagnostic("error", str(error), "guardian", "torque stays off until it starts")
-    finally:
-        guardian.leave(0)
-    return Diagnostic(
-        "ok", f"{describe(plan)} within .5 s if the program dies or hangs", "guardian"
-    )
-
-
-# fmt: off
-PORT_ADVICE = {
-    "well": Advice("ok", "can be opened"),
-    "name": Advice("note", "may be called otherwise after replugging",
-        "write {name} into the YAML's bus.port"),
-}
-# fmt: on
-
-
-def name_ports(ports: Sequence[SerialPort]) -> str:
-    """Format a list of ports for people."""
-    named = [f"{port.by_id or port.device} ({port.description})" for port in ports]
-    return ", ".join(named) or "none"
+    return present, shared

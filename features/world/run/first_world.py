@@ -15,17 +15,12 @@ ROOM = "--world living-room"
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "software")
 
 
-def missing_requirement() -> str:
-    """Return the missing requirement of a rendered world, "" if nothing is missing."""
-    return str(renderer_name()[1])
-
-
 def renderer_name() -> tuple[str, str]:
     """Return the name of the renderer, and the missing requirement of a rendered world, or ""."""
     if find_spec("mujoco") is None:
         return "", extra_hint("mujoco", "world", ModuleNotFoundError(name="mujoco"))
     try:
-        _, context, name = open_context(_opengl_name)
+        context, name = open_context(_opengl_name)
     except SetupError as error:
         return "", str(error)
     context.free()

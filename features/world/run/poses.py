@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gazerig.drivers.camera.shared_slots import TimedPose
-from gazerig.features.world.state_file import HostState, StateReader
+from gazerig.features.world.state_file import StateReader, WorldState
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
@@ -27,7 +27,7 @@ class RigInState(NamedTuple):
     kinematics: Kinematics
     joints: Mapping[str, int]
 
-    def head(self, state: HostState) -> tuple[Mat3, Vec3]:
+    def head(self, state: WorldState) -> tuple[Mat3, Vec3]:
         """Return rotation and position of the head in the world."""
         angles = _ABSENT.copy()
         for name in angles.keys() & self.joints.keys():
@@ -47,7 +47,7 @@ class WorldPoses:
     def __init__(self, path: Path, rig: RigInState) -> None:
         self._path, self._rig = path, rig
         self._reader: StateReader | None = None
-        self.state: HostState | None = None
+        self.state: WorldState | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self._path, self._rig)
@@ -95,10 +95,10 @@ class SimulatedPoses:
         self.begin_s = clock.now_s()
 
     @property
-    def state(self) -> HostState:
+    def state(self) -> WorldState:
         """Return the current state."""
-        now_s = self._world.now_s()
-        return HostState(now_s, *self._world.state())
+        self._world.now_s()
+        return self._world.state()
 
     def head(self, t_s: float) -> tuple[Mat3, Vec3]:
         """Return the current pose of the head."""

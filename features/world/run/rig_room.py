@@ -2,20 +2,25 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import partial
+from math import radians
 
 import numpy as np
 
 from gazerig.config.rig import Rig
+from gazerig.drivers.camera.capture_loop import CameraParts
+from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.types import Camera
+from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
-from gazerig.features.world.run.run_world import RunWorld, world_ideal_bus
-from gazerig.features.world.run.sight import RenderedWorld, world_camera
+from gazerig.features.world.run.run_world import RunWorld
+from gazerig.features.world.run.sight import LATENCY_MS, ComputedCamera, RenderedWorld
 from gazerig.features.world.serve import SentWorld
-from gazerig.features.world.shapes import shapes_of
+from gazerig.features.world.shapes import SpecShapes
 from gazerig.features.world.world_spec import state_file
-from gazerig.robot.app.bus_wiring import guarded_rig_bus
+from gazerig.robot.app.bus_wiring import guarded_rig_bus, servo_configs
 from gazerig.robot.app.camera_factory import frame_locator
+from gazerig.robot.app.drawn_camera import DrawnSource
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import ProgramParts
@@ -29,11 +34,9 @@ from gazerig.robot.app.run_bus import (
 from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.perception.motion_source import MotionSource
 from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.scenes.scene import Scene
-
-if TYPE_CHECKING:
-    from gazerig.features.world.physics import World
 
 
 @dataclass(frozen=True)
@@ -60,20 +63,31 @@ class RigRoom:
         own: ProgramParts,
         say: Callable[[str], None],
     ) -> Camera:
-        """Return the rig's camera; arguments as of ``RunRoom.camera``."""
-        world = self.world
-        rendered = RenderedWorld(world.spec, world.scene, sight.mount, placed, rng, world.camera)
-        return world_camera(
-            rig,
-            options,
-            rendered,
-            self.head,
-            frame_locator(placed),
-            self.clock,
-            sight.turns,
-            own,
-            say,
-        )
+        """Return the rig's camera; arguments as of ``RunRoom.camera``.
+
+        Raises:
+            NoRenderer: nothing on this machine can render.
+        """
+        world, poses, locate = self.world, self.head, frame_locator(placed)
+        field_deg = placed.horizontal_field_deg
+        if options.no_pictures:
+            return ComputedCamera(world.scene, sight.mount, field_deg, poses, rng, locate)
+        rendered = RenderedWorld(world.spec, sight.mount, placed, rng, world.camera, poses)
+        if isinstance(poses, SimulatedPoses):
+            from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
+
+            return rendered.pixels(
+                poses.head,
+                own.make_detector(rig.detector),
+                LATENCY_MS,
+                SyntheticMotionDetector(rig.motion),
+                locate,
+                poses.begin_s,
+            )
+        motion = partial(MotionSource, rig.motion, placed.lens, radians(field_deg), sight.turns)
+        source = partial(DrawnSource, rendered.served_pixels, poses)
+        parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
+        return CameraWorker(parts, self.clock.now_s)
 
     def start_s(self) -> float | None:
         """Return the start time of the script of the people, None before it."""
@@ -81,7 +95,7 @@ class RigRoom:
 
     def shapes(self) -> WorldShapes:
         """Return the shapes of the world."""
-        return shapes_of(self.world.spec)
+        return SpecShapes(self.world.spec.figures, self.world.spec.mjcf_file)
 
 
 def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> RigRoom:
@@ -90,28 +104,26 @@ def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> R
     Raises:
         SetupError: the world cannot be used; the message gives the reason.
     """
-    if options.fast:
-        return simulated_room(rig, options, clock, world, world.computed(clock.now_s))
-    buses = PtyBuses()
-    paths = buses.start(
-        emulated_lines(rig), lambda folder: SentWorld(world.spec.with_shared_file(folder), folder)
-    )
-    run_bus = RunBus(guarded_rig_bus(rig, paths), close=buses.stop, inject_fault=buses.command)
-    joints = RigInState(rig_kinematics(rig), buses.joints)
-    head = WorldPoses(state_file(buses.folder), joints)
-    return RigRoom(world.served(buses.folder), clock, run_bus, head)
-
-
-def simulated_room(
-    rig: Rig, options: RunOptions, clock: Clock, world: RunWorld, computed: "World"
-) -> RigRoom:
-    """Return a rig in a world of this process, on the clock of the run."""
-    if options.bus == "ideal":
-        run_bus = ideal_run_bus(rig, world_ideal_bus(rig, computed))
-    else:
-        lines = emulated_lines(rig).items()
-        run_bus = in_process_run_bus(
-            rig, {name: computed.device(line, name) for name, line in lines}
+    lines = emulated_lines(rig)
+    if not options.fast:
+        buses = PtyBuses()
+        paths = buses.start(
+            lines, lambda folder: SentWorld(world.spec.with_shared_file(folder), folder)
         )
-    joints = RigInState(rig_kinematics(rig), computed.model.rigs[0].qpos)
+        run_bus = RunBus(guarded_rig_bus(rig, paths), close=buses.stop, inject_fault=buses.command)
+        head = WorldPoses(state_file(buses.folder), RigInState(rig_kinematics(rig), buses.joints))
+        return RigRoom(world.served(buses.folder), clock, run_bus, head)
+    computed = world.computed(clock.now_s)
+    if options.bus == "ideal":
+        # Imports MuJoCo, which only runs in a world need.
+        from gazerig.features.world.ideal_bus import WorldIdealBus
+
+        measured = [rig.joints[name].model_facts.measures_position for name in rig.names]
+        shafts = computed.ideal_shafts()
+        ideal = WorldIdealBus(servo_configs(rig), shafts, measured, computed.now_s)
+        run_bus = ideal_run_bus(rig, ideal)
+    else:
+        devices = {name: computed.device(line, name) for name, line in lines.items()}
+        run_bus = in_process_run_bus(rig, devices)
+    joints = RigInState(rig_kinematics(rig), computed.model.rig.qpos)
     return RigRoom(world, clock, run_bus, SimulatedPoses(computed, clock, joints))

@@ -1,42 +1,25 @@
 """World with physics of a run: its people and its rig."""
 
-from collections.abc import Mapping
-from functools import partial
-from math import radians
-from typing import TYPE_CHECKING
-
-from gazerig.config.rig import Rig
-from gazerig.features.world.rig_in_world import (
-    JointTransmission,
-    PairTransmission,
-    RigInWorld,
-    ServoInWorld,
-    Transmission,
-)
-from gazerig.robot.app.bus_wiring import servo_configs
-from gazerig.robot.app.run_bus import STOP_BEYOND_DEG, start_angles_rad
-
-if TYPE_CHECKING:
-    from gazerig.features.world.ideal_bus import WorldIdealBus
-    from gazerig.features.world.physics import World
-
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.util import find_spec
+from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.config.load import load
+from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.world.figure import Figures
+from gazerig.features.world.rig_in_world import RigInWorld, ServoInWorld, Transmission
 from gazerig.features.world.room import HOME
 from gazerig.features.world.timeline import CHECKS
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_bus import BOARDS, CHAINS
+from gazerig.robot.app.run_bus import BOARDS, CHAINS, STOP_BEYOND_DEG, start_angles_rad
 from gazerig.robot.app.run_rig import refuse_missing_rules
 from gazerig.robot.app.scene_files import script_file
 from gazerig.sim_mock.scenes.scene import Scene
@@ -69,23 +52,14 @@ def _body(rig: Rig, looks: bool) -> tuple[str, Mapping[str, bytes]]:
     return xml, assets
 
 
-def world_ideal_bus(rig: Rig, world: "World") -> "WorldIdealBus":
-    """Return all servos of a rig in a world without bytes."""
-    # Imports MuJoCo, which only runs in a world need.
-    from gazerig.features.world.ideal_bus import WorldIdealBus
-
-    measured = [rig.joints[name].model_facts.measures_position for name in rig.names]
-    return WorldIdealBus(servo_configs(rig), world.ideal_shafts(), measured, world.now_s)
-
-
 def _servo(rig: Rig, name: str) -> ServoInWorld:
     joint = rig.joints[name]
     joints: tuple[str, ...] = (name,)
-    transmission: Transmission = JointTransmission(joint.make_linkage())
+    transmission = Transmission(joint.make_linkage())
     for pair in rig.couplings.values():
         if name in pair.joints:
             joints = pair.joints
-            transmission = PairTransmission(pair, joints.index(name), joint.make_linkage())
+            transmission = Transmission(joint.make_linkage(), pair.rates[joints.index(name)])
     return ServoInWorld(
         name, joint.bus, joint.id, joints, transmission, joint.model_facts.steps_per_turn
     )
@@ -115,20 +89,7 @@ class RunWorld(NamedTuple):
     def served(self, folder: Path) -> "RunWorld":
         """Return the same world, which shares the people's motion with its server."""
         spec = self.spec.with_shared_file(folder)
-        if spec.figures is None:
-            return self
         return self._replace(spec=spec, scene=WorldScene(self.scene.name, spec.figures))
-
-
-def requested_world(options: RunOptions) -> str:
-    """Return the name or path of the requested world.
-
-    Raises:
-        ValueError: no world was requested.
-    """
-    if options.world is None:
-        raise ValueError("the run is in no world")
-    return options.world
 
 
 def world_of(rig: Rig, options: RunOptions) -> RunWorld:
@@ -138,7 +99,7 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
         gazerig.config.load.ConfigError: its file has a fault or does not exist.
         SetupError: MuJoCo is not installed, or the rig has no rule for an event of the world.
     """
-    asked = requested_world(options)
+    asked = str(options.world)
     if find_spec("mujoco") is None:
         error = ModuleNotFoundError(name="mujoco")
         raise SetupError(f"--world {asked}: {extra_hint('mujoco', 'world', error)}")
@@ -148,13 +109,12 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
                 f"--world {asked}: a bus of kind {kind} has no servos that a world could "
                 "move: put its joints on one of our kinds, or use --scene"
             )
-    scene, mjcf_file = world_scene(asked, options.seed), mjcf_of(asked)
+    scene = world_scene(asked, options.seed)
     refuse_missing_rules(rig.gaze.top_down, scene, f"--world {asked}")
-    script = scene.figures.script
     # Without pictures the looks of the rig are not needed: the page has its own shapes.
     placed = rig_in_world(rig, looks=not options.no_pictures)
-    spec = WorldSpec(None if mjcf_file else scene.figures, (placed,), mjcf_file)
-    camera, level = script.camera, options.level
+    spec = WorldSpec(scene.figures, placed, mjcf_of(asked))
+    camera, level = scene.figures.script.camera, options.level
     if level is not None and level.pictures == "coarse":
         camera = replace(camera, rate_hz=min(COARSE_HZ, camera.rate_hz), samples=0)
     return RunWorld(spec, scene, camera)
@@ -170,16 +130,8 @@ def world_scene(name_or_path: str, seed: int) -> WorldScene:
     name = Path(name_or_path).stem
     if mjcf_of(name_or_path) is not None:
         return WorldScene(name, Figures(SceneScript(people={}), seed))
-    return WorldScene(name, Figures(world_script(name_or_path), seed))
-
-
-def world_script(name_or_path: str) -> SceneScript:
-    """Return the script of a world.
-
-    Raises:
-        gazerig.config.load.ConfigError: the file has a fault or does not exist.
-    """
-    return _read(*script_file("worlds", name_or_path, HOME))
+    script = _read(*script_file("worlds", name_or_path, HOME))
+    return WorldScene(name, Figures(script, seed))
 
 
 @lru_cache(maxsize=2)

@@ -17,9 +17,9 @@ class WorldSurroundings(Surroundings):
 
     def scene(self, options: RunOptions) -> Scene:
         """Return the people of the requested world."""
-        from gazerig.features.world.run.run_world import requested_world, world_scene
+        from gazerig.features.world.run.run_world import world_scene
 
-        return world_scene(requested_world(options), options.seed)
+        return world_scene(str(options.world), options.seed)
 
     def open(self, rig: Rig, options: RunOptions, clock: Clock) -> RunRoom:
         """Return the requested world with the rig in it."""
