@@ -126,7 +126,8 @@ for (const panel of PANELS) {
   drawers.get(panel.drawer).push(one);
 }
 
-setInterval(() => {
+/** Draw the panels of the open drawer that are due. */
+function drawPanels() {
   if (!open || !now.state || !now.shown || document.hidden) return;
   const time = performance.now();
   for (const one of drawers.get(nameOf(open)) ?? []) {
@@ -138,7 +139,8 @@ setInterval(() => {
       console.error(error);
     }
   }
-}, TICK_MS);
+}
+setInterval(drawPanels, TICK_MS);
 
 // --- drawers ------------------------------------------------------------------------------------
 
@@ -160,6 +162,7 @@ function choose(tab) {
   $("#drawer").hidden = !tab;
   document.body.classList.toggle("open", Boolean(tab));
   for (const one of tab ? drawers.get(nameOf(tab)) ?? [] : []) one.dueAt = 0;
+  drawPanels(); // what is already known must not move it later
 }
 
 function closeDrawer() {

@@ -41,7 +41,7 @@
   const soon = window.requestAnimationFrame.bind(window);
   const waiting = new Map();
   let number = 0, due = 0, asleep = true;
-  let painter = null, busyAt = 0; // viser's renderer, and when much of the picture has changed last
+  let busyAt = 0; // when much of the picture has changed last
   function draw(now) {
     if (now < due - EARLY_MS) return soon(draw);
     due = Math.max(due + LEAST_MS, now);
@@ -49,8 +49,6 @@
     waiting.clear();
     asleep = true;
     drawParts(window.__viserMutable?.scene);
-    const pixels = performance.now() - busyAt > REST_MS ? FINE : COARSE;
-    if (painter && painter.getPixelRatio() !== pixels) painter.setPixelRatio(pixels);
     for (const turn of turns) turn(now);
   }
   window.requestAnimationFrame = (turn) => {
@@ -77,13 +75,14 @@
   /** Limit a picture to the part of the canvas in which something has changed. */
   function begin(renderer, scene, eye, target) {
     if (target || eye !== window.__viserMutable.camera) return;
+    const ratio = performance.now() - busyAt > REST_MS ? FINE : COARSE;
+    if (renderer.getPixelRatio() !== ratio) renderer.setPixelRatio(ratio); // empties the canvas
     const { width, height } = renderer.domElement;
     const background = window.__viserMutable.backgroundMaterial; // covers all, mostly with nothing
     if (background) background.visible = background.uniforms.enabled.value;
     const matrices = [...eye.matrixWorld.elements, ...eye.projectionMatrix.elements];
     const turned = matrices.join() !== camera;
     const whole = turned || size !== `${width} x ${height}` || performance.now() - wholeAt > WHOLE_MS;
-    const ratio = renderer.getPixelRatio();
     const part = [1, 1, -1, -1], changed = [1, 1, -1, -1], now = new Set();
     scene.traverseVisible((object) => {
       if (!object.geometry || object.material?.visible === false) return;
@@ -107,7 +106,6 @@
       widen(part, box);
       drawn.delete(object);
     }
-    painter = renderer;
     if (turned || shareOf(changed) > MUCH) busyAt = performance.now();
     [camera, size] = [matrices.join(), `${width} x ${height}`];
     if (whole) { wholeAt = performance.now(); return; }
