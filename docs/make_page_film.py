@@ -84,7 +84,7 @@ class Film:
 
     def keeps_up(self) -> bool:
         """Return whether the page shows the rig as it is: not silent, and without old pictures."""
-        return not re.search(r"is silent|\d s old", self._browser.words())
+        return not re.search(r"is silent|as it was \d", self._browser.words())
 
     def press(self, name: str) -> None:
         """Press one of the buttons under the head."""

@@ -1,9 +1,10 @@
-"""A page with its door, on this machine and on another address."""
+"""A page's door with a rig behind it that answers as a test wants, on this and another address."""
 
 import json
 import socket
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from email.message import Message
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,53 +13,64 @@ from typing import Any
 from page_visitor import VISER, fetch
 from websockets.sync.client import ClientConnection, connect
 
-from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
-from gazerig.robot.dashboard.door.browsers import Browsers
+from gazerig.robot.control.tick_feed import TickFeed
+from gazerig.robot.dashboard.door.page_door import PageDoor
 from gazerig.robot.dashboard.door.viser_server import open_server
-from gazerig.robot.dashboard.requests.stop_channel import StopListener
-from gazerig.robot.dashboard.requests.stop_sender import StopSender
-from gazerig.robot.dashboard.widgets.widgets import Widgets
+from gazerig.robot.model.requests import ShowView
 
 PATIENCE_S = 20.0
 TOKEN = "what-only-the-terminal-shows"
 ELSEWHERE = "http://elsewhere.example"
+SOCKET = "/api/v1/socket"
 OPENED: list[str] = []
 """The addresses of all doors of these tests."""
+DONE: dict[str, Any] = {"ok": {"notes": []}}
 
 
 class Rig:
-    """A door with a server behind it, and the requests through it."""
+    """A door with a server behind it, and the requests through it.
+
+    asked, stops: what has reached the rig; views: what was chosen for the view
+    answer: what the rig answers to a request; it may wait
+    """
 
     def __init__(self, host: str, folder: Path) -> None:
         self.asked: list[dict[str, Any]] = []
         self.stops: list[dict[str, Any]] = []
-        self.takes = True
-        self.stop_answer = ""
-        with socket.socket() as trial:
-            trial.bind((host, 0))
-            port = trial.getsockname()[1]
+        self.views: list[tuple[ShowView, str]] = []
+        self.answer: Callable[[dict[str, Any]], dict[str, Any]] = lambda asked: DONE
+        listener = socket.create_server((host, 0))
+        port = listener.getsockname()[1]
         inside = folder / "page.sock"
         self.server = open_server(inside)
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._listener = StopListener(ours, self.stop)
-        self._sender = theirs
+        pairs = socket.socketpair(), socket.socketpair()
+        self._ends = [ours for ours, _ in pairs]
+        for end in self._ends:
+            threading.Thread(target=self._serve, args=(end,), daemon=True).start()
         self.take_picture: Callable[[bytes], bool] = lambda jpeg: False
-        self.door = AuthProxy(
-            host, port, inside, self.take, StopSender(theirs), TOKEN, Browsers(TOKEN), Widgets(),
-            lambda asked, who: True, lambda jpeg: self.take_picture(jpeg),
+        self.feed = TickFeed()
+        self.door = PageDoor(
+            host, listener, inside, [theirs for _, theirs in pairs], TOKEN, self.feed,
+            lambda view, browser: self.views.append((view, browser)),
+            lambda jpeg: self.take_picture(jpeg),
         )  # fmt: skip
         self.door.open()
         self.address = f"{host}:{port}"
         self.url = f"http://{self.address}"
         self.cookie = f"{self.door._cookie}={TOKEN}"
 
-    def take(self, data: bytes) -> bool:
-        self.asked.append(json.loads(data))
-        return self.takes
+    def _serve(self, end: socket.socket) -> None:
+        with suppress(OSError), end.makefile("rb") as lines:
+            for line in lines:
+                asked = json.loads(line)
+                if asked["do"] != "hello":
+                    (self.stops if asked["do"] == "stop" else self.asked).append(asked)
+                tag = {"tag": asked["tag"]} if "tag" in asked else {}
+                end.sendall(json.dumps({**self.answer(asked), **tag}).encode() + b"\n")
 
-    def stop(self, asked: Any) -> str:
-        self.stops.append(dict(asked))
-        return self.stop_answer
+    def named(self, name: str) -> str:
+        """Return the cookies of a browser with a name of its own."""
+        return f"{self.cookie}; {self.door._name_cookie}={name}"
 
     def get(self, path: str = "", **headers: str) -> tuple[int, Message, str]:
         """Get something as a browser does that has shown the token before."""
@@ -68,7 +80,7 @@ class Rig:
         """Ask for something as the page's script does, with other headers as given."""
         given = {"Cookie": self.cookie, "Origin": self.url, **headers}
         words = {k: v for k, v in given.items() if v is not None}
-        return fetch(f"{self.url}/rig/ask", words, body)
+        return fetch(f"{self.url}/api/v1/do", words, body)
 
     def knock(self, path: str = "/view", **headers: str | None) -> ClientConnection:
         """Open a websocket as a browser does, with other headers as given."""
@@ -87,8 +99,8 @@ class Rig:
     def close(self) -> None:
         self.door.close()
         self.server.stop()
-        self._listener.close()
-        self._sender.close()
+        for end in self._ends:
+            end.close()
 
 
 @contextmanager
@@ -100,3 +112,12 @@ def opened(host: str) -> Iterator[Rig]:
             yield rig
         finally:
             rig.close()
+
+
+def answer_to(end: ClientConnection, **message: object) -> dict[str, Any]:
+    """Send a message over a websocket; return its answer."""
+    end.send(json.dumps({**message, "tag": "t"}))
+    while True:
+        said: dict[str, Any] = json.loads(end.recv(timeout=PATIENCE_S))
+        if said.get("tag") == "t":
+            return said

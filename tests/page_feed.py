@@ -15,14 +15,14 @@ from present import present
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
-from gazerig.robot.dashboard.feed.live_feed import LiveRig
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
-from gazerig.robot.dashboard.feed.snapshot import RunState
+from gazerig.robot.dashboard.feed.rig_feed import LiveRig, ShownHead
 from gazerig.robot.model.types import LoopFigures
+from gazerig.robot.remote.topics import JointInfo, RigInfo, RunState
 
 IN_TIME = LoopFigures(200.0, 0.0, 0.0, 0.0, 0, 0, 10.0)
-STATE = RunState({}, "wait", "", "shy", timing=IN_TIME)
+STATE = RunState("wait", "", "shy", health="bus ok", timing=IN_TIME)
 GREY = np.full((400, 640, 3), (140, 120, 100), np.uint8)
 """A picture of the size that the scene's camera has."""
 
@@ -35,6 +35,19 @@ def visit(name: str) -> tuple[Assembly, Tick]:
     return made, ticks[-1]
 
 
+def info(made: Assembly) -> RigInfo:
+    """Return what is constant of a rig with emulated servos."""
+    joint = JointInfo(-0.6, 0.6, 55.0, 65.0, 4.8, 6.7, 0.5)
+    names = made.shown_rig().kinematics.names
+    return RigInfo("desk", "/rigs/desk.yaml", True, False, "", "", dict.fromkeys(names, joint))
+
+
+def shown(name: str = "desk", **changes: Any) -> ShownHead:
+    """Return a rig that looks at the mouth of a person, with changes of the tick."""
+    made, tick = visit(name)
+    return ShownHead(structs.replace(tick, **changes), made.shown_rig())
+
+
 class PageFeed:
     """Sends ticks of a rig to a page.
 
@@ -45,13 +58,13 @@ class PageFeed:
     def __init__(self, page: PageProcess, rig: str = "desk") -> None:
         self._made, self.tick = visit(rig)
         self.state = STATE
-        publisher = Publisher(page, self._rig, lambda: self.state, None, lambda line: None)
+        publisher = Publisher(page, self._rig, lambda: self.state, lambda line: None)
         self._stream = TickStream(_fail, 0.0)
         self._stream.add_sink("the page", publisher.take)
         self._frame = 1000
 
     def _rig(self) -> LiveRig:
-        return LiveRig(self._made.shown_rig())
+        return LiveRig(self._made.shown_rig(), info(self._made))
 
     def turned(self, joints_rad: Mapping[str, float]) -> Tick:
         """Return the tick with other angles of some joints."""

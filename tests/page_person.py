@@ -142,6 +142,10 @@ class Person:
 
         wait_for(filled, f"{text!r} in {field}")
 
+    def move(self, x: float, y: float) -> None:
+        """Move the mouse."""
+        self._mouse("mouseMoved", x, y, "none")
+
     def _mouse(self, kind: str, x: float, y: float, button: str) -> None:
         self.tab.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1)
 

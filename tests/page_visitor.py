@@ -77,10 +77,10 @@ class Visitor:
 
     def ask(self, asked: object) -> int:
         """Ask for something as the page's script does; the status of the answer."""
-        return fetch(f"{self.url}/rig/ask", self.headers, json.dumps(asked).encode())[0]
+        return fetch(f"{self.url}/api/v1/do", self.headers, json.dumps(asked).encode())[0]
 
     def open(self, path: str = "/view", receive_bytes: int | None = None) -> ClientConnection:
-        """Open a websocket: "/view" is that of the view, "/rig/line" that of the stop button."""
+        """Open a websocket: that of the view, or that of the page's script."""
         there = socket.socket()
         if receive_bytes is not None:
             there.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)
@@ -101,7 +101,6 @@ class Visitor:
         )
 
     def state(self) -> dict[str, Any]:
-        """First message to the stop button."""
-        with self.open("/rig/line") as line:
-            state: dict[str, Any] = json.loads(line.recv(timeout=PATIENCE_S))["state"]
-            return state
+        """Newest state of the rig."""
+        state: dict[str, Any] = json.loads(self.get("/api/v1/state"))["ok"]["state"]
+        return state

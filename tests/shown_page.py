@@ -1,4 +1,4 @@
-"""A page process to look at, and a snapshot for it to show."""
+"""A page process to look at, and a face for it to show."""
 
 import socket
 import time
@@ -7,37 +7,13 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 import numpy as np
-from desk import GAZE_JOINTS
 from page_visitor import PATIENCE_S
 
 from gazerig.gaze.types import Face
-from gazerig.robot.dashboard.feed.page_process import PageProcess
-from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.model.types import Snapshot
+from gazerig.robot.dashboard.feed.page_process import PageProcess, Serve
 
 T = TypeVar("T")
 
-AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-SNAPSHOT = Snapshot(
-    t_s=1.0,
-    measured_rad=(0.1,) * 9,
-    desired_rad=(0.1,) * 9,
-    R_world_head=AHEAD,
-    p_world_head_m=(0.03, 0.0, 0.14),
-    p_world_eyes_m=((0.03, 0.031, 0.14), (0.03, -0.031, 0.14)),
-    gaze_world=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    lids=(0.8, 0.8),
-    p_world_target_m=(0.9, 0.1, 0.25),
-    target_name="face 3: nose",
-    why="it is there",
-    phase="fixate",
-    level="ok",
-    reasons=(),
-    faces=(),
-    bodies=(),
-    health="0 lost",
-    joints=GAZE_JOINTS,
-)
 # A person's face in its own frame (x out of the face, y to the owner's left, z up), in the
 # order chin, left side, left eye, mouth, nose, right side, right eye, forehead.
 PARTS_M = (
@@ -56,7 +32,6 @@ FACE = Face(
     1.0,
 )
 """A face that looks back along the x axis, a little aside."""
-PARAM = Parameter("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
 
 
 def wait_for(ready: Callable[[], T | None], what: str) -> T:
@@ -78,9 +53,9 @@ def free_port() -> int:
 
 @contextmanager
 def running_page(
-    port: int | None = None, hear: Callable[[dict[str, object]], str | None] | None = None
+    port: int | None = None, serve: Serve | None = None
 ) -> Iterator[tuple[PageProcess, str]]:
-    page = PageProcess("127.0.0.1", free_port() if port is None else port, hear)
+    page = PageProcess("127.0.0.1", free_port() if port is None else port, serve)
     page.open()
     try:
         yield page, wait_for(page.url, "the page's address")

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from browser import browsing
 from page_at_the_door import PATIENCE_S, TOKEN, Rig, opened
+from page_feed import info, visit
 from present import present
 from shown_page import wait_for
 from websockets.exceptions import ConnectionClosed
@@ -23,6 +24,7 @@ from gazerig.drivers.types import Detections
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.browser_camera import SILENT_S, BrowserCamera
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.dashboard.door.page_door import HeadNews
 from gazerig.robot.model.frames import CameraMount, fixed_mount
 
 
@@ -161,7 +163,7 @@ def near() -> Iterator[Rig]:
 def test_pictures_come_in_one_at_a_time(near: Rig) -> None:
     taken = taker(near)
     picture = jpeg()
-    with near.knock("/rig/webcam") as line:
+    with near.knock("/api/v1/webcam") as line:
         for _ in range(3):
             line.send(picture)
             assert line.recv(timeout=PATIENCE_S) == "next"
@@ -175,7 +177,7 @@ def test_pictures_come_in_one_at_a_time(near: Rig) -> None:
 
 def test_a_flood_of_pictures_is_thinned(near: Rig) -> None:
     taken = taker(near)
-    with near.knock("/rig/webcam") as line:
+    with near.knock("/api/v1/webcam") as line:
         for _ in range(60):
             line.send(jpeg(size=(8, 8)))
             assert line.recv(timeout=PATIENCE_S) == "next"
@@ -184,7 +186,7 @@ def test_a_flood_of_pictures_is_thinned(near: Rig) -> None:
 
 def test_the_newest_browser_takes_over(near: Rig) -> None:
     near.take_picture = lambda data: True
-    with near.knock("/rig/webcam") as first, near.knock("/rig/webcam") as second:
+    with near.knock("/api/v1/webcam") as first, near.knock("/api/v1/webcam") as second:
         second.send(jpeg())
         assert second.recv(timeout=PATIENCE_S) == "next"
         first.send(jpeg())
@@ -214,7 +216,7 @@ def test_the_button_sends_the_browsers_own_pictures_until_it_is_pressed_again(ne
             return of_button("getAttribute('aria-pressed')") == on
 
         press = "document.querySelector('#webcam').click();"
-        near.door.send_state({"emulated": True})
+        near.door.call_soon(near.door.distribute, HeadNews(topics=(info(visit("desk")[0]),)))
         tab.go(f"{near.url}/?token={TOKEN}")
         wait_for(lambda: of_button("hidden") == "false", "the button")
         tab.run(REFUSED + press)
@@ -234,4 +236,4 @@ def test_the_button_sends_the_browsers_own_pictures_until_it_is_pressed_again(ne
 
 def test_without_the_token_no_picture_comes_in(near: Rig) -> None:
     with pytest.raises(Exception, match="403"):
-        near.knock("/rig/webcam", Cookie=None)
+        near.knock("/api/v1/webcam", Cookie=None)

@@ -13,13 +13,11 @@ from fakes.runs import go
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
-from gazerig.gaze.types import Floats
+from gazerig.gaze.types import PART_NAMES, Floats
 from gazerig.robot.app.session import shut_down
+from gazerig.robot.control.head_state import head_state
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import head_activity, tick_control_source
-from gazerig.robot.dashboard.feed.snapshot import snapshot
-from gazerig.robot.dashboard.panels.attention_panel import salience_bars, target_text
-from gazerig.robot.dashboard.panels.servo_health import health_table
 from gazerig.robot.model.client_control import ARRIVED_RAD
 from gazerig.robot.model.commands import (
     AnyCommand,
@@ -42,7 +40,6 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlSource, control_sentence
 from gazerig.robot.model.requests import read_request
-from gazerig.robot.model.types import Snapshot
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 GENTLE_RAD_S = radians(load_rig("desk").guard.soft_start_speed_deg_s)
@@ -426,18 +423,15 @@ def test_leads_are_counted_and_their_ends_have_reasons(running: Running) -> None
 # ---- The source of control of the head is one value with the same words everywhere.
 
 
-def shown(tick: Tick) -> Snapshot:
-    return snapshot(tick)
-
-
 def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:
     tick = running.go(0.1)[-1]
     assert (
         tick_control_source(tick) == ControlSource()
         and not tick_control_source(tick).overrides_gaze
     )
-    shot = shown(tick)
-    assert shot.headline.startswith("looks at person 1") and shot.target_kind == "face"
+    state = head_state(tick)
+    assert state.headline.startswith("looks at person 1") and state.gaze.kind == "face"
+    assert state.gaze.part in PART_NAMES.values() and state.saliences[0].id == 1
 
 
 def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running: Running) -> None:
@@ -450,13 +444,11 @@ def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running:
     leads = tick_control_source(tick)
     assert (leads.kind, leads.who, leads.since_s) == ("joint", "ann", first.t_s)
     assert leads.joints == ("neck_yaw", "neck_pitch")
-    shot = shown(tick)
-    assert shot.headline == "ann holds neck_yaw at 17.2 deg, neck_pitch at 5.7 deg, for 3 s"
-    assert (shot.target_name, shot.phase) == ("neck_yaw and neck_pitch held", "held")
-    assert shot.why == shot.headline
-    assert (shot.target_part, shot.saliences) == (None, ())
-    for said in (health_table(shot), target_text(shot), salience_bars(shot)):
-        assert "face 1" not in said and "person 1" not in said
+    state = head_state(tick)
+    assert state.headline == "ann holds neck_yaw at 17.2 deg, neck_pitch at 5.7 deg, for 3 s"
+    assert (state.gaze.target, state.gaze.phase) == ("neck_yaw and neck_pitch held", "held")
+    assert state.gaze.reason == state.headline
+    assert (state.gaze.kind, state.gaze.part, state.saliences) == ("joint", None, ())
 
 
 @pytest.mark.parametrize(
@@ -480,9 +472,9 @@ def test_stopped_says_that_and_nothing_else(running: Running) -> None:
     running.order(Jog((("neck_yaw", 0.3),), who="ann"))
     running.go(0.2)
     running.order(Stop("STOP was pressed", who="ann"))
-    shot = shown(running.go(0.5)[-1])
-    assert shot.control_source.kind == shot.target_name == shot.phase == "stopped"
-    assert shot.headline == shot.why == "stopped: STOP was pressed; the torque is off"
+    state = head_state(running.go(0.5)[-1])
+    assert state.control_source.kind == state.gaze.target == state.gaze.phase == "stopped"
+    assert state.headline == state.gaze.reason == "stopped: STOP was pressed; the torque is off"
     running.go(2.0)
     running.order(Resume(who="ann"))
     assert tick_control_source(running.go(0.1)[-1]) == ControlSource()

@@ -9,7 +9,9 @@ from fakes.runs import simulated
 from gazerig.config.load import ConfigError
 from gazerig.config.rig_files import AllowedFolder
 from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.dashboard.requests.page_requests import PageRequestHandler
+from gazerig.robot.control.command_handler import CommandHandler
+from gazerig.robot.model.parameter import SavedFile
+from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
 
 
 @pytest.fixture
@@ -72,9 +74,8 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     rig.write_text(Path("config/rigs/desk.yaml").read_text())
     made = simulated(str(rig))
     tuning = ParamStore(made.live_params, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
-    hear = PageRequestHandler(
-        made.robot.command, tuning, refusals=(ConfigError,), paths=tuning.confined
-    )  # fmt: skip
+    handler = CommandHandler(made.robot.command, tuning, (ConfigError,))
+    hear = RequestHandler(handler, LoopMonitor(made.clock), {}, paths=tuning.confined).answer
     before = sorted(os.listdir(tmp_path))
     for asked in (
         {"do": "character", "name": "/etc/shadow"},
@@ -83,10 +84,10 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
         {"do": "set", "changes": {"gaze.scanpath.transition_matrix": "/etc/shadow"}},
         {"do": "set", "changes": {"sound.folders": ["/etc"]}},
     ):
-        words = hear(asked)
-        assert words is not None and words.startswith("refused") and "root:" not in words
+        words = hear(asked)["refused"]
+        assert isinstance(words, str) and "root:" not in words
         assert "only files in" in words and len(words.splitlines()) == 1
     assert sorted(os.listdir(tmp_path)) == before and not (Path.home() / "made.yaml").exists()
-    assert hear({"do": "save", "path": "copy.yaml"}) == f"saved in {home / 'copy.yaml'}"
-    assert hear({"do": "character", "name": "shy"}) is not None
+    saved = hear({"do": "save", "path": "copy.yaml"})["ok"]
+    assert isinstance(saved, SavedFile) and saved.path == home / "copy.yaml"
     made.close()

@@ -21,7 +21,7 @@ from gazerig.gaze.attention.conversation import (
 )
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.control.head_state import HeadState, head_state
-from gazerig.robot.dashboard.door.programs import ProgramSocket
+from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
 from gazerig.robot.model.commands import LookAt, Renew, Speak, Talk, TalkOrder
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.reply import CommandReply
@@ -189,7 +189,8 @@ def test_a_speakers_head_moves_more_than_a_silent_one(running: Running) -> None:
 
 
 def test_a_websocket_renews_what_its_program_controls() -> None:
-    program, started = ProgramSocket(0.0, False), CommandReply(control_number=1)
+    program = ClientSocket(Wishes(), Visitor("", "here"), "")
+    started = CommandReply(control_number=1)
     look = {"do": "look_at", "p_world_m": [1.0, 0.0, 0.0], "who": "a"}
     for message, reply, held in (
         ({"do": "talk", "state": "listening", "who": "a"}, CommandReply(), {"talk"}),
@@ -199,6 +200,8 @@ def test_a_websocket_renews_what_its_program_controls() -> None:
         ({"do": "talk", "state": "speaking", "stay": True, "who": "a"}, CommandReply(), set()),
         ({"do": "talk", "state": "thinking", "who": "b"}, CommandReply(), {"talk"}),
         ({"do": "talk", "state": "idle", "who": "b"}, CommandReply(), set()),
+        (look, started, {"gaze"}),
+        ({**look, "pointer": True}, started, set()),  # in control only while it moves
     ):
         program.hold(message, reply)
         assert program.held == held and program.who == message["who"]

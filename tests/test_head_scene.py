@@ -1,15 +1,14 @@
 """The page opens on a face: how much of the canvas the head fills, and whether its lids shut."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import cache, partial
-from math import degrees
 
 import numpy as np
 import pytest
 import viser
 from gaze_targets import joints_at
-from shown_page import SNAPSHOT
+from msgspec import structs
+from page_feed import visit
 from viser import transforms
 
 from gazerig.config.load import shipped_path
@@ -17,34 +16,31 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_description import shape_of
+from gazerig.robot.dashboard.feed.rig_feed import ShownHead
 from gazerig.robot.dashboard.view.head_view import HeadView, head_dimensions
 from gazerig.robot.dashboard.view.viewpoints import FACE, View, named_view
 from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh, stored_shape
 from gazerig.robot.description.parts import measures_of
 from gazerig.robot.description.people import head, part_of, torso
-from gazerig.robot.model.types import Snapshot
 
 RIGS = sorted(path.stem for path in shipped_path("rigs", "desk").parent.glob("*.yaml"))
 CANVASES = (1.6, 1280 / 720, 1.0, 0.9, 390 / 380)
 
 
 @cache
-def at_rest(name: str) -> Snapshot:
-    """A snapshot of a shipped rig with all joints at 0."""
+def at_rest(name: str) -> ShownHead:
+    """A shipped rig with all joints at 0."""
     rig = load_rig(name)
-    kinematics = rig_kinematics(rig)
-    zero = (0.0,) * len(kinematics.names)
-    pose = kinematics.forward(joints_at(zero))
-    own, _ = kinematics.body_volumes(pose.R_world_head, pose.p_world_head_m)
-    return replace(
-        SNAPSHOT,
-        joints=kinematics.names,
-        measured_rad=zero,
-        R_world_head=pose.R_world_head,
-        p_world_head_m=pose.p_world_head_m,
-        p_world_eyes_m=(pose.p_world_eye_left_m, pose.p_world_eye_right_m),
-        p_world_pivot_m=own.start_m,
-    )
+    return at(name, (0.0,) * len(rig_kinematics(rig).names))
+
+
+def at(name: str, angles_rad: tuple[float, ...]) -> ShownHead:
+    """A shipped rig with its joints at these angles."""
+    rig, (made, tick) = load_rig(name), visit("desk")
+    kinematics, joints = rig_kinematics(rig), joints_at(angles_rad)
+    tick = structs.replace(tick, joints=joints, pose=kinematics.forward(joints))
+    shown_rig = made.shown_rig()._replace(kinematics=kinematics, shape=shape_of(rig))
+    return ShownHead(tick, shown_rig)
 
 
 def drawn(seen: View, points_m: Floats, aspect: float) -> Floats:
@@ -72,7 +68,7 @@ def skin_and_cap() -> Floats:
 def test_the_head_fills_most_of_the_canvas_and_is_all_in_sight(name: str, aspect: float) -> None:
     shot = at_rest(name)
     unit = head_dimensions(shot).interocular_m
-    points = skin_and_cap() * unit + shot.p_world_head_m
+    points = skin_and_cap() * unit + shot.tick.pose.p_world_head_m
     on_canvas = drawn(named_view(FACE, shot), points, aspect)
     low, high = on_canvas.min(axis=0), on_canvas.max(axis=0)
     assert 0.60 <= 0.5 * (high[1] - low[1]) <= 0.8
@@ -122,11 +118,10 @@ def server() -> Iterator[viser.ViserServer]:
 def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer) -> None:
     """Every link is in its parent by the kinematics, at any angles of a shipped rig."""
     rig = load_rig("desk")
-    kinematics, view = rig_kinematics(rig), HeadView(server.scene)
-    view.shape = shape_of(rig)
-    angles = tuple((0.3 * np.sin(np.arange(len(kinematics.names)))).tolist())
-    pose = kinematics.forward(joints_at(angles))
-    view.show(replace(SNAPSHOT, joints=kinematics.names, measured_rad=angles))
+    view, count = HeadView(server.scene), len(rig_kinematics(rig).names)
+    head = at("desk", tuple((0.3 * np.sin(np.arange(count))).tolist()))
+    pose = head.tick.pose
+    view.show(head)
     for link, p_world_m in (
         ("head", pose.p_world_head_m),
         ("left_eye", pose.p_world_eye_left_m),
@@ -151,28 +146,3 @@ def _in_world(view: HeadView, link: str) -> transforms.SE3:
                 turn, np.array(one.frame.position)
             )
     return found
-
-
-def _turned_deg(view: HeadView, link: str) -> float:
-    """Return how far a part of the face is turned about its axis across the head, upwards."""
-    _, y, _ = transforms.SO3(np.array(view.links[link].frame.wxyz)).log()
-    return -degrees(y)
-
-
-def test_a_rig_without_brows_and_jaw_shows_expressions_drawn_only(
-    server: viser.ViserServer,
-) -> None:
-    view = HeadView(server.scene)
-    view.show(SNAPSHOT)
-    assert _turned_deg(view, "left_brow_link") == _turned_deg(view, "jaw_link") == 0.0
-    both = ("surprised", "happy")  # a track comes before the expression beneath it
-    angles = []
-    for k in range(1, 21):
-        view.show(replace(SNAPSHOT, t_s=SNAPSHOT.t_s + 0.05 * k, expressed=both))
-        angles.append(_turned_deg(view, "left_brow_link"))
-    assert angles[-1] == pytest.approx(18.0, abs=0.1)
-    assert np.all(np.diff(angles) >= 0.0) and max(np.diff([0.0, *angles])) < 6.0  # without a jump
-    assert _turned_deg(view, "right_brow_link") == angles[-1]
-    assert _turned_deg(view, "jaw_link") == pytest.approx(-12.0, abs=0.1)
-    view.show(replace(SNAPSHOT, t_s=SNAPSHOT.t_s + 3.0, expressed=("", "neutral")))
-    assert _turned_deg(view, "left_brow_link") == pytest.approx(0.0, abs=0.01)

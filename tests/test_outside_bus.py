@@ -13,13 +13,15 @@ from command_line import invoked
 from fakes.runs import simulated, ticks
 from outside_bus import EXAMPLE, HEAD, install_example
 from outside_package import on_path
+from page_feed import info
+from present import present
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
 from gazerig.robot.app.run_bus import emulated_lines
-from gazerig.robot.dashboard.feed.live_feed import LiveFeed, LiveRig, rig_message
+from gazerig.robot.dashboard.feed.rig_feed import LiveRig, RigFeed, rig_message
 from gazerig.robot.description.build import describe
 from gazerig.robot.guardian.process import releaser
 from gazerig.robot.guardian.release_plan import decode, encode
@@ -95,12 +97,12 @@ def test_the_guardian_switches_its_torque_off(example):
 
 def test_the_page_draws_it(example):
     made = simulated(str(HEAD))
-    message = rig_message(LiveRig(made.shown_rig()))
+    message = rig_message(LiveRig(made.shown_rig(), info(made)))
     made.close()
     del SERVOS["lx-16a"]  # the page's process loads no package
-    feed = LiveFeed()
-    assert feed.handle_message(message) and feed.shape is not None
-    assert describe(feed.shape).joints
+    feed = RigFeed()
+    feed.take(message)
+    assert describe(present(feed.rig).shown.shape).joints
 
 
 @pytest.mark.parametrize("words", ["doctor", "setup", "monitor --once", "calibrate joints", "scan"])

@@ -16,13 +16,22 @@ from typing import Any
 import msgspec
 import pytest
 import viser
-from page_at_the_door import ELSEWHERE, OPENED, PATIENCE_S, TOKEN, Rig, opened
+from page_at_the_door import (
+    DONE,
+    ELSEWHERE,
+    OPENED,
+    PATIENCE_S,
+    SOCKET,
+    TOKEN,
+    Rig,
+    answer_to,
+    opened,
+)
 from page_visitor import VISER, fetch
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import ClientConnection
 
-from gazerig.robot.dashboard.door.auth_proxy import MOST_LINES
 from gazerig.robot.dashboard.door.browsers import MOST as MOST_CONNECTIONS
+from gazerig.robot.dashboard.door.page_door import MOST_CLIENTS
 from gazerig.robot.dashboard.door.viser_server import FROM_BROWSER_BYTES
 
 
@@ -38,7 +47,7 @@ def near() -> Iterator[Rig]:
 
 def test_the_page_comes_with_its_stop_button(near: Rig) -> None:
     status, headers, text = near.get()
-    assert status == 200 and '<script src="/rig/stop.js"></script>' in text
+    assert status == 200 and 'src="/rig/stop.js"></script>' in text
     assert headers["X-Frame-Options"] == "DENY"
     assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
     status, headers, text = near.get("/rig/stop.js")
@@ -68,7 +77,7 @@ def test_a_foreign_name_for_this_machine_is_refused(near: Rig, host: str) -> Non
 
 @pytest.mark.parametrize("origin", [ELSEWHERE, "null", "http://127.0.0.1:1", None])
 def test_a_page_of_another_origin_gets_no_websocket(near: Rig, origin: str | None) -> None:
-    for path in ("/view", "/rig/panels"):
+    for path in ("/view", SOCKET, "/api/v1/webcam"):
         with pytest.raises(InvalidStatus) as refused:
             near.knock(path, origin=origin)
         assert refused.value.response.status_code == 403
@@ -82,41 +91,51 @@ def test_a_page_of_another_origin_cannot_ask_for_anything(near: Rig, origin: str
 
 
 def test_what_is_asked_goes_to_the_rig_with_the_name_of_who_asks(near: Rig) -> None:
-    ana = {"Cookie": f"{near.cookie}; {near.door._name_cookie}=ana"}
-    bob = {"Cookie": f"{near.cookie}; {near.door._name_cookie}=bob"}
     named = []
-    for who in (ana, bob, ana):
-        assert near.post(b'{"confirmed": true, "who": "me", "do": "resume"}', **who)[0] == 204
-        assert list(near.asked[-1]) == ["do", "confirmed", "who"]
+    for who in ("ana", "bob", "ana"):
+        body = b'{"do": "resume", "confirmed": true}'
+        assert near.post(body, Cookie=near.named(who))[0] == 200
         named.append(near.asked[-1]["who"])
     assert named[0] == named[2] != named[1] and named[0].startswith("browser ")
-    assert near.post(b'{"pick": {"x": 0.5, "y": 0.5}}', **bob)[0] == 204
-    assert near.asked[-1]["pick"] == {"x": 0.5, "y": 0.5, "who": named[1]}
+    for chosen in ("me", named[0]):  # nobody can pose as a browser
+        body = json.dumps({"do": "resume", "confirmed": True, "who": chosen}).encode()
+        assert near.post(body, Cookie=near.named("bob"))[0] == 200
+        assert near.asked[-1]["who"] == f"{chosen} at 127.0.0.1"
+    with near.knock(SOCKET, Cookie=near.named("bob")) as end:
+        assert json.loads(end.recv(timeout=PATIENCE_S))["ok"]["you"] == named[1]
 
 
-def test_a_lead_is_renewed_while_the_browser_that_leads_is_there(near: Rig) -> None:
-    ana = f"{near.cookie}; {near.door._name_cookie}=ana"
-    who = near.door.browsers.name("ana")
+def test_control_is_renewed_while_the_browser_in_control_is_there(near: Rig) -> None:
+    near.answer = lambda asked: {"ok": {"reply": {"control_number": 1}}}
 
     def renewed() -> int:
-        return near.asked.count({"do": "renew", "who": who})
+        return [asked["do"] for asked in near.asked].count("renew")
 
-    near.asked.clear()
-    with near.knock("/rig/line", Cookie=ana):
-        body = b'{"do": "look_at", "p_world_m": [1, 0, 0]}'
-        assert near.post(body, Cookie=ana)[0] == 204 and near.asked[0]["who"] == who
-        for _ in range(400):
-            if renewed() > 2:
-                break
-            time.sleep(0.05)
-        assert renewed() > 2
-    for _ in range(400):
-        if not near.door.browsers.in_control():
-            break
-        time.sleep(0.05)
-    before = renewed()
-    time.sleep(0.6)  # more than two heartbeats
-    assert renewed() <= before + 1
+    try:
+        with near.knock(SOCKET, Cookie=near.named("ana")) as end:
+            assert "ok" in answer_to(end, do="look_at", p_world_m=[1, 0, 0])
+            near.asked.clear()
+            while renewed() < 3:
+                time.sleep(0.05)
+            # A pointer is in control only while it moves.
+            assert "ok" in answer_to(end, do="look_at", p_world_m=[1, 0, 0], pointer=True)
+            time.sleep(0.3)
+            before = renewed()
+            time.sleep(0.6)  # more than two heartbeats
+            assert renewed() == before
+    finally:
+        near.answer = lambda asked: DONE
+
+
+def test_the_view_changes_for_the_browser_that_asks(near: Rig) -> None:
+    with near.knock(SOCKET, Cookie=near.named("ana")) as end:
+        you = json.loads(end.recv(timeout=PATIENCE_S))["ok"]["you"]
+        said = answer_to(end, do="show_view", layers=["ghost"], look_from="from above")
+        assert "ok" in said
+        (view, browser) = near.views[-1]
+        assert (view.layers, view.look_from, browser) == (("ghost",), "from above", you)
+        refused = answer_to(end, do="show_view", layers=["bones"])["refused"]
+        assert "bones" in refused and len(near.views) == 1
 
 
 def test_the_address_that_a_program_is_handed_opens_the_page_once(near: Rig) -> None:
@@ -132,11 +151,15 @@ def test_the_address_that_a_program_is_handed_opens_the_page_once(near: Rig) -> 
 
 def test_a_resume_of_a_browser_needs_a_person_who_confirms(near: Rig) -> None:
     near.asked.clear()
-    for body in (b'{"do": "resume"}', b'{"do": "resume", "confirmed": 1}'):
-        status, _, text = near.post(body)
-        assert status == 409 and text.startswith('resume needs "confirmed": true')
-    assert near.asked == []
-    assert near.post(b'{"do": "resume", "confirmed": true}')[0] == 204
+    with near.knock(SOCKET, Cookie=near.named("ana")) as end:
+        for words in ({}, {"confirmed": 1}):
+            status, _, text = near.post(json.dumps({"do": "resume", **words}).encode())
+            assert status == 409 and 'resume needs \\"confirmed\\": true' in text
+            refused = answer_to(end, do="resume", **words)["refused"]
+            assert refused.startswith('resume needs "confirmed": true')
+        assert near.asked == []
+        assert "ok" in answer_to(end, do="resume", confirmed=True)
+    assert near.post(b'{"do": "resume", "confirmed": true}')[0] == 200
 
 
 @pytest.mark.parametrize(
@@ -151,59 +174,55 @@ def test_rubbish_is_not_handed_on(near: Rig, body: bytes) -> None:
 def test_too_much_is_not_even_read(near: Rig) -> None:
     before = len(near.asked)
     with pytest.raises((urllib.error.URLError, ConnectionError)) as refused:
-        answer = near.post(json.dumps({"pick": "x" * 100_000}).encode())
+        answer = near.post(json.dumps({"do": "x" * 10_000_000}).encode())
         raise urllib.error.URLError(str(answer[0]))
-    assert (
-        "413" in str(refused.value)
-        or "reset" in str(refused.value).lower()
-        or "pipe" in str(refused.value)
-    )
+    assert any(word in str(refused.value).lower() for word in ("413", "reset", "pipe"))
     assert len(near.asked) == before
 
 
 # --- stop -----------------------------------------------------------------------------------
 
 
-def stop_by_line(line: ClientConnection, why: str) -> int:
-    """Press STOP over an open connection; return the answer's status."""
-    line.send(json.dumps({"do": "stop", "why": why}))
-    while True:
-        said = json.loads(line.recv(timeout=PATIENCE_S))
-        if "answer" in said:
-            return int(said["answer"])
-
-
-def test_a_stop_has_a_way_of_its_own_and_is_answered_by_the_rig(near: Rig) -> None:
+def test_a_stop_overtakes_all_that_waits_and_is_answered_by_the_rig(near: Rig) -> None:
     near.stops.clear()
-    near.takes = False  # the path of all other messages is full
+    over = threading.Event()
+
+    def answer(asked: dict[str, Any]) -> dict[str, Any]:
+        if asked["do"] == "save":  # the disk is slow
+            over.wait(PATIENCE_S)
+        return DONE
+
+    near.answer = answer
     try:
-        assert near.post(b'{ "do": "stop",\n "why": "a test" }')[0] == 204
-        assert near.stops == [{"do": "stop", "why": "a test (the page)", "who": "the page"}]
-        with near.knock("/rig/line") as line:
-            assert stop_by_line(line, "by line") == 204  # type: ignore[arg-type]
-        assert near.stops[-1]["why"] == "by line (the page)"
-        near.stop_answer = "refused: it has ended"
+        with near.knock(SOCKET, Cookie=near.named("ana")) as end:
+            you = json.loads(end.recv(timeout=PATIENCE_S))["ok"]["you"]
+            for _ in range(10):
+                end.send(json.dumps({"do": "save"}))
+            assert "ok" in answer_to(end, do="stop", why="a hand", more=["nonsense"])
+            assert near.stops[-1]["why"] == f"a hand ({you})"
+            assert near.stops[-1]["who"].startswith(f"{you}, websocket ")
+        assert near.post(b'{ "do": "stop",\n "why": "a test" }')[0] == 200
+        assert near.stops[-1]["why"] == "a test"
+        near.answer = lambda asked: {"refused": "it has ended"}
         status, _, text = near.post(b'{"do": "stop", "why": "late"}')
-        assert (status, text) == (503, "refused: it has ended\n")
+        assert status == 409 and "it has ended" in text
     finally:
-        near.takes, near.stop_answer = True, ""
+        over.set()
+        near.answer = lambda asked: DONE
 
 
 # --- limits -----------------------------------------------------------------------------------
 
 
 def test_whoever_opens_too_much_loses_his_own(near: Rig) -> None:
-    """200 lines of one visitor, 200 silent connections: another's line and STOP stay."""
-    with near.knock("/rig/line", Cookie=f"{near.cookie}; {near.door._name_cookie}=ana") as ana:
-        greedy = [
-            near.knock("/rig/line", Cookie=f"{near.cookie}; {near.door._name_cookie}=bob")
-            for _ in range(MOST_LINES + 3)
-        ]
+    """35 websockets of one visitor, 200 silent connections: another's websocket and STOP stay."""
+    with near.knock(SOCKET, Cookie=near.named("ana")) as ana:
+        greedy = [near.knock(SOCKET, Cookie=near.named("bob")) for _ in range(MOST_CLIENTS + 3)]
         host, port = near.address.split(":")
         silent = [socket.create_connection((host, int(port))) for _ in range(200)]
         near.stops.clear()
-        assert stop_by_line(ana, "by line") == 204  # type: ignore[arg-type]
-        assert near.post(b'{"do": "stop", "why": "by a request"}')[0] == 204
+        assert "ok" in answer_to(ana, do="stop", why="over the websocket")
+        assert near.post(b'{"do": "stop", "why": "by a request"}')[0] == 200
         assert len(near.stops) == 2
         for gone in greedy[:3]:
             with pytest.raises(ConnectionClosed):
@@ -213,10 +232,10 @@ def test_whoever_opens_too_much_loses_his_own(near: Rig) -> None:
         with suppress(ConnectionError):
             assert silent[0].recv(1) == b""
         for _ in range(400):
-            if near.door._connections.count <= MOST_CONNECTIONS + MOST_LINES:
+            if near.door._connections.count <= MOST_CONNECTIONS + MOST_CLIENTS:
                 break
             time.sleep(0.05)
-        assert near.door._connections.count <= MOST_CONNECTIONS + MOST_LINES
+        assert near.door._connections.count <= MOST_CONNECTIONS + MOST_CLIENTS
         for one in silent:
             one.close()
         for line in greedy:
@@ -279,10 +298,10 @@ def test_a_message_that_is_too_long_ends_its_connection_alone(near: Rig) -> None
             while True:
                 long.recv(timeout=PATIENCE_S)
         assert other.recv(timeout=PATIENCE_S)
-    with near.knock("/rig/line") as line, pytest.raises(ConnectionClosed):
-        line.send("x" * 5000)
+    with near.knock(SOCKET) as end, pytest.raises(ConnectionClosed):
+        end.send("x" * 300_000)
         while True:
-            line.recv(timeout=PATIENCE_S)
+            end.recv(timeout=PATIENCE_S)
 
 
 def test_a_browser_cannot_publish_the_page(near: Rig) -> None:
@@ -310,7 +329,7 @@ def either(request: pytest.FixtureRequest, near: Rig, far: Rig) -> Rig:
 
 
 @pytest.mark.parametrize(
-    "path", ["/", "/view/", "/rig/line", "/rig/stop.js", "/?token=wrong", "/?token=", "/?token=%ff"]
+    "path", ["/", "/view/", "/rig/stop.js", "/?token=wrong", "/?token=", "/?token=%ff"]
 )
 def test_without_the_token_nothing_is_seen(either: Rig, path: str) -> None:
     status, headers, text = fetch(either.url + path)
@@ -325,7 +344,7 @@ def test_without_the_token_nothing_moves(either: Rig, cookie: str | None) -> Non
     given = None if cookie is None else f"{either.door._cookie}={cookie}"
     for body in (b'{"do":"resume"}', b'{"do":"stop","why":"x"}'):
         assert either.post(body, Cookie=given)[0] == 403
-    for path in ("/view", "/rig/line", "/rig/panels"):
+    for path in ("/view", SOCKET, "/api/v1/webcam"):
         with pytest.raises(InvalidStatus) as refused:
             either.knock(path, Cookie=given)
         assert refused.value.response.status_code == 403
@@ -376,28 +395,23 @@ def test_no_path_leads_out_of_the_pages_own_files(near: Rig, path: str) -> None:
 
 def test_a_stop_that_the_rig_does_not_answer_is_said_and_the_next_one_is_sent() -> None:
     with opened("127.0.0.1") as rig:
-        stall = [True]
+        over = threading.Event()
 
-        def stalls(asked: Any) -> str:
-            while stall[0]:
-                time.sleep(0.02)
-            return ""
+        def stalls(asked: dict[str, Any]) -> dict[str, Any]:
+            over.wait(PATIENCE_S)
+            return DONE
 
-        rig.stop = stalls  # type: ignore[method-assign]
-        rig._listener._take = stalls
+        rig.answer = stalls
         status, _, text = rig.post(b'{"do": "stop", "why": "x"}')
         assert status == 503 and "does not answer" in text
-        stall[0] = False
-        for _ in range(100):
-            if rig.post(b'{"do": "stop", "why": "x"}')[0] == 204:
-                break
-        else:
-            raise AssertionError("no stop was taken")
+        over.set()
+        assert rig.post(b'{"do": "stop", "why": "x"}')[0] == 200
+        assert len(rig.stops) == 2
 
 
 def test_neither_websockets_nor_slow_requests_shut_out_a_stop(near: Rig) -> None:
     """Websockets have limits of their own, and a request that has just begun is not closed."""
-    head = f"POST /rig/ask HTTP/1.1\r\nHost: {near.address}\r\nOrigin: {near.url}\r\n"
+    head = f"POST /api/v1/do HTTP/1.1\r\nHost: {near.address}\r\nOrigin: {near.url}\r\n"
     head += f"Cookie: {near.cookie}\r\nContent-Length: 14\r\n\r\n"
 
     def begin() -> socket.socket:
@@ -411,38 +425,28 @@ def test_neither_websockets_nor_slow_requests_shut_out_a_stop(near: Rig) -> None
             return one.recv(12)
 
     with ExitStack() as stack:
-        websockets = [
-            stack.enter_context(near.knock(path))
-            for path in ("/rig/line", "/rig/panels", f"/api/v1/socket?token={TOKEN}")
-            for _ in range(32)
-        ]
+        websockets = [stack.enter_context(near.knock(SOCKET)) for _ in range(32)]
+        websockets += [stack.enter_context(near.knock("/api/v1/webcam")) for _ in range(2)]
         near.stops.clear()
-        assert stop() == b"HTTP/1.1 204"
+        assert stop() == b"HTTP/1.1 200"
         for _ in range(150):
             stack.enter_context(begin()).sendall(head.encode())
-        assert stop() == b"HTTP/1.1 204"
+        assert stop() == b"HTTP/1.1 200"
         for one in websockets:
             one.ping()
         assert len(near.stops) == 2
 
 
-# --- The panels at the page's door: who may see them, what a flood costs, and a person at them
-
-
-PANELS = "/rig/panels"
-
-
 def test_a_flood_of_one_browser_does_not_hold_up_a_stop(near: Rig) -> None:
-    slider = near.door.widgets.panel("health").slider("neck", (0.0, 1.0), 0.1, 0.0)
-    over = threading.Event()
-    slider.on_change(lambda value, client: over.wait(0.05))  # as slow as a rig that is busy
+    near.answer = lambda asked: time.sleep(0.05) or DONE  # as slow as a rig that is busy
     before = len(near.stops)
-    with near.knock(PANELS) as there:
-        for k in range(600):
-            there.send(json.dumps({"set": [slider.place.number, (k % 10) / 10.0]}))
-        start_s = time.monotonic()
-        assert near.post(b'{"do": "stop", "why": "a test"}')[0] == 204
-        assert len(near.stops) == before + 1
-        assert time.monotonic() - start_s < 0.5 * PATIENCE_S
-        over.set()  # else the browser's farewell waits for the rest of the flood
-    slider.remove()
+    try:
+        with near.knock(SOCKET) as end:
+            for k in range(600):
+                end.send(json.dumps({"do": "set", "changes": {"a": k}}))
+            start_s = time.monotonic()
+            assert near.post(b'{"do": "stop", "why": "a test"}')[0] == 200
+            assert len(near.stops) == before + 1
+            assert time.monotonic() - start_s < 0.5 * PATIENCE_S
+    finally:
+        near.answer = lambda asked: DONE

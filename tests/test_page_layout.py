@@ -6,17 +6,15 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from browser import RARE_DRAWING, Browser, browsing
 from msgspec.structs import replace
-from page_feed import GREY, IN_TIME, PageFeed
-from shown_page import running_page, wait_for
+from page_stub import PICTURE, RUN, YOU, Stub, serving
+from shown_page import wait_for
 
-from gazerig.robot.control.loop_timing import busy_text
-from gazerig.robot.control.tick_text import head_activity
-from gazerig.robot.dashboard.feed.page_process import PageProcess
-from gazerig.robot.model.control_source import ControlState
+from gazerig.robot.model.control_source import ControlSource
 
 LEAST_TEXT_PX = 13.0
 # Of each control some points are asked for what lies on top there. What a drawer holds may be
@@ -55,6 +53,9 @@ MEASURE = """(() => {
   if (document.documentElement.scrollHeight > innerHeight) faults.push('the page is too high');
   for (const e of document.querySelectorAll('#drawer, #drawer > section, #notices, header')) {
     if (seen(e) && e.scrollWidth > e.clientWidth + 1) faults.push(`${name(e)} is too wide`);
+  }
+  for (const e of document.querySelectorAll('#headline')) {
+    if (e.scrollHeight > e.clientHeight + 2) faults.push(`${name(e)} is not shown whole`);
   }
   const words = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (words.nextNode()) {
@@ -113,45 +114,53 @@ SIZES = {
     "small": (800, 600),
     "narrow": (1000, 700),
 }
-TABS = ("watch", "steer", "tune", "health")
-MENUS = {"track": ("none", "nod", "shake", "surprised", "sleepy"), "lids": ("awake",)}
-MINUTES_S = -300.0
-CLICK = ControlState(
-    1, True, who="browser 1a2b", description="look at 0.9 0.1 0.25", since_s=MINUTES_S
-)
-STOP = "STOP was pressed on the page (browser 1a2b)"
+TABS = ("watch", "steer", "play", "talk", "tune", "health")
+CLICK = ControlSource("person", "ann at 192.168.1.20", "look at 0.9 0.1 0.25", (), -300.0)
+STOP = f"STOP was pressed on the page ({YOU})"
 LOST = "the servo bus is lost: /dev/ttyUSB0 is not there"
+HEADLINES = {
+    "awake": "looks at person 1 (mouth)",
+    "stopped": f"stopped: {STOP}; the torque is off",
+    "led by a click": (
+        "a program with a long name at 192.168.1.20 makes it look at 0.9 0.1 0.25, for 5 min; 12 deg "
+        "off: yaw 30 of 42 deg"
+    ),
+    "bus lost": f"the torque is off: {LOST}",
+    "busy": "looks at person 1 (mouth)",
+}
 CHANGES: dict[str, dict[str, Any]] = {
     "awake": {},
-    "stopped": {"stopped": STOP, "level": "torque_off"},
-    "led by a click": {"client_control": CLICK},
-    "bus lost": {"level": "torque_off", "reasons": (LOST,), "critical_reasons": (LOST,)},
+    "stopped": {"stopped": STOP, "level": "torque_off", "control_source": ControlSource("stopped")},
+    "led by a click": {"control_source": CLICK},
+    "bus lost": {"level": "torque_off", "reasons": (LOST,)},
     "busy": {},
 }
-"""What differs from a tick that looks at a person: of the guard's result or of the tick itself."""
-BUSY = IN_TIME._replace(late_share=0.12, latest_ms=38.0)
+"""What differs from a state in which the head looks at a person."""
+BUSY = "the computer is too busy: 12% of ticks came late (worst 38 ms)"
+GREY = cv2.imencode(".jpg", np.full((400, 640, 3), (140, 120, 100), np.uint8))[1].tobytes()
 
 
 class Shown:
     """A page in a browser, and what feeds it."""
 
-    def __init__(self, browser: Browser, page: PageProcess) -> None:
-        self.browser, self.feed = browser, PageFeed(page)
+    def __init__(self, browser: Browser, stub: Stub) -> None:
+        self.browser, self.stub = browser, stub
+        self._awake = stub.state
 
-    def state(self, name: str, image: np.ndarray | None = None) -> None:
+    def state(self, name: str) -> None:
         """Show a state and wait until the page shows it."""
-        changes, timing = CHANGES[name], BUSY if name == "busy" else IN_TIME
-        guard = self.feed.tick.guard_result
-        results = {key: changes[key] for key in changes if key in guard.__struct_fields__}
-        others = {key: changes[key] for key in changes if key not in guard.__struct_fields__}
-        errors = {"timeout": 3} if name == "bus lost" else {}
-        self.feed.state = self.feed.state._replace(errors=errors, timing=timing)
+        busy = BUSY if name == "busy" else ""
+        self.stub.run = replace(RUN, busy=busy)
+        fields = ("stopped", "level", "control_source", "reasons")
+        plain = {key: getattr(self._awake, key) for key in fields}
+        changes = {**plain, **CHANGES[name], "headline": HEADLINES[name]}
         said = "['headline', 'busy'].map(id => document.getElementById(id).textContent)"
 
         def says() -> bool:
-            tick = self.feed.show(image, guard_result=replace(guard, **results), **others)
-            words = [head_activity(tick).headline, busy_text(timing)]
-            return bool(value(self.browser, said) == words)
+            self.stub.show(**changes)
+            picture = replace(PICTURE, captured_s=self.stub.state.t_s)
+            self.stub.send("picture", picture, GREY)
+            return bool(value(self.browser, said) == [HEADLINES[name], busy])
 
         wait_for(says, f"the headline of {name}")
 
@@ -172,13 +181,11 @@ class Shown:
 
 @pytest.fixture(scope="module")
 def shown() -> Iterator[Shown]:
-    with browsing(SIZES["laptop"], RARE_DRAWING) as browser, running_page() as (page, url):
-        page.offer(MENUS)
-        shown = Shown(browser, page)
-        shown.feed.show(GREY)
+    with serving() as (stub, url), browsing(SIZES["laptop"], RARE_DRAWING) as browser:
         browser.go(url)
-        wait_for(lambda: value(browser, "document.querySelector('#camera img') !== null"), "it")
-        yield shown
+        drawn = "document.querySelector('#camera canvas') !== null && document.querySelector('.field') !== null"
+        wait_for(lambda: value(browser, drawn), "the panels")
+        yield Shown(browser, stub)
 
 
 @pytest.fixture(scope="module", params=SIZES)
@@ -195,6 +202,18 @@ def test_nothing_is_cut_off_covered_or_too_small(shown: Shown, state: str, size:
     # STOP can be hit with a finger, whatever else is shown.
     stop = "document.getElementById('rig-stop').getBoundingClientRect().height"
     assert value(shown.browser, stop) >= 44.0
+
+
+@pytest.mark.parametrize("tab", TABS)
+def test_drawers_fit_with_all_their_folds_open(shown: Shown, tab: str, size: str) -> None:
+    shown.state("awake")
+    shown.tab(tab)
+    try:
+        folds = f"document.querySelectorAll('#drawer-{tab} details')"
+        shown.browser.run(f"{folds}.forEach((fold) => {{ fold.open = true; }})")
+        assert faults(shown.browser) == []
+    finally:
+        shown.tab(tab)
 
 
 @pytest.mark.parametrize("size", ["desk", "laptop"], indirect=True)

@@ -13,15 +13,11 @@ from urllib.parse import urlsplit
 
 import child_processes
 import pytest
-from page_visitor import PATIENCE_S, Visitor
+from page_visitor import Visitor
 from present import present
 from shown_page import free_port, running_page, wait_for
 
-from gazerig.robot.dashboard.feed.page_process import (
-    URL,
-    PageProcess,
-)
-from gazerig.robot.dashboard.requests.inbox import BEAT
+from gazerig.robot.dashboard.feed.page_process import BEAT, URL, PageProcess
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -87,8 +83,8 @@ def test_close_ends_even_a_frozen_page(shared: tuple[PageProcess, str, int]) -> 
 
 
 def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None:
-    with running_page() as (page, url):
-        page.offer({"lids": ("wink", "blink")})
+    ends: list[socket.socket] = []
+    with running_page(serve=ends.append) as (page, url):
         first, folder = page_here(), Path(present(page._folder))
         assert first is not None and folder.exists()
         os.kill(first, signal.SIGKILL)
@@ -99,15 +95,8 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         assert not folder.exists() and Path(present(page._folder)).stat().st_mode & 0o077 == 0
         assert page_here() not in (None, first) and page.started == 2
         assert wait_for(page.notice, "the second notice") == f"the page is there again, at {url}"
-        with Visitor(url).open("/rig/panels") as talk:
-            while '"blink"' not in str(talk.recv(timeout=PATIENCE_S)):
-                pass
-        # Once more: no more words about it.
-        second = page_here()
-        assert second is not None
-        os.kill(second, signal.SIGKILL)
-        wait_for(lambda: page.started == 3, "the third page")
-        assert page.notice() is None
+        with Visitor(url).open("/api/v1/socket"):
+            assert b'"do":"hello"' in ends[2].recv(1 << 16)  # the new one of two for each page
 
 
 @pytest.mark.parametrize("beats", [True, False])

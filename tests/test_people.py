@@ -29,7 +29,7 @@ from gazerig.drivers.vision.palms import PalmDetector
 from gazerig.drivers.vision.people import PeopleDetector
 from gazerig.gaze.angles import norm
 from gazerig.gaze.types import Percept, Vec3
-from gazerig.robot.dashboard.feed.camera_overlay import draw_detections
+from gazerig.robot.dashboard.feed.camera_picture import camera_picture
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
@@ -147,8 +147,11 @@ def test_frames_carry_people_between_processes() -> None:
     (head,) = present(found.located).faces
     assert head.kind == "face" and head.R_face is None
     assert frames.analyze(Shot(0.03, 2, shown)).people == ()
-    drawn = draw_detections(shown, found, None, present(found.located).intrinsics)
-    assert (drawn != shown).any()
+    lens, level = present(found.located).intrinsics, ((0, 0, 1), (-1, 0, 0), (0, -1, 0))
+    picture, jpeg = camera_picture(found, lens, level, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    assert picture.people[0].head_px == pytest.approx(found.people[0].head_px, abs=0.05)
+    assert jpeg[:3] == b"\xff\xd8\xff"
+    assert picture.gaze_px == (round(lens.cx_px, 1), round(lens.cy_px, 1))
 
 
 @pytest.fixture

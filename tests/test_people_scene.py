@@ -1,17 +1,15 @@
 """Visitors on the page are people with a face, where they were seen; hands are hands."""
 
-from dataclasses import replace
-
 import pytest
 import trimesh
 import viser
-from shown_page import FACE, SNAPSHOT
+from page_feed import shown
+from seen_things import seen
 from trimesh.proximity import closest_point_naive
 
 from gazerig.robot.dashboard.view.people import PeopleView
 from gazerig.robot.description.people import LOOKS, head
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
-from gazerig.robot.model.types import SeenBody, Snapshot
 
 
 def scene() -> tuple[viser.ViserServer, PeopleView]:
@@ -32,22 +30,16 @@ def test_a_person_has_the_parts_of_a_face_where_the_canonical_face_has_them(part
         assert away_m < 0.006, number
 
 
-def seen(*, hand: bool = True) -> Snapshot:
-    bodies = (SeenBody(7, "hand", (0.6, 0.2, 0.1), 0.06),) if hand else ()
-    ball = SeenBody(8, "thing", (0.6, -0.2, 0.1), 0.05)
-    return replace(SNAPSHOT, faces=(FACE,), bodies=(*bodies, ball))
-
-
 def test_a_person_a_hand_and_a_thing_are_drawn_and_go() -> None:
     server, people = scene()
     try:
-        people.show(seen())
+        people.show(seen("hand").tick)
         assert {"/faces/3/head", "/chests/3", "/bodies/7/hand", "/bodies/8/ball"} <= nodes(server)
         head = server.scene._handle_from_node_name["/faces/3/head"]
         assert isinstance(head, viser.GlbHandle) and head.scale == pytest.approx(1.0, abs=0.02)
-        people.show(replace(seen(), bodies=(SeenBody(7, "thing", (0.6, 0.2, 0.1), 0.06),)))
+        people.show(seen("thing").tick)
         assert "/bodies/7/ball" in nodes(server) and "/bodies/7/hand" not in nodes(server)
-        people.show(replace(SNAPSHOT, faces=(), bodies=()))
+        people.show(shown(percept=None).tick)
         left = nodes(server)
         assert not any(
             name.startswith(("/faces/", "/chests/", "/bodies/", "/shades/")) for name in left

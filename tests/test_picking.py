@@ -1,7 +1,6 @@
 """A click in the picture means the thing that is seen there."""
 
-from types import SimpleNamespace
-from typing import cast
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,8 +10,6 @@ from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Bodies, Face, Percept, Vec3
-from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
@@ -25,7 +22,7 @@ WIDTH, HEIGHT = 640, 480
 
 def looking(
     head_rad: tuple[float, float, float], percept: Percept | None, depth: np.ndarray | None = None
-) -> tuple[ClickToLook, CameraMount, PoseHistory]:
+) -> tuple[Callable[[float, float], Vec3 | None], CameraMount, PoseHistory]:
     """A head that was turned so when the picture was taken, and has turned on since."""
     kinematics = Kinematics(
         GeometryParams(pitch_axis_height_mm=90.0, eyes_ahead_mm=30.0, eyes_above_mm=50.0),
@@ -37,10 +34,13 @@ def looking(
         poses.remember(t_s, head_rad)
     poses.remember(1.1, (head_rad[0] + 0.3, 0.0, 0.0))
     mount = CameraMount(CAMERA)
-    picking = ClickToLook(PixelToWorld(mount, poses, lambda: CAMERA))
+    pixels = PixelToWorld(mount, poses, lambda: CAMERA)
     found = Detections(1.0, 1, WIDTH, HEIGHT, (), (), None, depth, None)
-    picking.newest = cast(Tick, SimpleNamespace(detections=found, percept=percept))
-    return picking, mount, poses
+
+    def point(x: float, y: float) -> Vec3 | None:
+        return pixels.point((x * (WIDTH - 1), y * (HEIGHT - 1)), found, percept)
+
+    return point, mount, poses
 
 
 def place(p_world_m: Vec3, mount: CameraMount, poses: PoseHistory) -> tuple[float, float]:
@@ -60,19 +60,19 @@ def face_at(p_world_m: Vec3) -> Face:
 def test_a_click_on_a_face_is_at_the_face(yaw_rad: float) -> None:
     # Somebody before the camera as it stood when the picture was taken.
     there: Vec3 = (0.9 * np.cos(yaw_rad), 0.9 * np.sin(yaw_rad) + 0.05, 0.22)
-    picking, mount, poses = looking((yaw_rad, 0.0, 0.0), Percept(1.0, Bodies(), (face_at(there),)))
+    point_at, mount, poses = looking((yaw_rad, 0.0, 0.0), Percept(1.0, Bodies(), (face_at(there),)))
     x, y = place(there, mount, poses)
     assert 0.0 < x < 1.0 and 0.0 < y < 1.0
-    point = picking.point(x, y)
+    point = point_at(x, y)
     assert point is not None and norm(sub(point, there)) < 1e-6
 
 
 def test_depth_is_along_the_optical_axis() -> None:
     depth = np.full((HEIGHT, WIDTH), 2.0, np.float32)
     depth[:, : WIDTH // 2] = 0.7
-    picking, mount, poses = looking((0.0, 0.0, 0.0), None, depth)
+    point_at, mount, poses = looking((0.0, 0.0, 0.0), None, depth)
     _, p = mount.pose(*poses.head_pose(1.0))
-    left, right = picking.point(0.1, 0.5), picking.point(0.9, 0.5)
+    left, right = point_at(0.1, 0.5), point_at(0.9, 0.5)
     assert left is not None and right is not None
     assert left[0] - p[0] == pytest.approx(0.7, abs=1e-3)
     assert right[0] - p[0] == pytest.approx(2.0, abs=1e-3)

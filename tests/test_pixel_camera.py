@@ -18,8 +18,6 @@ from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.angles import angle_between, rotation
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.scene_files import load_scene, scene_names
-from gazerig.robot.dashboard.feed.camera_overlay import draw_heat
-from gazerig.robot.dashboard.feed.gaze_trail import GazeTrail
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
@@ -176,16 +174,3 @@ def test_the_same_dice_give_the_same_bytes() -> None:
         return bytes(present(image).tobytes())
 
     assert shot(1) == shot(1) != shot(2)
-
-
-def test_warmth_lies_where_the_gaze_has_been() -> None:
-    trail = GazeTrail()
-    for i in range(100):
-        trail.add(0.01 * i, (1.0, 0.0, 0.2))
-    assert 16 <= len(trail.points()) <= 20  # one every 50 ms
-    image = np.full((400, 640, 3), 120, np.uint8)
-    draw_heat(image, np.array([(320.0, 200.0)] * 40 + [(-50.0, 3000.0)]))
-    assert np.abs(image[200, 320].astype(int) - 120).max() > 40
-    assert (image[20:60, 20:60] == 120).all()
-    trail.add(0.0, (0.0, 0.0, 0.0))
-    assert len(trail.points()) == 1  # time went back: another run

@@ -1,17 +1,14 @@
-"""With a world the page shows its room and its people, and only marks what the rig has seen."""
-
-from dataclasses import replace
+"""With a world the page shows its room and its people, and what the rig has seen only without."""
 
 import numpy as np
 import pytest
 import viser
-from shown_page import FACE, SNAPSHOT
+from seen_things import seen
 from world_shapes import LEAVES_S, SmallWorld
 
 from gazerig.robot.dashboard.view.head_view import HeadView
 from gazerig.robot.dashboard.view.people import PeopleView
 from gazerig.robot.dashboard.view.world_view import WorldView
-from gazerig.robot.model.types import SeenBody
 
 
 def shown(server: viser.ViserServer, start: str) -> set[str]:
@@ -40,24 +37,18 @@ def test_people_of_a_world_are_where_they_are_at_the_time() -> None:
         server.stop()
 
 
-def test_with_a_world_what_was_seen_is_only_marked() -> None:
+def test_with_a_world_what_was_seen_is_not_drawn_again() -> None:
     server = viser.ViserServer(port=0, verbose=False)
-    bodies = (SeenBody(7, "hand", (0.6, 0.2, 0.1), 0.06),)
-    seen = replace(SNAPSHOT, faces=(FACE,), bodies=bodies)
+    rig = seen("hand")
     drawn = {"/faces/3/head", "/chests/3", "/bodies/7/hand", "/shades/3", "/shade"}
     try:
         people, head = PeopleView(server.scene), HeadView(server.scene)
-        for marked in (False, True, False):
-            people.mark_only(marked)
-            head.on_table = marked
-            people.show(seen)
-            head.show(seen)
+        for has_world in (False, True, False):
+            head.on_table = has_world
+            people.show(rig.tick, people=not has_world)
+            head.show(rig)
             found = shown(server, "/")
-            assert drawn.isdisjoint(found) if marked else drawn <= found
-            if marked:
-                outline = server.scene._handle_from_node_name["/faces/3/outline"]
-                assert isinstance(outline, viser.MeshHandle)
-                assert outline.scale == pytest.approx((1.0, 0.8, 1.12), abs=0.02)
-            assert ({"/faces/3/outline", "/faces/3/label", "/bodies/7/outline"} <= found) is marked
+            assert drawn.isdisjoint(found) if has_world else drawn <= found
+            assert "/target/point" in found
     finally:
         server.stop()

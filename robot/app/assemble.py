@@ -48,7 +48,7 @@ from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.joint_latency import JointLatency
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.track_choices import TrackChoices
-from gazerig.robot.dashboard.feed.snapshot import ShownRig
+from gazerig.robot.dashboard.feed.rig_feed import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
@@ -97,7 +97,6 @@ class Assembly(NamedTuple):
         rig, parts = self.live_params.rig, self.live_params.parts
         return ShownRig(
             parts.kinematics,
-            limits(rig.joints),
             self.mount,
             radians(self.horizontal_field_deg),
             shape_of(rig),

@@ -7,6 +7,7 @@ its own thread or process, and receives each tick with hardly any delay.
 import contextlib
 import os
 from collections.abc import Callable, Iterator
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,31 +20,29 @@ from gazerig.robot.app.door_processes import DoorProcesses
 from gazerig.robot.app.mock_agent import AgentScene, MockAgent
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.app.voice import RunVoice
-from gazerig.robot.control.command_handler import accept_only_stops
 from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.observers import Observers, failure_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
+from gazerig.robot.control.tick_text import health_text
 from gazerig.robot.dashboard.door.token_file import hide_token
-from gazerig.robot.dashboard.feed.live_feed import LiveRig
 from gazerig.robot.dashboard.feed.page_process import PageProcess
-from gazerig.robot.dashboard.feed.publisher import ParamFeed, Publisher
-from gazerig.robot.dashboard.feed.snapshot import RunState
+from gazerig.robot.dashboard.feed.publisher import Publisher
+from gazerig.robot.dashboard.feed.rig_feed import LiveRig
 from gazerig.robot.dashboard.feed.status_line import StatusLine
-from gazerig.robot.dashboard.requests.page_requests import PageRequestHandler
-from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
-from gazerig.robot.model.types import LoopFigures
-from gazerig.robot.perception.pixel_to_world import PixelToWorld
+from gazerig.robot.model.joint import JointLimit
+from gazerig.robot.model.moved_opponent import has_opponent
 from gazerig.robot.remote.client import rig_name
-from gazerig.robot.remote.live_server import LiveServer
+from gazerig.robot.remote.live_server import LiveServer, StopOnlyServer
+from gazerig.robot.remote.topics import JointInfo, RigInfo, RunState
+from gazerig.robot.safety.health import HOT_C, LASTING_LOAD, VOLTAGE_MARGIN_V, WARM_C
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
-
-_STATES_PER_FIGURES = 3
 
 
 class RunObservers:
@@ -60,7 +59,6 @@ class RunObservers:
         recorder: records the run.
         browse: opens the page in the user's browser.
         voice: Says sounds and texts; it is closed with the observers.
-        led_by: Who leads the head instead of the page, which can then only stop and resume it.
     """
 
     def __init__(
@@ -71,29 +69,30 @@ class RunObservers:
         status: Callable[[str], None] | None = None,
         tuning: ParamStore | None = None,
         recorder: "Recorder | None" = None,
-        led_by: str = "",
         browse: Callable[[str], object] | None = None,
         voice: RunVoice | None = None,
     ) -> None:
-        self._led_by, self._by_browser, self._voice = led_by, False, voice
+        self._by_browser, self._voice = False, voice
         self._made, self._fast, self._say = assembly, options.fast, say
         self._agent = (
             MockAgent(assembly.robot.command, assembly.scene, self._scene_start_s)
             if isinstance(assembly.scene, AgentScene)
             else None
         )
-        self._states = 0
-        self._figures: LoopFigures | None = None
         self._timing = LoopTiming(assembly.loop.rate_hz)
-        self._emulated = options.mock and not led_by
+        self._emulated = options.mock
         computed = options.no_pictures or (assembly.scene is not None and not options.pixels)
         self._detector = "" if computed else str(detector_status(assembly.live_params.rig.detector))
         self._choice = level_text(options.computer) if options.computer is not None else ""
         self._tuning, self._recorder = tuning, recorder
         name = options.name or rig_name(options.rig)
         about = {"rig": options.rig, "name": name, "pid": os.getpid()}
-        self._live = (
-            LiveServer(
+        self._server: LiveServer | StopOnlyServer | None = None
+        doors: tuple[str, ...] = ()
+        if tuning is None and not options.fast:
+            self._server = StopOnlyServer(assembly.robot.command, assembly.clock, about, say)
+        elif tuning is not None and not options.fast:
+            self._server = LiveServer(
                 assembly.robot,
                 tuning,
                 (ConfigError,),
@@ -105,14 +104,8 @@ class RunObservers:
                 tuning.confined,
                 voice,
             )
-            if tuning is not None and not options.fast
-            else None
-        )
-        doors = assembly.live_params.rig.doors if self._live is not None and not led_by else ()
+            doors = assembly.live_params.rig.doors
         self._doors = DoorProcesses(doors, os.getpid(), say)
-        self._picking = ClickToLook(
-            PixelToWorld(assembly.mount, assembly.poses, assembly.camera_params)
-        )
         address = options.page_address
         self._page = self._make_page(address, options.page_token) if address is not None else None
         # Simulated time is faster than a page or a line can show.
@@ -121,10 +114,7 @@ class RunObservers:
         tell = say if options.token_file is None else lambda line: say(hide_token(line))
         self._publisher = None
         if live and self._page:
-            feed = ParamFeed(self._page.send, tuning) if tuning is not None else None
-            self._publisher = Publisher(
-                self._page, self._live_rig, self._run_state, feed, tell, browse
-            )
+            self._publisher = Publisher(self._page, self._live_rig, self._run_state, tell, browse)
         health = assembly.robot.body.bus.health
         self._status = (
             StatusLine(status, health, self._timing.figures)
@@ -140,52 +130,47 @@ class RunObservers:
         self.attach(self._observers)
 
     def _make_page(self, address: tuple[str, int], token: str) -> PageProcess:
-        command = self._made.robot.command
-        page_requests = PageRequestHandler(
-            accept_only_stops(command, f"{self._led_by} leads the head now")
-            if self._led_by
-            else command,
-            params=self._tuning,
-            point=self._picking.point,
-            refusals=(ConfigError,) if self._tuning is not None else (),
-            saved=self._live.saved if self._live is not None else None,
-            paths=self._tuning.confined if self._tuning is not None else None,
-        )
         browser = self._made.browser
         on_picture = browser.take if browser is not None else None
-        live = self._live
-        return PageProcess(
-            *address,
-            page_requests,
-            on_picture,
-            lambda: live.path if live is not None else None,
-            token,
-        )
+        serve = self._server.serve if self._server is not None else None
+        return PageProcess(*address, serve, on_picture, token)
 
     def _live_rig(self) -> LiveRig:
-        made = self._made
-        picture = DrawnScene(made.scene) if made.scene is not None else None
+        made, tuning = self._made, self._tuning
+        rig = made.live_params.rig
         shapes = made.room.shapes() if made.room is not None else None
+        names = made.live_params.parts.kinematics.names
         return LiveRig(
-            made.shown_rig(), self._emulated, picture, shapes, self._detector,
-            self._choice,
-        )  # fmt: skip
+            made.shown_rig(),
+            RigInfo(
+                rig.name,
+                str(tuning.path) if tuning is not None else "",
+                self._emulated,
+                has_opponent(shapes),
+                self._detector,
+                self._choice,
+                dict(zip(names, map(_joint_info, limits(rig.joints)), strict=True)),
+            ),
+            DrawnScene(made.scene) if made.scene is not None else None,
+            shapes,
+        )
 
     def _run_state(self) -> RunState:
-        """Return the values of the page that are not in ticks."""
-        robot = self._made.robot
-        errors = {kind: n for kind, n in robot.body.bus.health().errors.items() if n}
+        """Return the state of the run that is not in ticks."""
+        robot, tuning = self._made.robot, self._tuning
         menus = robot.menus()
-        character = self._tuning.character_name if self._tuning is not None else ""
-        self._states += 1
-        if self._states % _STATES_PER_FIGURES == 1:  # computing them takes half a millisecond
-            self._figures = self._timing.figures()
+        figures = self._timing.figures()
         return RunState(
-            errors, menus["behaviour"][0], menus["conversation"][0], character,
-            self._scene_start_s(),
-            self._figures,
+            menus["behaviour"][0],
+            menus["conversation"][0],
+            tuning.character_name if tuning is not None else "",
             menus.get("expression", ("",))[0],
-        )  # fmt: skip
+            health_text(robot.body.bus.health()),
+            tuning.version if tuning is not None else 0,
+            figures,
+            busy_text(figures),
+            self._scene_start_s(),
+        )
 
     def attach(self, observers: Observers) -> None:
         """Add all of them as observers of the ticks; any that fails is dropped."""
@@ -198,11 +183,11 @@ class RunObservers:
         if not self._fast:
             observers.add("the loop's time", self._record_time)
         if self._page is not None:
-            observers.add("picking a point on the page", self._follow)
+            observers.add("the page's view", self._follow)
         if self._status is not None:
             observers.add("the status line", self._status.update)
-        if self._live is not None:
-            observers.add("the remote control", self._live.update)
+        if self._server is not None:
+            observers.add("the remote control", self._server.update)
         if self._voice is not None:
             observers.add("the voice", self._voice.update)
 
@@ -221,8 +206,8 @@ class RunObservers:
                 self._voice.stop()
             if self._status is not None:
                 self._status.update(tick)
-            if self._live is not None:
-                self._live.update(tick)
+            if self._server is not None:
+                self._server.update(tick)
             self._parking.update(tick)
 
     def wrap_stop(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
@@ -244,15 +229,11 @@ class RunObservers:
             if self._recorder is not None:
                 self._recorder.begin()
         with self._report_errors("the remote control"):
-            # Opened before the page, which relays to it.
-            if self._live is not None:
-                self._live.open()
+            if self._server is not None:
+                self._server.open()
         with self._report_errors("the page"):
             if self._page is not None:
                 self._page.open()
-                if not self._led_by:
-                    self._page.offer(self._made.robot.menus())
-                    self._page.offer_tracks(self._made.robot.tracks())
         with self._report_errors("the doors"):
             self._doors.open()
 
@@ -263,11 +244,6 @@ class RunObservers:
             yield
         except Exception as error:
             self._say(failure_text(name, error))
-
-    def show_message(self, text: str) -> None:
-        """Show a message to all users of the page."""
-        if self._page is not None:
-            self._page.say(text)
 
     def remove_files(self) -> None:
         """Remove the files of a robot that could not start."""
@@ -289,14 +265,12 @@ class RunObservers:
         with self._report_errors("the voice"):
             if self._voice is not None:
                 self._voice.close()
-        with self._report_errors("the remote control"):
-            if self._live is not None:
-                self._live.close()
         with self._report_errors("the page"):
-            if self._publisher is not None:
-                self._publisher.close()
             if self._page is not None:
                 self._page.close()
+        with self._report_errors("the remote control"):
+            if self._server is not None:
+                self._server.close()
         with self._report_errors("the recording"):
             if self._recorder is not None:
                 self._say(self._recorder.close(count.stopped_by, self._made.sent_bytes_digest()))
@@ -311,8 +285,7 @@ class RunObservers:
         self._timing.update(tick.t_s)
 
     def _follow(self, tick: Tick) -> None:
-        """Store the percept for the placement of a click, and show the rig again after tuning."""
-        self._picking.newest = tick
+        """Show the rig again after tuning or with another camera."""
         browser = self._made.browser
         if browser is not None:
             browser.update()
@@ -323,3 +296,16 @@ class RunObservers:
         if browser is not None and self._by_browser != browser.in_use:
             self._by_browser = browser.in_use
             self._publisher.resend_geometry()
+
+
+def _joint_info(limit: JointLimit) -> JointInfo:
+    highest_v = limit.highest_v - VOLTAGE_MARGIN_V
+    return JointInfo(
+        limit.low_rad,
+        limit.high_rad,
+        limit.hottest_c - WARM_C,
+        limit.hottest_c - HOT_C,
+        limit.lowest_v + VOLTAGE_MARGIN_V,
+        highest_v if isfinite(highest_v) else None,
+        LASTING_LOAD,
+    )

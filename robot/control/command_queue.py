@@ -4,6 +4,8 @@ from collections import deque
 from contextlib import suppress
 from typing import NamedTuple
 
+from msgspec import structs
+
 from gazerig.robot.model.commands import Command, ControlCommand, Resume, SetLevel, Stop, Tune
 from gazerig.robot.model.reply import CommandReply, Ticket
 
@@ -58,11 +60,11 @@ class CommandQueue:
         """Store the reply to a command until ``give_replies``."""
         self._replies.append((waiting.ticket, reply))
 
-    def give_replies(self) -> None:
-        """Give the stored replies; called when others can see the tick that executed them."""
+    def give_replies(self, t_s: float) -> None:
+        """Give the replies; called when others can see the tick of t_s, which executed them."""
         replies, self._replies = self._replies, []
         for ticket, reply in replies:
-            ticket.answer(reply)
+            ticket.answer(structs.replace(reply, t_s=t_s))
 
     def take_stops(self) -> list[QueuedCommand]:
         """Remove and return all stops; refuse queued commands that would move the head."""

@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from gazerig.gaze.angles import add, unit, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Vec3
+from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Salience, Vec3
 from gazerig.robot.control.gaze_events import EventKind
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import head_activity, target_name, tick_control_source
@@ -43,6 +43,7 @@ class JointReading(Struct, frozen=True):
         load: Share of the stall torque, signed, -1..1, None if unknown.
         temperature_c: Temperature, None before the first reading.
         voltage_v: Supply voltage, None before the first reading.
+        age_s: Time since the servo's last answer.
     """
 
     name: str
@@ -57,6 +58,7 @@ class JointReading(Struct, frozen=True):
     load: float | None = None
     temperature_c: float | None = None
     voltage_v: float | None = None
+    age_s: float = 0.0
 
     @property
     def desired_deg(self) -> float:
@@ -89,6 +91,9 @@ class GazeReading(Struct, frozen=True):
         lids: Opening of the left and the right upper lid, 0 shut .. 1 open.
         phase: "fixate", "saccade" or "pursue"; "held" while joints are held, "stopped", "parking".
         blink: Whether a blink is in progress.
+        kind: Kind of the target: "face", "hand", "thing", "idle" and so on; while something else
+            controls the head, that of ``control_source``.
+        part: Part of the face, e.g. "left eye", None if the target is no face.
     """
 
     target: str
@@ -102,6 +107,8 @@ class GazeReading(Struct, frozen=True):
     lids: Angles2
     phase: str
     blink: bool
+    kind: str = ""
+    part: str | None = None
 
     @property
     def direction_deg(self) -> Angles2:
@@ -177,6 +184,9 @@ class HeadState(Struct, frozen=True):
         headline: Present activity of the head in one sentence.
         conversation: State of the conversation that a voice agent reports.
         frame_s: Time of the newest camera frame, None before the first.
+        saliences: Saliences of the winner and the next bodies, highest first; empty while a client
+            is in control.
+        plan: Choice of the action planner and its reason, "" without one.
     """
 
     t_s: float
@@ -193,6 +203,8 @@ class HeadState(Struct, frozen=True):
     control_source: ControlSource = ControlSource()
     headline: str = ""
     conversation: ConversationState = NO_CONVERSATION
+    saliences: tuple[Salience, ...] = ()
+    plan: str = ""
 
 
 class HeadReport(Struct, frozen=True):
@@ -205,7 +217,8 @@ class HeadReport(Struct, frozen=True):
 
 def head_state(tick: Tick) -> HeadState:
     """Return the state of a head in a tick."""
-    percept = tick.percept
+    percept, leads = tick.percept, tick_control_source(tick)
+    chooses = not leads.overrides_gaze
     return HeadState(
         tick.t_s,
         _joints(tick),
@@ -220,9 +233,11 @@ def head_state(tick: Tick) -> HeadState:
         tick.client_control,
         tick.tracks,
         percept.captured_s if percept is not None else None,
-        tick_control_source(tick),
+        leads,
         head_activity(tick).headline,
         tick.conversation,
+        tick.target.saliences if chooses else (),
+        tick.target.plan if chooses else "",
     )
 
 
@@ -242,6 +257,7 @@ def _joints(tick: Tick) -> dict[str, JointReading]:
         _values_or_none(state.load, count),
         _values_or_none(state.temperature_c, count),
         _values_or_none(state.voltage_v, count),
+        [tick.t_s - at_s for at_s in state.measured_s] or [0.0] * count,
         strict=True,
     )
     return {row[0]: JointReading(*row) for row in columns}
@@ -253,6 +269,8 @@ def _values_or_none(values: Sequence[Any], count: int) -> Sequence[Any]:
 
 def _gaze(tick: Tick) -> GazeReading:
     pose, gaze, does = tick.pose, tick.gaze, head_activity(tick)
+    leads, part = tick_control_source(tick), tick.target.part
+    chooses = not leads.overrides_gaze
     # A client's target is a gaze target; held joints have none.
     target = (
         target_name(tick.target)
@@ -272,6 +290,8 @@ def _gaze(tick: Tick) -> GazeReading:
         (pose.lid_left, pose.lid_right),
         gaze.phase if does.phase == "blink" else does.phase,
         gaze.blink,
+        tick.target.kind if chooses else leads.kind,
+        PART_NAMES[part] if chooses and part is not None else None,
     )
 
 

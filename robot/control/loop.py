@@ -277,7 +277,7 @@ class Robot:
                 raise named from error
             raise
         finally:
-            self._commands.give_replies()
+            self._commands.give_replies(t_s)
 
     def _tick(self, t_s: float, dt_s: float) -> Tick:
         commands = self._execute_commands(t_s)
@@ -370,7 +370,7 @@ class Robot:
                     self._commands.reply(stop, self._executor.execute(stop.command, t_s))
                 if watch is not None and isinstance(newest, Tick):
                     watch(newest.stopped_tick(t_s, self._stop.stop_reason, self.body.bus.events()))
-                self._commands.give_replies()
+                self._commands.give_replies(t_s)
                 return False
             joints = self.body.read(t_s)
             guard_result = self._guard.check(pose_rad, joints, 0.0, t_s)

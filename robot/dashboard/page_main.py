@@ -1,11 +1,11 @@
-"""Process of the page: receives the newest snapshot from the socket and draws it.
+"""Process of the page: receives the rig's ticks, serves clients and draws the view.
 
 Started by ``gazerig.robot.dashboard.feed.page_process.PageProcess`` as ``python -m
-gazerig.robot.dashboard.page_main FD STOP_FD PARENT HOST PORT``. The token and a private folder are
-in its environment, because other users can read its arguments. It ends when the other side of the
-socket closes. Nothing is downloaded: the page's script is part of the viser package and all shapes
-are made here. Browsers connect through ``gazerig.robot.dashboard.door.auth_proxy``; their users'
-requests are sent to the rig over the same socket.
+gazerig.robot.dashboard.page_main LINK ORDERS SLOW PARENT HOST PORT``. The token and a private
+folder are in its environment, because other users can read its arguments. It ends when the other
+side of the link closes. Nothing is downloaded: viser's script is part of its package and all shapes
+are made here. Clients connect through ``gazerig.robot.dashboard.door.page_door``; their requests
+are sent to the rig over two further connections.
 """
 
 import errno
@@ -18,39 +18,37 @@ import signal
 import socket
 import sys
 import threading
+from collections.abc import Sequence
 from math import inf
 from pathlib import Path
-from typing import NamedTuple
-
-import msgspec
-import viser
 
 from gazerig.drivers.process import message_link
-from gazerig.drivers.process.message_link import MessageLink
+from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.drivers.process.priority import lower_priority
+from gazerig.robot.control.head_state import head_state
 from gazerig.robot.dashboard.door.admission import page_url
-from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
-from gazerig.robot.dashboard.door.browsers import Browsers
-from gazerig.robot.dashboard.door.viser_server import browser_of, camera_of, open_server
-from gazerig.robot.dashboard.feed.live_feed import LiveFeed, read_waiting
+from gazerig.robot.dashboard.door.page_door import BACKLOG, HeadNews, PageDoor
+from gazerig.robot.dashboard.door.viser_server import open_server
 from gazerig.robot.dashboard.feed.page_process import (
+    BEAT,
     CANNOT_OPEN,
-    COMMANDS_VARIABLE,
     FOLDER_VARIABLE,
     NOTICE,
     ONCE_VARIABLE,
+    PICTURE,
     TOKEN_VARIABLE,
     URL,
 )
-from gazerig.robot.dashboard.page_view import PageView
-from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.requests.pointer_to_look import PointerToLook
-from gazerig.robot.dashboard.requests.stop_sender import StopSender
-from gazerig.robot.dashboard.widgets.widgets import Widgets
+from gazerig.robot.dashboard.feed.rig_feed import RigFeed
+from gazerig.robot.dashboard.package_panels import PackagePanels
+from gazerig.robot.dashboard.view.scene import HeadScene
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import LookAt, MoveOpponent
+from gazerig.robot.remote.topics import PanelContent, RigInfo, RunState
 
-_FRAME_S = 0.04
+_PAUSE_S = 0.02
+"""Pause after a batch of ticks, s: the frame that follows it is then shown with it."""
+_SELDOM_S = 0.5
+"""Time between two states of the run, and of packages' panels, s."""
 _SILENT_AFTER_S = 1.0
 _BEAT_S = 0.5
 _PORTS_TRIED = 100
@@ -59,119 +57,131 @@ _NICENESS = 5  # the control loop has priority on a shared core
 _MOST_FILES = 8192  # a burst of connections must not use all file descriptors
 
 
-def free_port(host: str, port: int) -> int:
-    """Find the first port from this one on that can be bound.
+def listen(host: str, port: int) -> socket.socket:
+    """Listen on the first port from this one on that is free.
 
     Raises:
         OSError: the address does not belong to this machine, or none of the ports is free.
     """
     family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     for candidate in range(port, min(port + _PORTS_TRIED, _PORTS)):
-        with socket.socket(family, socket.SOCK_STREAM) as trial:
-            # Like the server itself: a port in TIME_WAIT is free, one with a listener is not.
-            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                trial.bind((address[0], candidate))
-            except OSError as error:
-                if error.errno != errno.EADDRINUSE:
-                    raise
-            else:
-                return candidate
+        try:
+            return socket.create_server((address[0], candidate), family=family, backlog=BACKLOG)
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise
     raise OSError(errno.EADDRINUSE, f"no port from {port} on is free")
 
 
-class ServedPage(NamedTuple):
-    """Open page: the server behind the door, the door and the address.
+class Page:
+    """The page of one rig: the server of the view, the door, and the data that they show.
 
-    outbox: sends requests to the rig; pointer: receives pointers of browsers
-    words: message for the terminal, None if there is none
-    """
+    Args:
+        host: Address.
+        port: First port to try.
+        token: What clients must show.
+        folder: Folder that only this user can read.
+        link: Link to the rig.
+        ends: Connections to the rig for requests.
 
-    server: viser.ViserServer
-    door: AuthProxy
-    outbox: Outbox
-    pointer: PointerToLook
-    url: str
-    words: str | None
-
-
-def serve(
-    host: str, port: int, token: str, folder: Path, feed: MessageLink, stop: StopSender,
-    rig: Path | None = None,
-) -> ServedPage:  # fmt: skip
-    """Open the page's server, and its door on the first free port.
+    Attributes:
+        url: Address with the token.
+        words: Message for the terminal, "" if there is none.
 
     Raises:
-        OSError: see ``free_port``.
+        OSError: see ``listen``.
     """
-    open_port = free_port(host, port)
-    inside = folder / "page.sock"
-    server = open_server(inside)
-    browsers, widgets = Browsers(token), Widgets()
 
-    def name(client: str) -> str:
-        """Return the name of a client's browser; client: its name, or its number in the view."""
-        in_view = browser_of(server, int(client)) if client.isdecimal() else ""
-        return widgets.browser(client) or in_view
+    def __init__(
+        self, host: str, port: int, token: str, folder: Path, link: MessageLink,
+        ends: Sequence[socket.socket],
+    ) -> None:  # fmt: skip
+        listener = listen(host, port)
+        open_port = listener.getsockname()[1]
+        inside = folder / "page.sock"
+        self._link, self._feed, self._clock = link, RigFeed(), RealClock()
+        self._server = open_server(inside)
+        self._scene = HeadScene(self._server)
+        self.door = PageDoor(
+            host, listener, inside, ends, token, self._feed.ticks, self._scene.change,
+            self._send_picture,
+        )  # fmt: skip
+        self._panels = PackagePanels()
+        self._beat_s = self._run_s = -inf
+        self._rig: RigInfo | None = None
+        self._number = 0
+        self.door.open()
+        busy = port not in (0, open_port)  # 0 asks for any port
+        self.words = f"port {port} is busy, using {open_port}" if busy else ""
+        self.url = f"{page_url(host, open_port)}/?token={token}"
 
-    outbox = Outbox(
-        feed,
-        name=name,
-        leads=browsers.give_control,
-    )
-    pointer = PointerToLook(
-        lambda browser: camera_of(server, browser),
-        # Do not mark the browser as in control: only its points show that a pointer is present.
-        lambda point, who: outbox.forward(
-            msgspec.json.encode(LookAt(point, who=who, pointer=True))
-        ),
-        move_opponent=lambda point: outbox.forward(msgspec.json.encode(MoveOpponent(point))),
-    )
-    door = AuthProxy(
-        host, open_port, inside, outbox.forward, stop, token, browsers, widgets, pointer.look_at_pointer,
-        outbox.send_picture, rig,
-    )  # fmt: skip
-    door.open()
-    text = []
-    if port not in (0, open_port):  # 0 asks for any port
-        text.append(f"port {port} is busy, using {open_port}")
-    url = f"{page_url(host, open_port)}/?token={token}"
-    return ServedPage(server, door, outbox, pointer, url, "; ".join(text) or None)
+    def run(self, parent: int) -> None:
+        """Show incoming ticks until the rig has closed the link.
 
+        Raises:
+            RuntimeError: no client can connect any more; a restart of the page may help.
+        """
+        pause, heard_s = threading.Event(), self._clock.now_s()
+        while True:
+            if not self.door.is_open():
+                raise RuntimeError("the page's door has closed")
+            now_s = self._clock.now_s()
+            if now_s >= self._beat_s:
+                # Started here and sent by the door's thread, so both are alive.
+                self._beat_s = now_s + _BEAT_S
+                self.door.call_soon(self._send, BEAT)
+            readable, _, _ = select.select([self._link], [], [], _SILENT_AFTER_S)
+            if readable:
+                heard_s = now_s
+                self._feed.read_waiting(self._link)
+                if self._feed.ended:
+                    return
+                self._show()
+                pause.wait(_PAUSE_S)
+            else:
+                # A process forked by the rig may hold the socket open after the rig's death.
+                if os.getppid() != parent:
+                    return
+                silent_s = self._clock.now_s() - heard_s
+                self.door.call_soon(self.door.distribute, HeadNews(silent_s=silent_s))
 
-def show_until_closed(feed: MessageLink, view: PageView, parent: int, served: ServedPage) -> None:
-    """Draw incoming snapshots until the other side has closed.
+    def _show(self) -> None:
+        """Give the clients and the view what is new."""
+        feed, wanted = self._feed, self.door.wanted()
+        head = feed.shown_head()
+        if head is None or feed.rig is None:
+            return
+        now_s = self._clock.now_s()
+        topics: list[RigInfo | RunState | PanelContent] = []
+        if feed.rig.info != self._rig:
+            self._rig = feed.rig.info
+            topics.append(self._rig)
+        if now_s - self._run_s >= _SELDOM_S:
+            self._run_s = now_s
+            topics.append(feed.run_state())
+            topics += self._panels.draw(head_state(head.tick)) if wanted.rig else ()
+        picture = feed.picture() if wanted.pictures else None
+        events = feed.ticks.events(self._number)
+        self._number = feed.ticks.number
+        news = HeadNews(head.tick, events, tuple(topics), picture)
+        self.door.call_soon(self.door.distribute, news)
+        self._scene.show(head, feed.shown_world())
 
-    Raises:
-        RuntimeError: no browser can connect any more; a restart of the page may help.
-    """
-    door, pointer = served.door, served.pointer
-    pause, live = threading.Event(), LiveFeed()
-    live.choices = view.choices
-    clock, beat_s = RealClock(), -inf
-    while True:
-        if not door.is_open():
-            raise RuntimeError("the page's door has closed")
-        if clock.now_s() >= beat_s:
-            # Started here and sent by the door's thread, so both are alive.
-            beat_s = clock.now_s() + _BEAT_S
-            door.call_soon(served.outbox.send_heartbeat)
-        readable, _, _ = select.select([feed], [], [], _SILENT_AFTER_S)
-        if readable:
-            live.watched = view.watched()
-            news = read_waiting(feed, live)
-            if news.ended:
-                return
-            view.emulated, view.choice = live.emulated, live.choice
-            view.show(news)
-            if news.snapshots:
-                pointer.p_world_eyes_m = news.snapshots[-1].p_world_head_m
-            pause.wait(_FRAME_S)
-        else:
-            # A process forked by the rig may hold the socket open after the rig's death.
-            if os.getppid() != parent:
-                return
-            view.silent()
+    def _send(self, message: bytes) -> bool:
+        """Send a message to the rig; return False if it does not accept it now."""
+        try:
+            self._link.send(message, DONT_WAIT)
+        except OSError:  # the buffer is full, the rig has ended, or the message is too long
+            return False
+        return True
+
+    def _send_picture(self, jpeg: bytes) -> bool:
+        return self._send(PICTURE + jpeg)
+
+    def close(self) -> None:
+        """Close all connections."""
+        self.door.close()
+        self._server.stop()
 
 
 def main(arguments: list[str]) -> int:
@@ -182,29 +192,25 @@ def main(arguments: list[str]) -> int:
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(least, min(_MOST_FILES, most)), most))
     # Standard error is in memory, and a client that sends malformed data fills it with errors.
     logging.disable(logging.CRITICAL)
-    fd, stop_fd, parent, host, port = arguments
+    fd, orders, slow, parent, host, port = arguments
     token = os.environ.pop(TOKEN_VARIABLE)
     # Do not close it explicitly: its end makes the other side read this process's last messages,
     # and those of an exception are written only after the end of a ``with`` block.
-    feed = message_link.open_link(fd)
-    stop = StopSender(message_link.open_link(stop_fd))
+    link = message_link.open_link(fd)
+    ends = [message_link.open_link(end) for end in (orders, slow)]
     folder = Path(os.environ.pop(FOLDER_VARIABLE))
-    commands = os.environ.pop(COMMANDS_VARIABLE, "")
     try:
         try:
-            rig = Path(commands) if commands else None
-            served = serve(host, int(port), token, folder, feed, stop, rig)
+            page = Page(host, int(port), token, folder, link, ends)
         except OSError as error:
             sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
             return CANNOT_OPEN
-        served.door.admission.one_time_token = os.environ.pop(ONCE_VARIABLE, "")
-        if served.words is not None:
-            feed.send(NOTICE + served.words.encode())
-        view = PageView(served.server, served.door.widgets, served.outbox, served.door.send_state)
-        feed.send(URL + served.url.encode())
-        show_until_closed(feed, view, int(parent), served)
-        served.door.close()
-        served.server.stop()
+        page.door.admission.one_time_token = os.environ.pop(ONCE_VARIABLE, "")
+        if page.words:
+            link.send(NOTICE + page.words.encode())
+        link.send(URL + page.url.encode())
+        page.run(int(parent))
+        page.close()
         return 0
     finally:
         shutil.rmtree(folder, ignore_errors=True)

@@ -90,6 +90,7 @@ class CommandReply(Struct, frozen=True):
         control_number: Number of the control that it started (``ControlState``),
             0 for none.
         track: Track that is played, None for other commands.
+        t_s: Time of the tick that executed it.
     """
 
     refused: str = ""
@@ -99,6 +100,7 @@ class CommandReply(Struct, frozen=True):
     error_rad: float = 0.0
     control_number: int = 0
     track: TrackReply | None = None
+    t_s: float = 0.0
 
     @property
     def error_deg(self) -> float:

@@ -4,7 +4,7 @@ Each is one class: all interfaces decode it, and the description of the network'
 from it.
 """
 
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 from msgspec import Meta, structs
@@ -100,6 +100,23 @@ class Fault(Request, frozen=True):
     """Execute a fault command of emulated servos (gazerig emulate)."""
 
     text: str
+
+
+Layer = Literal["ghost", "sight"]
+Viewpoint = Literal["face", "both", "over its shoulder", "from above"]
+
+
+class ShowView(Request, frozen=True):
+    """Choose what the page's view of the head shows; the page does it, not the rig.
+
+    Attributes:
+        layers: Layers for all browsers, None for no change: ghost of the desired pose, lines of
+            sight.
+        look_from: Viewpoint of this browser, None for no change.
+    """
+
+    layers: tuple[Layer, ...] | None = None
+    look_from: Viewpoint | None = None
 
 
 Question = (

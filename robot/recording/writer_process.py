@@ -79,7 +79,7 @@ class RecordRouter:
     def write_frame(self, captured_s: float, image: ImageArray) -> None:
         """Write a camera image as JPEG."""
         # Loads OpenCV.
-        from gazerig.robot.dashboard.feed.camera_overlay import encode as encode_jpeg
+        from gazerig.robot.dashboard.feed.camera_picture import encode as encode_jpeg
 
         first_s = self._first_s if self._first_s is not None else captured_s
         exposed = viewers.time_stamp(self._writer.time_ns(captured_s - first_s))

@@ -23,7 +23,6 @@ from gazerig.robot.control.command_handler import (
     accept_only_stops,
 )
 from gazerig.robot.control.loop import Robot
-from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.reply import CommandTaker
 from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
@@ -152,6 +151,10 @@ class LiveServer:
         changing: Returns the other fields of the status, e.g. {"page": address}.
         paths: Rules for the files that a client of the network may name; None if any.
         voice: Says sounds and texts; None if the head has no voice.
+
+    Attributes:
+        serve: Answers the page's process over a connection.
+        update: Stores the newest tick, for the loop.
     """
 
     def __init__(
@@ -177,8 +180,14 @@ class LiveServer:
             robot.command, tuning, refusals, self._watch.saved, voice=voice, menus=robot.menus,
             tracks=robot.tracks,
         )  # fmt: skip
-        requests = RequestHandler(handler, self._pulse, about, fault, changing, paths)
-        self._server = RemoteServer(requests, say)
+        self._server = RemoteServer(
+            RequestHandler(handler, self._pulse, about, fault, changing), say
+        )
+        # Apart from programs of this computer, so that neither uses up the other's time.
+        self._page_server = RemoteServer(
+            RequestHandler(handler, self._pulse, about, fault, changing, paths), say
+        )
+        self.serve, self.update = self._page_server.serve, self._pulse.update
 
     def open(self) -> None:
         """Listen to other programs and watch the files; print a line if listening fails."""
@@ -188,23 +197,10 @@ class LiveServer:
             self._say(f"gazerig ctl set and stop cannot find this rig: {error}")
         self._watch.start()
 
-    @property
-    def path(self) -> Path | None:
-        """Return the path of the socket while it listens, otherwise None."""
-        return self._server.path
-
-    @property
-    def update(self) -> Callable[[Tick], None]:
-        """Return the function that stores the newest tick, for the loop."""
-        return self._pulse.update
-
-    def saved(self, path: Path) -> None:
-        """Record that this program itself has written a file."""
-        self._watch.saved(path)
-
     def close(self) -> None:
         """Close all connections and stop watching the files."""
         self._watch.stop()
+        self._page_server.close()
         self._server.close()
 
     def _files(self) -> tuple[Path, ...]:
@@ -231,7 +227,7 @@ class LiveServer:
             self._say(f"{path} was written again without changes")
 
 
-_FIXED = "it is being calibrated: its parameters cannot be changed until the calibration ends"
+_CALIBRATED = "it is being calibrated"
 
 
 class StopOnlyServer:
@@ -242,6 +238,10 @@ class StopOnlyServer:
         clock: Clock of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         say: Prints a line on the terminal.
+
+    Attributes:
+        serve: Answers the page's process over a connection.
+        update: Stores the newest tick, for the loop.
     """
 
     def __init__(
@@ -252,10 +252,11 @@ class StopOnlyServer:
         say: Callable[[str], None],
     ) -> None:
         self._say = say
-        self._pulse = LoopMonitor(clock)
-        only = accept_only_stops(command, "it is being calibrated")
-        handler = CommandHandler(only, None, fixed=_FIXED)
-        self._server = RemoteServer(RequestHandler(handler, self._pulse, about), say)
+        pulse = LoopMonitor(clock)
+        only = accept_only_stops(command, _CALIBRATED)
+        handler = CommandHandler(only, None, fixed=f"{_CALIBRATED}: its parameters are fixed")
+        self._server = RemoteServer(RequestHandler(handler, pulse, about), say)
+        self.serve, self.update = self._server.serve, pulse.update
 
     def open(self) -> None:
         """Listen to other programs; print a line if that fails."""
@@ -263,10 +264,6 @@ class StopOnlyServer:
             self._server.open()
         except SetupError as error:  # the head runs without remote control
             self._say(f"gazerig stop cannot find this rig: {error}")
-
-    def update(self, tick: Tick) -> None:
-        """Store the newest tick; called by the loop."""
-        self._pulse.update(tick)
 
     def close(self) -> None:
         """Close all connections."""

@@ -7,13 +7,17 @@ from typing import Any
 import msgspec
 
 from gazerig.robot.control.head_state import HeadReport, HeadState
+from gazerig.robot.control.track_choices import TrackInfo
+from gazerig.robot.model.commands import Request, verb
 from gazerig.robot.model.outcome import Outcome
+from gazerig.robot.model.parameter import Parameter
 from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.model.requests import REQUESTS
+from gazerig.robot.model.requests import REQUESTS, ShowView
 from gazerig.robot.remote.socket_io import VERSION
+from gazerig.robot.remote.topics import PanelContent, Picture, RigInfo, RunState
 
 Schema = dict[str, Any]
-MOST_RATE_HZ = 60
+MOST_RATE_HZ = 25
 """Highest rate of states."""
 WAIT_S, MOST_WAIT_S = 10, 15
 """Wait of an HTTP request for an outcome: the usual one and the longest."""
@@ -44,12 +48,15 @@ class ProgramAnswer(msgspec.Struct):
 
 def message_schemas() -> tuple[list[Schema], dict[str, Schema]]:
     """Return a reference for each message of a program, and the schemas of all types."""
-    (*requests, _, _, _), named = msgspec.json.schema_components(
-        (*REQUESTS.values(), HeadReport, HeadState, ProgramAnswer),
+    messages: dict[str, type[Request]] = {**REQUESTS, verb(ShowView): ShowView}
+    found, named = msgspec.json.schema_components(
+        (*messages.values(), HeadReport, HeadState, ProgramAnswer, RigInfo, RunState, Picture,
+         PanelContent, TrackInfo, Parameter),
         ref_template="#/components/schemas/{name}",
-    )
-    for name, kind in REQUESTS.items():
-        schema = named[kind.__name__]
+    )  # fmt: skip
+    requests = list(found[: len(messages)])
+    for name, kind in messages.items():
+        schema = named[str(kind.__name__)]
         schema["title"] = name
         schema["properties"]["tag"] = _TAG
     return requests, named
@@ -84,12 +91,19 @@ def api_description(base: str) -> Schema:
         ),
         "socket": (
             "get",
-            "Websocket: messages as in do, answers and outcomes; states at rate_hz; events",
+            "Websocket: messages as in do, answers and outcomes; states at rate_hz; events; "
+            "pictures, each followed by its JPEG; rig, run and panels",
             {
                 "rate_hz": {"type": "number", "minimum": 1, "maximum": MOST_RATE_HZ},
-                "events": {"type": "boolean", "default": False},
+                **{name: {"type": "boolean", "default": False} for name in ("events", "pictures", "rig")},
             },
             {"101": {"description": "Open"}, **bad},
+        ),
+        "waveform": (
+            "get",
+            "Outline of a track's sound, 0..1",
+            {"track": {"type": "string"}},
+            {"200": _response("Outline", of_answer), **bad, "404": _response("No sound", of_answer)},
         ),
         "openapi.json": (
             "get", "This description", {}, {"200": _response("OpenAPI 3.1", {"type": "object"})},

@@ -11,7 +11,6 @@ from msgspec import structs
 
 from gazerig.robot.control.command_handler import CommandHandler, PathGuard
 from gazerig.robot.control.head_state import HeadReport, head_state
-from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.control.tick_text import camera_conditions
 from gazerig.robot.model.clock import Clock
@@ -46,17 +45,16 @@ class LoopMonitor:
 
     Args:
         clock: Clock of the loop.
+
+    Attributes:
+        update: Stores the newest tick, for the loop.
     """
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._feed = TickFeed()
+        self.update = self._feed.update
         self._never = threading.Event()
-
-    @property
-    def update(self) -> Callable[[Tick], None]:
-        """Return the function that stores the newest tick, for the loop."""
-        return self._feed.update
 
     def wait_for_commands(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
         """Wait until all previous changes are applied; return whether they are.
@@ -103,7 +101,7 @@ class RequestHandler:
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         fault: Executes a fault command of emulated servos; None if the servos are real.
         changing: Returns the other fields of the status, e.g. {"page": address}.
-        paths: Rules for the files that a client of the network may name; None if any.
+        paths: Rules for the files that a client may name; None if any.
     """
 
     def __init__(
@@ -124,15 +122,12 @@ class RequestHandler:
         """Execute one request; return {"ok": result} or {"refused": every broken rule}.
 
         Args:
-            message: Request {"do": verb, ...}. Its "tag" is returned with the answer; the page's
-                process marks requests of the network by "network": true.
-            peer: Client at the other end, e.g. "process 123", "" if unknown.
+            message: Request {"do": verb, ...}. Its "tag" is returned with the answer.
+            peer: Client at the other end, e.g. "process 123"; "" for the page, which names its own.
         """
         tag: dict[str, object] = {}
-        paths = None
         if isinstance(message, dict):
             message = dict(message)
-            paths = self._paths if message.pop("network", None) is True else None
             tag = {"tag": message.pop("tag")} if "tag" in message else {}
         try:
             request = read_request(message)
@@ -140,11 +135,11 @@ class RequestHandler:
                 # The process is added: a client cannot pose as another one or the page.
                 who = f"{request.who} ({peer})" if request.who else peer
                 request = set_client(request, who)
-            return {**self._execute(request, paths), **tag}
+            return {**self._execute(request), **tag}
         except self._handler.refusals as error:
             return {"refused": str(error), **tag}
 
-    def _execute(self, request: Request, paths: PathGuard | None) -> dict[str, object]:
+    def _execute(self, request: Request) -> dict[str, object]:
         """Execute a request, and wait until the loop has done it."""
         match request:
             case Hello(version):
@@ -162,7 +157,7 @@ class RequestHandler:
                 if self._fault is None:
                     raise ValueError(REAL)
                 return {"ok": self._fault(text)}
-        done = self._handler.handle(request, paths)
+        done = self._handler.handle(request, self._paths)
         if isinstance(done, Ticket):
             reply = done.wait(_TAKEN_UP_S)
             if reply is None:

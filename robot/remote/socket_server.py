@@ -141,6 +141,7 @@ class RemoteServer:
         self._listener: Listener | None = None
         self._lock = threading.Lock()
         self._wires: dict[Wire, None] = {}  # the least recently active first
+        self._over = False
         self._threads: list[threading.Thread] = []
 
     def open(self) -> Path:
@@ -159,13 +160,23 @@ class RemoteServer:
         self._start(self._accept, self._listener)
         return self.path
 
+    def serve(self, end: socket.socket) -> None:
+        """Answer the requests of the page's process, which names its clients itself."""
+        wire = Wire(end, REQUEST_BYTES)
+        with self._lock:
+            self._wires[wire] = None
+        if not self._start(self._serve, wire, ""):
+            wire.close()
+
     def close(self) -> None:
         """Close all connections and remove the socket."""
-        if self._listener is None or self.path is None:
-            return
-        self.path.unlink(missing_ok=True)
-        listener, self._listener = self._listener, None
-        listener.close()
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
+        with self._lock:
+            self._over = True
+            listener, self._listener = self._listener, None
+        if listener is not None:
+            listener.close()
         with self._lock:
             for wire in self._wires:
                 wire.close()
@@ -177,7 +188,7 @@ class RemoteServer:
         """Start a thread unless the server was closed; return whether it was started."""
         thread = threading.Thread(target=work, args=words, name="remote control", daemon=True)
         with self._lock:
-            if self._listener is None:
+            if self._over:
                 return False
             self._threads = [t for t in self._threads if t.is_alive()] + [thread]
             thread.start()
@@ -185,7 +196,7 @@ class RemoteServer:
 
     def _accept(self, listener: Listener) -> None:
         """Start a thread for every program that connects."""
-        while self._listener is not None:
+        while not self._over:
             try:
                 end = listener.accept()
             except OSError:  # it was closed
@@ -203,7 +214,7 @@ class RemoteServer:
             return
         wire = Wire(end, REQUEST_BYTES)
         with self._lock:
-            if self._listener is None:  # closed meanwhile: this connection would stay open
+            if self._over:  # closed meanwhile: this connection would stay open
                 wire.close()
                 return
             if len(self._wires) >= _MOST:

@@ -1,6 +1,7 @@
-// Cost of the 3-D view without a graphics card: coarser pixels without smoothed edges, 20 pictures
-// a second, of each only the part that has changed. A processor draws a whole picture in 50 to
-// 200 ms instead of 2, and the rig needs it, too.
+// Cost of the 3-D view without a graphics card: 20 pictures a second, of each only the part that has
+// changed, and coarse pixels while much of it changes. At rest there are more pixels than the page
+// has, so that edges are smooth. A processor draws a whole picture in 30 ms if it is coarse and in
+// 100 ms if it is fine, instead of 2, and the rig needs it, too.
 
 (() => {
   "use strict";
@@ -8,7 +9,9 @@
   const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
   const LEAST_MS = 1000 / 20;
   const EARLY_MS = 4; // pictures come at the refresh of the display
-  const PIXELS = "0.6"; // of the canvas, per pixel of the page
+  const COARSE = 0.6, FINE = 1.5; // pixels of the canvas, per pixel of the page
+  const MUCH = 0.1; // share of the picture
+  const REST_MS = 400;
 
   function drawsInSoftware() {
     const gl = document.createElement("canvas").getContext("webgl2");
@@ -24,7 +27,7 @@
   // Viser reads both from its address.
   const asked = new URLSearchParams(location.search);
   if (!asked.has("fixedDpr")) {
-    asked.set("fixedDpr", PIXELS);
+    asked.set("fixedDpr", COARSE);
     asked.set("websocket", location.origin.replace(/^http/, "ws") + "/view/");
     history.replaceState(null, "", `${location.pathname}?${asked}`);
   }
@@ -38,6 +41,7 @@
   const soon = window.requestAnimationFrame.bind(window);
   const waiting = new Map();
   let number = 0, due = 0, asleep = true;
+  let busyAt = 0; // when much of the picture has changed last
   function draw(now) {
     if (now < due - EARLY_MS) return soon(draw);
     due = Math.max(due + LEAST_MS, now);
@@ -57,10 +61,10 @@
   // --- the part that has changed ----------------------------------------------------------
 
   const WHOLE_MS = 2000; // a change that is not noticed here is drawn by then
-  const STILL_PX = 0.3; // nobody sees a smaller motion
+  const STILL_PX = 0.5; // of the page; nobody sees a smaller motion, and servos report steps like it
   const EDGE_PX = 3;
   const drawn = new Map(); // object -> how it was drawn: {pose, look, corners, box}
-  let camera = "", wholeAt = 0, hidden = [];
+  let camera = "", size = "", wholeAt = 0, hidden = [];
 
   function drawParts(scene) {
     if (!scene || scene.onBeforeRender === begin) return;
@@ -71,13 +75,15 @@
   /** Limit a picture to the part of the canvas in which something has changed. */
   function begin(renderer, scene, eye, target) {
     if (target || eye !== window.__viserMutable.camera) return;
+    const ratio = performance.now() - busyAt > REST_MS ? FINE : COARSE;
+    if (renderer.getPixelRatio() !== ratio) renderer.setPixelRatio(ratio); // empties the canvas
     const { width, height } = renderer.domElement;
     const background = window.__viserMutable.backgroundMaterial; // covers all, mostly with nothing
     if (background) background.visible = background.uniforms.enabled.value;
     const matrices = [...eye.matrixWorld.elements, ...eye.projectionMatrix.elements];
-    const seen = [...matrices, width, height].join();
-    const whole = seen !== camera || performance.now() - wholeAt > WHOLE_MS;
-    const part = [1, 1, -1, -1], now = new Set();
+    const turned = matrices.join() !== camera;
+    const whole = turned || size !== `${width} x ${height}` || performance.now() - wholeAt > WHOLE_MS;
+    const part = [1, 1, -1, -1], changed = [1, 1, -1, -1], now = new Set();
     scene.traverseVisible((object) => {
       if (!object.geometry || object.material?.visible === false) return;
       now.add(object);
@@ -86,10 +92,13 @@
       const same = before?.look === look;
       if (same && before.pose === pose && object.frustumCulled && !whole) return;
       const corners = cornersOf(object, eye);
-      if (same && isStill(before.corners, corners, width, height) && !whole) return;
+      const still = same && isStill(before.corners, corners, width / ratio, height / ratio);
+      if (still && !whole) return;
       const box = boxOf(corners);
-      if (before) widen(part, before.box);
-      widen(part, box);
+      for (const area of still ? [part] : [part, changed]) {
+        if (before) widen(area, before.box);
+        widen(area, box);
+      }
       drawn.set(object, { pose, look, corners, box });
     });
     for (const [object, { box }] of drawn) {
@@ -97,7 +106,8 @@
       widen(part, box);
       drawn.delete(object);
     }
-    camera = seen;
+    if (turned || shareOf(changed) > MUCH) busyAt = performance.now();
+    [camera, size] = [matrices.join(), `${width} x ${height}`];
     if (whole) { wholeAt = performance.now(); return; }
     for (const object of now) {
       const [left, low, right, high] = drawn.get(object).box;
@@ -105,7 +115,6 @@
       hidden.push([object, object.layers.mask]);
       object.layers.mask = 0;
     }
-    const ratio = renderer.getPixelRatio();
     const pixel = (share, size, edge) =>
       Math.min(size, Math.max(0, Math.round((share + 1) / 2 * size) + edge)) / ratio;
     const x = pixel(part[0], width, -EDGE_PX), y = pixel(part[1], height, -EDGE_PX);
@@ -178,6 +187,11 @@
       widen(box, [...corner, ...corner]);
     }
     return box;
+  }
+
+  /** Share of the canvas that a box covers. */
+  function shareOf([left, low, right, high]) {
+    return left < right && low < high ? (right - left) * (high - low) / 4 : 0;
   }
 
   function widen(box, [left, low, right, high]) {

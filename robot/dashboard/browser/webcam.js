@@ -3,26 +3,21 @@
 // Images of 640 x 480 are sent as JPEGs to the door, each after the last was accepted, at most fifteen
 // a second, until the button is pressed again, the page is closed or the camera is gone.
 
+import { on } from "/rig/connection.js";
+import { say } from "/rig/orders.js";
+
 const EVERY_MS = 1000 / 15;
 const WIDTH = 640, HEIGHT = 480, QUALITY = 0.8;
 const ELSEWHERE = "Browsers lend their camera only to pages of their own computer: on the rig's "
   + "computer, start it with --camera 0.";
 
 const button = document.querySelector("#webcam");
-const said = document.querySelector("#said");
 let stream = null, socket = null, timer = 0, sentAt = 0;
 
-/** @param {string} text */
-function say(text) { if (said) said.textContent = text; }
-
-/** Whether this page may use the browser's camera: only if the address is secure. */
-export function mayAsk() {
-  return window.isSecureContext && Boolean(navigator.mediaDevices?.getUserMedia);
-}
-
 /** Request the camera and send its images. */
-export async function begin() {
-  if (!mayAsk()) { say(ELSEWHERE); return; }
+async function begin() {
+  // A browser lends its camera only if the address is secure.
+  if (!window.isSecureContext || !navigator.mediaDevices?.getUserMedia) return say(ELSEWHERE);
   button.disabled = true;
   try {
     stream = await navigator.mediaDevices.getUserMedia({
@@ -30,9 +25,8 @@ export async function begin() {
       video: { width: { ideal: WIDTH }, height: { ideal: HEIGHT }, facingMode: "user" },
     });
   } catch (error) {
-    say(error.name === "NotAllowedError" ? "The browser was not allowed to use its camera."
+    return say(error.name === "NotAllowedError" ? "The browser was not allowed to use its camera."
       : `No camera of this browser can be used (${error.name}).`);
-    return;
   } finally {
     button.disabled = false;
   }
@@ -42,7 +36,7 @@ export async function begin() {
   stream.getVideoTracks()[0].addEventListener("ended", end);
   await video.play();
   const scheme = location.protocol === "https:" ? "wss" : "ws";
-  socket = new WebSocket(`${scheme}://${location.host}/rig/webcam`);
+  socket = new WebSocket(`${scheme}://${location.host}/api/v1/webcam`);
   const mine = socket;
   const canvas = document.createElement("canvas");
   const send = () => {
@@ -67,7 +61,7 @@ export async function begin() {
 }
 
 /** Stop the camera; the rig shows the scene again. */
-export function end() {
+function end() {
   clearTimeout(timer);
   stream?.getTracks().forEach((track) => track.stop());
   const last = socket;
@@ -76,11 +70,8 @@ export function end() {
   button.setAttribute("aria-pressed", "false");
 }
 
-if (button) {
-  button.addEventListener("click", () => (stream ? end() : begin()));
-  // A real rig has its own camera at its eyes.
-  window.addEventListener("rig-state", (event) => {
-    button.hidden = !event.detail.emulated;
-    if (button.hidden && stream) end();
-  });
-}
+button.addEventListener("click", () => (stream ? end() : begin()));
+on("rig", ({ emulated }) => { // a real rig has its own camera at its eyes
+  button.hidden = !emulated;
+  if (button.hidden && stream) end();
+});

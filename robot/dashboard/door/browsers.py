@@ -9,7 +9,6 @@ Websockets do not count: each kind has a limit of its own.
 import asyncio
 import hashlib
 import hmac
-import threading
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,41 +31,10 @@ _YOUNG_S = 1.0
 _DIGITS = 4
 
 
-class Browsers:
-    """Names of browsers by their cookies; safe to call from any thread."""
-
-    def __init__(self, token: str) -> None:
-        self._key = token.encode()
-        self._lock = threading.Lock()
-        self._open: Counter[str] = Counter()
-        self._leads = ""
-
-    def name(self, cookie: str | None) -> str:
-        """Return a browser's name; it is constant while the browser keeps its cookie."""
-        if not cookie:
-            return "the page"
-        digest = hmac.new(self._key, cookie.encode(errors="replace"), hashlib.sha256)
-        return f"browser {digest.hexdigest()[:_DIGITS]}"
-
-    @contextmanager
-    def connected(self, name: str) -> Iterator[None]:
-        """Count a browser as connected within the block."""
-        with self._lock:
-            self._open[name] += 1
-        try:
-            yield
-        finally:
-            with self._lock:
-                self._open[name] -= 1
-
-    def give_control(self, name: str) -> None:
-        """Record the browser that controlled the head last."""
-        self._leads = name
-
-    def in_control(self) -> str:
-        """Return the browser that controlled the head last, "" if it has disconnected."""
-        with self._lock:
-            return self._leads if self._leads and self._open[self._leads] > 0 else ""
+def browser_name(key: str, cookie: str) -> str:
+    """Return a browser's name; it is constant while the browser keeps its cookie."""
+    digest = hmac.new(key.encode(), cookie.encode(errors="replace"), hashlib.sha256)
+    return f"browser {digest.hexdigest()[:_DIGITS]}"
 
 
 class TabLimits:
@@ -100,7 +68,7 @@ class _ConnectionState:
 
     def __init__(self, since_s: float) -> None:
         self.since_s = since_s
-        self.begun = self.busy = self.lasting = False
+        self.busy = self.lasting = False
 
 
 class Connections:
@@ -130,13 +98,16 @@ class Connections:
         return len(self._server.connections)
 
     def _trim(self) -> None:
+        """Close those over the limit that are idle or busy longest, and forget those that ended."""
         self._trimming = False
-        self._forget_gone()
-        young_s = asyncio.get_running_loop().time() - _YOUNG_S
+        now_s = asyncio.get_running_loop().time()
+        for handler, state in tuple(self._states.items()):
+            if handler.transport is None and now_s - state.since_s > _BEGINS_WITHIN_S:
+                del self._states[handler]
         counted = [
-            (one.since_s > young_s, one.busy, one.since_s, handler)
-            for handler, one in self._states.items()
-            if one.begun and not one.lasting
+            (state.since_s > now_s - _YOUNG_S, state.busy, state.since_s, handler)
+            for handler, state in self._states.items()
+            if handler.transport is not None and not state.lasting
         ]
         counted.sort(key=lambda one: one[:3])
         too_many, old = len(counted) - MOST, sum(not young for young, *_ in counted)
@@ -151,7 +122,7 @@ class Connections:
             yield
             return
         loop = asyncio.get_running_loop()
-        state.begun, state.busy, state.since_s = True, True, loop.time()
+        state.busy, state.since_s = True, loop.time()
         try:
             yield
         finally:
@@ -178,13 +149,3 @@ class Connections:
         del self._states[handler]
         if handler.transport is not None:
             handler.transport.abort()
-
-    def _forget_gone(self) -> None:
-        """Remove connections that have ended; a new one appears after a moment."""
-        known = set(self._server.connections)
-        now_s = asyncio.get_running_loop().time()
-        for handler, state in tuple(self._states.items()):
-            if handler in known:
-                state.begun = True
-            elif state.begun or now_s - state.since_s > _BEGINS_WITHIN_S:
-                del self._states[handler]

@@ -1,20 +1,17 @@
-"""Websockets of the page: panels, webcam, and the relay to the server behind the door."""
+"""Websockets of the page: webcam, and the relay to the server behind the door."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import aiohttp
 from aiohttp import web
 
 from gazerig.drivers.camera.shared_slots import MOST_BYTES
-from gazerig.robot.dashboard.widgets.widgets import Client, Widgets
 from gazerig.robot.remote.excess import TokenBucket
 
 MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
-"""Rate limit of one browser's messages; dragging with two hands sends about 60 a second."""
-BYTES_PER_S, BYTES_BURST = 1e6, 4e6
+"""Rate limit of one browser's viewpoints."""
 TAKES_S = 20.0
 """Timeout of sending to a browser, s; it reconnects after it is disconnected."""
 _CLOSES_WITHIN_S = 1.0
@@ -25,16 +22,11 @@ Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 async def relay_in(browser: web.WebSocketResponse, inside: Socket) -> None:
     """Relay a browser's messages, at a limited rate."""
-    messages, size = (
-        TokenBucket(MESSAGES_PER_S, MESSAGES_BURST),
-        TokenBucket(BYTES_PER_S, BYTES_BURST),
-    )
-    loop = asyncio.get_running_loop()
+    loop, rate = asyncio.get_running_loop(), TokenBucket(MESSAGES_PER_S, MESSAGES_BURST)
     async for message in browser:
-        if (wait_s := max(messages.wait_s(loop.time()), size.wait_s(loop.time()))) > 0.0:
+        if (wait_s := rate.wait_s(loop.time())) > 0.0:
             await asyncio.sleep(wait_s)
-        messages.take(loop.time())
-        size.take(loop.time(), len(message.data or ""))
+        rate.take(loop.time())
         await _forward(message, inside)
 
 
@@ -116,63 +108,3 @@ class WebcamSocket:
 async def _send_text(socket: web.WebSocketResponse, text: str) -> None:
     async with asyncio.timeout(TAKES_S):
         await socket.send_str(text)
-
-
-_PAUSE_S = 0.04
-"""Time between messages to a browser, s: 25 a second; more would not be readable."""
-
-
-class WidgetSocket:
-    """Sends the panels to browsers, to each no faster than it reads them."""
-
-    def __init__(self, widgets: Widgets) -> None:
-        self._widgets = widgets
-        # Input of users is handled in a separate thread, in order: a STOP through the same loop
-        # must not wait for it.
-        self._worker = ThreadPoolExecutor(1, thread_name_prefix="page panels")
-
-    async def serve(self, socket: web.WebSocketResponse, browser: str) -> None:
-        """Serve a connection of a browser until it ends."""
-        loop, news = asyncio.get_running_loop(), asyncio.Event()
-
-        def wake() -> None:
-            loop.call_soon_threadsafe(news.set)
-
-        client = await loop.run_in_executor(self._worker, self._widgets.join, browser, wake)
-        try:
-            await until_one_ends(self._send(socket, client, news), self._receive(socket, client))
-        finally:
-            await asyncio.shield(loop.run_in_executor(self._worker, self._widgets.leave, client))
-
-    def close(self) -> None:
-        """End the thread."""
-        self._worker.shutdown(wait=False, cancel_futures=True)
-
-    async def _send(
-        self, socket: web.WebSocketResponse, client: Client, news: asyncio.Event
-    ) -> None:
-        while not socket.closed:
-            await news.wait()
-            news.clear()
-            message = self._widgets.outgoing(client)
-            if message is None:
-                continue
-            async with asyncio.timeout(TAKES_S):
-                if message.text:
-                    await socket.send_str(message.text)
-                for image in message.images:
-                    await socket.send_bytes(image)
-            await asyncio.sleep(_PAUSE_S)
-
-    async def _receive(self, socket: web.WebSocketResponse, client: Client) -> None:
-        loop = asyncio.get_running_loop()
-        rate = TokenBucket(MESSAGES_PER_S, MESSAGES_BURST)
-        async for message in socket:
-            if message.type is not aiohttp.WSMsgType.TEXT:
-                continue
-            if (wait_s := rate.wait_s(loop.time())) > 0.0:
-                await asyncio.sleep(wait_s)
-            rate.take(loop.time())
-            await loop.run_in_executor(
-                self._worker, self._widgets.handle_message, client, message.data
-            )

@@ -17,7 +17,7 @@ import aiohttp
 import viser
 import websockets.asyncio.server as websocket_server
 from aiohttp import web
-from viser import _messages, transforms
+from viser import _messages
 from yarl import URL
 
 from gazerig.robot.dashboard.door.browsers import Connections, TabLimits
@@ -27,15 +27,14 @@ from gazerig.robot.dashboard.door.sockets import (
     relay_out,
     until_one_ends,
 )
-from gazerig.robot.dashboard.requests.pointer_to_look import ViewCamera
 from gazerig.robot.remote.excess import TokenBucket
 
 BROWSER_HEADER = "X-Gazerig-Browser"
 """Header with the name of a websocket's browser."""
 TO_BROWSER_BYTES = 1 << 25
 """Longest message to a browser, bytes."""
-FROM_BROWSER_BYTES = 1 << 20
-"""Longest message from a browser, bytes; messages of the page's script have a few kB."""
+FROM_BROWSER_BYTES = 1 << 14
+"""Longest message from a browser, bytes; its viewpoint has 300."""
 
 
 def open_server(socket_path: Path) -> viser.ViserServer:
@@ -58,17 +57,6 @@ def browser_of(server: viser.ViserServer, client_id: int) -> str:
     if connection is None or connection.request is None:
         return ""
     return connection.request.headers.get(BROWSER_HEADER, "")
-
-
-def camera_of(server: viser.ViserServer, browser: str) -> ViewCamera | None:
-    """Return the camera of a browser's newest tab, None if it does not show the scene."""
-    for client_id, client in sorted(server.get_clients().items(), reverse=True):
-        if browser_of(server, client_id) == browser:
-            seen = client.camera
-            x, y, z = seen.position.tolist()
-            R = transforms.SO3(seen.wxyz).as_matrix().tolist()
-            return ViewCamera((x, y, z), (tuple(R[0]), tuple(R[1]), tuple(R[2])), float(seen.fov))
-    return None
 
 
 @contextlib.contextmanager
@@ -146,11 +134,8 @@ class ViewProxy:
         """Relay a browser's websocket to the server and back, at the speed of the slower side."""
         if not self._tab_rate.take(asyncio.get_running_loop().time()):
             return web.Response(status=429, text="too many tabs at once\n", headers=self._headers)
-        offered = [
-            word.strip()
-            for word in request.headers.get("Sec-WebSocket-Protocol", "").split(",")
-            if word.strip()
-        ]
+        words = request.headers.get("Sec-WebSocket-Protocol", "")
+        offered = [word.strip() for word in words.split(",") if words]
         browser = web.WebSocketResponse(
             protocols=offered, max_msg_size=FROM_BROWSER_BYTES, compress=False
         )

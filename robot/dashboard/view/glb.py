@@ -71,6 +71,10 @@ CLOTH = Finish()
 PLASTIC = Finish(0.22, 26.0)
 EYE = Finish(roughness=0.17)
 FLAT = Finish(is_lit=False)
+FINISHES = {
+    "skin": SKIN, "plastic": PLASTIC, "cloth": CLOTH, "eye": EYE, "dark": FLAT, "flat": FLAT,
+}  # fmt: skip
+"""Finishes by the names that descriptions and worlds use."""
 
 
 def textured_glb(shape: TexturedMesh, finish: Finish) -> bytes:

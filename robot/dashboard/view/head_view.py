@@ -1,26 +1,16 @@
 """Draw the rig's head on the page as measured: the links of its description, and lines of sight."""
 
-from collections.abc import Mapping
-from math import dist, exp, radians
+from math import dist, radians
 from typing import NamedTuple
 
 import numpy as np
 import viser
 
 from gazerig.gaze.angles import compose, rotate_back, rotation, sub, turn_about
-from gazerig.gaze.types import Mat3
-from gazerig.robot.dashboard.view.glb import (
-    CLOTH,
-    EYE,
-    FLAT,
-    PLASTIC,
-    SKIN,
-    Finish,
-    glow_disc,
-    painted_glb,
-)
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.dashboard.feed.rig_feed import ShownHead
+from gazerig.robot.dashboard.view.glb import FINISHES, FLAT, glow_disc, painted_glb
 from gazerig.robot.dashboard.view.scene_node import set_pose
-from gazerig.robot.description import links
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import CAMERA, Description
 from gazerig.robot.description.mesh import Colour
@@ -29,12 +19,9 @@ from gazerig.robot.description.parts import (
     SIDES,
     HeadMeasures,
     measures_of,
-    meeting_rad,
 )
-from gazerig.robot.model.frames import CameraParams, quaternion
-from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.kinematics import LIDS, GeometryParams
-from gazerig.robot.model.types import Snapshot
+from gazerig.robot.model.frames import quaternion
+from gazerig.robot.model.kinematics import LIDS
 
 _SIGHT: dict[str, Colour] = {
     "fixate": (48, 190, 120),
@@ -42,34 +29,12 @@ _SIGHT: dict[str, Colour] = {
     "pursue": (60, 150, 255),
 }
 _AHEAD = np.array((((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),))
-_FINISHES: Mapping[links.Finish, Finish] = {
-    "skin": SKIN,
-    "plastic": PLASTIC,
-    "cloth": CLOTH,
-    "eye": EYE,
-    "dark": FLAT,
-}
 _SHADE = 4.4
 """Radius of the shade below the shoulders, in distances between the eyes."""
 _LIT_OPEN = 0.7
 """Opening for which upper lids are lit: their usual one."""
 _LIT_LOWER_LID: Mat3 = rotation((0.0, radians(12.0), 0.0))
 """Rotation of lower lids for the lighting, as if a little higher; otherwise they look tired."""
-
-
-_FACES_DEG: Mapping[str, tuple[float, float]] = {
-    "happy": (6.0, 4.0),
-    "sad": (-10.0, 0.0),
-    "surprised": (18.0, 12.0),
-    "angry": (-16.0, 0.0),
-    "sleepy": (-4.0, 3.0),
-    "laugh": (5.0, 9.0),
-}
-"""Brows up and jaw down in an expression or a track of this name, as in the rig "expressive"."""
-_DRAWN_ONLY = ("left_brow", "right_brow", "jaw")
-"""Joints that are drawn even if the rig does not have them."""
-_FACE_TAU_S = 0.15
-"""Time constant of joints that are drawn only."""
 
 
 class _Node(NamedTuple):
@@ -82,81 +47,52 @@ class _Node(NamedTuple):
 class HeadView:
     """Rig in the scene, with all parts that its joints move.
 
-    shape: geometry of the rig; None: derived from snapshots
     on_table: whether it is on an object of a drawn world and needs no shadow of its own
-    lid_edges: positions of the lid edges; without lids before the first snapshot
     """
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
-        self.shape: RigShape | None = None
         self.on_table = False
         self.links: dict[str, _Node] = {}
         self._paths: dict[str, str] = {}
         self._drawn: RigShape | None = None
-        self._seen: tuple[tuple[str, ...], HeadMeasures] | None = None
         self._description: Description | None = None
         self._root = scene.add_frame("/rig", show_axes=False)
         self._shade = self._add("/shade", painted_glb(glow_disc((20, 24, 34, 140)), FLAT))
         self._sights: list[viser.LineSegmentsHandle] = []
         self._colour = _SIGHT["fixate"]
-        self.lid_edges = LidEdges({}, {})
-        self._face_rad, self._face_s = (0.0, 0.0), 0.0
 
     def _add(self, name: str, data: bytes) -> viser.GlbHandle:
         return self._scene.add_glb(name, data, cast_shadow=False, receive_shadow=False)
 
-    def show(self, snapshot: Snapshot, *, sight: bool = False, camera: bool = False) -> None:
-        """Move all parts to their measured positions.
-
-        Args:
-            snapshot: snapshot of the rig.
-            sight: whether to show the lines of sight.
-            camera: whether to show the camera's housing, which otherwise does not cover the face.
-        """
-        shape = with_shown_face(self.shape) if self.shape is not None else None
-        if shape is None:
-            seen = snapshot.joints, head_dimensions(snapshot)
-            shape = self._drawn if seen == self._seen else shape_of(*seen, snapshot)
-            self._seen = seen
-        if shape != self._drawn and shape is not None:  # the geometry has changed
-            self._drawn, self.lid_edges = shape, lid_edges(shape)
+    def show(self, head: ShownHead, *, sight: bool = False) -> None:
+        """Move all parts to their measured positions; ``sight``: show the lines of sight."""
+        tick, pose, names = head.tick, head.tick.pose, head.rig.kinematics.names
+        shape = with_shown_lids(head.rig.shape)
+        if shape != self._drawn:  # the geometry has changed
+            self._drawn = shape
             self._draw(describe(shape), shape)
-        description, shape = self._description, self._drawn
-        assert description is not None and shape is not None  # fitted
-        angles = description.angles(snapshot.joints, snapshot.measured_rad)
-        angles |= lid_angles(shape, snapshot.lids, snapshot.lower_lids or (0.0, 0.0))
-        drawn = zip(_DRAWN_ONLY, self._blend_face(snapshot), strict=True)
-        angles |= {name: angle for name, angle in drawn if name not in snapshot.joints}
+        description = self._description
+        assert description is not None
+        angles = description.angles(names, tick.joints.position_rad)
+        angles |= lid_angles(
+            shape, (pose.lid_left, pose.lid_right), (pose.lower_left, pose.lower_right)
+        )
         for link in description.links:
             if link.joint is not None:
                 R = compose(link.R, turn_about(link.joint.axis, angles[link.joint.name]))
                 set_pose(self.links[link.name].frame, link.p_m, quaternion(R))
-        for look in self.links[CAMERA].looks:
-            look.visible = camera
         self._shade.visible = not self.on_table
-        colour = _SIGHT.get(snapshot.phase, _SIGHT["fixate"])
-        for line, p_world_m in zip(self._sights, snapshot.p_world_eyes_m, strict=True):
+        colour = _SIGHT.get(tick.gaze.phase, _SIGHT["fixate"])
+        for line, p_world_m in zip(self._sights, eyes_m(head), strict=True):
             if sight:
                 # Their length is the target's distance: they meet at the target only if the eyes
                 # fixate it.
-                line.scale = round(dist(p_world_m, snapshot.p_world_target_m), 2)
+                line.scale = round(dist(p_world_m, tick.gaze.gaze_point_world_m), 2)
             line.visible = sight
             if colour != self._colour:
                 line.colors = np.array(colour, np.uint8)
         self._colour = colour
-
-    def _blend_face(self, snapshot: Snapshot) -> tuple[float, float, float]:
-        """Return the angles of brows and jaw that are only drawn, in radians."""
-        share = 1.0 - exp(-max(0.0, snapshot.t_s - self._face_s) / _FACE_TAU_S)
-        self._face_s = snapshot.t_s
-        known = (_FACES_DEG[name] for name in snapshot.expressed if name in _FACES_DEG)
-        goal = next(known, (0.0, 0.0))
-        brows, jaw = (
-            now + share * (radians(to) - now) for now, to in zip(self._face_rad, goal, strict=True)
-        )
-        self._face_rad = brows, jaw
-        return brows, brows, jaw
 
     def _draw(self, description: Description, shape: RigShape) -> None:
         """Draw a rig; if it has the same links, draw only those that look different."""
@@ -184,7 +120,8 @@ class HeadView:
         for link in description.links:
             node = self.links[link.name]
             set_pose(node.frame, link.p_m, quaternion(link.R))
-            if before is not None and before.link(link.name).visuals == link.visuals:
+            same = before is not None and before.link(link.name).visuals == link.visuals
+            if same or link.name == CAMERA:  # the camera's housing would cover the face
                 continue
             while node.looks:
                 node.looks.pop().remove()
@@ -193,7 +130,7 @@ class HeadView:
                 moved = link.joint.name if link.joint is not None else ""
                 if look.name.endswith("still_lid") or "lower_lid" in moved:
                     R_lit = _LIT_LOWER_LID
-                data = painted_glb(look.painted(), _FINISHES[look.finish], np.array(R_lit))
+                data = painted_glb(look.painted(), FINISHES[look.finish], np.array(R_lit))
                 handle = self._add(f"{paths[link.name]}/look_{look.name}", data)
                 handle.position, handle.wxyz = look.p_m, quaternion(look.R)
                 node.looks.append(handle)
@@ -222,70 +159,29 @@ def lid_angles(
     }
 
 
-def head_dimensions(snapshot: Snapshot) -> HeadMeasures:
-    """Return the dimensions of the head in a snapshot, from its eyes and the pivot of its neck."""
-    pivot_m = None
-    if snapshot.p_world_pivot_m is not None:
-        off = sub(snapshot.p_world_pivot_m, snapshot.p_world_head_m)
-        x, y, z = rotate_back(snapshot.R_world_head, off)
-        pivot_m = (round(x, 4), round(y, 4), round(z, 4))
-    return measures_of(*snapshot.p_world_eyes_m, pivot_m)
+def eyes_m(head: ShownHead) -> tuple[Vec3, Vec3]:
+    """Return the centres of the left and the right eye, world."""
+    return head.tick.pose.p_world_eye_left_m, head.tick.pose.p_world_eye_right_m
 
 
-class LidEdges(NamedTuple):
-    """Elevations above the eye's equator, in radians.
-
-    meeting_rad: elevation at which the lids of each side meet
-    span_rad: full opening of each lid from there, by its name
-    """
-
-    meeting_rad: Mapping[str, float]
-    span_rad: Mapping[str, float]
-
-    def elevation_rad(self, lid: str, opening: float) -> float:
-        """Return the elevation of a lid's edge at an opening, 0..1."""
-        side, which, _ = lid.split("_")
-        up = 1.0 if which == "upper" else -1.0
-        return self.meeting_rad[side] + up * opening * self.span_rad[lid]
+def pivot_m(head: ShownHead) -> Vec3:
+    """Return the intersection of the neck's pitch and roll axes, world."""
+    pose = head.tick.pose
+    return head.rig.kinematics.body_volumes(pose.R_world_head, pose.p_world_head_m)[0].start_m
 
 
-def lid_edges(shape: RigShape) -> LidEdges:
-    """Return the lid edges of a rig; a rig without lids has none."""
-    span_rad = {
-        name: abs(wide - shut)
-        for name, (shut, wide) in ((name, shape.lids.get(name, (0.0, 0.0))) for name in LIDS)
-    }
-    meeting = {
-        side: meeting_rad(span_rad[f"{side}_upper_lid"], span_rad[f"{side}_lower_lid"])
-        for side in SIDES
-    }
-    return LidEdges(meeting, span_rad)
+def head_dimensions(head: ShownHead) -> HeadMeasures:
+    """Return the dimensions of the head, from its eyes and the pivot of its neck."""
+    pose = head.tick.pose
+    x, y, z = rotate_back(pose.R_world_head, sub(pivot_m(head), pose.p_world_head_m))
+    return measures_of(*eyes_m(head), (round(x, 4), round(y, 4), round(z, 4)))
 
 
 _LID_RAD = {"upper": radians(74.0), "lower": radians(22.0)}
 """Rotation of shown lids from closed to open, about that of a person. Servos of a small head move
 its lids less, so that the head would always look sleepy."""
-_JOINT = JointParams(1, "xl330-m077", -90.0, 90.0, 600.0, 10_000.0)
 
 
-def shape_of(joints: tuple[str, ...], measures: HeadMeasures, snapshot: Snapshot) -> RigShape:
-    """Return a rig with the joints and the dimensions of a snapshot."""
-    x, _, z = measures.pivot_m
-    pivot_m = snapshot.p_world_pivot_m
-    above_base_m = pivot_m[2] if pivot_m is not None else snapshot.p_world_head_m[2] + z
-    geometry = GeometryParams(
-        max(0.0, 1e3 * above_base_m), -1e3 * x, -1e3 * z, 1e3 * measures.interocular_m
-    )
-    lids = dict.fromkeys((name for name in LIDS if name in joints), (0.0, 0.0))
-    shape = RigShape("rig", geometry, dict.fromkeys(joints, _JOINT), lids, {}, CameraParams())
-    return with_shown_face(shape)
-
-
-def with_shown_face(shape: RigShape) -> RigShape:
-    """Return a rig whose lids have the shown rotation, and whose brows and jaw move.
-
-    Do not add joints to a rig with its own meshes.
-    """
-    drawn = {} if shape.meshes else dict.fromkeys(_DRAWN_ONLY, _JOINT)
-    shape = shape._replace(joints=drawn | dict(shape.joints))
+def with_shown_lids(shape: RigShape) -> RigShape:
+    """Return a rig whose lids have the shown rotation."""
     return shape._replace(lids={name: (0.0, _LID_RAD[name.split("_")[1]]) for name in shape.lids})

@@ -43,11 +43,6 @@ def rotation_to(direction: Vec3) -> Quaternion:
     return _yaw_then_pitch(atan2(y, x), -atan2(z, hypot(x, y)))
 
 
-def pitch_up(angle_rad: float) -> Quaternion:
-    """Return the rotation that raises the x axis by an angle."""
-    return _yaw_then_pitch(0.0, -angle_rad)
-
-
 def _yaw_then_pitch(about_z_rad: float, then_about_y_rad: float) -> Quaternion:
     cz, sz = cos(0.5 * about_z_rad), sin(0.5 * about_z_rad)
     cy, sy = cos(0.5 * then_about_y_rad), sin(0.5 * then_about_y_rad)

@@ -8,9 +8,9 @@ import viser
 
 from gazerig.gaze.angles import add, sub
 from gazerig.gaze.types import Vec3
-from gazerig.robot.dashboard.view.head_view import head_dimensions
+from gazerig.robot.dashboard.feed.rig_feed import ShownHead
+from gazerig.robot.dashboard.view.head_view import head_dimensions, pivot_m
 from gazerig.robot.description.parts import CHIN, TOP, HeadMeasures
-from gazerig.robot.model.types import Snapshot
 
 _FOV_STEP_RAD = 0.01
 _KEPT = 64
@@ -60,17 +60,15 @@ _FIXED = {
 NAMES = (FACE, *_FIXED)
 
 
-def named_view(name: str, snapshot: Snapshot | None = None) -> View:
-    """Return a view by its name; the view of the face is fitted to the head of a snapshot."""
+def named_view(name: str, head: ShownHead | None = None) -> View:
+    """Return a view by its name; the view of the face is fitted to the head."""
     if name in _FIXED:
         return _FIXED[name]
     # A close-up of the head with its neck straight.
     measures, eyes_m = HeadMeasures(), (0.038, 0.0, 0.125)
-    if snapshot is not None:
-        measures = head_dimensions(snapshot)
-        eyes_m = snapshot.p_world_head_m
-        if snapshot.p_world_pivot_m is not None:
-            eyes_m = sub(snapshot.p_world_pivot_m, measures.pivot_m)
+    if head is not None:
+        measures = head_dimensions(head)
+        eyes_m = sub(pivot_m(head), measures.pivot_m)
     unit = measures.interocular_m
     middle = add(eyes_m, measures.scaled(_FACE_MIDDLE))
     away = _FACE_AWAY * unit
@@ -91,41 +89,38 @@ class Viewpoints:
         """
         self._server, self._browser_of = server, browser_of
         self._face = named_view(FACE)
-        self._snapshot: Snapshot | None = None
-        self._views: dict[int, str] = {}
-        self._asked_early: dict[str, str] = {}
+        self._head: ShownHead | None = None
+        self._names: dict[str, str] = {}
         self._begin_with(self._face)
         server.on_client_connect(self._greet)
-        server.on_client_disconnect(self._forget)
 
-    def fit(self, snapshot: Snapshot) -> None:
+    def fit(self, head: ShownHead) -> None:
         """Fit the view of the face to the rig's dimensions, in all browsers that show it."""
-        self._snapshot = snapshot
-        face = named_view(FACE, snapshot)
+        self._head = head
+        face = named_view(FACE, head)
         if face == self._face:
             return
         self._face = face
         self._begin_with(face)
         for client in self._server.get_clients().values():
-            if self._views.get(client.client_id, FACE) == FACE:
-                self._take(client, FACE)
+            if self._name(client) == FACE:
+                self._take(client)
 
     def choose(self, browser: str, name: str) -> None:
         """Move the cameras of a browser's tabs to a view, now or when its scene has loaded."""
-        if not browser:  # it has disconnected
-            return
-        # Store it first: the scene may finish loading before the next line.
-        self._asked_early[browser] = name
-        while len(self._asked_early) > _KEPT:
-            self._asked_early.pop(next(iter(self._asked_early)), None)
+        # Stored first: the scene may finish loading before the next line.
+        self._names[browser] = name
+        while len(self._names) > _KEPT:
+            self._names.pop(next(iter(self._names)), None)
         for number, client in self._server.get_clients().items():
             if self._browser_of(number) == browser:
-                self._asked_early.pop(browser, None)
-                self._take(client, name)
+                self._take(client)
 
-    def _take(self, client: viser.ClientHandle, name: str) -> None:
-        self._views[client.client_id] = name
-        seen = named_view(name, self._snapshot)
+    def _name(self, client: viser.ClientHandle) -> str:
+        return self._names.get(self._browser_of(client.client_id), FACE)
+
+    def _take(self, client: viser.ClientHandle) -> None:
+        seen = named_view(self._name(client), self._head)
         with client.atomic():
             client.camera.position, client.camera.look_at = seen.position_m, seen.look_at_m
             _fit_field(client.camera, seen)
@@ -136,19 +131,14 @@ class Viewpoints:
         if face.vertical_rad is not None:
             start.fov = face.vertical_rad
 
-    def _forget(self, client: viser.ClientHandle) -> None:
-        self._views.pop(client.client_id, None)
-
     def _greet(self, client: viser.ClientHandle) -> None:
         @client.camera.on_update
         def fit_field(camera: viser.CameraHandle) -> None:
-            name = self._views.get(client.client_id, FACE)
-            _fit_field(camera, named_view(name, self._snapshot))
+            _fit_field(camera, named_view(self._name(client), self._head))
 
         # Viser lists a client only after its scene has loaded; the buttons work before that.
-        early = self._asked_early.pop(self._browser_of(client.client_id), None)
-        if early is not None:
-            self._take(client, early)
+        if self._name(client) != FACE:
+            self._take(client)
 
 
 def _fit_field(camera: viser.CameraHandle, seen: View) -> None:

@@ -1,29 +1,15 @@
 """Draw a simulated world: its room, and people at their true positions."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Final
 
 import viser
 
 from gazerig.robot.dashboard.feed.world_shapes import WorldFinish, WorldPart, WorldShapes
-from gazerig.robot.dashboard.view.glb import (
-    CLOTH,
-    FLAT,
-    PLASTIC,
-    SKIN,
-    Finish,
-    painted_glb,
-    textured_glb,
-)
+from gazerig.robot.dashboard.view.glb import FINISHES, painted_glb, textured_glb
 from gazerig.robot.dashboard.view.scene_node import set_pose
 from gazerig.robot.description.mesh import Painted, merge_meshes
 
-_FINISHES: Mapping[WorldFinish, Finish] = {
-    "skin": SKIN,
-    "plastic": PLASTIC,
-    "cloth": CLOTH,
-    "flat": FLAT,
-}
 _FOG_M: Final = (1.2, 10.0)
 """Distances at which the room begins to fade and is fully faded, m; the head stays the subject."""
 _FOG_COLOUR: Final = (233, 236, 240)
@@ -84,13 +70,13 @@ def room_glbs(parts: Iterable[WorldPart]) -> list[bytes]:
         else:
             files.append(part_glb(part))
     return [
-        painted_glb(merge_meshes(shapes), _FINISHES[finish]) for finish, shapes in plain.items()
+        painted_glb(merge_meshes(shapes), FINISHES[finish]) for finish, shapes in plain.items()
     ] + files
 
 
 def part_glb(part: WorldPart) -> bytes:
     """Return one part as a binary glTF file."""
-    finish = _FINISHES[part.finish]
+    finish = FINISHES[part.finish]
     if isinstance(part.shape, Painted):
         return painted_glb(part.shape, finish)
     return textured_glb(part.shape, finish)

@@ -1,0 +1,115 @@
+// Panel: play tracks; those that play are on a timeline, with sound and cues.
+
+import { prepare } from "/rig/charts.js";
+import { choices, onChoices } from "/rig/choices.js";
+import { buttons, checkbox, heading, make, note, section, slider } from "/rig/elements.js";
+import { order } from "/rig/orders.js";
+import { spaced } from "/rig/words.js";
+
+const NONE = "none"; // ends all tracks
+const FINISHED = "finished"; // the end reason of a track at its own end
+const WAVE = 22, BAR = 7, TOP = 20, HIGH = TOP + WAVE + BAR + 22;
+
+export default {
+  drawer: "play",
+  every_ms: 200,
+  build(place) {
+    let speed = 1, row = null;
+    const pace = slider({ name: "speed", unit: "×", low: 0.25, high: 4, step: 0.05, value: 1 },
+      (value) => { speed = value; });
+    const loop = checkbox({ name: "loop", hint: "repeat until it is ended" });
+    const timeline = make("div"), top = make("div");
+    const all = section("all tracks", false);
+    place.append(top, pace.node, loop.node, timeline, all.node);
+    onChoices(() => {
+      const names = (choices.menus.track ?? []).filter((name) => name !== NONE).toSorted();
+      row = buttons("play", [NONE, ...names], (name) => order(name === NONE
+        ? { do: "end_track", track: "" } : { do: "play", track: name, speed, loop: loop.value }));
+      top.replaceChildren(row.node);
+      all.body.replaceChildren(...Object.values(choices.tracks).flatMap(entry));
+    });
+    return ({ state }) => {
+      const playing = state.tracks.filter((track) => !track.end_reason);
+      row?.show(playing.at(-1)?.name ?? NONE);
+      draw(timeline, state.tracks);
+    };
+  },
+};
+
+/** A track of the list: name, duration, description, or why the rig refuses it. */
+function entry({ name, description, duration_s, slowed_by, refused, sound }) {
+  const slower = slowed_by > 1.000001 ? `, ${slowed_by.toFixed(2)} times slower` : "";
+  const aside = refused ? "" : `${duration_s.toFixed(1)} s${slower}`;
+  const file = sound?.split("/").at(-1);
+  return [heading(spaced(name), aside),
+    ...[description, refused && `refused: ${refused}`, file].filter(Boolean).map(note)];
+}
+
+function draw(place, tracks) {
+  if (!tracks.length) return place.replaceChildren(note("no track plays"));
+  const [canvas, ...notes] = tracks.flatMap((track, i) => {
+    const drawn = place.querySelectorAll("canvas")[i] ?? make("canvas", { className: "track" });
+    return [drawn, ...remarks(track)];
+  });
+  place.replaceChildren(canvas, ...notes);
+  tracks.forEach((track, i) => drawTrack(place.querySelectorAll("canvas")[i], track));
+}
+
+function remarks({ name, who, limited, end_reason }) {
+  const texts = [];
+  if (who && !end_reason) texts.push(`started by ${who}`);
+  if (limited) texts.push(limited);
+  if (end_reason && end_reason !== FINISHED) texts.push(`ended: ${end_reason}`);
+  return texts.map((text) => note(`${spaced(name)}: ${text}`));
+}
+
+const waves = new Map(); // track -> outline of its sound, null while it is not known
+
+function wave(name) {
+  if (!waves.has(name)) {
+    waves.set(name, null);
+    fetch(`/api/v1/waveform?track=${encodeURIComponent(name)}`)
+      .then((answer) => answer.json())
+      .then(({ ok }) => waves.set(name, ok ?? null))
+      .catch(() => {});
+  }
+  return waves.get(name);
+}
+
+/** One track: its name and time, sound, bar with cues, layers and joints that it owns. */
+function drawTrack(canvas, track) {
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", `${spaced(track.name)} at ${track.position_s.toFixed(1)} s`);
+  const ready = prepare(canvas, HIGH);
+  if (!ready) return;
+  const { pen, width, colour } = ready, ink = pen.fillStyle;
+  const info = choices.tracks[track.name];
+  const lasts_s = Math.max(track.duration_s, 1e-3);
+  const across = (s) => Math.min(Math.max(s / lasts_s, 0), 1) * (width - 2);
+  pen.fillText(spaced(track.name) + (track.speed !== 1 ? `, speed ${track.speed}` : "")
+    + (track.loop ? ", loop" : ""), 0, 13);
+  pen.textAlign = "right";
+  pen.fillText(`${Math.max(0, track.position_s).toFixed(1)} of ${track.duration_s.toFixed(1)} s`, width, 13);
+  pen.textAlign = "left";
+  const outline = track.sound ? wave(track.name) : null;
+  pen.fillStyle = colour("calm");
+  outline?.forEach((share, i) => {
+    const tall = Math.max(0.6, share * WAVE), step = width / outline.length;
+    pen.fillRect(i * step, TOP + (WAVE - tall) / 2, 0.8 * step, tall);
+  });
+  const bar = TOP + WAVE, x = across(track.position_s);
+  pen.fillStyle = colour("line-grid");
+  pen.fillRect(0, bar, width, BAR);
+  pen.fillStyle = colour("level-ok");
+  pen.fillRect(0, bar, x, BAR);
+  pen.fillStyle = ink;
+  for (const [name, at_s] of info?.cues ?? []) {
+    pen.fillRect(across(at_s), bar - 4, 1, BAR + 4);
+    pen.fillText(name, Math.min(across(at_s) + 3, width - pen.measureText(name).width), bar - 4);
+  }
+  pen.fillStyle = colour("text");
+  pen.fillRect(x, TOP - 2, 2, WAVE + BAR + 2);
+  const owns = track.owns?.length ? `owns ${track.owns.map(spaced).join(", ")}` : "owns no joint";
+  pen.fillStyle = ink;
+  pen.fillText([info?.layers?.join(", "), owns].filter(Boolean).join("; "), 0, HIGH - 6, width);
+}

@@ -1,1 +1,0 @@
-"""Panels of the page: charts, figures, controls, health."""

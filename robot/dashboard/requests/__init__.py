@@ -1,1 +1,0 @@
-"""Input of the page's users, checked and sent to the rig."""

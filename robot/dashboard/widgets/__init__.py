@@ -1,1 +1,0 @@
-"""Elements of the page's panels, the Python side."""
