@@ -18,7 +18,7 @@ SCAN = CommandEntry(
 )
 SETUP = CommandEntry(
     "gazerig.features.bringup.cli.setup",
-    "Set id and baud rate of the servos, connected one at a time; print a board's settings.",
+    "Set id and baud rate of the servos, connected one at a time.",
     "Bring-up",
     examples={
         "setup": (
