@@ -22,7 +22,7 @@ SETUP = CommandEntry(
     "Bring-up",
     examples={
         "setup": (
-            ("setup my.yaml", "give new servos their ids, one at a time; a board's settings"),
+            ("setup my.yaml", "give new servos their ids, one at a time"),
             ("setup my.yaml --joint neck_yaw", "one servo only"),
         )
     },
