@@ -1,16 +1,15 @@
-// The last half minute: joint angles, targets, levels of the guard, eye movements.
+// The last half minute: targets, levels of the guard, eye movements.
 
 import { now, on } from "/rig/connection.js";
 import { degrees, isLed } from "/rig/words.js";
 
 export const KEPT_S = 30;
 
-/** Angles in degrees, oldest first: {t_s, joints: name -> [desired, commanded, measured]}. */
-export const trail = [];
 /** Intervals {start_s, end_s, text, kind} in which a value was constant, oldest first. */
 export const intervals = { target: [], part: [], guard: [], head: [], people: [] };
 /** Saccades and blinks that have ended: {kind, start_s, end_s, size_deg}. */
 export const movements = [];
+let newest_s = -Infinity;
 const begun = {}; // kind -> {t_s, direction_rad} at the start of the present one
 
 /** Lengthen a row's last interval, or begin the next one. */
@@ -26,19 +25,14 @@ export function targetSince(t_s) {
 }
 
 function forget(before_s) {
-  while (trail[1]?.t_s < before_s) trail.shift(); // one older, so that lines start at the edge
   while (movements[0]?.end_s < before_s) movements.shift();
   for (const row of Object.values(intervals)) while (row[0]?.end_s < before_s) row.shift();
 }
 
 on("state", (state) => {
   const { t_s, gaze } = state;
-  if (t_s < trail.at(-1)?.t_s) forget(Infinity); // the rig was started again
-  const joints = {};
-  for (const [name, joint] of Object.entries(state.joints)) {
-    joints[name] = [joint.desired_rad, joint.commanded_rad, joint.measured_rad].map(degrees);
-  }
-  trail.push({ t_s, joints });
+  if (t_s < newest_s) forget(Infinity); // the rig was started again
+  newest_s = t_s;
   const led = isLed(state);
   const part = led ? "" : gaze.part ?? "";
   const turn = state.conversation?.state ?? "idle";

@@ -16,12 +16,11 @@ import { toggle } from "/rig/stage.js";
 import steer from "/rig/steer.js";
 import talk from "/rig/talk.js";
 import timeline from "/rig/timeline.js";
-import traces from "/rig/traces.js";
 import tune from "/rig/tune.js";
 import watch from "/rig/watch.js";
 import { isLed, reason } from "/rig/words.js";
 
-const PANELS = [watch, timeline, traces, scene, steer, play, talk, tune, health];
+const PANELS = [watch, timeline, scene, steer, play, talk, tune, health];
 
 const $ = (selector) => document.querySelector(selector);
 
