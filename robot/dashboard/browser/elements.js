@@ -82,7 +82,7 @@ function inTurn(send) {
 }
 
 /** Text of a number, without the noise of binary fractions. */
-export const written = (value) => String(Number(value.toPrecision(6)));
+const written = (value) => String(Number(value.toPrecision(6)));
 
 /**
  * Slider between two ends, whose number can also be typed.
@@ -94,11 +94,13 @@ export function slider({ name, unit = "", low, high, step, value, hint = "" }, s
   const number = make("input", { type: "number", className: "number", min: low, max: high, step });
   number.setAttribute("aria-label", `${name}, as a number${unit && ` in ${unit}`}`);
   for (const field of [range, number]) describe(field, hint);
-  let current = value, held = false, typed = false;
+  let current = value, held = false, typed = false, sending = false;
   const draw = () => { range.value = current; number.value = written(current); };
   const set = inTurn(async (next) => {
     current = next;
+    sending = true; // until then the rig shows the value before
     await send(next);
+    sending = false;
   });
   range.addEventListener("input", () => { number.value = range.value; set(Number(range.value)); });
   range.addEventListener("pointerdown", () => { held = true; });
@@ -129,7 +131,7 @@ export function slider({ name, unit = "", low, high, step, value, hint = "" }, s
     node: make("div", { className: "field" }, label(name, id),
       make("div", { className: "both" }, range, field)),
     show(next) {
-      if (held || typed) return;
+      if (held || typed || sending) return;
       current = next;
       draw();
     },

@@ -113,7 +113,7 @@ function timing(loop) {
 }
 
 /** Age of the newest frame, s; null before the first. */
-export const frameAge = ({ frame_s, t_s }) => (typeof frame_s === "number" ? t_s - frame_s : null);
+const frameAge = ({ frame_s, t_s }) => (typeof frame_s === "number" ? t_s - frame_s : null);
 
 function frame(state) {
   const age_s = frameAge(state);

@@ -15,12 +15,11 @@ import scene from "/rig/scene.js";
 import { toggle } from "/rig/stage.js";
 import steer from "/rig/steer.js";
 import talk from "/rig/talk.js";
-import timeline from "/rig/timeline.js";
 import tune from "/rig/tune.js";
 import watch from "/rig/watch.js";
 import { isLed, reason } from "/rig/words.js";
 
-const PANELS = [watch, timeline, scene, steer, play, talk, tune, health];
+const PANELS = [watch, scene, steer, play, talk, tune, health];
 
 const $ = (selector) => document.querySelector(selector);
 

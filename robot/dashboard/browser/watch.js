@@ -1,7 +1,7 @@
 // Panel: what the head looks at and why, in plain words; the terms of the equation in a fold.
 
+import { onShown } from "/rig/camera.js";
 import { chip, heading, make, note, pill, section } from "/rig/elements.js";
-import { targetSince } from "/rig/history.js";
 import { activity, isLed, reason, spaced, TERMS } from "/rig/words.js";
 
 const PHASES = { fixate: "ok", saccade: "saccade", pursue: "pursue", blink: "calm" };
@@ -9,6 +9,14 @@ const LEAST_FULL = 1; // salience of a bar as wide as the panel, or the highest 
 const SOURCES = "translation, looming and rotation are motion across, along and about the line of "
   + "sight (Mitake et al., eq 1); onset is having just come into view, rule the behaviour's "
   + "constant, habituation the share that it leaves";
+
+let target = "", since_s = 0; // of the target that is shown
+
+onShown(({ t_s, gaze }) => {
+  const next = gaze.target.split(":")[0]; // without the part
+  if (next === target && t_s >= since_s) return;
+  [target, since_s] = [next, t_s];
+});
 
 export default {
   drawer: "watch",
@@ -24,7 +32,7 @@ export default {
     place.append(silence, what, why, chips, terms.node, estimated);
     return ({ shown, state, run, silent }) => {
       silence.textContent = silent ? "The rig has sent nothing for a second: this is the last data." : "";
-      what.textContent = activity(shown, targetSince(shown.t_s));
+      what.textContent = activity(shown, since_s);
       why.textContent = isLed(shown) ? "" : sentence(reason(shown, run));
       chips.replaceChildren(...present(shown, run));
       const joints = Object.entries(state.joints);
