@@ -27,7 +27,8 @@ export default {
   build(place) {
     const behaviour = section("behaviour"), face = section("face"), joints = section("joints");
     const gaze = buttons("target", [FREE, AHEAD], (choice) => order(
-      choice === FREE ? { do: "look_at", p_world_m: null } : { do: "look_at", p_world_m: AHEAD_M, stay: true },
+      choice === FREE ? { do: "look_at", p_world_m: null }
+        : { do: "look_at", p_world_m: AHEAD_M, stay: true },
     ), "release gaze and joints, or hold the gaze");
     place.append(note("Click in the camera's picture: the head looks there."), gaze.node,
       behaviour.node, face.node, joints.node);

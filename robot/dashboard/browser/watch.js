@@ -25,13 +25,11 @@ export default {
     const what = make("div", { className: "big", textContent: "waiting for the rig" });
     const why = make("div", { className: "tall" });
     const chips = make("div", { className: "in-force" });
-    const silence = make("div", { className: "warn" });
     const terms = section("why: the terms of the equation", false);
     const estimated = note("The eyes' servos give no feedback: these are the movements that the eyes "
       + "should make, estimated from their goals, and no measurements.");
-    place.append(silence, what, why, chips, terms.node, estimated);
-    return ({ shown, state, run, silent }) => {
-      silence.textContent = silent ? "The rig has sent nothing for a second: this is the last data." : "";
+    place.append(what, why, chips, terms.node, estimated);
+    return ({ shown, state, run }) => {
       what.textContent = activity(shown, since_s);
       why.textContent = isLed(shown) ? "" : sentence(reason(shown, run));
       chips.replaceChildren(...present(shown, run));
