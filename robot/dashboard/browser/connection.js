@@ -87,10 +87,10 @@ function receive(message) {
 }
 
 /** Open a websocket at a path of the rig. */
-export const open = (path) => new WebSocket(location.origin.replace(/^http/, "ws") + path);
+export const openSocket = (path) => new WebSocket(location.origin.replace(/^http/, "ws") + path);
 
 function connect() {
-  const mine = open(`/api/v1/socket?${QUERY}`);
+  const mine = openSocket(`/api/v1/socket?${QUERY}`);
   mine.binaryType = "blob";
   socket = mine;
   mine.onmessage = ({ data }) => {
