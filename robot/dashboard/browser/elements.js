@@ -129,13 +129,11 @@ export function slider({ name, unit = "", low, high, step, value, hint = "" }, s
   const number = make("input", { type: "number", className: "number", min: low, max: high, step });
   number.setAttribute("aria-label", `${name}, as a number${unit && ` in ${unit}`}`);
   for (const field of [range, number]) describe(field, hint);
-  let current = value, held = false, sending = false;
+  let current = value, held = false;
   const draw = () => { range.value = current; number.value = written(current); };
   const set = inTurn(async (next) => {
     current = next;
-    sending = true; // until then the rig shows the value before
     await send(next);
-    sending = false;
   });
   range.addEventListener("input", () => { number.value = range.value; set(Number(range.value)); });
   range.addEventListener("pointerdown", () => { held = true; });
@@ -156,7 +154,7 @@ export function slider({ name, unit = "", low, high, step, value, hint = "" }, s
     node: make("div", { className: "field" }, label(name, id),
       make("div", { className: "both" }, range, field)),
     show(next) {
-      if (held || isTyped() || sending) return;
+      if (held || isTyped()) return;
       current = next;
       draw();
     },

@@ -67,16 +67,18 @@ const STEP_DEG = 0.1;
 
 /** Sliders of all joints at their desired angles; returns a function that moves them along. */
 function jointSliders(place) {
-  const sliders = new Map(); // joint -> control
+  const sliders = new Map(), asked = new Set(); // joint -> control; joints
   on("rig", (rig) => {
     sliders.clear();
     for (const [joint, { low_rad, high_rad }] of Object.entries(rig.joints)) {
       const [low, high] = [low_rad, high_rad].map((rad) => Number(degrees(rad).toFixed(1)));
       const hint = `moves the joint, slowly; ${low} to ${high} deg, + left, up, open, right ear down`;
       const options = { name: spaced(joint), unit: "deg", low, high, step: STEP_DEG, value: 0, hint };
-      sliders.set(joint, slider(options, (deg) => order(
-        { do: "jog", angles_rad: [[joint, radians(deg)]] },
-      )));
+      sliders.set(joint, slider(options, async (deg) => {
+        asked.add(joint); // until the answer the rig reports the angle before
+        await order({ do: "jog", angles_rad: [[joint, radians(deg)]] });
+        asked.delete(joint);
+      }));
     }
     place.replaceChildren(
       note("This moves the joint of the real head slowly, within the guard's limits. All others hold "
@@ -85,7 +87,7 @@ function jointSliders(place) {
   });
   return ({ joints }) => {
     for (const [joint, { show }] of sliders) {
-      if (joint in joints) show(Number(degrees(joints[joint].desired_rad).toFixed(1)));
+      if (joint in joints && !asked.has(joint)) show(Number(degrees(joints[joint].desired_rad).toFixed(1)));
     }
   };
 }
