@@ -380,7 +380,9 @@ def test_a_track_that_begins_in_its_middle_grows_from_rest_within_limits(at_s: f
     (voice,) = it.player.voices
     assert not it.player.state(0.0).any() and at_s - 0.6 < voice.position_s(0.0) < at_s
     times = np.arange(0.0, 2.0, 0.005)
-    value, speed, acceleration = np.moveaxis([it.player.state(t) for t in times.tolist()], 1, 0)
+    value, speed, acceleration = np.moveaxis(
+        np.array([it.player.state(t) for t in times.tolist()]), 1, 0
+    )
     assert it.strain(speed, acceleration) <= 1.0 + 2e-3
     assert speed[1:-1] == pytest.approx((value[2:] - value[:-2]) / 0.01, abs=0.02)
     offsets = np.array([it.player.step(t).to_flat() for t in times.tolist()])

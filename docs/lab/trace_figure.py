@@ -36,9 +36,9 @@ class Trace(NamedTuple):
     lid: np.ndarray
 
 
-def evoked_blink_probability(amplitude_deg: np.ndarray) -> np.ndarray:
+def evoked_blink_probability(amplitude_deg: float) -> float:
     """Return a blink's probability with a gaze shift: .5 at 17, .97 at 33 deg (Evinger 1994)."""
-    return 1.0 / (1.0 + np.exp(-0.217 * (amplitude_deg - 17.0)))
+    return float(1.0 / (1.0 + np.exp(-0.217 * (amplitude_deg - 17.0))))
 
 
 def of_profile(profile: str) -> Trace:

@@ -65,8 +65,9 @@ def samples(boxes: PartBoxes, looks: Iterator[tuple[str, float]], seed: int) -> 
     places: list[np.ndarray] = []
     at, before = np.array([0.0, 0.0]), ""
     left = True
+    at_part = {str(code): box for code, box in boxes.boxes.items()}
     for part, dwell_s in looks:
-        x0, y0, x1, y1 = boxes.boxes[part]
+        x0, y0, x1, y1 = at_part[part]
         left = not left if part == before else left
         share = np.array([0.2 if left else 0.8, rng.uniform(0.3, 0.7)])
         goal = np.array([x0, y0]) + share * np.array([x1 - x0, y1 - y0])
