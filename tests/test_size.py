@@ -17,7 +17,7 @@ LARGEST = {
     "gazerig": 14_000,
     "doors": 10_260,
     "features/animation": 5_500,
-    "features/bringup": 34_000,
+    "features/bringup": 33_960,
     "features/lab": 26_000,
     "features/study": 10_170,
     "features/world": 34_000,

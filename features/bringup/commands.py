@@ -18,7 +18,7 @@ SCAN = CommandEntry(
 )
 SETUP = CommandEntry(
     "gazerig.features.bringup.cli.setup",
-    "Set id and baud rate of the servos, connected one at a time.",
+    "Set id and baud rate of the servos, connected one at a time, or of a spare in its chain.",
     "Bring-up",
     examples={
         "setup": (

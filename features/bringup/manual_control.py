@@ -128,7 +128,6 @@ class ManualControl:
         clock: clock of the host, or a simulated one with the emulated bus.
         speed_deg_s: top speed on the way; the guard's gentle speed holds as well.
         stopped: called at every step; returns why to stop, None without a reason.
-        watch: receives every step.
     """
 
     def __init__(
@@ -138,14 +137,12 @@ class ManualControl:
         clock: Clock,
         speed_deg_s: float = SPEED_DEG_S,
         stopped: Callable[[], str | None] = no_reason,
-        watch: Callable[[Step], None] | None = None,
     ) -> None:
         self.body = body
         self._guard = guard
         self._clock = clock
         self._speed_deg_s = speed_deg_s
         self._stopped = stopped
-        self._watch = watch
         self._goal: JointAngles = ()
 
     def start(self) -> None:
@@ -259,8 +256,6 @@ class ManualControl:
             result = self._guard.check(desired, joints, 0.0, t_s)
             self.body.write(result.command_rad)
             self._goal, step = result.command_rad, Step(t_s, desired, result, joints)
-            if self._watch is not None:
-                self._watch(step)
             for line in result.reasons:
                 joint, _, reason = line.partition(": ")
                 if reason not in PASSING:

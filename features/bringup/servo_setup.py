@@ -1,10 +1,13 @@
-"""Search for a new servo, and assignment of its id and baud rate.
+"""Search for a new servo, alone or in a chain, and assignment of its id and baud rate.
 
-A servo is connected alone: two servos with the same id appear as one, and both would receive the
-new id. Id and baud rate take effect immediately, after the status packet of their own write. If the
-memory has a lock, they are written with it open; otherwise they would be lost at the next
-power-off. It is closed under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech
-memory table STS3215.
+A servo is connected alone, or it is the factory-new spare of the only servo that a chain misses:
+two servos with the same id appear as one, and both would receive the new id.
+
+Id and baud rate take effect immediately, after the status packet of their own write. The id comes
+first: in a chain the servo is alone at the factory's baud rate, but perhaps not with its id at the
+chain's. If the memory has a lock, they are written with it open; otherwise they would be lost at
+the next power-off. It is closed under the new id and at the new rate. Sources: ROBOTIS e-Manual;
+Feetech memory table STS3215.
 """
 
 from collections.abc import Mapping, Sequence
@@ -81,6 +84,45 @@ def search_rates(
         wanted = thorough and not any(one.found for one in found.values())
         found[baud] = search_rate(port, kind, baud, wanted) or Answers()
     return found
+
+
+def search_all(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> dict[int, Answers]:
+    """Find all connected servos at any baud rate, the factory's and that of a bus first."""
+    order = dict.fromkeys((kind.family.factory_baud, baud, *kind.family.baud_rates))
+    return search_rates(port, kind, list(order), tell, thorough=True)
+
+
+def find_spare(
+    port: BusPort,
+    kind: ServoKind,
+    chain: Sequence[ServoConfig],
+    baud: int,
+    answers: Mapping[int, Answers],
+) -> tuple[FoundServo, ServoConfig] | None:
+    """Return the factory-new servo in the place of the only missing one, and that one's setup.
+
+    None if not exactly one servo of the chain is missing, if not exactly one other answers, if
+    that is not new or has another model, or if any answers are spoilt. After an interrupted
+    assignment it has its new id at the factory's rate.
+
+    Args:
+        port: open port; at the chain's rate afterwards if a servo was found.
+        kind: kind of the servos.
+        chain: setups of all servos of the chain.
+        baud: baud rate of the chain.
+        answers: answers at all baud rates.
+    """
+    others = {(servo.id, servo.baud): servo for one in answers.values() for servo in one.found}
+    missing = [setup for setup in chain if others.pop((setup.id, baud), None) is None]
+    if (len(missing), len(others)) != (1, 1) or any(one.is_spoilt for one in answers.values()):
+        return None
+    (setup,), (spare,) = missing, others.values()
+    is_new = spare.baud == kind.family.factory_baud and spare.id in (FACTORY_ID, setup.id)
+    if not is_new or spare.number != kind.family.models[setup.model].number:
+        return None
+    # The answer of the missing one may only have been lost.
+    open_at(port, baud)
+    return None if ping(port, kind.family, setup.id, baud) else (spare, setup)
 
 
 def find_alone(answers: Mapping[int, Answers], where: str) -> FoundServo:

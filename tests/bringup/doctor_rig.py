@@ -7,8 +7,7 @@ import pytest
 from gazerig.drivers.feetech.memory_table import REGISTERS
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.examination import examine_bus
-from gazerig.features.bringup.doctor.servo_rules import apply_fixes
+from gazerig.features.bringup.doctor.examination import apply_fixes, examine_bus
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.safety.start_range import far_outside
@@ -95,7 +94,8 @@ class Rig:
         return {name: text for name, text in found.items() if text}
 
     def fix(self, findings):
-        return [one for found in findings for one in apply_fixes(self.port, self.kind, found)]
+        tell = self.reported.append
+        return list(apply_fixes(self.port, self.kind, self.setups, BAUD, findings, tell))
 
 
 def one(findings, level, where, words):

@@ -30,16 +30,16 @@ def test_the_offsets_steered_to_are_in_the_rig_file(rig: Path, tmp_path: Path) -
     before = rig.read_text("utf-8")
     answers = script(
         tmp_path,
-        "left 2", "up", "",  # nose: step 5
-        "+", "down", "enter",  # left eye: step 10
+        "left 2", "up", "",  # nose
+        "down 2", "enter",  # left eye
         "skip",
-        "-", "-", "-", "right 3", "enter",  # mouth: step 1
+        "right", "enter",  # mouth
         "back", "down 2", "",  # mouth again, from there
         "end", "y",
     )  # fmt: skip
     done = run(str(rig), "--mock", *answers)
     assert done.code == 0, done.err
-    moved = {"N": (10.0, 5.0), "LE": (0.0, -10.0), "M": (-3.0, -2.0)}
+    moved = {"N": (10.0, 5.0), "LE": (0.0, -10.0), "M": (-5.0, -10.0)}
     found = load_rig(str(rig)).face_parts_mm
     assert set(found) == set(moved)
     for part, (left, up) in moved.items():
@@ -80,8 +80,8 @@ def test_nothing_chosen_a_no_or_what_is_wrong_writes_nothing(
 def test_what_a_terminal_sends_for_keys() -> None:
     keys, rest = split_words("\x1b[A\x1b[B\x1bOC\x1b[1;5Dwasd+-=\rnb\x1b[3~\x1bOPQ\x1b[")
     assert keys == [
-        "up", "down", "right", "left", "up", "left", "down", "right", "larger", "smaller",
-        "larger", "enter", "skip", "back", "end",
+        "up", "down", "right", "left", "up", "left", "down", "right", "enter", "skip", "back",
+        "end",
     ]  # fmt: skip
     assert rest == "\x1b["
 
@@ -98,9 +98,9 @@ def sitting_at(rig: Path, *words: str) -> OnTerminal:
 def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
     before = rig.read_bytes()
     with sitting_at(rig) as sitting:
-        sitting.reads("1/8 the tip of your nose: 0 mm")
-        sitting.types(b"\x1b[D")
-        sitting.reads("5 mm left")
+        sitting.reads("the tip of your nose: steer")
+        sitting.types(b"n")
+        sitting.reads("your left eye: steer")
         sitting.types(b"\x03")
         assert sitting.ends() == 1, sitting.said
     assert "stopped by SIGINT: parked, torque off" in sitting.said

@@ -1,6 +1,5 @@
 """A servo steered at a terminal: keys as they are pressed, lines of a file, and numbers."""
 
-import time
 from pathlib import Path
 from typing import Any
 
@@ -33,23 +32,17 @@ def test_keys_steer_a_hobby_servo_at_the_terminal(rigs: dict[str, str]) -> None:
         terminal.types(b"\n")
         terminal.reads("straight ahead, then press Enter")
         terminal.reads("1510 us")
-        terminal.reads("step 10 us")
-        terminal.types(b"\x1b[A\x1b[C")  # a larger step, then one of those to the right
+        terminal.types(4 * b"\x1b[C")
         terminal.reads("1530 us")
         terminal.types(b"\r")
         terminal.reads("to its UPPER end")
-        terminal.reads("step 10 us")
-        terminal.types(b"\x1b[A\x1b[Ad")
+        terminal.types(10 * b"d")
         terminal.reads("1580 us")
         terminal.types(b"\r")
         terminal.reads("eyes_tilt at 1580 us: how many degrees (UPPER is +)?")
         terminal.types(b"8\n")
         terminal.reads("to its LOWER end")
-        terminal.reads("step 10 us")
-        terminal.types(b"\x1b[A\x1b[Aa")
-        terminal.reads("1530 us")
-        time.sleep(0.6)  # a key that is held down runs no farther ahead than its pulse
-        terminal.types(b"a")
+        terminal.types(20 * b"a")
         terminal.reads("1480 us")
         terminal.types(b"\r")
         terminal.reads("at 1480 us: how many degrees")

@@ -1,6 +1,6 @@
 """Moving rigs of every kind slowly by command, over emulated buses in simulated time."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import degrees, radians
 from typing import Any, cast
 
@@ -15,11 +15,25 @@ from gazerig.features.bringup.manual_control import ManualControl, Step
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.control.body import Body
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.devices import DynamixelLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 CROOKED = {"neck_yaw": -12.0, "left_eye_pan": 6.0, "neck_pitch": -8.0}
+
+
+class NotedGuard(Guard):
+    """A guard that shows every step."""
+
+    note: Callable[[Step], None]
+
+    def check(
+        self, desired_rad: JointAngles, joints: JointState, frame_age_s: float, t_s: float
+    ) -> GuardResult:
+        result = super().check(desired_rad, joints, frame_age_s, t_s)
+        self.note(Step(t_s, desired_rad, result, joints))
+        return result
 
 
 class Bench(EmulatedRig):
@@ -29,7 +43,8 @@ class Bench(EmulatedRig):
         self, rig: Rig, speed_deg_s: float, lines: dict[str, DynamixelLine] | None = None
     ) -> None:
         super().__init__(rig, lines)
-        guard = Guard(rig.guard, limits(rig.joints), rig.names)
+        guard = NotedGuard(rig.guard, limits(rig.joints), rig.names)
+        guard.note = self.note
         self.steps: list[Step] = []
         self.why: str | None = None
         self.at: dict[float, str] = {}
@@ -39,7 +54,6 @@ class Bench(EmulatedRig):
             self.clock,
             speed_deg_s,
             lambda: self.why,
-            self.note,
         )
 
     def note(self, step: Step) -> None:

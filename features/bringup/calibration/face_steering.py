@@ -24,7 +24,7 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.kinematics import gaze_error
 
-Key = Literal["left", "right", "up", "down", "larger", "smaller", "enter", "skip", "back", "end"]
+Key = Literal["left", "right", "up", "down", "enter", "skip", "back", "end"]
 
 ORDER = ("N", "LE", "RE", "M", "DN", "UP", "FL", "FR")
 """The parts in the order of the calibration, from the centre outwards."""
@@ -41,7 +41,8 @@ PART_NAMES_TEXT = {
 }
 """Left and right are the owner's."""
 
-STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0)
+STEP_MM = 5.0
+"""Distance by which one key moves the gaze: .4 deg at .7 m, finer than a person's judgement."""
 FARTHEST_MM = 150.0
 """Largest distance of a face part from the tip of the nose, sideways or vertically."""
 
@@ -65,7 +66,6 @@ class FaceCalibration:
         starts_mm, places_mm: Initial and present position of each part in the face frame.
         part_number: Number of the part in ORDER, len(ORDER) after the last.
         adjusted_parts: Parts that the gaze seemed to look at.
-        step_mm: Distance by which one key moves the gaze.
     """
 
     def __init__(self, own_mm: Mapping[str, Vec3]) -> None:
@@ -74,17 +74,11 @@ class FaceCalibration:
         self.places_mm = dict(self.starts_mm)
         self.part_number = 0
         self.adjusted_parts: set[str] = set()
-        self.step_mm = STEPS_MM[2]
 
     @property
     def part(self) -> str | None:
         """Return the current part, None at the end."""
         return ORDER[self.part_number] if self.part_number < len(ORDER) else None
-
-    def moved_mm(self, part: str) -> tuple[float, float]:
-        """Return the distances by which a part has been moved to its owner's left and up."""
-        _, left, up = sub(self.places_mm[part], self.starts_mm[part])
-        return left, up
 
     def apply(self, key: Key) -> None:
         """Apply a key; after the end, keys have no effect."""
@@ -92,9 +86,6 @@ class FaceCalibration:
         if part is None:
             return
         match key:
-            case "larger" | "smaller":
-                at = STEPS_MM.index(self.step_mm) + (1 if key == "larger" else -1)
-                self.step_mm = STEPS_MM[max(0, min(len(STEPS_MM) - 1, at))]
             case "enter":
                 self.adjusted_parts.add(part)
                 self.part_number += 1
@@ -108,7 +99,7 @@ class FaceCalibration:
                 self.part_number = len(ORDER)
             case _:
                 x, y, z = self.places_mm[part]
-                left, up = (self.step_mm * way for way in _WAYS[key])
+                left, up = (STEP_MM * way for way in _WAYS[key])
                 self.places_mm[part] = x, _within_face(y, left), _within_face(z, up)
 
     def changed_places(self) -> dict[str, Vec3]:

@@ -33,8 +33,6 @@ PULSES_US = (500.0, 2500.0)
 PERIOD_S = 0.03
 SPEED_US_S = 200.0
 """18 deg/s of the shaft: slow enough to stop before something bends."""
-LEAD_US = 50.0
-"""Travel in a quarter of a second at its slow speed, until it stops after the release of a key."""
 
 NEAR_STEPS = 4
 TIMEOUT_S = 1.0
@@ -136,11 +134,6 @@ class HobbyServoAccess:
         low, high = self._setup.min_steps, self._setup.max_steps
         self._goal = min(max(round(place_us * US_STEPS), low), high)
         return self.place_us
-
-    def nudge(self, us: float) -> None:
-        """Move the joint by a pulse width, at most ``LEAD_US`` ahead of its pulse."""
-        at_us = self._pulse / US_STEPS
-        self.aim(min(max(self.place_us + us, at_us - LEAD_US), at_us + LEAD_US))
 
     def live(self) -> str:
         """Continue the motion; return pulse width and angle as text."""

@@ -33,9 +33,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
     summarize,
     worst_level,
 )
-from gazerig.features.bringup.doctor.servo_rules import apply_fixes
 from gazerig.features.bringup.servo_kinds import servo_kind
-from gazerig.features.bringup.servo_setup import open_at
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.rig_weight import weight_findings
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
@@ -103,9 +101,9 @@ def _examine_and_fix(rig: Rig, bus: str, line: BusPort, fix: bool, tell: Tell) -
         return findings
     done = []
     if any(finding.fixes for finding in findings):
-        kind = servo_kind(setups_on(rig, bus)[0].model)
-        open_at(line, rig.bus_named(bus).section.baud)
-        done = [text for finding in findings for text in apply_fixes(line, kind, finding)]
+        setups, baud = setups_on(rig, bus), rig.bus_named(bus).section.baud
+        kind = servo_kind(setups[0].model)
+        done = list(checkup.apply_fixes(line, kind, setups, baud, findings, progress))
         line.closePort()
     for text in done or ["nothing that --fix may mend"]:
         tell(text)

@@ -19,11 +19,9 @@ from gazerig.features.bringup.cli.ports import (
     rig_ports,
 )
 from gazerig.features.bringup.manual_control import (
-    PASSING,
     RATE_HZ,
     SPEED_DEG_S,
     ManualControl,
-    Step,
     park_slowly,
     refuse_angle,
 )
@@ -31,7 +29,7 @@ from gazerig.robot.app.bus_wiring import guarded_rig_bus
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.app.rig_weight import rest_park_deg
 from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say, status
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.event_text import group_events
 from gazerig.robot.control.interrupts import Interrupts
@@ -90,11 +88,10 @@ def jog(
         gentle = loaded.guard.soft_start_speed_deg_s
         if speed > gentle:
             say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")
-        watch = _show if sys.stderr.isatty() else None
         by_key = hold and sys.stdin.isatty()
         end = lambda: stopped() or (enter_pressed() if by_key else None)  # noqa: E731
         top = min(speed, gentle)
-        with holding_rig(loaded, wire.paths, top, end, stopped, not no_park, watch) as control:
+        with holding_rig(loaded, wire.paths, top, end, stopped, not no_park) as control:
             _print_events(control.body.bus.events())
             say(f"{holding_text(loaded)}; Ctrl-C switches it off")
             moved = control.jog(joint, deg)
@@ -109,12 +106,6 @@ def jog(
                 _print_events(control.hold(inf if hold else seconds).events)
     if not moved.arrived:
         raise typer.Exit(FAULT)
-
-
-def _show(step: Step) -> None:
-    """Show the reasons that limit a motion."""
-    reasons = [r for r in step.guard_result.reasons if r.partition(": ")[2] not in PASSING]
-    status(", ".join(reasons) or "on the way")
 
 
 def enter_pressed() -> str | None:
@@ -147,7 +138,6 @@ def holding_rig(
     stopped: Callable[[], str | None],
     interrupts: Interrupts,
     park: bool = True,
-    watch: Callable[[Step], None] | None = None,
 ) -> Iterator[ManualControl]:
     """Switch torque on at the present pose; at the end of the block park, torque off, close.
 
@@ -158,7 +148,6 @@ def holding_rig(
         stopped: returns why to end a motion, None without a reason.
         interrupts: requests to end this program.
         park: whether to park the joints at the end.
-        watch: receives every step.
 
     Raises:
         SetupError: port or servos do not match the configuration.
@@ -168,7 +157,7 @@ def holding_rig(
         guarded_rig_bus(rig, paths), rig.joints, park_rad(rig), pairs=rig.couplings.values()
     )
     guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=1.0 / RATE_HZ)
-    control = ManualControl(body, guard, RealClock(), speed_deg_s, stopped, watch)
+    control = ManualControl(body, guard, RealClock(), speed_deg_s, stopped)
     with PowerDown(
         (lambda again: park_slowly(control, rest_park_deg(rig), again)) if park else None,
         control.stop,

@@ -24,13 +24,9 @@ HAND_STEPS = 100
 
 YES, NO = ("y", "yes"), ("n", "no")
 
-STEPS_US = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-FIRST_STEP = 3
-
-KEYS_HELP = (
-    "arrow keys left and right (or a d) move it, up and down change the step, Enter: it is there, "
-    "q ends"
-)
+STEP_US = 5.0
+"""Step of a key, near the dead band of a hobby servo; one in ``LOOK_S``: slower than it turns."""
+KEYS_HELP = "arrow keys left and right (or a d) move it, Enter: it is there, q ends"
 LINES_HELP = "+20 or -20 moves it by so many us, 1480 to that width, Enter: it is there, q ends"
 
 
@@ -122,22 +118,17 @@ class TerminalPerson:
                 else:
                     servo.aim(servo.place_us + us if line[0] in "+-" else us)
             return
-        step = FIRST_STEP
         say(f"{question}; {KEYS_HELP}")
         with TerminalKeys() as keys:
             while (key := keys.next()) != "enter":
-                self._look(servo.live, f"; step {STEPS_US[step]:g} us: {KEYS_HELP}")
+                self._look(servo.live)
                 match key:
                     case None:
                         select.select([sys.stdin.fileno()], [], [], LOOK_S)
                     case "end":
                         raise CalibrationStopped("q")
                     case "left" | "right":
-                        servo.nudge(STEPS_US[step] if key == "right" else -STEPS_US[step])
-                    case "up" | "larger":
-                        step = min(step + 1, len(STEPS_US) - 1)
-                    case "down" | "smaller":
-                        step = max(step - 1, 0)
+                        servo.aim(servo.place_us + (STEP_US if key == "right" else -STEP_US))
 
     def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
         """Return the typed number; Enter selects the proposed one."""
@@ -164,14 +155,14 @@ class TerminalPerson:
             say(f"{line!r} is no answer: {wanted} goes on, q ends")
         return line
 
-    def _look(self, live: Callable[[], str], more: str = "") -> None:
+    def _look(self, live: Callable[[], str]) -> None:
         """Read the joint once, and show it."""
         why = self._stopped()
         if why is not None:
             raise CalibrationStopped(why)
         shown = live()
         if sys.stderr.isatty():
-            status(f"{shown}{more}")
+            status(shown)
 
     def _line(self, question: str, live: Callable[[], str]) -> str:
         """Wait for a line while the joint is watched."""
@@ -202,13 +193,12 @@ def _number(line: str) -> float | None:
 # --- keys
 
 HELP = (
-    "arrow keys or w a s d move the gaze as you see it; + and - the step; Enter: it looks at it; "
+    "arrow keys or w a s d move the gaze as you see it; Enter: it looks at it; "
     "n: next, leave this part; b: back; q: end"
 )
 
 _PLAIN: dict[str, Key] = {
     "w": "up", "a": "left", "s": "down", "d": "right",
-    "+": "larger", "=": "larger", "-": "smaller", "_": "smaller",
     "\r": "enter", "\n": "enter", "n": "skip", "b": "back", "q": "end",
 }  # fmt: skip
 _WORDS: dict[str, Key] = {"": "enter", **_PLAIN} | {
@@ -233,7 +223,7 @@ def parse_keys(line: str) -> list[Key]:
     number = number.strip() or "1"
     if word not in _WORDS or not number.isdecimal() or not 0 < int(number) <= 1000:
         raise SetupError(
-            f"{line!r} is no key: left, right, up, down, +, - with a number of times (left 3), "
+            f"{line!r} is no key: left, right, up, down with a number of times (left 3), "
             "enter or an empty line, skip, back, end"
         )
     return [_WORDS[word]] * int(number)

@@ -42,7 +42,7 @@ def setup(
     mock: MockOption = False,
     yes: YesOption = False,
 ) -> None:
-    """Set id and baud rate of the servos, connected one at a time."""
+    """Set id and baud rate of the servos, connected one at a time, or of a spare in its chain."""
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
         refuse_packages(model, "setup")
@@ -53,8 +53,7 @@ def setup(
                 raise SetupError(f"--joint {name}: unknown; joints are {named}")
         done: set[str] = set()
         for bus in bus_names(model):
-            chain = setups_on(model, bus)
-            mine = [one for one in chain if one.name in wanted]
+            mine = [one for one in setups_on(model, bus) if one.name in wanted]
             if mine and model.bus_named(bus).kind in KINDS:
                 done |= _set_up_chain(model, bus, mine, port, mock, yes)
             elif mine:
@@ -76,9 +75,12 @@ def _set_up_chain(
     baud, count, done = rig.bus_named(bus).section.baud, len(setups), set[str]()
     say(
         f"{bus_label(rig, bus)}: {count} of {len(rig.names)} servos to set up for {baud} bit/s. "
-        "Switch the servo supply off before you plug or unplug one."
+        "Switch the servo supply off before you plug or unplug one. A new servo in the place of "
+        "the only missing one may be set up in the chain."
     )
     for n, wanted in enumerate(setups, 1):
+        if wanted.name in done:
+            continue
         # Factory settings.
         kind, zero = servo_kind(wanted.model), rig.joints[wanted.name].zero
         spec = ServoSpec(servo_setup.FACTORY_ID, wanted.model, zero)
@@ -92,8 +94,7 @@ def _set_up_chain(
                     rig_ports(rig, mock, port, fresh) as wired,
                     unopened_port(wired.paths[bus]) as line,
                 ):
-                    if _set_up(line, wanted, baud, yes):
-                        done.add(wanted.name)
+                    done |= _set_up(line, wanted, setups, setups_on(rig, bus), baud, yes)
                 break
             except DriverError as error:
                 if yes:
@@ -113,25 +114,33 @@ def _press_enter() -> str:
 def _set_up(
     line: BusPort,
     wanted: ServoConfig,
+    setups: Sequence[ServoConfig],
+    chain: Sequence[ServoConfig],
     baud: int,
     yes: bool,
-) -> bool:
-    """Give the new servo its id and baud rate; return whether it is done."""
-    kind = servo_kind(wanted.model)
-    # The most likely rates first.
-    order = list(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.baud_rates)))
-    answers = servo_setup.search_rates(line, kind, order, progress, thorough=True)
+) -> set[str]:
+    """Give the new servo its id and baud rate; return the joints that are done then."""
+    kind, names = servo_kind(wanted.model), {wanted.name}
+    answers = servo_setup.search_all(line, kind, baud, progress)
+    spare = servo_setup.find_spare(line, kind, chain, baud, answers)
     progress()
-    found = servo_setup.find_alone(answers, line.port_name)
+    if spare is not None and spare[1] in setups:
+        (found, wanted), names = spare, {one.name for one in chain}
+        say(
+            f"   all others of the chain answer, so it is for {servo_label(wanted)}; its zero is "
+            f"another: then gazerig calibrate --joint {wanted.name}"
+        )
+    else:
+        found = servo_setup.find_alone(answers, line.port_name)
     label = servo_label(wanted)
     firmware = kind.family.format_firmware(found.firmware)
     say(f"   found: {found.model}, firmware {firmware}, id {found.id} at {found.baud} bit/s")
     servo_setup.refuse_model(found, kind, wanted, line.port_name)
     question = f"   give it id {wanted.id} and {baud} bit/s?"
     if not yes and not confirm(question, default=True, err=True):
-        return False
+        return set()
     after, changes = servo_setup.assign_servo(line, kind, found, wanted, baud, progress)
     progress()
     done = "; ".join(changes) or "nothing to change"
     say(f"   {label}: {done}; answers as id {after.id} at {after.baud} bit/s")
-    return True
+    return names

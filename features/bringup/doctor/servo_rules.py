@@ -11,7 +11,6 @@ import msgspec
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.drivers.servo_bus.settings import write_settings
@@ -255,21 +254,12 @@ RULES: tuple[Callable[[ServoState], Iterator[Diagnostic]], ...] = (
 )
 
 
-def apply_fixes(port: BusPort, kind: ServoKind, finding: Diagnostic) -> Iterator[str]:
-    """Write the fixes of a finding; yield a line about each.
-
-    port: open at the rate of the servos
+def apply_fix(line: Transactions, fix: Fix) -> str:
+    """Write a fix if the torque is off, so that it persists; return "" or the reason why not.
 
     Raises:
         BusLost: the port has disappeared.
     """
-    for fix in finding.fixes:
-        why = _apply_fix(Transactions(port, kind.family), fix)
-        yield f"{finding.where}: {fix}: {f'not done, {why}' if why else 'done'}"
-
-
-def _apply_fix(line: Transactions, fix: Fix) -> str:
-    """Write a fix if the torque is off, so that it persists; return "" or the reason why not."""
     servo_id, level = fix.servo_id, line.family.answer_level
     torque = line.read(servo_id, "torque_enable")
     if not torque and line.read(servo_id, "status_return_level") != level:

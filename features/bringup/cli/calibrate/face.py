@@ -38,7 +38,7 @@ from gazerig.gaze.attention.top_down import TopDown
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import prepare_shutdown
-from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say, status
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
 from gazerig.robot.control.event_text import group_events
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop import LoopCount, Tick
@@ -49,7 +49,6 @@ STILL_SCENE = "sits-still"
 
 # A script cannot move nearer or turn to the robot, so the waiting time is limited.
 _SCRIPT_WAITS_S = 20.0
-_SHOW_S = 0.1
 # Short gaps of a detector are not reported.
 _UNSEEN_S = 1.0
 
@@ -159,7 +158,7 @@ class _CalibrationSession:
         self.keys = None if scripted else TerminalKeys()
         self._script: list[Key] = []
         self._said: tuple[str | None, bool] | None = None
-        self._ready_s = self._shown_s = self._seen_s = now_s()
+        self._ready_s = self._seen_s = now_s()
 
     def over(self, _: float) -> str | None:
         """Handle a key; return why the procedure ended, None while it continues.
@@ -213,20 +212,3 @@ class _CalibrationSession:
                 if seen
                 else "no face is seen: sit before the camera, 0.5 to 1.5 m away, and look at it"
             )
-        if self.keys is not None and sys.stderr.isatty() and tick.t_s - self._shown_s >= _SHOW_S:
-            self._shown_s = tick.t_s
-            status(status_text(steering))
-
-
-def status_text(steering: FaceSteering) -> str:
-    """Return the status line: part, distance moved, step."""
-    state = steering.state
-    if state.part is None or steering.face is None:
-        return "no face is seen"
-    left, up = state.moved_mm(state.part)
-    across = f"{abs(left):g} mm {'left' if left > 0.0 else 'right'}" if left else "0 mm across"
-    upright = f"{abs(up):g} mm {'up' if up > 0.0 else 'down'}" if up else "0 mm up"
-    return (
-        f"{state.part_number + 1}/{len(PART_NAMES_TEXT)} {PART_NAMES_TEXT[state.part]}: {across}, {upright}; "
-        f"step {state.step_mm:g} mm"
-    )
