@@ -58,6 +58,8 @@ def load(
     for layer, file in zip(layers, files, strict=True):
         above = _resolve(layer.data, file.parent) if into is Rig else layer.data
         data = _merge(data, above, Declaration("params", params=cast(Any, into)))
+    if into is Rig:
+        _add_tracks(data, files[0].parent / "tracks")
     value, found = validate_rules(into, data, checks)
     faults += [_find_line(layers, one) for one in found]
     if faults or value is None:
@@ -135,6 +137,14 @@ def find_file(kind: str, name_or_path: str, home: Path | None = None) -> Path:
     if is_path(name_or_path):
         return Path(name_or_path).expanduser()
     return shipped_path(kind, name_or_path, home)
+
+
+def _add_tracks(data: dict[str, Any], folder: Path) -> None:
+    """Add the tracks in the folder beside a rig to those that it names."""
+    named = data.get("track_files", ())
+    files = map(str, sorted(folder.glob("*.yaml")))
+    if isinstance(named, list | tuple) and (more := [file for file in files if file not in named]):
+        data["track_files"] = (*named, *more)
 
 
 def _resolve(value: Any, folder: Path, key: str = "") -> Any:

@@ -1,9 +1,8 @@
 """Tracks by name: shipped ones, and those of a rig's own files; all are checked."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from math import degrees
 from pathlib import Path
 from typing import Annotated
 
@@ -17,7 +16,7 @@ from gazerig.config.load import (
     shipped_path,
 )
 from gazerig.config.shipped_files import file_in_folders
-from gazerig.gaze.track.track import LID_CHANNELS, MAX_DURATION_S, Track, frame_faults, loop_fault
+from gazerig.gaze.track.track import MAX_DURATION_S, Track, frame_faults, loop_fault
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 _GAZE_JOINT = (
@@ -44,29 +43,6 @@ def _sound_file(path: Path, track: Track) -> Iterable[tuple[str, str]]:
             file_in_folders([path.parent], track.sound)
     except ValueError as error:
         yield "sound", f"{error}; put the sound next to the track's file"
-
-
-def radians_hint(angles_deg: Iterable[float], below: float = 1.0) -> str:
-    """Return a hint if all angles are so small that they may be in radians, otherwise "".
-
-    It is no fault: a sway, or a mechanism with tiny motion, may have such angles in degrees.
-
-    Args:
-        angles_deg: The angles.
-        below: Size that one of them must have.
-    """
-    largest = max(map(abs, angles_deg), default=0.0)
-    if not 0.0 < largest < below:
-        return ""
-    return f"no angle is above {largest:.3g}: degrees? these look like radians (1 rad is 57.3 deg)"
-
-
-def track_angles_deg(track: Track) -> Iterator[float]:
-    """Yield the angles of a track's frames."""
-    for frame in (*track.frames, *track.frames_without_neck):
-        for channel, value in frame.values().items():
-            if channel not in LID_CHANNELS:
-                yield degrees(value)
 
 
 @cache

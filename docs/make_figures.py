@@ -20,7 +20,7 @@ import matplotlib.pyplot as plt  # noqa: E402  # the backend must be chosen befo
 import start_figures  # noqa: E402
 
 from gazerig.config.schema import load_rig, load_walk  # noqa: E402
-from gazerig.gaze.angles import rotation  # noqa: E402
+from gazerig.gaze.angles import add, rotation, scale, sub, yaw_pitch  # noqa: E402
 from gazerig.gaze.lids.blink import LidParams, closure  # noqa: E402
 from gazerig.gaze.oculomotor.binocular import DELAY_S, BinocularController  # noqa: E402
 from gazerig.gaze.oculomotor.head import HeadParams, HeadShare  # noqa: E402
@@ -35,7 +35,6 @@ from gazerig.robot.model.frames import PoseHistory  # noqa: E402
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from true_gaze import (  # noqa: E402
-    angles_of_place,
     gaze_angles,
     gaze_error_rad,
     true_part,
@@ -255,8 +254,9 @@ def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"])
         person = people(tick.t_s - (rows[0][0] if rows else tick.t_s))[0]
         face, pose = person.p_world_face_m, tick.pose
         part = true_part(person, tick.target.part)
+        middle = scale(add(pose.p_world_eye_left_m, pose.p_world_eye_right_m), 0.5)
         yaws = (
-            angles_of_place(face, pose)[0],
+            yaw_pitch(sub(face, middle))[0],
             gaze_angles(pose)[0],
             kinematics.neck_angles_to(face)[0],
         )

@@ -69,6 +69,7 @@ class Bodies(Struct, frozen=True, gc=False):
     radius_m:  (n,) half the size
     v_cov:     (n, 3, 3) covariance of the velocity, None where unknown
     cut_off:   ids of those at the edge of the picture or outside it
+    lifeless:  ids of the faces that have not moved for seconds, or are on a screen
     """
 
     ids: tuple[int, ...] = ()
@@ -79,6 +80,7 @@ class Bodies(Struct, frozen=True, gc=False):
     radius_m: Floats = field(default_factory=lambda: np.zeros(0))
     v_cov: Floats | None = None
     cut_off: tuple[int, ...] = ()
+    lifeless: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         """Give arrays without rows their columns, which a recording does not have."""
@@ -126,7 +128,6 @@ class Face(Struct, frozen=True, gc=False):
     eye_opening: opening of the lids divided by the usual one, 0 is shut; None if not found
     mouth_opening_m: gap between the lips, at an adult's size; None if not found
     speaks:        whether the mouth moves like that of a speaking person; None if not found
-    is_alive:      whether it has moved in the last seconds, and not on a screen
     """
 
     id: int
@@ -143,7 +144,6 @@ class Face(Struct, frozen=True, gc=False):
     eye_opening: float | None = None
     mouth_opening_m: float | None = None
     speaks: bool | None = None
-    is_alive: bool = True
 
 
 class Percept(Struct, frozen=True, gc=False):

@@ -164,14 +164,6 @@ def ideal_servos() -> Iterator[None]:
 
 
 @pytest.fixture
-def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw figures small and without finding room for their labels, in a third of the time."""
-    plotting = pytest.importorskip("gazerig.features.lab.report.plotting")
-    monkeypatch.setattr(plotting, "_LAYOUT", None)
-    monkeypatch.setattr(plotting, "_DPI", 30)
-
-
-@pytest.fixture
 def simulated_wires(request: pytest.FixtureRequest) -> Iterator[None]:
     """Serve emulated buses here in simulated time, except to a test that is marked ``pty``."""
     from simulated_wires import simulated_wires as served_here

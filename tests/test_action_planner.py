@@ -115,10 +115,9 @@ def test_a_fist_has_come_on_since_its_picture_was_made() -> None:
         {"speed_m_s": 0.7},
         {"speed_m_s": -2.5},
         {"aside_m": 0.5},
-        {"aside_m": 0.25, "speed_m_s": 1.8},
+        {"aside_m": 0.25, "speed_m_s": 1.8},  # raised to the guard
         {"away_m": 3.0, "speed_m_s": 2.5},
     ],
-    ids=["slowly", "goes back", "passes beside", "raised to the guard", "from afar"],
 )
 def test_what_is_no_punch_is_not_guarded_against(comes: dict[str, float]) -> None:
     assert actions(Bout().see(punch, 10, **comes)) == {"wait"}

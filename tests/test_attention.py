@@ -458,3 +458,28 @@ def test_a_hand_that_reaches_in_is_noticed_though_it_holds_still() -> None:
     noticed = next(look for t, look in looks if look.id == 4)
     assert noticed.why == "hand 4: onset 1.00"
     assert first(looks, "face", 2.0) <= 1.0
+
+
+def test_each_of_three_people_gets_a_first_look_at_once() -> None:
+    model = attention()
+    people = [body(k, "face", (1.0, 0.4 * k, 0.0)) for k in range(3)]
+    assert {look(model, k / 10, *people).id for k in range(20)} == {0, 1, 2}
+
+
+@pytest.mark.parametrize("count", [10, 30])
+def test_nothing_but_a_face_is_new_soon_after_somebody_has_come(count: int) -> None:
+    model = attention()
+    for k in range(count):
+        look(model, k / 10, FACE)
+    found = look(model, count / 10, FACE, body(2, "thing", (0.8, 0.3, 0.0))).saliences
+    assert sum(one.onset for one in found) == (count > 20)
+
+
+def test_a_lifeless_face_gets_a_small_share_and_is_not_remembered() -> None:
+    model, looks = attention(), []
+    for k in range(600):
+        rows = FACE, body(2 + k // 60, "face", (0.7, 0.4, 0.0))
+        seen = percept(k / 20, *rows[: 1 + (k % 60 < 40)])
+        bodies = structs.replace(seen.bodies, lifeless=seen.bodies.ids[1:])
+        looks.append(model.choose(structs.replace(seen, bodies=bodies), looking(), k / 20).id)
+    assert looks.count(1) > 540

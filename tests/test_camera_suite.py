@@ -41,7 +41,7 @@ class TestWebcam(CameraSuite):
         )  # fmt: skip
 
 
-@pytest.mark.parametrize("pixels", [False, True], ids=["ideal", "drawn"])
+@pytest.mark.parametrize("pixels", [False, True])
 class TestScene(CameraSuite):
     @pytest.fixture
     def bench(self, pixels):

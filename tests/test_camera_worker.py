@@ -323,7 +323,6 @@ def test_an_error_as_a_process_closes_its_source_is_reported():
             "camera lost (no new frame): waiting for it",
         ),
     ],
-    ids=["killed", "hangs"],
 )
 def test_a_process_that_ends_or_hangs_is_told_of_and_started_again(end, care, reported):
     camera = process(Ticking, care)

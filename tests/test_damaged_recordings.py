@@ -101,13 +101,9 @@ def _again(file: Path) -> object:
 
 def _reported(file: Path) -> object:
     pytest.importorskip("gazerig.features.lab")
-    from gazerig.features.lab.cli.report import _recording_header
     from gazerig.features.lab.report.report import read_run
 
-    recording = RunRecording(file)
-    about = _recording_header(recording, "x")
-    with report_bad_contents(file):
-        return len(read_run(recording.ticks(), about, lambda words, share: None).rows)
+    return len(read_run(RunRecording(file), lambda words, share: None).run.rows)
 
 
 USES: dict[str, Callable[[Path], object]] = {

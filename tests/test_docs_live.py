@@ -91,8 +91,9 @@ def works_until_ctrl_c(process: subprocess.Popen[str], first: str) -> None:
 def test_commands_to_a_running_head_work(folder: Path) -> None:
     """Of one head for all: the expressive one with the track of the tutorial."""
     [agree] = [b.text for b in blocks("yaml") if b.text.startswith('description: "a small nod')]
-    (folder / "agree.yaml").write_text(agree)
-    own = "\ntrack_files: [agree.yaml]\nsound: {device: silent}\nloop: {rate_hz: 40.0}\n"
+    (folder / "tracks").mkdir()
+    (folder / "tracks" / "agree.yaml").write_text(agree)
+    own = "\nsound: {device: silent}\nloop: {rate_hz: 40.0}\n"
     copy("expressive", folder / "head.yaml", own)
     write_wav(folder / "hello.wav", b"\0\0" * 4800, 16000)
     with gazerig.open("head.yaml", mock=True, scene="face-to-face"):

@@ -36,7 +36,9 @@ for words in COMMANDS:
 """
 
 
-OF_EXTRAS = ("matplotlib", "depthai", "scipy", "jinja2", "mujoco", "ai_edge_litert")
+OF_EXTRAS = (
+    *("matplotlib", "depthai", "scipy", "jinja2", "mujoco", "ai_edge_litert", "distributed"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -64,15 +66,15 @@ def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_d
         tmp_path,
         ("report", "--scene", "face-to-face"),
         ("report", "a.mcap", "b.mcap"),
-        ("sweep", "--set", "gaze.head.eye_only_range_deg=16:56:7"),
+        ("sweep", "--set", "gaze.head.eye_only_range_deg=16:56:7", "--scheduler", "tcp://a:1"),
         ("calibrate", "camera", "--oak", "--what", "lens", "--out", "copy.yaml"),
         ("calibrate", "camera", "desk", "--mock", "--yes"),
     )
-    draws = f"matplotlib is not installed: pip install -e '{ROOT}[report]'"
+    writes = f"jinja2 is not installed: pip install -e '{ROOT}[report]'"
     sees = f"depthai is not installed: pip install -e '{ROOT}[oak]'"
     places = f"scipy is not installed: pip install -e '{ROOT}[calibration]'"
-    writes = f"jinja2 is not installed: pip install -e '{ROOT}[report]'"
-    assert (codes, said) == (["2"] * 5, [writes, writes, draws, sees, places])
+    spreads = f"distributed is not installed: pip install -e '{ROOT}[cluster]'"
+    assert (codes, said) == (["2"] * 5, [writes, writes, spreads, sees, places])
     assert not list(tmp_path.iterdir())
 
 

@@ -5,10 +5,15 @@ import pytest
 from seeing.material import noisy, portrait
 from seeing.row_05_finding_and_placing import after_frames
 
-from gazerig.drivers.types import ImageArray
+from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.preprocess import grey_range, improve_contrast
+from gazerig.drivers.vision.face.preprocess import (
+    FoundFace,
+    grey_range,
+    improve_contrast,
+    new_faces,
+)
 
 PHOTO = portrait("astronaut").image[40:240, 100:340]
 
@@ -38,3 +43,9 @@ def test_a_wall_stays_a_wall() -> None:
 
 def test_a_pale_face_is_found() -> None:
     assert after_frames(face_detector(FaceDetectorParams()), paled(0.15)) == 1
+
+
+def test_a_face_that_is_searched_elsewhere_next_is_still_the_same() -> None:
+    face = DetectedFace((100.0, 50.0, 40.0, 40.0), np.zeros((5, 2)), 0.9)
+    found = [FoundFace(np.array([x, 50.0, x + 40.0, 90.0]), face, True) for x in (100.0, 130.0)]
+    assert len(new_faces(found, [])) == 1

@@ -7,7 +7,7 @@ import pytest
 from gazerig.gaze.angles import rotation, sub, unit
 
 gaze_point_on_face = pytest.importorskip(
-    "gazerig.features.lab.analysis.gaze_on_face"
+    "gazerig.features.lab.report.gaze_trace"
 ).gaze_point_on_face
 
 NOSE = (1.0, 0.2, 0.25)

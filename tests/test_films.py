@@ -123,7 +123,6 @@ def test_film_repeats_and_counts_on(film_file: Path) -> None:
         np.full((40, 30, 4), 9, np.uint8),
         np.full((40, 30), 9 << 8, np.uint16),
     ],
-    ids=["1x1", "alpha", "grey of 16 bits"],
 )
 def test_still_repeats_ten_times_a_second(tmp_path: Path, pixels: Any) -> None:
     file = tmp_path / "still_%02d.png"  # one file, no pattern

@@ -45,8 +45,8 @@ def test_what_moves_within_reach_is_a_hand_from_the_second_frame_on() -> None:
     [patch(v=(0.0, 0.6, 0.0)), patch(p=(2.0, 2.4, 0.0)), patch(p=(2.0, 0.5, -1.9)),
      patch(radius_m=0.6), patch(mark=3, kind="ball"), patch(p=(2.0, 0.1, 0.1)),
      patch(p=(3.4, 0.7, -0.2), depth_measured=True, along_sd_m=0.02)],
-    ids=["hardly moves", "out of reach", "a leg", "a person who passes", "something known",
-         "a head that turns", "measured far behind"],
+    # hardly moves, out of reach, a leg, a person who passes, something known, a head that turns,
+    # measured far behind
 )  # fmt: skip
 def test_what_is_no_hand_is_none(seen: Located) -> None:
     assert HAND not in kinds(Hands(), *[seen] * 5)
@@ -66,7 +66,7 @@ CURTAIN = led((2.0, 1.3, 0.1), (2.0, 1.5, -0.1), radius_m=0.45, thickness_m=0.5)
     "seen",
     [CURTAIN, led((2.0, 1.1, -0.9), (2.0, 0.9, -0.2)), led((2.0, 0.4, -0.4), (2.0, 0.9, -0.9)),
      patch(radius_m=0.08)],
-    ids=["a curtain", "a thing aside", "an elbow", "too small for an arm"],
+    # a curtain, a thing aside, an elbow, too small for an arm
 )  # fmt: skip
 def test_what_moves_within_reach_is_a_thing_without_evidence_of_a_hand(
     seen: Located,
@@ -168,7 +168,6 @@ def coming(growth_1_s: float, sd_1_s: float = 0.3, radius_m: float = 0.2) -> Loc
     ("seen", "first"),
     [(coming(5.0), HAND), (coming(2.0), "thing"), (coming(5.0, sd_1_s=2.0), "thing"),
      (coming(5.0, radius_m=0.05), "thing")],
-    ids=["comes", "slowly", "uncertain", "too small"],
 )  # fmt: skip
 def test_what_comes_at_the_camera_is_a_hand_at_once(seen: Located, first: str) -> None:
     assert kinds(Hands(), seen)[0] == first
@@ -195,10 +194,10 @@ def test_what_is_too_large_for_a_hand_at_the_persons_distance_is_as_near_as_make
 
 @pytest.mark.parametrize(
     "seen",
-    [FIST._replace(compact=False), FIST._replace(radius_m=0.19),
+    [FIST._replace(compact=False),  # an arm
+     FIST._replace(radius_m=0.19),  # a large hand
      FIST._replace(p_m=(0.9, 0.2, -0.1), fastest_m=(0.9, 0.2, -0.1), radius_m=0.13,
              depth_measured=True, along_sd_m=0.02)],
-    ids=["an arm", "a large hand", "its distance is measured"],
 )  # fmt: skip
 def test_other_hands_are_as_far_as_the_person_or_as_measured(seen: Located) -> None:
     hands = Hands()
@@ -211,12 +210,7 @@ def test_other_hands_are_as_far_as_the_person_or_as_measured(seen: Located) -> N
 
 def reaching(wide_m: float, **more: object) -> Located:
     """Return an arm from aside, as wide as given if it were as far away as the person of FACE."""
-    said: dict[str, object] = {
-        "from_side": True,
-        "p": (2.0, 1.1, -0.2),
-        "fastest_m": BESIDE,
-        **more,
-    }
+    said = {"from_side": True, "p": (2.0, 1.1, -0.2), "fastest_m": BESIDE} | more
     return patch(thickness_m=2.1 * wide_m, **said)  # type: ignore[arg-type]
 
 
@@ -236,11 +230,10 @@ def test_an_arm_that_moved_before_it_touched_the_side_does_not_reach_in() -> Non
 
 @pytest.mark.parametrize(
     "seen",
-    [reaching(0.1), reaching(0.17, from_side=False),
-     reaching(0.17, p=(2.0, 0.55, -0.4)),
+    [reaching(0.1),  # as wide as an arm is there
+     reaching(0.17, from_side=False), reaching(0.17, p=(2.0, 0.55, -0.4)),  # from the shoulder
      reaching(0.17, p=(1.0, 0.55, -0.1), fastest_m=(1.0, 0.35, -0.1), radius_m=0.12,
               depth_measured=True, along_sd_m=0.02)],
-    ids=["as wide as an arm is there", "within the image", "from the shoulder", "measured"],
 )  # fmt: skip
 def test_other_arms_are_as_far_as_the_person_or_as_measured_however_wide(
     seen: Located,

@@ -112,6 +112,14 @@ def test_somebody_who_walks_is_seen_while_the_head_turns(speed_deg_s: float, kno
     assert flow == pytest.approx((FOCAL_PX / 2.0, 0.0), abs=0.1 * FOCAL_PX / 2.0)
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_a_thing_comes_in_at_the_side_of_a_camera_whose_turn_is_known(known: bool) -> None:
+    found, _ = watch(
+        ramp(20.0), Board((1.2, 0.1, 2.0), (0.25, 0.25), 1, speed_m_s=1.0), known=known
+    )
+    assert any(blob.from_side for blobs in found[5:] for blob in blobs) is known
+
+
 def test_with_depth_place_and_velocity_are_metric() -> None:
     found, _ = watch(ramp(20.0), WALKER, depth_known=True)
     blob = found[-1][0]

@@ -167,7 +167,8 @@ def test_a_palm_is_no_farther_than_its_person_unless_it_is_measured() -> None:
 
 
 @pytest.mark.parametrize(
-    "palm", [palm_at(P_PALM, 0.6), palm_at((0.1, 0.12, 1.5))], ids=["unsure", "a neck"]
+    "palm",
+    [palm_at(P_PALM, 0.6), palm_at((0.1, 0.12, 1.5))],  # unsure; a neck
 )
 def test_what_is_hardly_a_palm_or_on_the_head_is_no_hand(palm: DetectedPalm) -> None:
     assert [places(percept) for percept in hands(palm)] == [[]] * 30

@@ -84,19 +84,16 @@ def test_a_face_is_as_far_as_the_camera_measures_and_says_so() -> None:
 @pytest.mark.parametrize(
     ("size", "depth_m", "believed"),
     [
-        (1.0, depth_of(1.7), False),
-        (1.0, depth_of(0.6), False),
-        (1.0, depth_of(9.0), False),
-        (1.0, depth_of(1.0, 1.7, width=10), True),
-        (0.65, depth_of(0.65), True),
+        (1.0, depth_of(1.7), False),  # background behind a narrow face
+        (1.0, depth_of(0.6), False),  # a hand before the face
+        (1.0, depth_of(9.0), False),  # far behind
+        (1.0, depth_of(1.0, 1.7, width=10), True),  # background beside the face
+        (0.65, depth_of(0.65), True),  # a child
         (1.3, depth_of(1.3), True),
-        (1.0, np.random.default_rng(1).normal(1.0, 0.3, (HEIGHT, WIDTH)), False),
+        (1.0, np.random.default_rng(1).normal(1.0, 0.3, (HEIGHT, WIDTH)), False),  # no surface
         (1.0, None, False),
     ],
-    ids=["background behind a narrow face", "a hand before the face", "far behind",
-         "background beside the face", "a child", "a large face", "no surface",
-         "no depth"],
-)  # fmt: skip
+)
 def test_depth_that_is_not_the_faces_is_not_taken(
     size: float, depth_m: NDArray[Any] | None, believed: bool
 ) -> None:
@@ -129,17 +126,15 @@ def walking(blob: MovingBlob) -> Percept:
 @pytest.mark.parametrize(
     ("blob", "own"),
     [
-        (blob_at((0.25, 0.5, 1.5), (0.5, 0.0, 0.0)), True),
+        (blob_at((0.25, 0.5, 1.5), (0.5, 0.0, 0.0)), True),  # the trunk
         (blob_at((0.33, 0.67, 2.0), (0.67, 0.0, 0.0), known=False), True),
-        (blob_at((0.26, 0.02, 1.5), (-0.4, 0.4, 0.0)), True),
-        (blob_at((0.25, 0.3, 1.5), (-0.8, 0.6, 0.0)), False),
-        (blob_at((0.25, 0.8, 2.4), (0.5, 0.0, 0.0)), False),
-        (blob_at((0.25, -0.5, 1.5), (0.5, 0.0, 0.0)), False),
+        (blob_at((0.26, 0.02, 1.5), (-0.4, 0.4, 0.0)), True),  # on the head
+        (blob_at((0.25, 0.3, 1.5), (-0.8, 0.6, 0.0)), False),  # a waving arm
+        (blob_at((0.25, 0.8, 2.4), (0.5, 0.0, 0.0)), False),  # far behind
+        (blob_at((0.25, -0.5, 1.5), (0.5, 0.0, 0.0)), False),  # above
         (replace(blob_at((0.25, 0.5, 1.5), (0.5, 0.0, 0.0)), kind="hand"), False),
     ],
-    ids=["trunk", "trunk, distance unknown", "on the head", "waving arm", "far behind",
-         "above", "a hand that is known as one"],
-)  # fmt: skip
+)
 def test_a_persons_own_motion_is_no_second_body(blob: MovingBlob, own: bool) -> None:
     percept = walking(blob)
     assert len(percept.faces) == 1
@@ -218,8 +213,8 @@ def test_the_sway_of_who_stands_is_life_and_the_noise_of_a_photo_is_none(sway_m:
     for k in range(1, 2000):
         face = face_at((sway_m * sin(0.06 * k), 0.0, 1.5))  # 0.3 Hz
         points = face.landmarks_px + rng.normal(0.0, 0.5, (5, 2))
-        (one,) = seen(perception, k, faces=(replace(face, landmarks_px=points),)).faces
-        shown.append(one.is_alive)
+        found = seen(perception, k, faces=(replace(face, landmarks_px=points),))
+        shown.append(not found.bodies.lifeless)
     assert shown[90] and abs(np.mean(shown[180:]) - (sway_m > 0.0)) < 0.1
 
 
@@ -237,5 +232,5 @@ def test_a_face_that_jumps_again_and_again_is_in_a_film() -> None:
     for k in range(1, 300):
         places = 0.1 + k // 60 % 2 / 5, 0.02 * sin(0.2 * k) - 1.0
         faces = tuple(face_at((x, 0.0, 2.0)) for x in places)
-        shown = [face.is_alive for face in seen(perception, k, faces=faces).faces]
-    assert shown == [False, True]
+        found = seen(perception, k, faces=faces)
+    assert found.bodies.lifeless == found.bodies.ids[:1]

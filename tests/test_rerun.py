@@ -110,7 +110,6 @@ def test_a_recording_without_ticks_is_refused(once: Run, tmp_path: Path) -> None
 
 SHOW = """\
 description: a show
-fit: slow
 owns: [neck, eyes]
 cues: {here: 0.8}
 frames:

@@ -14,7 +14,6 @@ from mcap.reader import make_reader
 from msgspec import structs
 from recorded_rigs import Run, recorded
 from recorded_run import exact
-from six_joints import SIX
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
@@ -115,7 +114,7 @@ def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
     samples, *_, beside = write_csv(trace, labels, find_intervals(trace, labels), tmp_path / "six")
     with samples.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == columns(SIX)
+    assert tuple(rows[0]) == columns(load_rig("maker").names)
     lids = ["left_lid", "right_lid", "left_lower_lid", "right_lower_lid"]
     assert [column for column in rows[0] if column.endswith("lid")] == lids
     assert "head_yaw_deg" not in rows[0]
@@ -124,7 +123,7 @@ def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
     assert "" not in {row["x_deg"] for row in rows}
     said = json.loads(beside.read_text())
     assert set(said["basis"].values()) == {"estimated"}
-    assert said["estimated_joints"] == list(SIX)
+    assert said["estimated_joints"] == [*load_rig("maker").names]
 
 
 def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import atan2, cos, dist, pi, sin
+from math import atan2, cos, pi, sin
 
 import numpy as np
 import pytest
@@ -67,13 +67,8 @@ def looked_at(scene: StillPeople, seconds: float, seed: int) -> np.ndarray:
 def _person(kind: str, place: Vec3, places: Sequence[Vec3]) -> int:
     if kind != "face":
         return -1
-    return int(np.argmin([_apart(place, one) for one in places]))
-
-
-def _apart(a: Vec3, b: Vec3) -> float:
-    """Return how far two places are apart as seen from the head, the distance counting little."""
-    rel = [np.subtract(one, HEAD_M) for one in (a, b)]
-    return dist(*[one / np.linalg.norm(one) for one in rel])
+    first, *others = (one / np.linalg.norm(one) for one in np.subtract([place, *places], HEAD_M))
+    return int(np.argmax(others @ first))
 
 
 def gaps_s(looks: np.ndarray, people: int) -> list[float]:

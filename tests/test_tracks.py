@@ -17,8 +17,9 @@ from gazerig.config.tracks import load_track, shipped_tracks
 from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.track.pose_offset import PoseOffset
-from gazerig.gaze.track.track import POSE_CHANNELS, KeyFrame, Track
-from gazerig.gaze.track.track_player import OffsetState, TrackPlayer
+from gazerig.gaze.track.track import LIMIT_SHARE, KeyFrame, Track
+from gazerig.gaze.track.track_motion import TrackMotion
+from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.gaze.types import Floats, GazeCommand
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_limits import lid_spans, limits
@@ -27,20 +28,36 @@ from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.commands import EndTrack, Play, SyncTrack
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.motion_keys import fit_keys, smooth
-from gazerig.robot.model.track_fit import FittedTrack, TrackFit, TrackRefused, track_motions
+from gazerig.robot.model.reply import TrackReply
+from gazerig.robot.model.track_fit import RigTrack, TrackFit, TrackRefused
 from gazerig.robot.model.types import JointAngles, further_joints
 
 RIGS = [name for name in shipped_names("rigs") if name != "minimal"]
 """The shipped rigs but the one without neck and lids, which has nothing to laugh or tilt with."""
 
 
-def fitted(track: Track, name: str = "desk", **at: float) -> FittedTrack:
+class Fitted(NamedTuple):
+    """A track on a shipped rig: its keys, curves, and the reply to its play."""
+
+    placed: RigTrack
+    motion: TrackMotion
+    reply: TrackReply
+
+
+def fitted(track: Track, name: str = "desk", **at: float) -> Fitted:
     """Return a track on a shipped rig, with joints at angles in degrees, else at 0."""
     rig = load_rig(name)
-    joints = rig.names
-    base = np.array([radians(at.get(name, 0.0)) for name in joints])
-    fit = TrackFit(joints, lid_spans(rig))
-    return fit.fit("x", track_motions(track, joints), 1.0, base, limits(rig.joints))
+    base = np.array([radians(at.get(joint, 0.0)) for joint in rig.names])
+    bounds = limits(rig.joints)
+    fit = TrackFit(rig.names, lid_spans(rig))
+    placed = fit.place(track)
+    _, reduced = fit.sizes(placed, base, bounds)
+    motion = fit.motion(placed, bounds)
+    return Fitted(placed, motion, fit.reply("x", placed, motion, reduced))
+
+
+def sampled(motion: TrackMotion) -> Floats:
+    return motion.sample_at(np.arange(0.0, motion.duration_s + 0.1, 0.001))
 
 
 @pytest.mark.parametrize("rig", RIGS)
@@ -52,13 +69,11 @@ def test_every_shipped_track_is_done_by_every_shipped_rig_as_written(name: str, 
         with pytest.raises(TrackRefused, match="left_brow, right_brow"):
             fitted(track, rig)
         return
-    found = fitted(track, rig)
-    assert found.reduced_joints == () and (found.slowed_by == 1.0 or name == "flinch")
-    samples = found.track.motion.samples
-    assert np.abs(samples.value).max() > radians(3.0)
-    for end in (0, -1):
-        for column in samples[1:]:
-            assert np.abs(column[end]).max() < 1e-9
+    _, motion, reply = fitted(track, rig)
+    assert reply.reduced_joints == () and (reply.slowed_by == 1.0 or name == "flinch")
+    samples = sampled(motion)
+    assert np.abs(samples[0]).max() > radians(3.0)
+    assert np.abs(samples[:, [0, -1]]).max() < 1e-9
 
 
 def spline_of_least_jerk(times: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
@@ -99,55 +114,50 @@ def test_a_curve_rests_where_it_turns_and_never_swings_past() -> None:
     assert np.abs(np.gradient(speed, 5e-4) - acceleration)[5:-5].max() < 20.0
 
 
-def nod(**more: object) -> Track:
-    frames = (KeyFrame(0.2, head_pitch_deg=-8.0), KeyFrame(0.5, head_pitch_deg=0.0))
-    return Track("a nod", frames, **more)  # type: ignore[arg-type]
+def nod() -> Track:
+    return Track("a nod", (KeyFrame(0.2, head_pitch_deg=-8.0), KeyFrame(0.5, head_pitch_deg=0.0)))
 
 
-def test_too_fast_is_refused_with_joint_time_and_limit_or_slowed() -> None:
-    fast = (KeyFrame(0.05, head_pitch_deg=-10.0),)
-    with pytest.raises(
-        TrackRefused, match=r"neck_pitch at 0\.0\d s: needs \d+ deg/s2, but tracks may use 1600"
-    ):
-        fitted(Track("a jerk", fast))  # fmt: skip
-    slow = fitted(Track("a jerk", fast, fit="slow"))
+def test_only_segments_that_are_too_fast_take_longer() -> None:
+    fast = (KeyFrame(1.0, head_pitch_deg=-10.0), KeyFrame(1.05, head_pitch_deg=0.0))
+    held = (KeyFrame(2.05, head_pitch_deg=0.0), KeyFrame(3.05, head_pitch_deg=5.0))
+    _, motion, reply = fitted(Track("a jerk", (*fast, *held)))
     # 10 deg in 50 ms peak at 5.7735 x 10 / .05^2 = 23094 deg/s2; 1600 may be used.
-    assert slow.slowed_by == pytest.approx((23094.0 / 1600.0) ** 0.5, rel=0.01)
-    assert slow.slow_joint == "neck_pitch"
-    most = np.abs(slow.track.motion.samples.scale(np.array(slow.track.sizes), slow.track.speed).acceleration)  # fmt: skip
-    assert degrees(most.max()) == pytest.approx(1600.0, rel=0.01)
+    longer_s = 0.05 * ((23094.0 / 1600.0) ** 0.5 - 1.0)
+    assert motion.duration_s == pytest.approx(3.45 + longer_s, abs=0.003)
+    assert reply.slowed_by == pytest.approx(1.0 + longer_s / 3.45, abs=0.001)
+    assert degrees(np.abs(sampled(motion)[2]).max()) == pytest.approx(1600.0, rel=0.01)
+    for before_s, after_s in ((1.0, 1.0), (2.05, 2.05 + longer_s)):
+        assert motion.position_at(after_s) == pytest.approx(before_s, abs=0.003)
+    assert motion.rate < 1.0
+
+
+def test_a_track_that_begins_in_motion_is_led_in_from_rest() -> None:
+    frames = tuple(KeyFrame(0.02 + 0.1 * i, head_yaw_deg=12.0 + 2.0 * i) for i in range(8))
+    motion = fitted(Track("a part of a turn", frames)).motion
+    lead_s = -motion.position_at(0.0)
+    assert 0.1 < lead_s < 0.5 and motion.rate == 1.0  # the rest keeps its times
+    value, speed, acceleration = motion.sample_at(np.arange(0.0, lead_s + 0.8, 0.001))[:, :, 0]
+    assert value[0] == speed[0] == acceleration[0] == 0.0
+    assert degrees(np.abs(acceleration).max()) < 1.001 * LIMIT_SHARE * 2000.0
+    (at,) = motion.sample_at(np.array([lead_s + 0.42]))[0, :, 0]
+    assert degrees(at) == pytest.approx(20.0, abs=1e-6)
 
 
 def test_at_the_end_of_a_range_it_is_smaller_or_refused() -> None:
-    with pytest.raises(TrackRefused, match="neck_pitch leaves its range: it can move 50% as far"):
-        fitted(nod(), neck_pitch=-31.0)  # fmt: skip
-    found = fitted(nod(fit="slow"), neck_pitch=-31.0)
-    assert found.reduced_joints == (("neck_pitch", pytest.approx(0.5)),)
+    reply = fitted(nod(), neck_pitch=-31.0).reply
+    assert reply.reduced_joints == (("neck_pitch", pytest.approx(0.5)),)
     with pytest.raises(TrackRefused, match="neck_pitch is at the end of its range"):
-        fitted(nod(fit="slow"), neck_pitch=-34.5)
+        fitted(nod(), neck_pitch=-34.5)
 
 
-def test_joints_that_a_rig_lacks_are_left_out_where_optional_else_refused_by_name(
-    desk_rig: Rig,
-) -> None:
+def test_joints_that_a_rig_lacks_are_left_out_where_optional_else_refused_by_name() -> None:
     jaw = (KeyFrame(0.3, head_pitch_deg=5.0, joints_deg={"jaw": 10.0}),)
     with pytest.raises(TrackRefused, match="it moves jaw, which this rig lacks"):
         fitted(Track("a yawn", jaw))
-    made = track_motions(Track("a yawn", jaw, optional=("jaw",)), desk_rig.names)
-    assert made.left_out == ("jaw",)
+    assert fitted(Track("a yawn", jaw, optional=("jaw",))).placed.left_out == ("jaw",)
     with pytest.raises(TrackRefused, match="this rig has none of the joints"):
-        track_motions(Track("a yawn", (KeyFrame(0.3, joints_deg={"jaw": 9.0}),), optional=("jaw",)), desk_rig.names)  # fmt: skip
-
-
-def test_in_joint_space_the_eyes_go_along_with_the_head(desk_rig: Rig) -> None:
-    for space, follows in (("gaze", 0.0), ("joint", 1.0)):
-        motion = track_motions(nod(space=space), desk_rig.names).motion
-        flat = [0.0] * len(POSE_CHANNELS)
-        motion.add_to(flat, 0.2, (1.0,) * len(flat))
-        assert flat[1] == pytest.approx(radians(-8.0))
-        assert flat[POSE_CHANNELS.index("eyes_pitch")] == pytest.approx(follows * radians(-8.0))
-        eyes = motion.samples.value[:, POSE_CHANNELS.index("eyes_pitch")]
-        assert np.allclose(eyes, follows * motion.samples.value[:, 1])
+        fitted(Track("a yawn", (KeyFrame(0.3, joints_deg={"jaw": 9.0}),), optional=("jaw",)))
 
 
 LONG = "frames:\n" + "".join(
@@ -172,31 +182,24 @@ BAD = {
         "frames.0.joints_deg.neck_yaw",
         "head_yaw_deg",
     ),
-    "fit: maybe\nframes:\n  - {time_s: 0.5, head_yaw_deg: 1}\n": ("fit", "slow"),
     "frames:\n  - {time_s: 1, look_at: [1, .nan, 2]}\n": ("frames.0", "give [x, y, z]"),
-    "frames:\n  - {time_s: 1, look_at: nobody}\n": ("frames.0", "person, or null"),
     "cues: {a: 1, a: 2}\nframes: [{time_s: 2, look_at: 3}]\n": ("cues.a", "duplicate key"),
     "cues: {a: 9}\nframes: [{time_s: 2, look_at: 3}]\n": ("cues.a", "after the last frame"),
     "owns: [Neck]\nframes: [{time_s: 2, look_at: 3}]\n": ("owns.0", "neck, eyes, lids"),
     "sound: ../x.wav\n": ("sound", "and below can be named"),
-    LONG.replace("time_s: 7,", "time_s: 3,"): ("frames.6.time_s", "which is at 6 s"),
-    LONG.replace("time_s: 7,", "time_s: .nan,"): ("frames.6.time_s", "wanted a number"),
     LONG.replace("time_s: 7, head", "time_s: 7, heat"): ("frames.6.heat_yaw_deg", "head_yaw_deg"),
 }
 
 
-def test_a_long_track_is_one_curve_and_a_longer_file_is_refused(
-    desk_rig: Rig, tmp_path: Path
-) -> None:
+def test_a_long_track_is_one_curve_and_a_longer_file_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "long.yaml"
-    file.write_text(f"description: long\nfit: slow\n{LONG}cues: {{a: 4}}\n", encoding="utf-8")
+    file.write_text(f"description: long\n{LONG}cues: {{a: 4}}\n", encoding="utf-8")
     track = load_track(file)
     assert len(track.frames) == 5000 and track.frames[6].look_at == "person" and track.cues
-    motion = track_motions(track, desk_rig.names).motion
-    assert motion.duration_s > 5000.0 and len(motion.samples.times_s) < 100
-    every = motion.sample_at(np.arange(0.0, 60.0, 0.005))
-    for part, whole in zip(every[1:], motion.samples[1:], strict=True):
-        assert part.max() <= whole.max() * 1.02 and part.min() >= whole.min() * 1.02
+    motion = fitted(track).motion
+    assert motion.duration_s == motion.length_s > 5000.0
+    yaw = np.degrees(motion.sample_at(np.array([1.0, 7.0, 4999.0]))[0, :, 0])
+    assert yaw == pytest.approx([0.0, 1.0, 3.0])
     file.write_bytes(b"frames:\n" + b"  - {time_s: 1, look_at: 1}\n" * 750_000)
     with pytest.raises(ConfigError, match="larger than the 20 MB that"):
         load_track(file)
@@ -227,13 +230,6 @@ def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> Non
     curve = MinimumJerkCurve(float(values_deg[0]), found.tolist(), values.tolist())
     assert np.abs(curve.sample_at(even)[0] - values_deg).max() <= TOLERANCE_DEG
     assert np.abs(curve.sample_at(times - times[0])[0] - truth).max() < TOLERANCE_DEG + 0.6
-    held = np.concatenate((values_deg, np.full(50, values_deg[-1]), values_deg[::-1]))
-    long = np.tile(np.concatenate((held, np.full(50, values_deg[0]))), 20)
-    times = np.arange(len(long)) * (even[1] - even[0])
-    many, values = fit_keys(times, long, TOLERANCE_DEG)
-    curve = MinimumJerkCurve(float(long[0]), many.tolist(), values.tolist())
-    assert np.abs(curve.sample_at(times)[0] - long).max() <= TOLERANCE_DEG
-    assert len(many) <= 20 * (2 * len(found) + 4)
     still = fit_keys(even, np.full(len(even), 3.0), TOLERANCE_DEG)
     assert len(still[0]) == 0
 
@@ -243,20 +239,6 @@ def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> Non
 
 DT_S = 0.01
 TARGET = (1.0, 0.0, 0.25)
-
-
-class Moments(NamedTuple):
-    """What a chain of interrupted tracks asked of the joints.
-
-    step_deg, speed_share, accel_share: (joints,) largest step in a tick, and largest speed and
-        acceleration over the joint's limit
-    began: tracks that were begun
-    """
-
-    step_deg: Floats
-    speed_share: Floats
-    accel_share: Floats
-    began: int
 
 
 def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
@@ -276,9 +258,13 @@ def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
     return np.array([angles(one) for one in offsets])
 
 
-def interrupted(track: str, rig_name: str, moments: int, seed: int) -> Moments:
-    """Play a track and, at random moments, another one, the same again, or nothing."""
-    rig, random = load_rig(rig_name), np.random.default_rng(seed)
+def interrupted(track: str, rig_name: str, moments: int) -> tuple[Floats, Sequence[JointLimit]]:
+    """Play a track and, at random moments, another one, the same again, or nothing.
+
+    Returns:
+        (n, joints) angles in each tick, and the limits of the joints.
+    """
+    rig, random = load_rig(rig_name), np.random.default_rng(len(track))
     player = TrackPlayer(len(further_joints(rig.joints)))
     choices = TrackChoices(shipped_tracks(), player, rig.names, lid_spans(rig))
     bounds, others = limits(rig.joints), (*choices.names, track, track, "")
@@ -292,15 +278,8 @@ def interrupted(track: str, rig_name: str, moments: int, seed: int) -> Moments:
         for _ in range(int(random.integers(1, round(0.25 / DT_S)))):
             t += DT_S
             offsets.append(player.step(t))
-    angles = joint_angles(rig_name, offsets)
-    step = np.abs(np.diff(angles, axis=0)).max(axis=0)
-    accel = np.abs(np.diff(angles, 2, axis=0)).max(axis=0) / DT_S**2
-    return Moments(
-        np.degrees(step),
-        step / DT_S / [one.speed_rad_s for one in bounds],
-        accel / [one.accel_rad_s2 for one in bounds],
-        began,
-    )
+    assert began > 0.7 * moments
+    return joint_angles(rig_name, offsets), bounds
 
 
 TRACKS = shipped_names("tracks")
@@ -311,11 +290,12 @@ RIG_OF = dict(
 
 @pytest.mark.parametrize("track", TRACKS)
 def test_no_joint_jumps_or_breaks_a_limit_at_400_random_moments(track: str) -> None:
-    found = interrupted(track, RIG_OF[track], 400, seed=len(track))
-    assert found.began > 280
-    assert found.step_deg.max() > 0.1  # something has moved
-    assert found.speed_share.max() < 1.0
-    assert found.accel_share.max() < 1.0
+    angles, bounds = interrupted(track, RIG_OF[track], 400)
+    speed = np.abs(np.diff(angles, axis=0)).max(axis=0) / DT_S
+    acceleration = np.abs(np.diff(angles, 2, axis=0)).max(axis=0) / DT_S**2
+    assert speed.max() * DT_S > radians(0.1)  # something has moved
+    assert (speed < [one.speed_rad_s for one in bounds]).all()
+    assert (acceleration < [one.accel_rad_s2 for one in bounds]).all()
 
 
 # --- Tracks in a show: another clock at random, several at once, joints of their own
@@ -339,6 +319,15 @@ class Show(NamedTuple):
         assert reply.track is not None, reply
         return reply.track.number
 
+    def strain(self, speed: Floats, acceleration: Floats) -> float:
+        """Return the factor by which offsets must be slower to keep the share of all limits."""
+        matrix = TrackFit(rig().names, lid_spans(rig()))._matrix
+        shares = [
+            np.abs(column @ matrix) / [LIMIT_SHARE * one[kind] for one in self.bounds]
+            for column, kind in ((speed, 2), (acceleration, 3))
+        ]
+        return float(max(shares[0].max(), np.sqrt(shares[1].max())))
+
     def end(self, t_s: float, track: str = "") -> str:
         return self.choices.end(EndTrack(track), t_s, self.bounds).refused
 
@@ -361,7 +350,7 @@ def long_track(seconds: float, seed: int) -> Track:
         )
         for t in times
     )
-    return Track("a show", frames, fit="slow", cues={"middle": seconds / 2})
+    return Track("a show", frames, cues={"middle": seconds / 2})
 
 
 def test_a_show_of_an_hour_with_200_corrections_keeps_all_limits() -> None:
@@ -375,13 +364,12 @@ def test_a_show_of_an_hour_with_200_corrections_keeps_all_limits() -> None:
         off_s = float(random.choice([0.01, 0.1, -0.2, 2.0]))
         it.choices.sync(SyncTrack(1, max(0.0, voice.position_s(t) + off_s)), t)
         after = it.player.state(t)
-        for was, now in zip(before[:2], after[:2], strict=True):
-            assert np.abs(was - now).max() < 1e-9
+        assert np.abs(before[:2] - after[:2]).max() < 1e-9
         for _ in range(18):
             t += 0.2
             it.player.step(t)
             _, speed, acceleration = it.player.state(t)
-            worst = max(worst, voice.played.stretch(speed[None], acceleration[None]))
+            worst = max(worst, it.strain(speed, acceleration))
     assert 0.4 < worst <= 1.06, worst
 
 
@@ -390,20 +378,21 @@ def test_a_track_that_begins_in_its_middle_grows_from_rest_within_limits(at_s: f
     it = show(minute=long_track(60.0, 3))
     it.play("minute", 0.0, from_s=at_s)
     (voice,) = it.player.voices
-    assert not it.player.state(0.0).value.any() and voice.position_s(0.0) == at_s
+    assert not it.player.state(0.0).any() and at_s - 0.6 < voice.position_s(0.0) < at_s
     times = np.arange(0.0, 2.0, 0.005)
-    states = [it.player.state(t) for t in times.tolist()]
-    value, speed, acceleration = (np.array([one[i] for one in states]) for i in range(3))
-    assert voice.played.stretch(speed, acceleration) <= 1.0 + 1e-3
-    assert speed[1:] == pytest.approx(np.diff(value, axis=0) / 0.005, abs=0.02)
+    value, speed, acceleration = np.moveaxis(
+        np.array([it.player.state(t) for t in times.tolist()]), 1, 0
+    )
+    assert it.strain(speed, acceleration) <= 1.0 + 2e-3
+    assert speed[1:-1] == pytest.approx((value[2:] - value[:-2]) / 0.01, abs=0.02)
     offsets = np.array([it.player.step(t).to_flat() for t in times.tolist()])
     assert offsets - offsets[0] == pytest.approx(value, abs=1e-9)
 
 
 def test_other_channels_run_together_and_the_same_replace() -> None:
-    pitch = Track("p", (KeyFrame(2.0, head_pitch_deg=5.0),), fit="slow")
-    jaw = Track("j", (KeyFrame(2.0, joints_deg={"jaw": 5.0}),), fit="slow", owns=("jaw",))
-    talk = Track("t", (KeyFrame(2.0, joints_deg={"jaw": 3.0}),), fit="slow")
+    pitch = Track("p", (KeyFrame(2.0, head_pitch_deg=5.0),))
+    jaw = Track("j", (KeyFrame(2.0, joints_deg={"jaw": 5.0}),), owns=("jaw",))
+    talk = Track("t", (KeyFrame(2.0, joints_deg={"jaw": 3.0}),))
     it = show(pitch=pitch, jaw=jaw, talk=talk)
     it.play("pitch", 0.0)
     it.play("jaw", 0.1)
@@ -416,7 +405,7 @@ def test_other_channels_run_together_and_the_same_replace() -> None:
     states = it.choices.states(0.6)
     assert [one.name for one in states if one.is_playing] == ["pitch", "talk"]
     assert states[1].end_reason == "another track: talk"
-    assert not it.choices.ends_show(Play("talk")) and not it.choices.ends_show(Play("pitch"))
+    assert not it.choices.ends_show(Play("talk"), it.bounds)
     assert it.end(0.7) == ""
     it.player.step(0.7)
     assert not [one for one in it.choices.states(0.7) if one.is_playing]
@@ -424,15 +413,15 @@ def test_other_channels_run_together_and_the_same_replace() -> None:
 
 
 def test_a_jaw_that_is_interrupted_in_a_syllable_comes_to_rest_at_once() -> None:
-    state = OffsetState(*np.zeros((3, 12)))
-    state.value[9], state.speed[9], state.acceleration[9] = 0.152, -3.22, -140.0
+    state = np.zeros((3, 12))
+    state[:, 9] = 0.152, -3.22, -140.0
     assert TrackFit(rig().names, lid_spans(rig())).fade_s(state, limits(rig().joints), 0.25) < 1.0
 
 
 def test_an_owned_jaw_goes_from_the_present_angle_to_the_track_and_back() -> None:
     jaw = Track(
         "j", tuple(KeyFrame(float(s), joints_deg={"jaw": 2.0 + s % 2}) for s in range(1, 9)),
-        fit="slow", owns=("jaw",), blend_in_s=0.5, blend_out_s=0.8,
+        owns=("jaw",),
     )  # fmt: skip
     it = show(jaw=jaw)
     it.play("jaw", 0.0)
@@ -452,7 +441,7 @@ def test_an_owned_jaw_goes_from_the_present_angle_to_the_track_and_back() -> Non
 
 def test_cues_loops_and_a_clock_of_a_sound() -> None:
     frames = (KeyFrame(1.0, head_pitch_deg=3.0), KeyFrame(2.0, head_pitch_deg=0.0))
-    it = show(hello=Track("h", frames, fit="slow", cues={"top": 1.0, "end": 1.9}, loop=True))
+    it = show(hello=Track("h", frames, cues={"top": 1.0, "end": 1.9}, loop=True))
     number = it.play("hello", 0.0)
     t, cues = 0.0, list[tuple[int, str]]()
     for _ in range(1004):
@@ -471,7 +460,7 @@ def test_cues_loops_and_a_clock_of_a_sound() -> None:
     assert state.position_s == pytest.approx((1.12 + 4.0) % 2.0, abs=0.012)
     assert state.clock == "sound"
     with pytest.raises(ValueError, match="has no cue 'no'; available: top, end"):
-        it.choices.require(Play("hello", from_s="no"))
+        it.choices.require(Play("hello", from_s="no"), it.bounds)
     it.play("hello", t, from_s="top")
     (playing,) = [one for one in it.choices.states(t) if one.is_playing]
     assert playing.position_s <= 1.0

@@ -20,11 +20,6 @@ def gaze_angles(pose: GazeState) -> Angles2:
     return yaw_pitch(_cyclopean(pose))
 
 
-def angles_of_place(p_world_m: Vec3, pose: GazeState) -> Angles2:
-    """Return yaw and pitch in the world from the midpoint of the eyes to a point."""
-    return yaw_pitch(sub(p_world_m, _middle(pose)))
-
-
 def gaze_error_rad(p_world_m: Vec3, pose: GazeState) -> float:
     """Return the angle between the measured gaze and a point, from the midpoint of the eyes."""
     return angle_between(_cyclopean(pose), sub(p_world_m, _middle(pose)))

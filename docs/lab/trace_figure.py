@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from gazerig.config.schema import load_rig
-from gazerig.features.lab.analysis.human_norms import evoked_blink_probability, mean_head_deg
+from gazerig.features.lab.analysis.human_norms import mean_head_deg
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.gaze.angles import yaw_pitch
 from gazerig.robot.app.options import RunOptions
@@ -34,6 +34,11 @@ class Trace(NamedTuple):
     gaze_deg: np.ndarray
     head_deg: np.ndarray
     lid: np.ndarray
+
+
+def evoked_blink_probability(amplitude_deg: float) -> float:
+    """Return a blink's probability with a gaze shift: .5 at 17, .97 at 33 deg (Evinger 1994)."""
+    return float(1.0 / (1.0 + np.exp(-0.217 * (amplitude_deg - 17.0))))
 
 
 def of_profile(profile: str) -> Trace:

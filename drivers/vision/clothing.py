@@ -8,7 +8,7 @@ value, weighted by distance, so that small changes of light or noise have a smal
 from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -85,7 +85,10 @@ def clothing_colours(
     seen = ((ys >= 0.0) & (ys < height))[:, None] & (xs >= 0.0) & (xs < width)
     for other in covering:
         if other is not None and other.px_m > head.px_m * _NEARER:
-            seen &= ~_covered_mask(other, xs, ys)
+            aside, below = np.abs(xs - other.x) / other.px_m, (ys - other.y) / other.px_m
+            face = (below > -_HEAD_UP_M)[:, None] & (aside < _HEAD_HALF_M)
+            body = (below > _HEAD_HALF_M)[:, None] & (aside < _BODY_HALF_M)
+            seen &= ~(face | body)
     share = float(seen.mean())
     if share < _LEAST_SHARE:
         return None
@@ -96,15 +99,6 @@ def clothing_colours(
     both = np.concatenate([light, chroma.ravel()]) / np.float32(2 * len(lab))
     # The squares of these roots of the bins' shares add up to 1.
     return Clothing(tuple(np.sqrt(both, dtype=np.float64).round(4).tolist()), round(share, 3))
-
-
-def _covered_mask(
-    by: _Head, xs: NDArray[np.floating[Any]], ys: NDArray[np.floating[Any]]
-) -> NDArray[np.bool_]:
-    """Return a mask of the grid of pixels that a nearer person covers."""
-    aside, below = np.abs(xs - by.x) / by.px_m, (ys - by.y) / by.px_m
-    head = (below > -_HEAD_UP_M)[:, None] & (aside < _HEAD_HALF_M)
-    return np.asarray(head | ((below > _HEAD_HALF_M)[:, None] & (aside < _BODY_HALF_M)))
 
 
 def face_head(face: DetectedFace) -> _Head | None:

@@ -18,11 +18,11 @@ SCAN = CommandEntry(
 )
 SETUP = CommandEntry(
     "gazerig.features.bringup.cli.setup",
-    "Set id and baud rate of the servos, connected one at a time; print a board's settings.",
+    "Set id and baud rate of the servos, connected one at a time.",
     "Bring-up",
     examples={
         "setup": (
-            ("setup my.yaml", "give new servos their ids, one at a time; a board's settings"),
+            ("setup my.yaml", "give new servos their ids, one at a time"),
             ("setup my.yaml --joint neck_yaw", "one servo only"),
         )
     },

@@ -16,20 +16,18 @@ REPORT = CommandEntry(
 )
 SWEEP = CommandEntry(
     "gazerig.features.lab.cli.sweep",
-    "Vary parameters over many simulated runs; write a table and a figure of the responses.",
+    "Vary parameters over many simulated runs; write a table of all runs as CSV.",
     SPECIALIST,
     examples={
         "sweep": (
             (
                 "sweep --set gaze.head.eye_only_range_deg=16:56:7 --seeds 8",
-                "a table and curves of 56 runs",
+                "a table of 56 runs, made on all processors",
             ),
             (
-                "sweep --set gaze.lids.blinks_per_min=8:30:5 --set gaze.lids.close_ms=50,75",
-                "a heat map",
+                "sweep --set gaze.lids.close_ms=50,75 --scheduler tcp://lab1:8786",
+                "the same on the machines of a Dask scheduler",
             ),
-            ("sweep my.yaml --set gaze.head.base_speed_deg_s=40:120 --samples 50", "a sample"),
-            ("sweep my.yaml --fit --set gaze.lids.blinks_per_min=4:40", "what is most like people"),
         ),
     },
 )

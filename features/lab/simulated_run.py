@@ -8,7 +8,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.session import ComposedRun, Session, run
+from gazerig.robot.app.session import ComposedRun, run
 from gazerig.robot.control.tick import Tick
 
 
@@ -37,7 +37,8 @@ def simulate(
         gazerig.config.load.ConfigError: a file that the rig names has a fault.
         SetupError: the options do not fit the rig, or the run ended with a fault.
     """
-    builder, failures = GazeTraceBuilder(), list[Exception]()
+    builder = GazeTraceBuilder(ideal_servos=options.bus == "ideal")
+    failures = list[Exception]()
 
     def update(tick: Tick) -> None:
         try:
@@ -55,17 +56,3 @@ def simulate(
     if stopped_by.startswith("fault"):
         raise SetupError(f"the simulated run ended by a {stopped_by}")
     return SimulatedRun(figures, builder.trace())
-
-
-def refuse_unfit(rig: Rig, options: RunOptions) -> None:
-    """Refuse options with which a run of a rig could not start; nothing runs.
-
-    Raises:
-        gazerig.config.load.ConfigError: a file that the rig names has a fault.
-        SetupError: the options do not fit the rig.
-    """
-    made = assemble(rig, options)
-    try:
-        Session(ComposedRun(options, made, None, None), lambda: None, lambda line: None)
-    finally:
-        made.close()

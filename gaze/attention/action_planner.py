@@ -344,11 +344,11 @@ def _lowered(hand: SeenHand) -> SeenHand:
 
 def hit_places(face: Face, hands: Sequence[SeenHand], p_eye: Vec3) -> list[HitTarget]:
     """Return the places to hit, those with the most room around the line first."""
-    known = dict(zip(PARTS, face.parts_world_m, strict=False))
+    known = dict(zip(PARTS, face.parts_world_m, strict=True))
     spots = {
         "chest": add(face.p_world_m, CHEST_M),
-        "left side of the face": known.get("FL", face.p_world_m),
-        "right side of the face": known.get("FR", face.p_world_m),
+        "left side of the face": known["FL"],
+        "right side of the face": known["FR"],
     }
     found = [
         HitTarget(name, p, min((_distance_from_line(add(face.p_world_m, hand.off_m), p_eye, p) for hand in hands),

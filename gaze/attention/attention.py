@@ -243,7 +243,8 @@ class Attention:
         self._persons.update(percept, eye)
         rows, speaking = percept.bodies.rows(), self._persons.speaking
         if self._social:
-            rows = self._memory.step(rows, self._identity[1], captured_s)
+            lifeless = percept.bodies.lifeless
+            rows = self._memory.step(rows, self._identity[1], captured_s, lifeless)
             if not speaking:
                 guesses = t_s - self._turned_s > _TURNS_S
                 speaking = self._persons.may_speak(rows) if guesses else self._speakers
@@ -330,10 +331,11 @@ class Attention:
         )
         worth = dict.fromkeys(rows.ids, 1.0)
         for face in percept.faces if self._social else ():
-            if not face.is_alive:
-                worth[face.id] = _LIFELESS
-            elif face.looks_at_head is False and not face.speaks:
+            if face.looks_at_head is False and not face.speaks:
                 worth[face.id] = _LOOKS_ELSEWHERE
+        lifeless = percept.bodies.lifeless if self._social else ()
+        worth |= dict.fromkeys(lifeless, _LIFELESS)
+        self._met.update(lifeless)  # the first look at a person is for the living
         unseen = rows.ids[len(percept.bodies) :]
         self._cut_off = (*percept.bodies.cut_off, *unseen)
         edge = set(percept.bodies.cut_off).difference(own) if self._social else _NO_ONE

@@ -326,7 +326,8 @@ class ConversationGaze:
         if not self._why and (
             t_s >= self._place_until_s or _is_on_face(self._away, centre, p_world_head_m)
         ):  # also if the person has moved into the look away
-            self._move_on(target, p_world_head_m, t_s)
+            way = self._way + radians(_WANDERS_DEG) * float(self._rng.uniform(-1.0, 1.0))
+            self._go_towards(way, target, p_world_head_m, t_s)
         return self._away_target(target, self._away, t_s)
 
     def _count(self, target: Target) -> Target:
@@ -395,20 +396,11 @@ class ConversationGaze:
             return
         away_s, averts = self._averts_s, self._averts_s is not None
         self._averts_s = None
-        self._avert(target, p_world_head_m, t_s)
+        self._why = ""
+        self._go_towards(radians(self._draw_direction_deg()), target, p_world_head_m, t_s)
         self._until_s = t_s + (self._draw_away_s() if away_s is None else away_s)
         if averts:
             self._kept_until_s = self._until_s
-
-    def _avert(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
-        """Look at a place next to the face."""
-        self._why = ""
-        self._go_towards(radians(self._draw_direction_deg()), target, p_world_head_m, t_s)
-
-    def _move_on(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
-        """Look at the next place of a look away."""
-        way = self._way + radians(_WANDERS_DEG) * float(self._rng.uniform(-1.0, 1.0))
-        self._go_towards(way, target, p_world_head_m, t_s)
 
     def _go_towards(self, way: float, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
         """Look past the edge of the face in a direction, 0 right and pi/2 up, at its distance.

@@ -6,6 +6,7 @@ gaze does not find is forgotten. So is the last visible face if it is lost under
 searches for it (gazerig.gaze.attention.idle).
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from math import dist, inf
 
@@ -39,13 +40,20 @@ class FaceMemory:
         self._faces: dict[int, _RememberedFace] = {}
         self._captured_s = -inf
 
-    def step(self, rows: BodyRows, attended_id: int, captured_s: float) -> BodyRows:
+    def step(
+        self,
+        rows: BodyRows,
+        attended_id: int,
+        captured_s: float,
+        lifeless: Collection[int] = (),
+    ) -> BodyRows:
         """Return the bodies of a new frame with the remembered faces behind them.
 
         Args:
             rows: bodies in the frame.
             attended_id: the present target; -1 for none.
             captured_s: capture time of the frame.
+            lifeless: ids of faces that are not remembered.
         """
         before, self._captured_s = self._captured_s, captured_s
         alone = "face" not in rows.kinds
@@ -59,8 +67,10 @@ class FaceMemory:
             another = any(dist(face.p_world_m, p) < _SAME_M for p in rows.p_world_m)
             if lost or another or not_found or captured_s - face.seen_s > _LASTS_S:
                 del self._faces[id]
+        for id in lifeless:
+            self._faces.pop(id, None)
         for id, kind, p in zip(rows.ids, rows.kinds, rows.p_world_m, strict=True):
-            if kind == "face":
+            if kind == "face" and id not in lifeless:
                 self._faces[id] = _RememberedFace(p, captured_s)
         rest = {id: face.p_world_m for id, face in self._faces.items() if id not in rows.ids}
         still = [_STILL] * len(rest)

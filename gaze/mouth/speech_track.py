@@ -2,18 +2,16 @@
 
 from collections.abc import Sequence
 
-from gazerig.gaze.mouth.mouth_keys import MouthKey
 from gazerig.gaze.track.track import KeyFrame, Track
 
 SPEECH = "speech"
 """Name of the track."""
 
 _FIRST_S = 0.02
-_RETURN_S = 0.3
 
 
 def speech_track(
-    sound: str, duration_s: float, level: str, mouth: Sequence[MouthKey], volume: float
+    sound: str, duration_s: float, level: str, mouth: Sequence[tuple[float, float]], volume: float
 ) -> Track:
     """Return the sound and the mouth of a speech as a track.
 
@@ -25,10 +23,10 @@ def speech_track(
         volume: Volume of the sound.
     """
     frames = [
-        KeyFrame(key.time_s, levels={level: key.opening})
-        for key in (mouth if level else ())
-        if key.time_s >= _FIRST_S
+        KeyFrame(time_s, levels={level: opening})
+        for time_s, opening in (mouth if level else ())
+        if time_s >= _FIRST_S
     ]
     if not frames and not sound:  # a lid's factor 1 moves nothing
         frames = [KeyFrame(max(duration_s, _FIRST_S), lids={"all": 1.0})]
-    return Track(SPEECH, tuple(frames), fit="slow", return_s=_RETURN_S, sound=sound, volume=volume)
+    return Track(SPEECH, tuple(frames), sound=sound, volume=volume)

@@ -75,6 +75,6 @@ class Animation:
     @property
     def loudness(self) -> float | None:
         """Return the loudness 0..1 of a speech by its mouth, 1 without one; None: no speech."""
-        if not any([one.played.name == SPEECH for one in self.tracks.voices]):
+        if not any([one.name == SPEECH for one in self.tracks.voices]):
             return None
         return 1.0 if self._mouth is None else self._mouth.value_of(self._sum)

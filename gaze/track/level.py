@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf
 from typing import Annotated, NamedTuple
 
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
@@ -44,23 +43,9 @@ class LevelRange(NamedTuple):
         return min(max((now - low) / (high - low or 1.0), 0.0), 1.0)
 
 
-class _Level:
-    """Motion of one level to its value."""
-
-    def __init__(self, span: LevelRange) -> None:
-        self.span = span
-        self.value, self.until_s = 0.0, inf
-        self.blend = MinimumJerkBlend((0.0,), span.smoothing_s)
-
-    def set(self, value: float, until_s: float) -> None:
-        self.value, self.until_s = value, until_s
-        self.blend.move_to((value,))
-
-
 class Levels:
     """All levels of a rig.
 
-    lapses_s: before this time no level lapses
     moves: whether ``step`` may return another offset than last time
 
     Args:
@@ -73,17 +58,15 @@ class Levels:
         self._ranges = ranges
         self.reset()
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of the levels."""
-        return tuple(self._levels)
-
     def reset(self) -> None:
         """Set all levels to 0 immediately."""
-        self._levels = {name: _Level(span) for name, span in self._ranges.items()}
+        self._blends = {
+            name: MinimumJerkBlend((0.0,), span.smoothing_s) for name, span in self._ranges.items()
+        }
+        # Time until which each level above 0 stays.
+        self._until_s: dict[str, float] = {}
         self._offset = self._rest
         self.moves = True
-        self.lapses_s = inf
 
     def set(self, name: str, value: float, t_s: float) -> None:
         """Set a level to a value 0..1, from the next step on.
@@ -92,36 +75,31 @@ class Levels:
             ValueError: the level is unknown; the message lists the known ones.
         """
         self.require(name)
-        self._levels[name].set(value, t_s + HOLD_S)
+        self._blends[name].move_to((value,))
+        self._until_s.pop(name, None)
+        if value > 0.0:
+            self._until_s[name] = t_s + HOLD_S
         self.moves = True
-        self.lapses_s = min(self.lapses_s, t_s + HOLD_S)
 
     def require(self, name: str) -> None:
         """Raise ValueError for an unknown level; the message lists the known ones."""
-        if name not in self._levels:
-            there = ", ".join(self._levels) or "none: add a table levels to the rig"
-            raise ValueError(f"no level {name!r}; available: {there}")
+        if name not in self._ranges:
+            known = ", ".join(self._ranges) or "none: add a table levels to the rig"
+            raise ValueError(f"no level {name!r}; available: {known}")
 
     def drop_lapsed(self, t_s: float) -> tuple[str, ...]:
-        """Drop levels to 0 that were not set for ``HOLD_S``; return those that were above."""
-        fallen = []
-        for name, level in self._levels.items():
-            if t_s >= level.until_s:
-                if level.value > 0.0:
-                    fallen.append(name)
-                level.set(0.0, inf)
-                self.moves = True
-        self.lapses_s = min([level.until_s for level in self._levels.values()], default=inf)
-        return tuple(fallen)
+        """Drop levels to 0 that were not set for ``HOLD_S``; return their names."""
+        fallen = tuple([name for name, until_s in self._until_s.items() if t_s >= until_s])
+        for name in fallen:
+            self.set(name, 0.0, t_s)
+        return fallen
 
     def step(self, t_s: float) -> PoseOffset:
         """Return the offset of all levels at a time; at rest it is the same object."""
-        if not self.moves:
-            return self._offset
-        offset = self._rest
-        for level in self._levels.values():
-            (value,) = level.blend.step(t_s)
-            offset = offset.combine(PoseOffset.from_flat(level.span.offset_at(value)))
-        self._offset = offset
-        self.moves = not all([level.blend.is_at_rest for level in self._levels.values()])
-        return offset
+        if self.moves:
+            self._offset = self._rest
+            for name, blend in self._blends.items():
+                offset = self._ranges[name].offset_at(blend.step(t_s)[0])
+                self._offset = self._offset.combine(PoseOffset.from_flat(offset))
+            self.moves = not all([blend.is_at_rest for blend in self._blends.values()])
+        return self._offset

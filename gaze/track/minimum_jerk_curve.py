@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
 
+_SHARES = np.linspace(0.0, 1.0, 33)[:, None]
+"""Places within a segment at which its direction is checked."""
+
 
 class MinimumJerkCurve:
     """A curve from rest through key values to rest at the last of them.
@@ -31,22 +34,15 @@ class MinimumJerkCurve:
     """
 
     def __init__(self, start: float, times_s: Sequence[float], values: Sequence[float]) -> None:
-        knots = np.array([0.0, *times_s])
-        span = np.diff(knots)
+        self._knots = np.array([0.0, *times_s])
+        span = np.diff(self._knots)
         if len(span) != len(values) or not (span > 0.0).all():
             raise ValueError("the times of the keys must increase from 0, one for each value")
         position = np.array([start, *values])
-        speed, acceleration = _states(position, span)
-        self._table = _coefficients(span, *_segment_ends(position, speed, acceleration))
-        self._rows = [tuple(row) for row in self._table.tolist()]
-        self._knots = knots
-        self._starts: list[float] = knots[:-1].tolist()
-        self.duration_s, self._last = float(knots[-1]), float(position[-1])
-
-    @property
-    def times_s(self) -> Floats:
-        """Return the times of its keys."""
-        return self._knots[1:]
+        self._table = _coefficients(span, position, *_states(position, span))
+        self._rows: list[list[float]] = self._table.T.tolist()
+        self._starts: list[float] = self._knots[:-1].tolist()
+        self.duration_s, self._last = float(self._knots[-1]), float(position[-1])
 
     def value_at(self, t_s: float) -> float:
         """Return the value at a time since the start."""
@@ -55,25 +51,23 @@ class MinimumJerkCurve:
         i = max(0, bisect_right(self._starts, t_s) - 1)
         c0, c1, c2, c3, c4, c5 = self._rows[i]
         t = max(0.0, t_s - self._starts[i])
-        return float(c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))))
+        return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
 
     def sample_at(self, times_s: Floats) -> tuple[Floats, Floats, Floats]:
         """Return (n,) values, speeds and accelerations at (n,) times."""
-        times = np.clip(times_s, 0.0, None)
-        i = np.minimum(
-            np.searchsorted(self._knots[:-1], times, side="right") - 1, len(self._rows) - 1
-        )
-        t = times - self._knots[i]
-        c0, c1, c2, c3, c4, c5 = self._table[i].T
-        over = times >= self.duration_s
-        value = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
-        speed = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5)))
-        acceleration = 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5))
-        return (
-            np.where(over, self._last, value),
-            np.where(over, 0.0, speed),
-            np.where(over, 0.0, acceleration),
-        )
+        times = np.clip(times_s, 0.0, self.duration_s)
+        i = np.searchsorted(self._knots[1:-1], times, side="right")
+        return _evaluate(self._table[:, i], times - self._knots[i])
+
+
+def _evaluate(coefficients: Floats, t: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return value, speed and acceleration of polynomials."""
+    c0, c1, c2, c3, c4, c5 = coefficients
+    return (
+        c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
+        c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
+        2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
+    )
 
 
 def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
@@ -82,131 +76,71 @@ def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     Elsewhere those of least jerk, unless the curve would swing back between two stops: then the
     slower of the mean speeds before and after each key, which prevents it.
     """
-    step = np.diff(position)
-    passed = np.flatnonzero(step[:-1] * step[1:] > 0.0) + 1
-    if not len(passed):
+    mean = np.diff(position) / span
+    stops = np.concatenate(([True], mean[:-1] * mean[1:] <= 0.0, [True]))
+    if stops.all():
         return np.zeros(len(position)), np.zeros(len(position))
-    stops = np.ones(len(position) - 2, bool)
-    stops[passed - 1] = False
     speed, acceleration = _least_jerk(position, span, stops)
-    _, c1, c2, c3, c4, c5 = _coefficients(span, *_segment_ends(position, speed, acceleration)).T
-    forward = np.sign(step)
-    lowest, highest = np.zeros((2, len(span) + 1))
-    for share in np.linspace(0.0, 1.0, 33):
-        s = share * span
-        rate = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
-        lowest[:-1] = np.minimum(lowest[:-1], rate * forward)
-        highest[:-1] = np.maximum(highest[:-1], np.abs(rate))
-    first = np.flatnonzero(np.diff(passed, prepend=-1) > 1)
-    last = np.append(first[1:], len(passed)) - 1
-    # The segments of each run of passed keys, from the stop before it to the stop after it.
-    ends = np.stack((passed[first] - 1, passed[last] + 1), 1).ravel()
-    swings = (
-        np.minimum.reduceat(lowest, ends)[::2] < -1e-6 * np.maximum.reduceat(highest, ends)[::2]
-    )
-    slow = passed[np.repeat(swings, last - first + 1)]
-    mean = step / span
-    speed[slow] = np.minimum(np.abs(mean[slow - 1]), np.abs(mean[slow])) * forward[slow]
-    acceleration[slow] = 0.0
+    table = _coefficients(span, position, speed, acceleration)
+    rate = _evaluate(table, _SHARES * span)[1] * np.sign(mean)
+    first = np.flatnonzero(stops)[:-1]  # of the segments from one stop to the next
+    lowest = np.minimum.reduceat(rate.min(axis=0), first)
+    swings = lowest < -1e-6 * np.maximum.reduceat(rate.max(axis=0), first)
+    slow = ~stops & np.append(np.repeat(swings, np.diff(np.flatnonzero(stops))), False)
+    slower = np.minimum(np.abs(mean[:-1]), np.abs(mean[1:])) * np.sign(mean[1:])
+    speed[slow], acceleration[slow] = slower[slow[1:-1]], 0.0
     return speed, acceleration
 
 
 def _least_jerk(position: Floats, span: Floats, stops: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """Return speed and acceleration at all keys such that jerk and snap are continuous.
 
+    Jerk and snap at both ends of a segment are linear in the states there, so every key gives two
+    equations in the states before, at and after it; they are solved key by key.
+
     Args:
         position: (n,) values at the keys.
         span: (n - 1,) times between them.
-        stops: (n - 2,) whether the curve rests at an inner key.
+        stops: (n,) whether the curve rests at a key.
     """
-    count = len(position) - 2
-    inner = slice(1, -1)
-    speed, acceleration = np.zeros(len(position)), np.zeros(len(position))
-
-    def gaps(unknown: Floats) -> Floats:
-        """Return the jumps of jerk and snap at the inner keys; linear in the unknowns."""
-        speed[inner], acceleration[inner] = unknown[:count], unknown[count:]
-        _, _, _, c3, c4, c5 = _coefficients(span, *_segment_ends(position, speed, acceleration)).T
-        jerk = 6.0 * c3 + span * (24.0 * c4 + span * 60.0 * c5)
-        snap = 24.0 * c4 + span * 120.0 * c5
-        return np.concatenate((jerk[:-1] - 6.0 * c3[1:], snap[:-1] - 24.0 * c4[1:]))
-
-    at_zero = gaps(np.zeros(2 * count))
-    keys = np.arange(count)
-    # Contributions of the key before, the key itself and the key behind to each key's gaps.
-    before, own, behind = blocks = np.zeros((3, count, 2, 2))
-    for first in range(3):
-        moved = keys[first::3]  # no two of them affect the same gap
-        for of in (0, 1):
-            probe = np.zeros(2 * count)
-            probe[of * count + moved] = 1.0
-            jumps = (gaps(probe) - at_zero).reshape(2, count)
-            for block, offset in zip(blocks, (1, 0, -1), strict=True):
-                gap = moved + offset
-                gap = gap[(gap >= 0) & (gap < count)]
-                block[gap, :, of] = jumps[:, gap].T
-    right = -at_zero.reshape(2, count).T[..., None]
-    before[stops], own[stops], behind[stops], right[stops] = 0.0, np.eye(2), 0.0, 0.0
-    gaps(_solve(before, own, behind, right).T.ravel())
-    return speed, acceleration
-
-
-def _solve(before: Floats, own: Floats, behind: Floats, right: Floats) -> Floats:
-    """Return the solution (n, 2) of a block tridiagonal system by cyclic reduction.
-
-    The system is that of a minimum and so positive definite: no pivot is needed.
-
-    Args:
-        before: (n, 2, 2) factors of the unknowns of the key before.
-        own: (n, 2, 2) factors of its own unknowns.
-        behind: (n, 2, 2) factors of the unknowns of the next key.
-        right: (n, 2, 1) right sides.
-    """
-    if len(own) == 1:
-        return np.asarray(np.linalg.solve(own, right)[..., 0], dtype=np.float64)
-    if len(own) % 2 == 0:  # append one equation of 0, so that every second one has two neighbours
-        zero, one = np.zeros((1, 2, 2)), np.eye(2)[None]
-        before, behind = np.concatenate((before, zero)), np.concatenate((behind, zero))
-        own, right = np.concatenate((own, one)), np.concatenate((right, np.zeros((1, 2, 1))))
-        return _solve(before, own, behind, right)[:-1]
-    kept, gone = slice(1, None, 2), slice(0, None, 2)
-    there = np.concatenate((before[gone], behind[gone], right[gone]), axis=2)
-    reduced = np.linalg.solve(own[gone], there)
-    by_before, by_behind, by_right = reduced[..., :2], reduced[..., 2:4], reduced[..., 4:]
-    a, c = before[kept], behind[kept]
-    inner = _solve(
-        -a @ by_before[:-1],
-        own[kept] - a @ by_behind[:-1] - c @ by_before[1:],
-        -c @ by_behind[1:],
-        right[kept] - a @ by_right[:-1] - c @ by_right[1:],
+    states = np.zeros((len(position), 2))
+    d, e = np.diff(position)[:-1], np.diff(position)[1:]
+    s, t = span[:-1], span[1:]
+    blocks = np.array(
+        [
+            [[-24.0 / s**2, -3.0 / s], [-168.0 / s**3, -24.0 / s**2]],
+            [
+                [36.0 / t**2 - 36.0 / s**2, 9.0 / s + 9.0 / t],
+                [-192.0 / s**3 - 192.0 / t**3, 36.0 / s**2 - 36.0 / t**2],
+            ],
+            [[24.0 / t**2, -3.0 / t], [-168.0 / t**3, 24.0 / t**2]],
+        ]
     )
-    solution = np.empty((len(own), 2))
-    solution[kept] = inner
-    padded = np.concatenate((np.zeros((1, 2)), inner, np.zeros((1, 2))))[..., None]
-    solution[gone] = (by_right - by_before @ padded[:-1] - by_behind @ padded[1:])[..., 0]
-    return solution
+    before, own, behind = blocks.transpose(0, 3, 1, 2)
+    right = np.stack((60.0 * (e / t**3 - d / s**3), -360.0 * (e / t**4 + d / s**4)), 1)
+    passed = np.flatnonzero(~stops)
+    for i in passed - 1:
+        if not stops[i]:
+            factor = before[i] @ np.linalg.inv(own[i - 1])
+            own[i] -= factor @ behind[i - 1]
+            right[i] -= factor @ right[i - 1]
+    for i in passed[::-1]:
+        states[i] = np.linalg.solve(own[i - 1], right[i - 1] - behind[i - 1] @ states[i + 1])
+    return states[:, 0], states[:, 1]
 
 
-def _segment_ends(position: Floats, speed: Floats, acceleration: Floats) -> tuple[Floats, ...]:
-    """Return the states before and after every segment, as ``_coefficients`` takes them."""
-    before = position[:-1], speed[:-1], acceleration[:-1]
-    return *before, position[1:], speed[1:], acceleration[1:]
-
-
-def _coefficients(
-    span: Floats, p0: Floats, v0: Floats, a0: Floats, p1: Floats, v1: Floats, a1: Floats
-) -> Floats:
-    """Return the (n, 6) coefficients of fifth-order polynomials between two states each."""
-    d, T = p1 - p0, span
+def _coefficients(span: Floats, position: Floats, speed: Floats, acceleration: Floats) -> Floats:
+    """Return the (6, n - 1) coefficients of fifth-order polynomials between n states."""
+    d, T = np.diff(position), span
+    v0, v1, a0, a1 = speed[:-1], speed[1:], acceleration[:-1], acceleration[1:]
     return np.stack(
         (
-            p0,
+            position[:-1],
             v0,
             0.5 * a0,
             (20.0 * d - (8.0 * v1 + 12.0 * v0) * T - (3.0 * a0 - a1) * T * T) / (2.0 * T**3),
             (-30.0 * d + (14.0 * v1 + 16.0 * v0) * T + (3.0 * a0 - 2.0 * a1) * T * T)
             / (2.0 * T**4),
             (12.0 * d - 6.0 * (v1 + v0) * T + (a1 - a0) * T * T) / (2.0 * T**5),
-        ),
-        axis=1,
+        )
     )

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import radians
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated
 
 from gazerig.params import Bounds
 
@@ -22,12 +22,12 @@ MAX_FRAMES = 200_000
 """Largest number of frames of a track."""
 MAX_DURATION_S = 4 * 3600.0
 """Longest track."""
-MAX_TRACKS = 8
-"""Largest number of tracks that play at once."""
 LIMIT_SHARE = 0.8
 """Share of the joints' speed and acceleration limits that a track may use; the rest is for gaze."""
-BLEND_OUT_S = 0.25
-"""Shortest time in which a track that is interrupted returns to rest."""
+RETURN_S = 0.4
+"""Time in which what is displaced in the last frame returns to rest."""
+BLEND_IN_S, BLEND_OUT_S = 0.4, 0.25
+"""Shortest times in which a track takes over its joints, and returns to rest if interrupted."""
 HEAD_CHANNELS = ("head_yaw", "head_pitch", "head_roll")
 EYE_CHANNELS = ("eyes_yaw", "eyes_pitch")
 LID_CHANNELS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
@@ -44,6 +44,8 @@ LID_GROUPS: Mapping[str, tuple[str, ...]] = {
 """Lids that a frame may name, groups before single lids."""
 
 
+LEVEL = "level "
+"""Start of the name of a level among channels."""
 KEEP = ""
 """Value of ``look_at`` in a frame that does not change the gaze."""
 _FAR_M = 1000.0
@@ -69,9 +71,9 @@ class KeyFrame:
     head_pitch_deg: Annotated[float | None, Bounds(-90, 90), "head turn upwards, added to the gaze"] = None
     head_roll_deg: Annotated[float | None, Bounds(-90, 90), "head tilt towards the right shoulder"] = None
     eyes_yaw_deg: Annotated[float | None, Bounds(-90, 90),
-        "line of sight to the left of its target; with space joint: eyes to the left in the head"] = None
+        "line of sight to the left of its target; eyes that it owns: to the left in the head"] = None
     eyes_pitch_deg: Annotated[float | None, Bounds(-90, 90),
-        "line of sight above its target; with space joint: eyes up in the head"] = None
+        "line of sight above its target; eyes that it owns: up in the head"] = None
     lids: Annotated[Mapping[str, float], Bounds(0, 3),
         "factor on the opening of lids: all, upper, lower, left, right or a lid's joint; 0: shut, 1: unchanged"] = field(
         default_factory=dict
@@ -124,14 +126,9 @@ class Track:
     # fmt: off
     description: Annotated[str, "meaning of the track"]
     frames: Annotated[tuple[KeyFrame, ...], "key frames in the order of their times; everything returns to rest after the last one"] = ()
-    space: Annotated[Literal["gaze", "joint"],
-        "gaze: the eyes stay on their target while the head moves; joint: they move with the head"] = "gaze"
-    fit: Annotated[Literal["slow", "refuse"],
-        "if a rig cannot do it: slow: play it more slowly, and smaller at the end of a range; refuse: do not play it"] = "refuse"
     count: Annotated[int, Bounds(1, MAX_COUNT), "number of repetitions"] = 1
     loop_s: Annotated[tuple[float, float] | None, Bounds(0, 60),
         "times of the two frames between which it repeats; null: the whole track repeats"] = None
-    return_s: Annotated[float, Bounds(0.05, 10), "time in which the channels that are displaced in the last frame return to rest"] = 0.4
     optional: Annotated[tuple[str, ...], "joints that a rig may lack; a rig that lacks any other joint is refused the track"] = ()
     frames_without_neck: Annotated[tuple[KeyFrame, ...],
         "alternative frames for rigs that lack a non-optional neck joint of the track"] = ()
@@ -143,9 +140,6 @@ class Track:
         default_factory=dict
     )
     loop: Annotated[bool, "repeat the track until it is ended"] = False
-    blend_in_s: Annotated[float, Bounds(0.05, 10), "shortest time in which the track takes over the joints that it owns"] = 0.4
-    blend_out_s: Annotated[float | None, Bounds(0.05, 10),
-        "shortest time in which it returns them to gaze, or ends early; null: 0.25"] = None
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -180,13 +174,6 @@ class Track:
         return tuple(found)
 
 
-class ChannelKeys(NamedTuple):
-    """The keys of one channel: times, and values relative to rest (0, of lids 1)."""
-
-    times_s: tuple[float, ...]
-    values: tuple[float, ...]
-
-
 def rest_value(channel: str) -> float:
     """Return the neutral value of a channel."""
     return 1.0 if channel in LID_CHANNELS else 0.0
@@ -217,40 +204,31 @@ def loop_fault(track: Track) -> str:
     return ""
 
 
-def channel_keys(track: Track, frames: tuple[KeyFrame, ...], count: int) -> dict[str, ChannelKeys]:
-    """Return the keys of every channel with its loop repeated, ending at rest.
+def channel_keys(
+    track: Track, frames: tuple[KeyFrame, ...], count: int
+) -> dict[str, list[tuple[float, float]]]:
+    """Return (time, value) keys of each channel and each level, by ``LEVEL`` and its name.
+
+    The loop is repeated, and everything ends at rest.
 
     Args:
         track: defines the loop.
         frames: those of its frames that are played.
         count: number of repetitions.
     """
-    channels: dict[str, list[tuple[float, float]]] = {}
-    for time_s, values in _repeat_loop(frames, track.loop_s, count):
-        for name, value in values.items():
-            channels.setdefault(name, []).append((time_s, value))
-    return {name: _end_at_rest(name, keys, track.return_s) for name, keys in channels.items()}
-
-
-def _repeat_loop(
-    frames: tuple[KeyFrame, ...], loop_s: tuple[float, float] | None, count: int
-) -> list[tuple[float, dict[str, float]]]:
-    """Return the times and the values of all frames, with those of the loop repeated."""
-    if not frames:
-        return []
-    begin_s, end_s = loop_s or (0.0, frames[-1].time_s)
-    keys = [(frame.time_s, frame.values()) for frame in frames]
-    before = [key for key in keys if key[0] <= begin_s]
-    again = [key for key in keys if begin_s < key[0] <= end_s]
-    period_s = end_s - begin_s
-    rounds = [(i * period_s + t_s, values) for i in range(count) for t_s, values in again]
-    later_s = (count - 1) * period_s
-    return [*before, *rounds, *((later_s + t_s, values) for t_s, values in keys if t_s > end_s)]
-
-
-def _end_at_rest(name: str, keys: list[tuple[float, float]], return_s: float) -> ChannelKeys:
-    rest = rest_value(name)
-    if keys[-1][1] != rest:
-        keys = [*keys, (keys[-1][0] + return_s, rest)]
-    times, values = zip(*keys, strict=True)
-    return ChannelKeys(times, values)
+    last_s = frames[-1].time_s if frames else 0.0
+    begin_s, end_s = track.loop_s or (0.0, last_s)
+    found: dict[str, list[tuple[float, float]]] = {}
+    for frame in frames:
+        rounds = range(count) if begin_s < frame.time_s <= end_s else [0]
+        if frame.time_s > end_s:
+            rounds = [count - 1]
+        levels = {f"{LEVEL}{name}": value for name, value in frame.levels.items()}
+        for name, value in {**frame.values(), **levels}.items():
+            keys = found.setdefault(name, [])
+            keys += [(frame.time_s + i * (end_s - begin_s), value) for i in rounds]
+    for name, keys in found.items():
+        keys.sort()
+        if keys[-1][1] != rest_value(name):
+            keys.append((keys[-1][0] + RETURN_S, rest_value(name)))
+    return found

@@ -1,53 +1,35 @@
-"""Motion of one track as smooth curves, and as samples for the check of limits."""
+"""Motion of one track on one rig, on a clock that is slower only where a joint needs it."""
 
-from collections.abc import Mapping, Sequence
-from copy import copy
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
-from gazerig.gaze.track.track import EYE_CHANNELS, POSE_CHANNELS, ChannelKeys, rest_value
 from gazerig.gaze.types import Floats
 
-_SAMPLE_S = 0.005
-_MOST_SAMPLES = 6000
-_PER_KEY = 8
-"""Samples between two keys of a long track."""
-_FIRST_EYE = POSE_CHANNELS.index(EYE_CHANNELS[0])
+_LEAD_IN_S = 0.02
+"""Time from rest to the position at which a track begins in its middle, before it is slowed."""
+_SHARES = np.unique([*np.linspace(0.0, 1.0, 25), 0.5 - sqrt(3.0) / 6.0, 0.5 + sqrt(3.0) / 6.0])
+"""Places between two keys at which limits are checked: also those of the largest acceleration
+between two rests."""
+_BLOCK = 500
+_ROUNDS, _KEPT = 12, 1.0 + 1e-3
+"""Most corrections of the times between keys, and the ratio to a limit at which they end."""
+
+Strain = Callable[[Floats, Floats], Floats]
+"""Returns the (n, joints) factors by which (n, channels) speeds and accelerations must take longer
+to keep the joints' limits, at most 1 if they keep them."""
 
 
-class MotionSamples(NamedTuple):
-    """A track sampled over its whole time, relative to rest.
+class ChannelKeys(NamedTuple):
+    """Keys of one channel: times, and values relative to rest."""
 
-    times_s: (n,); value, speed, acceleration: (n, channels), in the order of PoseOffset.flat()
-    """
-
+    channel: int
     times_s: Floats
-    value: Floats
-    speed: Floats
-    acceleration: Floats
-
-    def scale(self, size: Floats, rate: float) -> "MotionSamples":
-        """Return the samples of the same motion, scaled in size and speed.
-
-        Args:
-            size: (channels,) factors.
-            rate: factor of the speed.
-        """
-        return MotionSamples(
-            self.times_s / rate,
-            self.value * size,
-            self.speed * (size * rate),
-            self.acceleration * (size * rate * rate),
-        )
-
-
-class LevelCurve(NamedTuple):
-    """Keys of a level, and the offset of every channel at level 1, (channels,)."""
-
-    keys: ChannelKeys
-    gain: tuple[float, ...]
+    values: Floats
 
 
 class TrackEvents(NamedTuple):
@@ -58,148 +40,121 @@ class TrackEvents(NamedTuple):
     cues: tuple[tuple[float, str], ...] = ()
 
 
-NO_EVENTS = TrackEvents()
-
-
-class _ChannelCurve(NamedTuple):
-    """A curve that moves one channel, by its index; ``rest``: value of the channel at rest."""
-
-    channel: int
-    curve: MinimumJerkCurve
-    rest: float
-    gain: float = 1.0
-    delay_s: float = 0.0
-
-
 class TrackMotion:
-    """Curves of one track on one rig, at its original speed and size.
+    """Curves of one track on one rig.
 
-    duration_s: time until everything is at rest again
-    samples: samples of all channels; of a long track those with the extremes
-    channels: indices of the channels that it moves; owned: those that it owns
-    events: gaze points, expressions and cues
+    Segments that are too fast for a joint take longer, the others keep their times. A track that
+    begins in motion is led in from rest: the time that its first key needs comes before its
+    beginning, at positions below it.
+
+    curves: (channel, curve) pairs; a channel may have several
+    duration_s, length_s: time of its motion, and the position at its end
+    rate: mean speed of the position; ``speed`` if nothing behind the first key is slower
+    slowed_by, slowest: factor by which it takes longer, and index of the joint that needs it, or -1
 
     Args:
-        keys: keys by channel.
-        joints: the rig's further joints, the channels after those of every rig.
-        eyes_follow_head: the eyes keep their angles in the head, instead of their target.
-        owned: names of the channels that it owns.
-        levels: curves of levels.
+        rows: its keys.
+        channels: number of channels.
+        owned: channels that it owns.
         events: gaze points, expressions and cues.
+        strain: factors that the joints need.
+        speed: factor on its defined speed.
+        from_s: position at which it begins.
     """
 
     def __init__(
-        self,
-        keys: Mapping[str, ChannelKeys],
-        joints: tuple[str, ...],
-        eyes_follow_head: bool,
-        owned: Sequence[str] = (),
-        levels: Sequence[LevelCurve] = (),
-        events: TrackEvents = NO_EVENTS,
-    ) -> None:
-        channels = (*POSE_CHANNELS, *joints)
-        self._rests = [rest_value(name) for name in channels]
-        self.rest = np.array(self._rests)
-        self._curves = [
-            _ChannelCurve(
-                channels.index(name),
-                MinimumJerkCurve(rest_value(name), found.times_s, found.values),
-                rest_value(name),
-            )
-            for name, found in keys.items()
-        ]
-        for level in levels:
-            curve = MinimumJerkCurve(0.0, level.keys.times_s, level.keys.values)
-            self._curves += [
-                _ChannelCurve(i, curve, 0.0, gain) for i, gain in enumerate(level.gain) if gain
-            ]
-        self.owned = frozenset(channels.index(name) for name in owned)
-        self._follow = eyes_follow_head and not self.owned & {_FIRST_EYE, _FIRST_EYE + 1}
-        self.channels = self.owned | {i for i, *_ in self._curves}
-        if self._follow:
-            self.channels |= {_FIRST_EYE + i for i in (0, 1) if i in self.channels}
-        self.events = events
-        self._times_s = [np.array([t for t, _ in found]) for found in events[:2]]
-        self._keys_s = [
-            np.array(found.times_s) for found in (*keys.values(), *(one.keys for one in levels))
-        ]
-        ends = [found[-1][0] for found in events if found]
-        self.duration_s = max(
-            [curve.duration_s for _, curve, *_ in self._curves] + ends, default=0.0
+        self, rows: Sequence[ChannelKeys], channels: int, owned: frozenset[int],
+        events: TrackEvents, strain: Strain, speed: float = 1.0, from_s: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.owned, self.events, self.speed = owned, events, speed
+        self._count, self._strain = channels, strain
+        self._rows = [_cut(row, from_s) for row in rows] if from_s > 0.0 else rows
+        self.channels = owned | {row.channel for row in rows}
+        begin_s = from_s - _LEAD_IN_S if from_s > 0.0 else 0.0
+        self._positions = np.unique(
+            np.concatenate(([begin_s], *(row.times_s for row in self._rows)))
         )
-        self.samples = self._sample_evenly()
+        self._times = (self._positions - begin_s) / speed
+        self.slowed_by, self.slowest = 1.0, -1
+        # The way from rest to a position in the middle does not count as slower.
+        first = int(from_s > 0.0)
+        requested_s = np.ptp(self._times[first:])
+        self._slow_down()
+        if requested_s > 0.0:
+            self.slowed_by = float(np.ptp(self._times[first:]) / requested_s)
+        if len(self._times) > 1:
+            self._positions[0] = self._positions[1] - self._times[1] * speed
+        moved_s = float(np.ptp(self._positions))
+        self.rate = round(moved_s / self._times[-1], 6) if moved_s else speed
+        ends = [found[-1][0] for found in events if found]
+        self.length_s = max([float(self._positions[-1]), *ends])
+        self.duration_s = float(self._times[-1])
+        self._events_s = [[at_s for at_s, _ in found] for found in events[:2]]
 
-    def delay(self, delays_s: Sequence[float]) -> "TrackMotion":
-        """Return the same motion with each channel later by its delay, at the original speed."""
-        most_s = max([delays_s[i] for i in self.channels], default=0.0)
-        if most_s == 0.0:
-            return self
-        later = copy(self)
-        later._curves = [one._replace(delay_s=delays_s[one.channel]) for one in self._curves]
-        later.duration_s = self.duration_s + most_s
-        return later
+    def _slow_down(self) -> None:
+        """Make the curves, with more time between keys where a joint would be too fast."""
+        for attempt in range(_ROUNDS + 2):
+            self.curves = [
+                (
+                    channel,
+                    MinimumJerkCurve(
+                        0.0,
+                        np.interp(times_s, self._positions, self._times).tolist(),
+                        values.tolist(),
+                    ),
+                )
+                for channel, times_s, values in self._rows
+            ]
+            factors = self._factors()
+            if factors.max(initial=1.0) <= _KEPT:
+                return
+            if self.slowest < 0:
+                self.slowest = int(factors.max(axis=0).argmax())
+            longer = factors.max(axis=1)
+            longer[longer <= _KEPT] = 1.0
+            if attempt >= _ROUNDS:
+                longer[:] = longer.max()
+            self._times = np.append(0.0, np.cumsum(np.diff(self._times) * longer))
 
-    def _sample_evenly(self) -> MotionSamples:
-        count = int(self.duration_s / _SAMPLE_S) + 2
-        if count > _MOST_SAMPLES:
-            return self._sample_extremes()
-        even = np.linspace(0.0, self.duration_s, count)
-        # The extremes are keys, which evenly spaced samples may miss.
-        return self.sample_at(np.unique(np.concatenate((even, *self._keys_s))))
+    def _factors(self) -> Floats:
+        """Return the (spans, joints) factors of the times between two keys."""
+        begins, spans = self._times[:-1, None], np.diff(self._times)[:, None]
+        found = []
+        for i in range(0, len(spans), _BLOCK):
+            times = begins[i : i + _BLOCK] + spans[i : i + _BLOCK] * _SHARES
+            _, speed, acceleration = self.sample_at(times.ravel())
+            factors = self._strain(speed, acceleration)
+            found.append(factors.reshape(*times.shape, -1).max(axis=1))
+        return np.concatenate(found) if found else np.zeros((0, 1))
 
-    def _sample_extremes(self) -> MotionSamples:
-        """Return the samples with the largest and smallest values, speeds and accelerations.
+    def sample_at(self, times_s: Floats, delays_s: Sequence[float] = ()) -> Floats:
+        """Return (3, n, channels) values, speeds and accelerations at (n,) times since its start.
 
-        They are found block by block at and between all keys.
+        delays_s: of each channel; () for none
         """
-        keys = np.unique(np.concatenate((np.zeros(1), *self._keys_s)))
-        size = _MOST_SAMPLES // _PER_KEY
-        chosen = np.zeros(1)
-        for first in range(0, len(keys), size):
-            block = keys[first : first + size + 1]
-            between = block[:-1, None] + np.diff(block)[:, None] * np.linspace(0.0, 1.0, _PER_KEY)
-            found = self.sample_at(np.unique(np.concatenate((chosen, block, between.ravel()))))
-            chosen = found.times_s[_extreme_rows(found)]
-        return self.sample_at(chosen)
+        found: Floats = np.zeros((3, len(times_s), self._count))
+        for channel, curve in self.curves:
+            late_s = delays_s[channel] if delays_s else 0.0
+            found[:, :, channel] += curve.sample_at(times_s - late_s)
+        return found
 
-    def sample_at(self, times_s: Floats) -> MotionSamples:
-        """Return the motion at (n,) times since its start."""
-        columns = [np.zeros((len(times_s), len(self.rest))) for _ in range(3)]
-        for i, curve, rest, gain, delay_s in self._curves:
-            value, *others = curve.sample_at(times_s - delay_s)
-            for column, found in zip(columns, (value - rest, *others), strict=True):
-                column[:, i] += gain * found
-        if self._follow:
-            first = _FIRST_EYE
-            for column in columns:
-                column[:, first : first + 2] += column[:, :2]
-        return MotionSamples(times_s, *columns)
+    def position_at(self, time_s: float) -> float:
+        """Return the position in the track at a time since its start."""
+        later_s = max(0.0, time_s - self.duration_s)
+        return float(np.interp(time_s, self._times, self._positions)) + later_s * self.speed
 
-    def add_to(self, flat: list[float], t_s: float, sizes: tuple[float, ...]) -> None:
-        """Add the motion at one time to a flat PoseOffset.
-
-        Args:
-            flat: changed in place.
-            t_s: time since the start, at the original speed.
-            sizes: factor of every channel.
-        """
-        first = _FIRST_EYE
-        for i, curve, rest, gain, delay_s in self._curves:
-            moved = sizes[i] * (gain * (curve.value_at(t_s - delay_s) - rest))
-            flat[i] += moved
-            if self._follow and i < 2:
-                flat[first + i] += moved
-
-    def event_at(self, kind: int, t_s: float) -> int:
+    def event_at(self, kind: int, position_s: float) -> int:
         """Return the index of the newest gaze point (0) or expression (1), -1 before the first."""
-        return int(self._times_s[kind].searchsorted(t_s, side="right")) - 1
+        return bisect_right(self._events_s[kind], position_s) - 1
 
 
-def _extreme_rows(samples: MotionSamples) -> list[int]:
-    """Return the rows with extremes of a channel, or of the eyes against the head."""
-    rows: set[int] = set()
-    for column in samples[1:]:
-        eyes = column[:, _FIRST_EYE : _FIRST_EYE + 2] - column[:, :2]
-        both = np.concatenate((column, eyes), axis=1)
-        rows.update(both.argmax(axis=0).tolist(), both.argmin(axis=0).tolist())
-    return sorted(rows)
+def _cut(row: ChannelKeys, from_s: float) -> ChannelKeys:
+    """Return the keys from a position on, the first of them there; the last one stays."""
+    begins = MinimumJerkCurve(0.0, row.times_s.tolist(), row.values.tolist()).value_at(from_s)
+    first_s = from_s + _LEAD_IN_S
+    later = row.times_s > first_s
+    later[-1] = True
+    times_s = np.maximum(row.times_s[later], first_s)
+    return ChannelKeys(
+        row.channel, np.append(from_s, times_s), np.append(begins, row.values[later])
+    )

@@ -42,6 +42,7 @@ from gazerig.robot.app.rig_weight import park_note
 from gazerig.robot.app.run_bus import RunBus, run_bus
 from gazerig.robot.app.run_rig import scene_of, with_options
 from gazerig.robot.app.surroundings import RunRoom, surroundings
+from gazerig.robot.app.track_file import TrackFolder
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.joint_latency import JointLatency
@@ -188,7 +189,9 @@ def assemble(
             None if options.bus == "ideal" else sag_compensation(rig),
             messages.append if options.recover else None,
         )
-        parts = _build_components(rig, body, kinematics, seen, sight.mount, camera, walk, random)
+        parts = _build_components(
+            rig, body, kinematics, seen, sight.mount, camera, walk, random, options.rig
+        )
         browser: BrowserCamera | None = None
 
         def placement() -> CameraParams:
@@ -260,6 +263,7 @@ def _build_components(
     placed: CameraParams,
     walk: Walk,
     random: _Generators,
+    rig_file: str,
 ) -> Components:
     """Build all components that have parameters."""
     lids = Lids(rig.gaze.lids, random.lids)
@@ -310,6 +314,7 @@ def _build_components(
             rig.gaze.oculomotor.eye_lag_ms / 1e3,
             _sound_s,
             JointLatency([rig.joints[name].bus for name in rig.names]),
+            TrackFolder(rig_file).changes,
         ),
     )
 

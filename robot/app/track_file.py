@@ -3,44 +3,78 @@
 Such angles come from recordings and from animation programs.
 """
 
-from collections.abc import Mapping
-from math import ceil, radians
+import contextlib
+from collections.abc import Iterable, Iterator, Mapping
+from math import degrees
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from gazerig.config.load import ConfigError
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import format_value
+from gazerig.config.shipped_files import is_path
 from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.gaze.track.track import HEAD_CHANNELS, MAX_DURATION_S, MAX_FRAMES, Track
+from gazerig.gaze.track.track import (
+    EYE_CHANNELS,
+    HEAD_CHANNELS,
+    LID_CHANNELS,
+    MAX_DURATION_S,
+    MAX_FRAMES,
+    Track,
+)
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import animation_tables, lid_spans, limits
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.motion_keys import GRID_S, fit_keys, resample, smooth
-from gazerig.robot.model.track_fit import (
-    FittedTrack,
-    TrackFit,
-    TrackRefused,
-    channel_of_joint,
-    shortest_move_s,
-    track_motions,
-)
+from gazerig.robot.model.reply import TrackReply
+from gazerig.robot.model.track_fit import TrackFit, TrackRefused, channel_of_joint
 from gazerig.robot.model.types import GAZE_JOINTS
 
 TOLERANCE_DEG = 0.7
 """Largest distance of the curve through fitted keys from the samples."""
 _DENSE_S = 0.09
 """Rows closer than this are samples of a motion, not keys of an animator."""
-_RETURN_S = 0.4
-"""Default of return_s."""
 _STILL_DEG = 0.01
 
 Series = tuple[Floats, Floats]
 """Times in seconds and angles in degrees of one joint."""
-Keys = dict[str, list[tuple[float, float]]]
+
+
+class TrackFolder:
+    """Tracks in the folder beside a rig, which are found as soon as they are written.
+
+    Args:
+        rig: Name or path of the rig; one without a file has no folder.
+    """
+
+    def __init__(self, rig: str) -> None:
+        self._folder = Path(rig).expanduser().parent / "tracks" if is_path(rig) else None
+        self._stamps = self._read_stamps()
+
+    def changes(self) -> dict[str, Track | str]:
+        """Return the tracks whose files are new or changed since the last call; or their fault."""
+        before, self._stamps = self._stamps, self._read_stamps()
+        found: dict[str, Track | str] = {}
+        for path, stamp in self._stamps.items():
+            if before.get(path) != stamp:
+                try:
+                    found[track_name(str(path))] = load_track(path)
+                except ConfigError as error:
+                    found[path.stem] = str(error)
+        return found
+
+    def _read_stamps(self) -> dict[Path, tuple[int, int]]:
+        """Return time and size of each file."""
+        found = {}
+        for path in self._folder.glob("*.yaml") if self._folder is not None else ():
+            with contextlib.suppress(OSError):  # it has just been removed
+                status = path.stat()
+                found[path] = status.st_mtime_ns, status.st_size
+        return found
 
 
 class TrackText(NamedTuple):
@@ -79,100 +113,104 @@ def track_text(
             f"no joint {unknown[0]!r}; available: {', '.join(rig.names)}; rename the column"
         )
     start_s = min(float(times[0]) for times, _ in series.values())
-    end_s = max(float(times[-1]) for times, _ in series.values())
-    _check_length(end_s - start_s)
+    length_s = max(float(times[-1]) for times, _ in series.values()) - start_s
+    if not GRID_S < length_s <= MAX_DURATION_S:
+        raise SetupError(
+            f"it takes {length_s:.6g} s: a track takes at most {MAX_DURATION_S:g} s; split it"
+        )
     means, notes = _average_eyes(series)
-    keys: Keys = {}
-    begins_s = ends_s = 0.0
-    for name, (times, angles) in means.items():
-        found = _joint_keys(name, times - start_s, angles, tolerance_deg)
-        if not owned and not found:
-            continue
-        rest = _rest_deg(rig, name) if owned else float(angles[0])
-        keys[name] = [(0.0, float(angles[0])), *found]
-        first, last = (_move_s(rig, name, keys[name][i][1] - rest) for i in (0, -1))
-        begins_s, ends_s = max(begins_s, first), max(ends_s, last)
-    if not any(len(found) > 1 for found in keys.values()):
-        raise SetupError(f"nothing moves by more than {tolerance_deg or TOLERANCE_DEG:g} deg")
+    if not owned:
+        means = _lines_of_sight(means)
     frames: dict[float, dict[str, float]] = {}
-    begins_s = GRID_S * (ceil(begins_s / GRID_S) + 1) if begins_s > GRID_S else 0.0
-    _check_length(begins_s + end_s - start_s)
-    for name, found in keys.items():
-        # Equal values at two keys are a rest, from which the motion begins as in its source.
-        rests = [(-GRID_S, found[0][1]), found[0]] if begins_s else []
-        for time_s, value in (*rests, *found[1:]):
-            at_s = round(time_s + begins_s, 3)
-            if at_s > 0.0:
-                value = _channel_value(rig, name, value, float(means[name][1][0]), owned)
-                most = 90.0 if name in GAZE_JOINTS else 180.0
-                if abs(value) > most:
-                    raise SetupError(
-                        f"{name} at {time_s + start_s:.2f} s: {value:.4g} deg, more than the "
-                        f"{most:g} deg of any joint: check the unit of the angles"
-                    )
-                frames.setdefault(at_s, {})[channel_of_joint(name)] = round(value, 3)
-    notes += tuple(_lid_note(rig, name, *means[name]) for name in keys if name in LIDS)
-    notes = tuple(filter(None, notes))
-    if begins_s:
-        notes += (f"begins with {begins_s:.2f} s from the neutral pose to its first one",)
+    moves = False
+    for name, (times, angles) in means.items():
+        keys = _joint_keys(name, times - start_s, angles, tolerance_deg)
+        moves |= bool(keys)
+        if owned:  # its first pose is a key too, to which the player leads it from rest
+            keys = [(GRID_S, float(angles[0])), *((at_s + GRID_S, value) for at_s, value in keys)]
+        for at_s, value in keys:
+            most = 90.0 if name in GAZE_JOINTS else 180.0
+            value = _channel_value(rig, name, value, float(angles[0]), owned)
+            if abs(value) > most:
+                raise SetupError(
+                    f"{name} at {at_s + start_s:.2f} s: {value:.4g} deg, more than the {most:g} "
+                    "deg of any joint: check the unit of the angles"
+                )
+            frame = frames.setdefault(round(at_s, 3), {})
+            frame[channel_of_joint(name)] = round(value, 3)
+        if keys and name in LIDS:
+            notes += _lid_notes(rig, name, times, angles)
+    if not moves:
+        raise SetupError(f"nothing moves by more than {tolerance_deg or TOLERANCE_DEG:g} deg")
     if len(frames) > MAX_FRAMES:
         raise SetupError(
             f"{len(frames):,} frames; a track has at most {MAX_FRAMES:,}: import it with a larger "
             "--tolerance, or in parts"
         )
     owns = ", ".join(name for name in rig.names if name in series)
-    lines = [f"description: {format_value(description)}", "fit: slow"]
-    lines += [f"owns: [{owns}]" if owned else "space: joint"]
-    lines += [f"return_s: {min(ends_s + 0.01, 10.0):.2f}"] if ends_s > _RETURN_S else []
+    lines = [f"description: {format_value(description)}"]
+    lines += [f"owns: [{owns}]"] if owned else []
     lines += ["frames:"]
-    lines += [f"  - {{{', '.join(_frame_lines(t, frames[t]))}}}" for t in sorted(frames)]
+    lines += [f"  - {_frame_text(t, frames[t])}" for t in sorted(frames)]
     return TrackText("\n".join(lines) + "\n", notes)
 
 
-class RigTrack(NamedTuple):
-    """A track on a rig, from the middle of its ranges.
-
-    fitted: the track as the rig plays it; None if it cannot
-    refused: the reason, "" if it can
-    """
-
-    fitted: FittedTrack | None
-    refused: str
-
-
-def write_track(rig: Rig, name: str, text: str, folder: Path, force: bool) -> tuple[Path, RigTrack]:
+def write_track(
+    rig: Rig, name: str, text: str, folder: Path, force: bool
+) -> tuple[Path, TrackReply]:
     """Write a track's file and check it against the rig.
 
     Returns:
-        The file, and the track on the rig.
+        The file, and how the rig plays it.
 
     Raises:
-        SetupError: the file cannot be written.
+        SetupError: the file cannot be written, or the rig cannot play the track.
         gazerig.config.load.ConfigError: the name or the track breaks a rule.
     """
     path = folder / f"{name}.yaml"
     track_name(str(path))
     write_file(path, text, force)
-    return path, fit_to_rig(rig, load_track(path))
+    try:
+        return path, fit_to_rig(rig, name, load_track(path))
+    except TrackRefused as refused:
+        raise SetupError(f"{path} is written, but {rig.name} cannot play it: {refused}") from None
 
 
-def fit_to_rig(rig: Rig, track: Track) -> RigTrack:
-    """Return a track on a rig."""
+def fit_to_rig(rig: Rig, name: str, track: Track) -> TrackReply:
+    """Return how a rig plays a track from the middle of its ranges.
+
+    Raises:
+        TrackRefused: it cannot.
+    """
     bounds = limits(rig.joints)
     middle = np.clip(0.0, [one.low_rad for one in bounds], [one.high_rad for one in bounds])
-    fit = TrackFit(rig.names, lid_spans(rig))
-    try:
-        made = track_motions(track, rig.names, 0, animation_tables(rig))
-        return RigTrack(fit.fit("", made, 1.0, middle, bounds), "")
-    except TrackRefused as refused:
-        return RigTrack(None, str(refused))
+    fit = TrackFit(rig.names, lid_spans(rig), animation_tables(rig))
+    placed = fit.place(track)
+    _, reduced = fit.sizes(placed, middle, bounds)
+    return fit.reply(name, placed, fit.motion(placed, bounds), reduced)
 
 
-def _check_length(takes_s: float) -> None:
-    if not GRID_S < takes_s <= MAX_DURATION_S:
-        raise SetupError(
-            f"it takes {takes_s:.6g} s: a track takes at most {MAX_DURATION_S:g} s; split it"
-        )
+def radians_hint(angles_deg: Iterable[float], below: float = 1.0) -> str:
+    """Return a hint if all angles are so small that they may be in radians, otherwise "".
+
+    It is no fault: a sway, or a mechanism with tiny motion, may have such angles in degrees.
+
+    Args:
+        angles_deg: The angles.
+        below: Size that one of them must have.
+    """
+    largest = max(map(abs, angles_deg), default=0.0)
+    if not 0.0 < largest < below:
+        return ""
+    return f"no angle is above {largest:.3g}: degrees? these look like radians (1 rad is 57.3 deg)"
+
+
+def track_angles_deg(track: Track) -> Iterator[float]:
+    """Yield the angles of a track's frames."""
+    for frame in (*track.frames, *track.frames_without_neck):
+        for channel, value in frame.values().items():
+            if channel not in LID_CHANNELS:
+                yield degrees(value)
 
 
 def _average_eyes(series: Mapping[str, Series]) -> tuple[dict[str, Series], tuple[str, ...]]:
@@ -194,6 +232,18 @@ def _average_eyes(series: Mapping[str, Series]) -> tuple[dict[str, Series], tupl
             times, angles = both_s, 0.5 * (first + second)
         found[name] = times, angles
     return found, tuple(notes)
+
+
+def _lines_of_sight(series: Mapping[str, Series]) -> dict[str, Series]:
+    """Return the series with eyes as they turn in space, as tracks over gaze move them."""
+    heads = {channel_of_joint(name): pair for name, pair in series.items()}
+    found = dict(series)
+    for name, (times, angles) in series.items():
+        head = heads.get(channel_of_joint(name).replace("eyes", "head"))
+        if channel_of_joint(name) in EYE_CHANNELS and head is not None:
+            both_s = np.union1d(times, head[0])
+            found[name] = both_s, np.interp(both_s, times, angles) + np.interp(both_s, *head)
+    return found
 
 
 def _joint_keys(
@@ -220,22 +270,17 @@ def _lid_ends(rig: Rig, joint: str) -> tuple[float, float]:
     return ends
 
 
-def _lid_note(rig: Rig, joint: str, times_s: Floats, angles_deg: Floats) -> str:
-    """Return by how much a lid would leave its travel, "" if it does not."""
+def _lid_notes(rig: Rig, joint: str, times_s: Floats, angles_deg: Floats) -> tuple[str, ...]:
+    """Return by how much a lid would leave its travel, () if it does not."""
     low, high = sorted(_lid_ends(rig, joint))
     beyond = np.maximum(low - angles_deg, angles_deg - high)
     worst = int(beyond.argmax())
     if beyond[worst] < TOLERANCE_DEG:
-        return ""
+        return ()
     return (
         f"{joint} stops at its shut or open angle: {beyond[worst]:.1f} deg less "
-        f"(at {times_s[worst]:.2f} s)"
+        f"(at {times_s[worst]:.2f} s)",
     )
-
-
-def _rest_deg(rig: Rig, joint: str) -> float:
-    """Return the angle of a joint in the neutral pose."""
-    return _lid_ends(rig, joint)[1] if joint in LIDS else 0.0
 
 
 def _channel_value(rig: Rig, joint: str, angle: float, first: float, owned: bool) -> float:
@@ -257,28 +302,11 @@ def _channel_value(rig: Rig, joint: str, angle: float, first: float, owned: bool
     return min(max((angle - shut) / (base - shut), 0.0), 3.0)
 
 
-def _move_s(rig: Rig, joint: str, size_deg: float) -> float:
-    """Return the shortest time in which tracks may move a joint of the rig so far."""
-    known = [name for name in rig.names if channel_of_joint(name) == channel_of_joint(joint)]
-    return float(shortest_move_s(radians(abs(size_deg)), rig.joints[known[0]].limit()))
-
-
-def _frame_lines(time_s: float, values: Mapping[str, float]) -> list[str]:
-    own = [
-        f"{n}_deg: {v}"
-        for n, v in values.items()
-        if n in (*HEAD_CHANNELS, "eyes_yaw", "eyes_pitch")
-    ]
-    lids = [f"{n}: {v}" for n, v in values.items() if n in LIDS]
-    others = [
-        f"{n}: {v}"
-        for n, v in values.items()
-        if n not in LIDS and not n.startswith(("head_", "eyes_"))
-    ]
-    assert not any(n in GAZE_JOINTS and n not in LIDS for n in values)
-    return [
-        f"time_s: {time_s}",
-        *own,
-        *([f"lids: {{{', '.join(lids)}}}"] if lids else []),
-        *([f"joints_deg: {{{', '.join(others)}}}"] if others else []),
-    ]
+def _frame_text(time_s: float, values: Mapping[str, float]) -> str:
+    frame: dict[str, Any] = {"time_s": time_s}
+    for name, value in values.items():
+        if name in (*HEAD_CHANNELS, *EYE_CHANNELS):
+            frame[f"{name}_deg"] = value
+        else:
+            frame.setdefault("lids" if name in LIDS else "joints_deg", {})[name] = value
+    return format_value(frame)

@@ -119,7 +119,7 @@ class RunVoice:
         self._fed_s = 0.0
         self._over = False
         self._stream: _Stream | None = None
-        self._texts = deque[Path]()
+        self._texts = 0
         self._scratch: Path | None = None
         self._lines = deque[str](maxlen=20)
 
@@ -142,7 +142,7 @@ class RunVoice:
             sound = check_sound(self._find(what, confined), MAX_SPEECH_S)
             samples = read_samples(sound).astype(np.float64)
             keys = self._mouth(samples, len(samples) / sound.duration_s)
-            speech = self._speak(sound.path, sound.duration_s, keys)
+            speech = Speak(sound.path, sound.duration_s, self._level, keys)
         else:
             said = speak(what, params.voice)
             silent_s = _LEAD_IN_S + params.latency_ms / 1e3
@@ -173,21 +173,16 @@ class RunVoice:
         samples = _mono(pcm, channels)
         path = "" if self._fast else str(self._write(pcm, rate_hz, channels))
         keys = self._mouth(samples, rate_hz, phonemes)
-        return self._speak(path, len(samples) / rate_hz, keys)
-
-    def _speak(self, path: str, duration_s: float, keys: tuple[MouthKey, ...] = ()) -> Speak:
-        rig = self._rig()
-        level = rig.gaze.mouth.level if rig.gaze.mouth.level in rig.levels else ""
-        return Speak(path, duration_s, level, keys)
+        return Speak(path, len(samples) / rate_hz, self._level, keys)
 
     def _mouth(
         self, samples: Floats, rate_hz: float, spoken: Sequence[tuple[str, float]] = ()
     ) -> tuple[MouthKey, ...]:
         """Return the keys of the mouth, () if the rig has none."""
         rig = self._rig()
-        level = rig.levels.get(rig.gaze.mouth.level)
-        if level is None:
+        if not self._level:
             return ()
+        level = rig.levels[self._level]
         pressures = band_pressures(samples, rate_hz)
         opening = MOUTH_SIZE * openings(pressures, loud_pressure(pressures))
         end_s = len(samples) / rate_hz
@@ -217,11 +212,8 @@ class RunVoice:
         with self._lock:
             if self._scratch is None:
                 self._scratch = Path(tempfile.mkdtemp(prefix="gazerig-voice-"))
-            number = int(self._texts[-1].stem) + 1 if self._texts else 1
-            path = Path(self._scratch, f"{number}.wav")
-            self._texts.append(path)
-            while len(self._texts) > _KEPT_FILES:
-                self._texts.popleft().unlink(missing_ok=True)
+            self._texts += 1
+            path = Path(self._scratch, f"{self._texts % _KEPT_FILES}.wav")
         write_wav(path, pcm, rate_hz, channels)
         return path
 
@@ -283,7 +275,7 @@ class RunVoice:
         if self._stream is None:
             if not 0.0 <= volume <= 1.0:
                 raise SoundError(f"the volume is {volume:g}: give 0..1")
-            if not volume and self._rig().gaze.mouth.level not in self._rig().levels:
+            if not volume and not self._level:
                 raise SoundError(
                     f"this head has no level {self._rig().gaze.mouth.level!r} that a sound without "
                     "volume could move"
@@ -320,7 +312,7 @@ class RunVoice:
     ) -> None:
         rig = self._rig()
         check_format(rate_hz, channels)
-        ticket = self._command(self._speak("", _STREAM_TRACK_S))
+        ticket = self._command(Speak("", _STREAM_TRACK_S, self._level))
         reply = ticket.wait(_REPLY_S) if ticket is not None else None
         if reply is None or reply.track is None:
             raise SoundError(reply.refused if reply is not None else "the control loop hangs")
@@ -328,8 +320,9 @@ class RunVoice:
         self._played = None  # the stream replaces it; to stop it later would stop the stream
         player.open_stream(rate_hz, channels, now_s + STREAM_DELAY_S, volume * rig.sound.volume)
         mouth = StreamMouth(rate_hz)
-        level = rig.levels.get(rig.gaze.mouth.level)
-        lead_s = self._latencies_s()[rig.names.index(level.joint)] if level else 0.0
+        lead_s = 0.0
+        if self._level:
+            lead_s = self._latencies_s()[rig.names.index(rig.levels[self._level].joint)]
         self._stream = _Stream(mouth, rate_hz, channels, reply.track.number, lead_s)
         self._wake.set()
 
@@ -452,6 +445,12 @@ class RunVoice:
         )
 
     @property
+    def _level(self) -> str:
+        """Return the level that opens the mouth, "" for a rig without it."""
+        level = self._rig().gaze.mouth.level
+        return level if level in self._rig().levels else ""
+
+    @property
     def _latency_s(self) -> float:
         return self._rig().sound.latency_ms / 1e3
 
@@ -464,28 +463,25 @@ class RunVoice:
             self._end_stream(tick)
             return
         if now_s - self._fed_s > _ABANDONED_S and player.ahead_s(now_s) < _WATCH_S:
-            self._lines.append(f"the stream has ended, as no piece has come for {_ABANDONED_S:g} s")
-            player.stop()
-            self._end_stream(tick)
-            return
-        rig = self._rig()
-        if rig.gaze.mouth.level not in rig.levels:
+            player.finish_stream()
+        if not self._level:
             return
         heard_s = player.position_s(now_s)
         opening = 0.0
         if heard_s is not None:
-            ahead_s = stream_ahead_s(rig, stream.lead_s) - self._latency_s
+            smoothing_s = self._rig().levels[self._level].smoothing_ms / 1e3
+            ahead_s = smoothing_s * _SMOOTHING_LAG + stream.lead_s + 0.5 * _WATCH_S
+            ahead_s -= self._latency_s
             opening = MOUTH_SIZE * stream.mouth.opening_at(heard_s + ahead_s)
-        self._try(SetLevel(rig.gaze.mouth.level, opening))
+        self._try(SetLevel(self._level, opening))
 
     def _end_stream(self, tick: Tick | None) -> None:
         """End the stream: the mouth shuts, and its track ends unless another has replaced it."""
         stream, self._stream = self._stream, None
         if stream is None:
             return
-        level = self._rig().gaze.mouth.level
-        if level in self._rig().levels:
-            self._try(SetLevel(level, 0.0))
+        if self._level:
+            self._try(SetLevel(self._level, 0.0))
         if tick is not None and not _has_ended(stream.track, tick):
             self._try(EndTrack(SPEECH))
 
@@ -493,17 +489,6 @@ class RunVoice:
         """Queue a command; a refusal is not important, as the next one follows."""
         with contextlib.suppress(ValueError):
             self._command(command)
-
-
-def stream_ahead_s(rig: Rig, lead_s: float) -> float:
-    """Return the time by which the mouth of a stream is set before its sound is heard.
-
-    Args:
-        rig: The rig.
-        lead_s: Latency of the mouth's joint.
-    """
-    smoothing_s = rig.levels[rig.gaze.mouth.level].smoothing_ms / 1e3
-    return smoothing_s * _SMOOTHING_LAG + lead_s + 0.5 * _WATCH_S
 
 
 def _sounding_track(tick: Tick | None) -> TrackState | None:

@@ -162,9 +162,9 @@ def next_steps(rig: NewRig, file: str) -> Iterable[str]:
     sees = {"webcam": "--camera 0", "oak": "--oak", "none": "--scene visitor"}[rig.camera]
     steps = [(f"gazerig run {named} --mock", "the head in your browser, without any hardware")]
     if rig.board != "none":
-        numbers = "names a board's settings" if rig.board in ("maestro", "pca9685") else "gives ids"
+        if rig.board not in ("maestro", "pca9685"):  # whose channels have no ids
+            steps.append((f"gazerig setup {named}", "with the adaptor plugged in: gives ids"))
         steps += [
-            (f"gazerig setup {named}", f"with the board plugged in: {numbers}"),
             (f"gazerig doctor {named} --fix", "check port, servos and settings against the file"),
             (f"gazerig calibrate {named}", "measure zero, sign and range of each joint"),
             (f"gazerig run {named} {sees}", "the real head"),

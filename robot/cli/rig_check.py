@@ -42,7 +42,8 @@ def unit_lines(rig: str) -> list[str]:
     """
     from gazerig.config.load import find_file
     from gazerig.config.schema import load_rig
-    from gazerig.config.tracks import load_track, radians_hint, track_angles_deg
+    from gazerig.config.tracks import load_track
+    from gazerig.robot.app.track_file import radians_hint, track_angles_deg
 
     loaded = load_rig(rig)
     ends = [end for one in loaded.joints.values() for end in (one.min_deg, one.max_deg)]
@@ -74,10 +75,13 @@ def track_lines(rig: str) -> list[str]:
     from gazerig.config.schema import load_rig
     from gazerig.config.tracks import load_track
     from gazerig.robot.app.track_file import fit_to_rig
-    from gazerig.robot.cli.tracks import fit_text
+    from gazerig.robot.model.track_fit import TrackRefused
 
-    loaded = load_rig(rig)
-    return [
-        fit_text(loaded.name, file, fit_to_rig(loaded, load_track(find_file("tracks", file))))
-        for file in loaded.track_files
-    ]
+    loaded, lines = load_rig(rig), []
+    for file in loaded.track_files:
+        path = find_file("tracks", file)
+        try:
+            lines.append(f"{file}: {fit_to_rig(loaded, path.stem, load_track(path)).text()}")
+        except TrackRefused as refused:
+            lines.append(f"{file}: {loaded.name} cannot play it: {refused}")
+    return lines

@@ -85,6 +85,7 @@ def refuse_impossible(
     joints: Sequence[str],
     animation: Animation,
     tracks: TrackChoices,
+    limits: Sequence[JointLimit],
 ) -> None:
     """Refuse a command that names something that this robot does not have.
 
@@ -94,6 +95,7 @@ def refuse_impossible(
         joints: Joints of the rig.
         animation: Expressions and levels of the rig.
         tracks: Tracks of the rig.
+        limits: Limits of the joints.
 
     Raises:
         ValueError: The message lists the available choices.
@@ -108,10 +110,8 @@ def refuse_impossible(
         animation.levels.require(command.level)
     elif isinstance(command, Say):
         raise ValueError("this run has no voice")
-    elif isinstance(command, Speak):
-        tracks.prepare(command)
-    elif isinstance(command, Play):
-        tracks.require(command)
+    elif isinstance(command, Play | Speak):
+        tracks.require(command, limits)
 
 
 def refuse_unknown(command: Ask, menus: Mapping[str, Sequence[str]]) -> None:

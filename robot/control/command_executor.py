@@ -125,9 +125,8 @@ class CommandExecutor:
             )
             self._conversation.end(talk, t_s)
             self._menus.converse(self._conversation.state, t_s)
-        if t_s >= levels.lapses_s:
-            for name in levels.drop_lapsed(t_s):
-                self._messages.append(f"level {name}: not set any more, so it returns to 0")
+        for name in levels.drop_lapsed(t_s):
+            self._messages.append(f"level {name}: not set any more, so it returns to 0")
 
     def execute(self, command: Command, t_s: float) -> CommandReply:
         """Execute a command; return its reply."""
@@ -220,11 +219,7 @@ class CommandExecutor:
         starts = isinstance(command, Speak) or bool(command.track)
         if starts and self._lead.pose_rad:
             return CommandReply(f"{self._lead.controlled_by}: the joints are held at their angles")
-        limits = self._guard.limits
-        if isinstance(command, Speak):
-            reply = self._tracks.speak(command, t_s, self.commanded_rad, limits)
-        else:
-            reply = self._tracks.play(command, t_s, self.commanded_rad, limits)
+        reply = self._tracks.play(command, t_s, self.commanded_rad, self._guard.limits)
         if starts:
             by = f" for {command.who}" if command.who else ""
             self._messages.append(f"track{by}: {reply.text()}")
@@ -237,9 +232,13 @@ class CommandExecutor:
 
     def _play_by_itself(self, command: Play, t_s: float) -> None:
         """Play a track that no client has asked for, unless a client or a show moves the head."""
-        if self._stop.stop_reason or self._lead.active or self._tracks.ends_show(command):
+        if (
+            self._stop.stop_reason
+            or self._lead.active
+            or self._tracks.ends_show(command, self._guard.limits)
+        ):
             return
-        reply = self._play(self._tracks.measure_sound(command), t_s)
+        reply = self._play(self._tracks.complete(command, self._guard.limits), t_s)
         if reply.refused:
             self._messages.append(f"track for {command.who} {reply.text()}")
 

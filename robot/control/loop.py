@@ -5,6 +5,8 @@ from collections.abc import Callable
 from math import inf, radians
 from typing import Any, NamedTuple
 
+from msgspec import structs
+
 from gazerig.drivers.camera.capture_loop import CLOSING
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.plugins import describe_error, plugin_error
@@ -156,6 +158,8 @@ class Robot:
             refuse_out_of_range(command, self.body.names, self._guard.limits)
         if isinstance(command, MoveOpponent) and self._executor.opponent is None:
             raise ValueError("no opponent to move: the run is in no world with a boxer")
+        if isinstance(command, Play):  # only a recording has the text of a track
+            command = structs.replace(command, yaml="")
         return self.replay_command(command)
 
     def replay_command(self, command: Command) -> Ticket:
@@ -165,7 +169,9 @@ class Robot:
             ValueError: As ``command``.
         """
         command = check_command(command)
-        refuse_impossible(command, self.menus, self.body.names, self._animation, self._tracks)
+        refuse_impossible(
+            command, self.menus, self.body.names, self._animation, self._tracks, self._guard.limits
+        )
         return self._commands.add(command)
 
     def set_opponent(self, opponent: TickClockOpponent) -> None:
@@ -401,7 +407,7 @@ class Robot:
             if isinstance(command, Ask) and command.menu == "track":
                 command = Play("" if command.choice == NO_TRACK else command.choice)
             if isinstance(command, Play | Speak):
-                command = self._tracks.measure_sound(command)
+                command = self._tracks.complete(command, self._guard.limits)
             taken.append(command)
             self._commands.reply(waiting, self._executor.execute(command, t_s))
         self._executor.end_expired(t_s)

@@ -1,15 +1,23 @@
 """Tracks of a robot: the available ones, their fit to this rig, and their control."""
 
+import contextlib
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from msgspec import Struct, structs
 
+from gazerig.config.load import load
+from gazerig.config.save_text import params_text
 from gazerig.gaze.angles import norm, sub
-from gazerig.gaze.mouth.mouth_keys import MouthKey
 from gazerig.gaze.mouth.speech_track import SPEECH, speech_track
 from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
-from gazerig.gaze.track.track import BLEND_OUT_S, KEEP, MAX_TRACKS, Track
+from gazerig.gaze.track.track import BLEND_IN_S, BLEND_OUT_S, KEEP, Track
+from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.track.track_player import TrackPlayer, Voice
 from gazerig.gaze.types import ORDERED, Percept, Target, Vec3
 from gazerig.robot.control.joint_latency import JointLatency
@@ -17,18 +25,11 @@ from gazerig.robot.model.commands import EndTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import FINISHED, SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, TrackReply
-from gazerig.robot.model.track_fit import (
-    FittedTrack,
-    TrackFit,
-    TrackMotions,
-    TrackRefused,
-    track_motions,
-)
+from gazerig.robot.model.track_fit import RigTrack, TrackFit, TrackRefused
 from gazerig.robot.model.types import JointAngles
 
 _MOST_KEPT = 64
-"""Number of tracks with a non-default count whose curves are cached."""
-_MOST_SPEECHES = 8
+"""Number of curves that are kept for the next time."""
 
 
 class TrackInfo(Struct, frozen=True):
@@ -57,10 +58,30 @@ class TrackInfo(Struct, frozen=True):
     layers: tuple[str, ...] = ()
 
 
-def _limits_text(limits: str, sound: str, speed: float) -> str:
-    """Return what limits changed in a track, also that its sound is silent at other speeds."""
-    silent = "without its sound, which plays at speed 1 only" if sound and speed != 1.0 else ""
-    return "; ".join(filter(None, (limits, silent)))
+class PreparedTrack(NamedTuple):
+    """A track on this rig, ready to be played.
+
+    Attributes:
+        placed: Its keys.
+        motion: Its curves from where it begins.
+        again: Its curves when it repeats.
+        sound_s: Duration of its sound, 0 without one.
+        yaml: The track for a recording, if its file is newer than the run.
+    """
+
+    placed: RigTrack
+    motion: TrackMotion
+    again: TrackMotion
+    sound_s: float = 0.0
+    yaml: str = ""
+
+    @property
+    def duration_s(self) -> float:
+        """Return the time from its start to the end of motion and sound."""
+        more_s = max(self.motion.length_s, self.sound_s) - self.motion.position_at(
+            self.motion.duration_s
+        )
+        return self.motion.duration_s + max(0.0, more_s) / self.motion.speed
 
 
 class TrackChoices:
@@ -75,6 +96,7 @@ class TrackChoices:
         latency_s: Latency of joints that has not been measured yet.
         sound_s: Returns the duration of a track's sound.
         latency: Measures the latencies of the joints; None: as of joints on one bus.
+        newest: Returns tracks whose files have changed since the start, or the fault of a file.
     """
 
     def __init__(
@@ -87,36 +109,167 @@ class TrackChoices:
         latency_s: float = 0.0,
         sound_s: Callable[[str], float] = lambda path: 0.0,
         latency: JointLatency | None = None,
+        newest: Callable[[], Mapping[str, Track | str]] = dict,
     ) -> None:
         self.latency = latency or JointLatency(("",) * len(joints))
-        self._tracks, self._player, self._joints = dict(tracks), player, joints
-        self._tables, self._sound_s = tables, sound_s
-        self._states: tuple[TrackState, ...] = ()
+        self._tracks: dict[str, Track | str] = dict(tracks)
+        self._player, self._joints, self._tables = player, joints, tables
+        self._sound_s, self._newest = sound_s, newest
+        self._changed: set[str] = set()
         self._playing: dict[int, TrackState] = {}
         self._ended: dict[int, tuple[TrackState, float]] = {}
         self._number = self._shifts = 0
         self._look: object = KEEP
-        self._sounds: dict[str, float] = {}
         self._nearest: int | None = None
-        self._cache: dict[tuple[str, int], TrackMotions | TrackRefused] = {}
-        self._speeches: dict[Speak, TrackMotions] = {}
+        self._lid_spans_rad: Mapping[str, float] | None = None
         self.retune(lid_spans_rad, latency_s)
-        for name in tracks:
-            self._motions(name, 0)
 
     def retune(self, lid_spans_rad: Mapping[str, float], latency_s: float) -> None:
         """Change the parameters of the next track."""
         self._latency_s = latency_s
-        self._fit = TrackFit(self._joints, lid_spans_rad)
+        if lid_spans_rad != self._lid_spans_rad:  # else what is prepared stays
+            self._lid_spans_rad = lid_spans_rad
+            self._fit = TrackFit(self._joints, lid_spans_rad, self._tables)
+            self._prepared: dict[object, PreparedTrack] = {}
+            self._names: tuple[str, ...] | None = None
+
+    # --- the available ones
+
+    def _read_files(self) -> None:
+        """Take over tracks whose files have changed."""
+        if changed := self._newest():
+            self._tracks |= changed
+            self._changed |= changed.keys()
+            self._prepared, self._names = {}, None
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the tracks whose joints this rig has."""
-        return tuple(
-            name
-            for name in self._tracks
-            if name != SPEECH and not isinstance(self._motions(name, 0), Exception)
+        """Return the tracks whose joints this rig has. Thread-safe."""
+        self._read_files()
+        if self._names is None:
+            found = []
+            for name, track in self._tracks.items():
+                with contextlib.suppress(TrackRefused):
+                    if isinstance(track, Track) and self._fit.place(track):
+                        found.append(name)
+            self._names = tuple(found)
+        return self._names
+
+    def all_tracks(self, limits: Sequence[JointLimit]) -> tuple[TrackInfo, ...]:
+        """Return all tracks with their fit to this rig. Thread-safe.
+
+        Args:
+            limits: Limits of the joints.
+        """
+        self._read_files()
+        return tuple([self._info(name, limits) for name in self._tracks])
+
+    def _info(self, name: str, limits: Sequence[JointLimit]) -> TrackInfo:
+        track = self._tracks[name]
+        if isinstance(track, str):
+            return TrackInfo(name, "", refused=track)
+        middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
+        try:
+            found = self.prepare(Play(name), limits)
+            self._fit.sizes(found.placed, middle, limits)
+        except ValueError as refused:
+            return TrackInfo(name, track.description, refused=str(refused))
+        return TrackInfo(
+            name, track.description, found.duration_s, found.motion.slowed_by, "",
+            found.placed.owns, track.sound, tuple(track.cues.items()), track.layers,
+        )  # fmt: skip
+
+    def prepare(self, command: Play | Speak, limits: Sequence[JointLimit]) -> PreparedTrack:
+        """Return a track's motion on this rig, which takes time at first. Thread-safe.
+
+        Raises:
+            ValueError: There is no such track, cue or level, or the rig cannot play the track.
+        """
+        key = structs.replace(command, lead_s=None, who="")
+        if isinstance(key, Play):
+            key = structs.replace(key, sound_s=0.0)
+            if key.track in self._changed:  # its text is only for the recording
+                key = structs.replace(key, yaml="")
+        found = self._prepared.get((key, tuple(limits)))
+        if found is not None:
+            return found
+        if isinstance(command, Play):
+            found = self._prepare_track(command, limits)
+        else:
+            track = speech_track(
+                command.sound, command.duration_s, command.level, command.mouth, command.volume
+            )
+            placed = self._fit.place(track)
+            motion = self._fit.motion(placed, limits)
+            found = PreparedTrack(placed, motion, motion, command.duration_s)
+        if len(self._prepared) >= _MOST_KEPT:
+            self._prepared = {}
+        self._prepared[key, tuple(limits)] = found
+        return found
+
+    def _prepare_track(self, command: Play, limits: Sequence[JointLimit]) -> PreparedTrack:
+        name = command.track
+        track = _track_of_text(command.yaml) if command.yaml else self._tracks.get(name)
+        if track is None:
+            known = ", ".join(self.names)
+            raise ValueError(f"no track {name!r}; available: {known}")
+        if isinstance(track, str):
+            raise ValueError(f"{name}: {track}")
+        start_s = command.from_s
+        if isinstance(start_s, str):
+            if start_s not in track.cues:
+                known = ", ".join(track.cues) or "none"
+                raise ValueError(f"{name} has no cue {start_s!r}; available: {known}")
+            start_s = track.cues[start_s]
+        try:
+            placed = self._fit.place(track, command.times)
+            sound_s = command.sound_s
+            if track.sound and not sound_s:
+                sound_s = self._sound_s(track.sound)
+        except TrackRefused as refused:
+            raise ValueError(f"{name}: {refused}") from None
+        motion = again = self._fit.motion(placed, limits, command.speed)
+        if start_s > 0.0:
+            motion = self._fit.motion(placed, limits, command.speed, start_s)
+            length_s = max(again.length_s, sound_s)
+            if start_s > length_s:
+                raise ValueError(f"{name} lasts {length_s:.2f} s: from_s must be less")
+        text = (
+            params_text(replace(track, sound=Path(track.sound).name))
+            if name in self._changed
+            else ""
         )
+        return PreparedTrack(placed, motion, again, sound_s, text)
+
+    def require(self, command: Play | Speak, limits: Sequence[JointLimit]) -> None:
+        """Check that a track can be played, and compute its curves. Thread-safe.
+
+        Raises:
+            ValueError: It cannot; the message lists the available tracks or cues.
+        """
+        self._read_files()
+        if isinstance(command, Speak) or command.track:
+            self.prepare(command, limits)
+
+    def complete(self, command: Play | Speak, limits: Sequence[JointLimit]) -> Play | Speak:
+        """Return a command with what a recording needs: lead and duration of a sound, its file."""
+        if command.lead_s is not None or not (isinstance(command, Speak) or command.track):
+            return command
+        if isinstance(command, Speak):
+            return structs.replace(command, lead_s=self.latencies_s())
+        try:
+            found = self.prepare(command, limits)
+        except ValueError:  # ``play`` reports it
+            return command
+        if found.sound_s:
+            command = structs.replace(command, lead_s=self.latencies_s(), sound_s=found.sound_s)
+        return structs.replace(command, yaml=found.yaml) if found.yaml else command
+
+    def latencies_s(self) -> tuple[float, ...]:
+        """Return the latencies of all joints, measured or assumed. Thread-safe."""
+        return self.latency.estimates_s(self._latency_s)
+
+    # --- playing
 
     @property
     def playing(self) -> str:
@@ -126,202 +279,98 @@ class TrackChoices:
     def states(self, t_s: float) -> tuple[TrackState, ...]:
         """Return the tracks that play, and the last ones that have ended, by their numbers."""
         if not self._playing and not self._ended:
-            return self._states
+            return ()
         voices = {voice.number: voice for voice in self._player.voices}
-        for number in [number for number in self._playing if number not in voices]:
+        for number in self._playing.keys() - voices.keys():
             self._end_state(number, FINISHED, t_s)
         for number, voice in voices.items():
             state, passed = self._playing[number], voice.passed
             self._playing[number] = structs.replace(
                 state,
-                position_s=voice.position_s(t_s) - voice.ahead_s,
+                position_s=voice.position_s(t_s),
                 cue=passed[-1] if passed else state.cue,
                 cues=state.cues + len(passed),
             )
             passed.clear()
-        newest = self._number
         self._ended = {
-            number: one
-            for number, one in self._ended.items()
-            if number == newest or t_s < one[1] + SHOWN_S
+            number: (state, end_s)
+            for number, (state, end_s) in self._ended.items()
+            if number == self._number or t_s < end_s + SHOWN_S
         }
         found = {number: state for number, (state, _) in self._ended.items()} | self._playing
-        self._states = tuple([found[number] for number in sorted(found)])
-        if not self._playing and len(self._ended) == 1:
-            self._ended = {} if self._states[0].number == newest else self._ended
-        return self._states
-
-    def require(self, command: Play) -> None:
-        """Check that a track exists, and compute its curves. Thread-safe.
-
-        Raises:
-            ValueError: There is no such track; the message lists the available ones.
-        """
-        if not command.track:
-            return
-        if command.track not in self._tracks:
-            there = ", ".join(self.names)
-            raise ValueError(f"no track {command.track!r}; available: {there}")
-        made = self._motions(command.track, command.times)
-        if isinstance(made, TrackRefused):
-            raise ValueError(f"{command.track}: {made}")
-        length_s = max(made.motion.duration_s, self._sounds.get(made.track.sound, 0.0))
-        if self._start_s(command) > length_s:
-            raise ValueError(f"{command.track} lasts {length_s:.2f} s: from_s must be less")
-
-    def prepare(self, command: Speak) -> TrackMotions:
-        """Return the track of a speech, which takes time. Thread-safe.
-
-        Raises:
-            ValueError: The rig has no such level.
-        """
-        key = structs.replace(command, lead_s=None, who="")
-        if key not in self._speeches:
-            if command.level and command.level not in self._tables.levels:
-                raise ValueError(f"no level {command.level!r} for the mouth")
-            mouth = [MouthKey(*pair) for pair in command.mouth]
-            track = speech_track(
-                command.sound, command.duration_s, command.level, mouth, command.volume
-            )
-            for old in tuple(self._speeches)[: 1 - _MOST_SPEECHES]:
-                self._speeches.pop(old, None)
-            self._speeches[key] = track_motions(track, self._joints, 0, self._tables)
-        return self._speeches[key]
-
-    def speak(
-        self, command: Speak, t_s: float, commanded_rad: JointAngles, limits: Sequence[JointLimit]
-    ) -> CommandReply:
-        """Start a speech; the arguments are those of ``play``."""
-        made = self.prepare(command)
-        replaced = self._player.overlapping(made.motion)
-        # A stream sets its level itself, so that its track does not overlap another speech.
-        others = [
-            voice
-            for voice in self._player.voices
-            if voice.played.name == SPEECH and voice not in replaced
-        ]
-        if others:
-            self._end(others, t_s, limits, command.who)
-        self._tracks[SPEECH], self._cache[SPEECH, 0] = made.track, made
-        played = Play(SPEECH, who=command.who, lead_s=command.lead_s, sound_s=command.duration_s)
-        return self.play(played, t_s, commanded_rad, limits)
-
-    def measure_sound(self, command: Play | Speak) -> Play | Speak:
-        """Return a command with lead and duration of a sound, which a recording needs."""
-        if command.lead_s is not None:
-            return command
-        if isinstance(command, Speak):
-            return structs.replace(command, lead_s=self.latencies_s())
-        track = self._tracks.get(command.track)
-        if track is None or not track.sound:
-            return command
-        sound_s = self._sounds.get(track.sound, 0.0)
-        return structs.replace(command, lead_s=self.latencies_s(), sound_s=sound_s)
-
-    def latencies_s(self) -> tuple[float, ...]:
-        """Return the latencies of all joints, measured or assumed. Thread-safe."""
-        return self.latency.estimates_s(self._latency_s)
-
-    def all_tracks(self, limits: Sequence[JointLimit]) -> tuple[TrackInfo, ...]:
-        """Return all tracks with their fit to this rig.
-
-        Args:
-            limits: Limits of the joints.
-        """
-        return tuple(
-            self._info(name, track, limits)
-            for name, track in self._tracks.items()
-            if name != SPEECH
-        )
-
-    def _info(self, name: str, track: Track, limits: Sequence[JointLimit]) -> TrackInfo:
-        middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
-        try:
-            fitted = self._fit_track(Play(name), middle, limits)
-        except TrackRefused as refused:
-            return TrackInfo(name, track.description, refused=str(refused))
-        made = self._require_motions(name, 0)
-        return TrackInfo(
-            name, track.description, fitted.track.duration_s, fitted.slowed_by, "", made.owns,
-            track.sound, tuple(track.cues.items()), track.layers,
-        )  # fmt: skip
-
-    def _start_s(self, command: Play) -> float:
-        """Return the position at which a track begins.
-
-        Raises:
-            ValueError: It has no such cue; the message lists the available ones.
-        """
-        cues, start = self._tracks[command.track].cues, command.from_s
-        if isinstance(start, str) and start not in cues:
-            there = ", ".join(cues) or "none"
-            raise ValueError(f"{command.track} has no cue {start!r}; available: {there}")
-        return cues[start] if isinstance(start, str) else start
+        return tuple([found[number] for number in sorted(found)])
 
     def play(
-        self, command: Play, t_s: float, commanded_rad: JointAngles, limits: Sequence[JointLimit]
-    ) -> CommandReply:
+        self, command: Play | Speak, t_s: float, commanded_rad: JointAngles,
+        limits: Sequence[JointLimit],
+    ) -> CommandReply:  # fmt: skip
         """Start a track from the joints' present angles, or end all tracks.
 
         Args:
-            command: Track, speed and count.
+            command: Track, speed and count, or a speech.
             t_s: Present time.
             commanded_rad: Joint angles last sent.
             limits: Present limits of the joints.
         """
-        if not command.track:
+        name = SPEECH if isinstance(command, Speak) else command.track
+        if not name:
             return self._end(self._player.voices, t_s, limits, command.who)
-        made = self._require_motions(command.track, command.times)
-        replaced = self._player.overlapping(made.motion)
-        if len(self._player.voices) - len(replaced) >= MAX_TRACKS:
-            return CommandReply(f"{MAX_TRACKS} tracks are playing: end one of them first")
-        state = self._player.state(t_s, replaced)
-        fade_s = self._fit.fade_s(state, limits, BLEND_OUT_S)
-        base = self._fit.subtract_offset(commanded_rad, self._player.state(t_s))
+        player, fit = self._player, self._fit
+        base_rad = fit.subtract_offset(commanded_rad, player.state(t_s))
         try:
-            fitted = self._fit_track(command, base, limits)
+            found = self.prepare(command, limits)
+            sizes, reduced = fit.sizes(found.placed, base_rad, limits)
         except TrackRefused as refused:
-            return CommandReply(f"{command.track}: {refused}")
-        wait_s = self._fit.wait_s(state, fade_s, fitted.track, limits)
+            return CommandReply(f"{name}: {refused}")
+        except ValueError as error:
+            return CommandReply(str(error))
+        track, motion = found.placed.track, found.motion
+        loop = track.loop or (isinstance(command, Play) and command.loop)
+        replaced = player.overlapping(motion, name)
+        state = player.state(t_s, replaced)
+        fade_s = fit.fade_s(state, limits, BLEND_OUT_S)
         self._number += 1
-        track, loop = self._tracks[command.track], command.loop or made.track.loop
-        for voice in replaced:
-            self._end_state(voice.number, f"another track: {command.track}", t_s)
-        self._player.play(
-            fitted.track, self._number, t_s, fade_s, wait_s, self._start_s(command), loop
+        voice = Voice(
+            self._number, name, motion, sizes.tolist(), partial(fit.move_s, limits=limits),
+            fit.channel_means(command.lead_s) if command.lead_s else (), found.sound_s,
+            found.again if loop else None,
+        )  # fmt: skip
+        wait_s = fit.wait_s(state, fade_s, motion, limits) if state.any() else 0.0
+        voice.begins_s = t_s + wait_s
+        if motion.owned:
+            voice.entry_s = max(BLEND_IN_S, fit.entry_s(motion, base_rad, limits))
+        for one in replaced:
+            self._end_state(one.number, f"another track: {name}", t_s)
+        player.play(voice, t_s, fade_s)
+        reply = structs.replace(
+            fit.reply(name, found.placed, motion, reduced),
+            duration_s=wait_s + found.duration_s,
+            number=self._number,
         )
-        reply = TrackReply(
-            command.track,
-            wait_s + fitted.track.duration_s,
-            fitted.slowed_by,
-            fitted.slow_joint,
-            fitted.reduced_joints,
-            made.left_out,
-            self._number,
-        )
-        limited = _limits_text(reply.text().partition("; ")[2], track.sound, fitted.track.speed)
+        limited = [reply.text().partition("; ")[2]]
+        if track.sound and motion.rate != 1.0:
+            limited.append("without its sound, which plays at speed 1 only")
         self._playing[self._number] = TrackState(
-            self._number, command.track, 0.0, fitted.track.length_s, fitted.track.speed,
-            loop=loop, owns=made.owns, who=command.who, sound=track.sound, limited=limited,
-            since_s=t_s, volume=track.volume,
+            self._number, name, voice.position_s(t_s), voice.length_s, motion.rate, loop=loop,
+            owns=found.placed.owns, who=command.who, sound=track.sound,
+            limited="; ".join(filter(None, limited)), since_s=t_s, volume=track.volume,
         )  # fmt: skip
         return CommandReply(track=reply)
 
-    def ends_show(self, command: Play) -> bool:
+    def ends_show(self, command: Play, limits: Sequence[JointLimit]) -> bool:
         """Return whether a track would replace one that owns joints."""
-        made = self._motions(command.track, command.times)
-        return isinstance(made, TrackMotions) and any(
-            voice.motion.owned for voice in self._player.overlapping(made.motion)
-        )
+        try:
+            motion = self.prepare(command, limits).motion
+        except ValueError:
+            return False
+        return any(one.motion.owned for one in self._player.overlapping(motion, command.track))
 
     def end(self, command: EndTrack, t_s: float, limits: Sequence[JointLimit]) -> CommandReply:
         """End tracks that play; to end all is done with none."""
-        voices = [
-            voice for voice in self._player.voices if command.track in ("", voice.played.name)
-        ]
+        voices = [voice for voice in self._player.voices if command.track in ("", voice.name)]
         if not voices and command.track:
-            there = ", ".join(voice.played.name for voice in self._player.voices) or "none"
-            return CommandReply(f"{command.track} is not playing; playing: {there}")
+            known = ", ".join(voice.name for voice in self._player.voices) or "none"
+            return CommandReply(f"{command.track} is not playing; playing: {known}")
         return self._end(voices, t_s, limits, command.who)
 
     def sync(self, command: SyncTrack, t_s: float) -> None:
@@ -336,16 +385,14 @@ class TrackChoices:
         self, voices: Sequence[Voice], t_s: float, limits: Sequence[JointLimit], who: str
     ) -> CommandReply:
         """End tracks early, with a blend."""
-        least_s = max([voice.played.blend_s[1] for voice in voices], default=0.0)
-        fade_s = self._fit.fade_s(self._player.state(t_s, voices), limits, least_s or BLEND_OUT_S)
+        fade_s = self._fit.fade_s(self._player.state(t_s, voices), limits, BLEND_OUT_S)
         for voice in voices:
             self._end_state(voice.number, f"{who or 'a user'} has ended it", t_s)
         self._player.end(voices, t_s, fade_s)
         return CommandReply(track=TrackReply("", fade_s))
 
     def _end_state(self, number: int, reason: str, t_s: float) -> None:
-        ended = structs.replace(self._playing.pop(number), end_reason=reason)
-        self._ended[number] = ended, t_s
+        self._ended[number] = structs.replace(self._playing.pop(number), end_reason=reason), t_s
 
     def drop_present(self, t_s: float) -> str:
         """Drop all tracks, as a client holds their joints or the torque is off.
@@ -353,7 +400,7 @@ class TrackChoices:
         Returns:
             The names of the tracks, "" if there were none.
         """
-        names = ", ".join(voice.played.name for voice in self._player.voices)
+        names = ", ".join(voice.name for voice in self._player.voices)
         self._player.reset()
         for number in tuple(self._playing):
             self._end_state(number, "its joints are controlled by a client or switched off", t_s)
@@ -365,67 +412,32 @@ class TrackChoices:
         if look != self._look:
             self._look, self._nearest = look, None
             self._shifts += 1
+        if look is KEEP or look is None:
+            return chosen
         if isinstance(look, tuple):
-            x, y, z = look
-            return Target(
-                (float(x), float(y), float(z)), (0.0, 0.0, 0.0), t_s, ORDERED, -1, 1.0, True, None,
-                chosen.shift + self._shifts, "a track looks there", saliences=chosen.saliences,
-            )  # fmt: skip
-        if look is KEEP or look is None or percept is None:
-            return chosen
-        faces = {face.id: face for face in percept.faces}
-        if look != "person":
-            self._nearest = look if isinstance(look, int) else None
-        elif self._nearest not in faces:
-            near = min(faces.values(), key=lambda f: norm(sub(f.p_world_m, p_head_m)), default=None)
-            self._shifts += near is not None
-            self._nearest = near.id if near is not None else None
-        face = faces.get(self._nearest) if self._nearest is not None else None
-        if face is None:
-            return chosen
+            x, y, z = map(float, look)
+            seen = (x, y, z), (0.0, 0.0, 0.0), t_s, ORDERED, -1
+            why = "a track looks there"
+        else:
+            faces = {face.id: face for face in percept.faces} if percept is not None else {}
+            if isinstance(look, int):
+                self._nearest = look
+            elif faces and self._nearest not in faces:
+                self._nearest = min(faces, key=lambda i: norm(sub(faces[i].p_world_m, p_head_m)))
+                self._shifts += 1
+            if percept is None or self._nearest not in faces:
+                return chosen
+            face = faces[self._nearest]
+            seen = face.p_world_m, face.v_world_m_s, percept.captured_s, "face", face.id
+            why = f"face {face.id}: a track looks at it"
         return Target(
-            face.p_world_m, face.v_world_m_s, percept.captured_s, "face", face.id, 1.0, True, None,
-            chosen.shift + self._shifts, f"face {face.id}: a track looks at it",
-            saliences=chosen.saliences,
-        )  # fmt: skip
+            *seen, 1.0, True, None, chosen.shift + self._shifts, why, saliences=chosen.saliences
+        )
 
-    def _fit_track(
-        self,
-        command: Play,
-        base_rad: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
-        limits: Sequence[JointLimit],
-    ) -> FittedTrack:
-        name, made = command.track, self._require_motions(command.track, command.times)
-        out_s = made.track.blend_out_s or BLEND_OUT_S
-        lead_s = 0.0
-        if command.lead_s and made.motion.channels:
-            # Faster joints begin later than the slowest one.
-            leads = self._fit.channel_means(command.lead_s)
-            lead_s = max([leads[i] for i in made.motion.channels])
-            delays = [max(0.0, lead_s - one) for one in leads]
-            made = made._replace(motion=made.motion.delay(delays))
-        return self._fit.fit(
-            name, made, command.speed, base_rad, limits,
-            (made.track.blend_in_s, out_s), lead_s, command.sound_s,
-        )  # fmt: skip
 
-    def _require_motions(self, name: str, count: int) -> TrackMotions:
-        made = self._motions(name, count)
-        if isinstance(made, TrackRefused):
-            raise made
-        return made
-
-    def _motions(self, name: str, count: int) -> TrackMotions | TrackRefused:
-        """Return the curves of a track, or the reason why this rig has none."""
-        key = name, count if count != self._tracks[name].count else 0
-        if key not in self._cache:
-            if len(self._cache) >= len(self._tracks) + _MOST_KEPT:
-                self._cache = {kept: made for kept, made in self._cache.items() if kept[1] == 0}
-            track = self._tracks[name]
-            if track.sound and track.sound not in self._sounds:
-                self._sounds[track.sound] = self._sound_s(track.sound)
-            try:
-                self._cache[key] = track_motions(track, self._joints, count, self._tables)
-            except TrackRefused as refused:
-                self._cache[key] = refused
-        return self._cache[key]
+def _track_of_text(text: str) -> Track:
+    """Return the track of a YAML text, which a recording holds."""
+    with tempfile.NamedTemporaryFile("w", suffix=".yaml", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        return load(Path(file.name), Track)

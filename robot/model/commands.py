@@ -207,6 +207,7 @@ class Play(ClientCommand, frozen=True):
         lead_s: Latencies of all joints, by which the motion of a track with sound is early; set on
             execution for the recording.
         sound_s: Duration of its sound, set on execution.
+        yaml: The track, set on execution if its file is newer than the run.
     """
 
     track: _Name
@@ -216,6 +217,7 @@ class Play(ClientCommand, frozen=True):
     loop: bool = False
     lead_s: _Lead | None = None
     sound_s: _Position = 0.0
+    yaml: str = ""
 
 
 class EndTrack(ClientCommand, frozen=True):

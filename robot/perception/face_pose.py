@@ -128,7 +128,12 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
     turned_away = dot((R[0][0], R[1][0], R[2][0]), p) > -cos(_MOST_TURNED_RAD) * norm(p)
     if turned_away or not nearest_m > 0.0:
         return None
-    return FacePose(p, R, length, _turn_sd_rad(norm(p), noise))
+    # The yaw is less certain than the pitch. The nose projects from the plane of eyes and mouth,
+    # and its image position shows the turn.
+    per_rad = _NOSE_OUT_M / norm(p)
+    variance = noise * noise + (_NOISE_OF_EYES * PUPIL_DISTANCE_M / norm(p)) ** 2
+    turn_sd_rad = 1.0 / sqrt(per_rad * per_rad / (_OF_FIVE * variance) + _YAW_INFO)
+    return FacePose(p, R, length, turn_sd_rad)
 
 
 def _shows_front(points: Points) -> bool:
@@ -259,13 +264,3 @@ def _smile(wider: float) -> tuple[Vec3, ...]:
 def _mouth_width(seen: Points) -> float:
     """Return the width of a mouth relative to the distance of the eyes."""
     return dist(seen[3], seen[4]) / dist(seen[0], seen[1])
-
-
-def _turn_sd_rad(away_m: float, noise: float) -> float:
-    """Return the standard deviation of a face's yaw, which is less certain than its pitch.
-
-    The nose projects from the plane of eyes and mouth, and its image position shows the turn.
-    """
-    per_rad = _NOSE_OUT_M / away_m
-    variance = noise * noise + (_NOISE_OF_EYES * PUPIL_DISTANCE_M / away_m) ** 2
-    return 1.0 / sqrt(per_rad * per_rad / (_OF_FIVE * variance) + _YAW_INFO)

@@ -415,7 +415,8 @@ def _arm_of(thing: Located, faces: list[Known], p_camera: Vec3, last: Vec3 | Non
             continue
         # The arm continues from the hand through the patch's centre to the shoulder.
         middle = add(p_camera, scale(sub(thing.p_m, p_camera), ratio))
-        shoulder_m = _off_shoulder(sub(scale(middle, 2.0), tip), face[0])
+        aside, up = _offset_from_face(sub(scale(middle, 2.0), tip), face[0])
+        shoulder_m = hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
         off_m = shoulder_m
         if last is not None and norm(sub(last, face[0])) < _SAME_M:
             off_m -= _REACH_M
@@ -431,12 +432,6 @@ def _arm_of(thing: Located, faces: list[Known], p_camera: Vec3, last: Vec3 | Non
             comes_in = thing.from_side and shoulder_m > _ANOTHERS_M and wide
             best, least = _Arm(face, tip, v, ratio, attached, comes_in), off_m
     return best
-
-
-def _off_shoulder(p_m: Vec3, p_face: Vec3) -> float:
-    """Return the distance between a position and the person's shoulder on its side."""
-    aside, up = _offset_from_face(p_m, p_face)
-    return hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
 
 
 def _as_hand(thing: Located, arm: _Arm, nearer: float, p_camera: Vec3) -> Located:
@@ -491,18 +486,24 @@ def _approaches(thing: Located, p_camera: Vec3) -> bool:
 
 def without_own_motion(
     faces: list[Located], things: Iterable[Located], known: list[Known], p_camera: Vec3
-) -> tuple[list[Located], list[Located]]:
+) -> tuple[list[Located], list[Located], list[tuple[int, Located]]]:
     """Return the faces with the spin of their own motion, and the things that belong to no face.
 
     known: the faces from ``known_faces``
+
+    Returns:
+        Faces, things, and the patches of people who are only tracked, each with its index there.
     """
     spins = [0.0] * len(faces)
     others: list[Located] = []
+    carried: list[tuple[int, Located]] = []
     for thing in things:
         owner = _owner(thing, known, p_camera)
         if owner is None:
             others.append(thing)
-        elif owner < len(faces):
+        elif owner >= len(faces):
+            carried.append((owner - len(faces), thing))
+        else:
             off = _offset_of_patch(thing, known[owner][0], p_camera)
             if off is not None and hypot(*off) < _HEAD_M:
                 spins[owner] = max(spins[owner], thing.spin_rad_s, key=abs)
@@ -510,7 +511,7 @@ def without_own_motion(
         face._replace(spin_rad_s=spin) if spin != 0.0 else face
         for face, spin in zip(faces, spins, strict=True)
     ]
-    return turned, others
+    return turned, others, carried
 
 
 def known_faces(faces: list[Located], tracked: Sequence[Known]) -> list[Known]:

@@ -11,9 +11,9 @@ from math import cos, hypot, radians, sqrt
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
+from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections, Located
 from gazerig.gaze.angles import add, angle_between, dot, rotate, rotate_back, scale, sub, transpose
-from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
+from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
@@ -33,7 +33,7 @@ from gazerig.robot.perception.track import (
     looks_at_head,
     place_in_world,
 )
-from gazerig.robot.perception.tracker import Tracker
+from gazerig.robot.perception.tracker import Tracker, correct_velocity
 
 # A camera that turned farther than this between two frames shows another part of the same room.
 _COS_SAME_VIEW = cos(radians(5.0))
@@ -97,27 +97,30 @@ class Perception:
         faces = [place_in_world(face, R, p) for face in located.faces]
         things = [place_in_world(thing, R, p) for thing in located.things]
         palms = located.palms and [place_in_world(one, R, p) for one in located.palms]
+        people = [track for track in self._tracks if track.is_person]
+        carried: list[tuple[int, Located]] = []
         if things or palms or self._hands.resting:
             if self._own_parts is not None:
                 things = label_own_body(things, self._own_parts(R_head, p_head), p)
             tracked = [
                 (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
-                for t in self._tracks
-                if t.is_person
+                for t in people
             ]
             known = known_faces(faces, tracked)
             things = self._hands.label(things, known, p, t_s, palms)
-            faces, things = without_own_motion(faces, things, known, p)
+            faces, things, carried = without_own_motion(faces, things, known, p)
             # A patch that may be a walking person is at the position of the head, not at the feet.
             things = [
                 thing._replace(p_m=thing.upper_m or thing.p_m) if thing.kind == UNNAMED else thing
                 for thing in things
             ]
         in_sight = self._tracker.step([*faces, *things], p, t_s)
+        for k, thing in carried:
+            if people[k].seen_s < t_s:
+                correct_velocity(people[k], thing)
         for track in in_sight:
             if track.seen_s == t_s:
                 track.life.record(track.filter, axis, t_s)
-        size_px = detections.width_px, detections.height_px
         self._tracks = tracks = tuple(
             [
                 track
@@ -126,7 +129,7 @@ class Perception:
                 and (
                     track.seen_s == t_s
                     or _in_picture(
-                        rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, size_px
+                        rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, detections
                     )
                 )
             ]
@@ -177,12 +180,22 @@ class Perception:
             track.looks_at_head = looks_at_head(
                 off_rad, found.turn_sd_rad, gaze is not None, track.looks_at_head
             )
+        # A measured part keeps its measured position; a canonical one is stretched with the face.
+        size, length = track.face_size or 1.0, track.face_length
+        parts = tuple(
+            [
+                add(
+                    p, rotate(R, at if own else (size * at[0], size * at[1], size * length * at[2]))
+                )
+                for at, own in self._parts
+            ]
+        )
         return Face(
             track.id,
             p,
             track.v_world_m_s,
             R,
-            self._face_parts(R, p, track.face_size or 1.0, track.face_length),
+            parts,
             found.confidence,
             track.depth_from,
             hypot(sqrt(track.filter.along.p), unknown_size),
@@ -192,28 +205,13 @@ class Perception:
             opening,
             signs and signs.mouth_opening_m,
             track.is_alive and track.speech.speaks(t_s) if signs else None,
-            track.is_alive,
-        )
-
-    def _face_parts(self, R: Mat3, p: Vec3, size: float, length: float) -> tuple[Vec3, ...]:
-        """Return the eight parts of a face in the world.
-
-        A measured part keeps its measured position; a canonical one is stretched with the face.
-        """
-        return tuple(
-            [
-                add(
-                    p, rotate(R, at if own else (size * at[0], size * at[1], size * length * at[2]))
-                )
-                for at, own in self._parts
-            ]
         )
 
 
-def _in_picture(p_camera_m: Vec3, lens: Intrinsics, size_px: tuple[int, int]) -> bool:
+def _in_picture(p_camera_m: Vec3, lens: Intrinsics, found: Detections) -> bool:
     """Return whether a position is inside the image; people outside it are only remembered."""
     x, y = project([p_camera_m], lens)[0].tolist()  # NaN behind the camera
-    return bool(0.0 <= x < size_px[0] and 0.0 <= y < size_px[1])
+    return bool(0.0 <= x < found.width_px and 0.0 <= y < found.height_px)
 
 
 def _bodies(tracks: tuple[BodyTrack, ...]) -> Bodies:
@@ -230,6 +228,7 @@ def _bodies(tracks: tuple[BodyTrack, ...]) -> Bodies:
         np.array([one.radius_m for one in found]),
         np.array([covariance(one.view, one.across.v, one.along.v) for one in filters]),
         tuple([track.id for track in tracks if track.detection.from_side]),
+        tuple([track.id for track in tracks if track.is_person and not track.is_alive]),
     )
 
 

@@ -81,7 +81,7 @@ def seen_distance_m(percept: Percept | None, p_world_m: Vec3, direction_world: V
     if percept is None:
         return near
     places = [face.p_world_m for face in percept.faces]
-    places += [(float(x), float(y), float(z)) for x, y, z in percept.bodies.p_world_m]
+    places += map(vec, percept.bodies.p_world_m)
     for place in places:
         there = sub(place, p_world_m)
         angle = angle_between(unit(there), direction_world)

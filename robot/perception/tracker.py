@@ -122,11 +122,18 @@ class Tracker:
         kept = [
             t
             for t in self._tracks
-            if t.unseen_s <= self._kept_s(t) and not _is_another_now(t, renamed)
+            if t.unseen_s <= (_REMEMBER_FACE_S if t.is_person and t.frames >= _KNOWN else FORGET_S)
+            and not _is_another_now(t, renamed)
         ]
         for track in self._tracks:
-            if track.is_person and track not in kept:
-                self._retire_track(track)
+            if not track.is_person or track in kept:
+                continue
+            if track.frames >= _KNOWN:
+                self._left = [*self._left, _person(track)][-_MOST_LEFT:]
+            elif track.returned_person is not None:
+                self._left.append(track.returned_person)
+            else:
+                self._free.add(track.id)  # the number of a false detection
         self._tracks = kept
         return tuple([t for t in self._tracks if t.unseen_s <= self._coasts_s(t)])
 
@@ -134,10 +141,6 @@ class Tracker:
         """Return the time for which a track without a detection is still reported."""
         by_body = track.is_person and track.seen_s > track.faced_s and track.frames > 1
         return _COAST_PERSON_S if by_body else IN_SIGHT_S
-
-    def _kept_s(self, track: BodyTrack) -> float:
-        """Return the time for which a track is kept without a detection."""
-        return _REMEMBER_FACE_S if track.is_person and track.frames >= _KNOWN else FORGET_S
 
     def _begin_track(self, detection: Located, p_camera: Vec3, t_s: float) -> BodyTrack:
         track = BodyTrack(
@@ -159,7 +162,7 @@ class Tracker:
         )
         self._learn_size(track, detection, 1.0)
         track.clothes.learn(detection.clothing)
-        _correct_velocity(track, detection)
+        correct_velocity(track, detection)
         if track.is_person:
             self._number(track)
             self._note_film(track)
@@ -206,15 +209,6 @@ class Tracker:
         self._next_person += 1
         return self._next_person - 1
 
-    def _retire_track(self, track: BodyTrack) -> None:
-        """Store a person who left; the number of a false detection becomes free."""
-        if track.frames >= _KNOWN:
-            self._left = [*self._left, _person(track)][-_MOST_LEFT:]
-        elif track.returned_person is not None:
-            self._left.append(track.returned_person)
-        else:
-            self._free.add(track.id)
-
     def _update_track(self, track: BodyTrack, detection: Located, p_camera: Vec3) -> None:
         """Update a track with a detection."""
         place, R = detection.p_m, detection.R_face
@@ -225,8 +219,10 @@ class Tracker:
         if R and track.R_world_face and jump_m > max(_JUMP_M, _JUMP_M_S * track.unseen_s):
             self._jumps = [*self._jumps[-_MOST_LEFT:], (known.view, track.at_s)]
             self._note_film(track)
+        elif track.unseen_s > IN_SIGHT_S:
+            self._note_film(track)
         known.correct(place, detection.across_sd_m, detection.along_sd_m)
-        _correct_velocity(track, detection)
+        correct_velocity(track, detection)
         if track.is_person:
             known.slow_to(FASTEST_M_S)
         track.clothes.record_absence(track.unseen_s)
@@ -269,7 +265,7 @@ def _is_another_now(track: BodyTrack, renamed: set[int]) -> bool:
     return track.detection.kind == UNNAMED and track.detection.detector_id in renamed
 
 
-def _correct_velocity(track: BodyTrack, found: Located) -> None:
+def correct_velocity(track: BodyTrack, found: Located) -> None:
     """Update a track with a velocity that was measured in the image."""
     if found.v_m_s is not None:
         sds = found.across_sd_m_s, found.along_sd_m_s

@@ -335,7 +335,9 @@ def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
         keys = run.master if run.process.stdin is None else run.process.stdin.fileno()
         with contextlib.suppress(OSError):
             os.write(keys, b"1500\n+40\n")
-    needs = 0 if name == "monitor" else 1
+    # A joint of smart servos is calibrated by hand, its torque off.
+    is_limp = name == "monitor" or (name == "calibrate" and at.name not in BOARDS)
+    needs = 0 if is_limp else 1
     # A lack of memory is timed by ticks; everything else starts when the program works.
     ended = lambda: run.process.poll() is not None  # noqa: E731
     ticks = lambda: at.on() >= needs and at.busy() and at.on() >= needs  # noqa: E731

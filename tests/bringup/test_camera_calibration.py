@@ -15,14 +15,14 @@ from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.features.bringup.calibration.board_page import PAPERS_MM, write_page
 from gazerig.features.bringup.calibration.board_views import ViewCollector, board_view
 from gazerig.features.bringup.calibration.camera_procedure import neck_angles, neck_steps
-from gazerig.features.bringup.calibration.hand_eye import HandEye, NeckView, camera_on_head
+from gazerig.features.bringup.calibration.hand_eye import NeckView, camera_on_head
 from gazerig.features.bringup.calibration.lens_calibration import (
     CameraCalibrationRefused,
     LensCalibration,
     calibrate_lens,
 )
 from gazerig.gaze.types import Angles3
-from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard, DetectedBoard
+from gazerig.robot.model.charuco_board import CharucoBoard, DetectedBoard
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.intrinsics import project
@@ -56,16 +56,9 @@ LENS = replace(BOARD_LENS, distortion=(-0.11, 0.06, 0.0008, -0.0006, 0.0))
 GUESS = intrinsics_of_view(radians(69.0), *SIZE)
 
 
-def corners(
-    number: int, noise_px: float, rng: np.random.Generator, lens: Intrinsics
-) -> DetectedBoard:
-    """Detections of the board, without a picture."""
-    return seen_board(hand_held_pose(number, BOARD), lens, noise_px, rng)
-
-
 def some_views(noise_px: float = 0.3, count: int = 16) -> list[DetectedBoard]:
     rng = np.random.default_rng(0)
-    return [corners(k, noise_px, rng, LENS) for k in range(count)]
+    return [seen_board(hand_held_pose(k, BOARD), LENS, noise_px, rng) for k in range(count)]
 
 
 def calibrated(views: list[DetectedBoard]) -> LensCalibration:
@@ -157,17 +150,14 @@ def test_corners_that_jump_about_are_refused_with_the_number() -> None:
 # --- The calibration board: on paper in true size, and found in pictures
 
 
-PRINTED = CharucoBoard()
-
-
 @pytest.mark.parametrize("paper", sorted(PAPERS_MM))
 def test_the_page_has_the_size_of_the_paper_in_print(paper: str, tmp_path: Path) -> None:
     from PIL import Image
 
     wide_mm, high_mm = PAPERS_MM[paper]
     png, pdf = tmp_path / "board.png", tmp_path / "board.pdf"
-    write_page(PRINTED, paper, png)
-    write_page(PRINTED, paper, pdf)
+    write_page(BOARD, paper, png)
+    write_page(BOARD, paper, pdf)
     with Image.open(png) as image:
         dots_mm = [
             size / dpi * 25.4 for size, dpi in zip(image.size, image.info["dpi"], strict=True)
@@ -179,17 +169,6 @@ def test_the_page_has_the_size_of_the_paper_in_print(paper: str, tmp_path: Path)
     assert ((right - left) / 72 * 25.4, (top - low) / 72 * 25.4) == pytest.approx(
         (wide_mm, high_mm), abs=0.1
     )
-
-
-@pytest.mark.parametrize(
-    ("measures", "message"),
-    [((7, 5, 36.0, 35.0), "0.4 to 0.9"), ((20, 20, 10.0, 7.0), "more than 50 markers")],
-)
-def test_boards_that_cannot_be_are_refused(
-    measures: tuple[int, int, float, float], message: str
-) -> None:
-    with pytest.raises(ValueError, match=message):
-        BoardParams(*measures)
 
 
 # --- Calibrating a camera step by step, with a simulated board, head and clock
@@ -269,10 +248,6 @@ def neck_views(
     return views
 
 
-def found_in(scene: BoardScene, views: list[NeckView]) -> HandEye:
-    return camera_on_head(views, BOARD_LENS, 640)
-
-
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_turns_about_one_axis_are_refused(axis: int) -> None:
     scene = scene_elsewhere()
@@ -280,27 +255,27 @@ def test_turns_about_one_axis_are_refused(axis: int) -> None:
         tuple(a if k == axis else 0.0 for k in range(3)) for a in np.linspace(-0.25, 0.25, 12)
     ]
     with pytest.raises(CameraCalibrationRefused, match="turn the head farther|nods as well"):
-        found_in(scene, neck_views(scene, angles))  # type: ignore[arg-type]
+        camera_on_head(neck_views(scene, angles), BOARD_LENS, 640)  # type: ignore[arg-type]
 
 
 def test_a_place_that_is_not_sure_is_refused() -> None:
     scene = scene_elsewhere()
     small = [(0.3 * y, 0.3 * p, 0.3 * r) for y, p, r in planned()]
     with pytest.raises(CameraCalibrationRefused, match="sure to .* mm and .* deg only"):
-        found_in(scene, neck_views(scene, small, 0.6))
+        camera_on_head(neck_views(scene, small, 0.6), BOARD_LENS, 640)
 
 
 def test_few_views_and_a_joint_with_the_wrong_sign_are_refused() -> None:
     scene = scene_elsewhere()
     views = neck_views(scene, planned())
     with pytest.raises(CameraCalibrationRefused, match="seen from 7 neck angles"):
-        found_in(scene, views[:7])
+        camera_on_head(views[:7], BOARD_LENS, 640)
     mirrored = [
         NeckView(*KINEMATICS.head_pose((-yaw, pitch, roll)), view.seen)
         for (yaw, pitch, roll), view in zip(planned(), views, strict=True)
     ]
     with pytest.raises(CameraCalibrationRefused, match="reprojection error"):
-        found_in(scene, mirrored)
+        camera_on_head(mirrored, BOARD_LENS, 640)
 
 
 def test_angles_planned_stay_inside_the_neck_and_turn_about_all_axes() -> None:

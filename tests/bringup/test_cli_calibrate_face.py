@@ -11,7 +11,7 @@ from gazerig.features.bringup.cli.prompts import (
     split_words,
 )
 from gazerig.robot.control.command_handler import accept_only_stops
-from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop
+from gazerig.robot.model.commands import Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 
@@ -112,7 +112,7 @@ def test_while_the_terminal_leads_the_page_can_only_stop_and_resume() -> None:
     order = accept_only_stops(given.append, "the terminal leads the head now")
     order(Stop("a test"))
     order(Resume())
-    for asked in (LookAt((1.0, 0.0, 0.0)), Jog((("neck_yaw", 0.1),)), Ask("behaviour", "guard")):
+    for asked in (LookAt((1.0, 0.0, 0.0)), Jog((("neck_yaw", 0.1),))):
         with pytest.raises(ValueError, match="leads the head now"):
             order(asked)
     assert given == [Stop("a test"), Resume()]

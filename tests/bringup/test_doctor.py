@@ -110,8 +110,6 @@ DYNAMIXEL_RULES = [
 FEETECH_RULES = [
     ({"status": 0x20}, "error", "reports: overload", "switch its "),
     ({"present_input_voltage": 121}, "error", "12.1 V, its limits are 4.0..8.0 V", "sts3215-12v"),
-    ({"present_input_voltage": 60}, "warn", "made for 7.4 V", "thin wires"),
-    ({"baud_rate": 4}, "warn", "its Baud Rate is 115200", "gazerig setup"),
     ({"angular_resolution": 2}, "warn", "counts 2 turns for one", "--fix"),
     ({"position_offset": -85}, "note", "shifted by -85 steps", "gazerig calibrate"),
     ({"max_torque": 400}, "note", "gives 40% of its torque", "Max Torque (16)"),

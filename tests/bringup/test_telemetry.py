@@ -27,10 +27,11 @@ from gazerig.features.bringup.telemetry import (
     smart_servo_reader,
 )
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
+from gazerig.robot.app.rig_limits import lid_spans, limits
 from gazerig.robot.app.track_file import TOLERANCE_DEG, track_text, write_track
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.mass_params import HeadMassParams, MassParams
-from gazerig.robot.model.track_fit import track_motions
+from gazerig.robot.model.track_fit import TrackFit
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
@@ -209,11 +210,11 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(
     text = track_text(desk_rig, found.series, "by hand").text
     path, on_rig = write_track(desk_rig, "mine", text, tmp_path, False)
     track = load_track(path)
-    assert track.space == "joint" and len(track.frames) < 40
-    assert on_rig.fitted is not None and on_rig.fitted.slowed_by == 1.0
-    motion = track_motions(track, desk_rig.names).motion
+    assert len(track.frames) < 40 and on_rig.slowed_by == 1.0
+    fit = TrackFit(desk_rig.names, lid_spans(desk_rig))
+    motion = fit.motion(fit.place(track), limits(desk_rig.joints))
     at = np.linspace(0.1, 2.3, 50)
-    played = np.degrees(motion.sample_at(at).value)
+    played = np.degrees(motion.sample_at(at)[0])
     wanted = np.array([how(t)["neck_pitch"] for t in at])
     assert np.abs(played[:, 1] - wanted).max() < TOLERANCE_DEG + 0.8
     assert np.abs(played[:, 2]).max() == 0.0  # the roll has not moved

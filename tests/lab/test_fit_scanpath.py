@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import invoked
 
 from gazerig.config.load import load, shipped_path
 from gazerig.drivers.errors import SetupError
-from gazerig.features.lab.analysis.eye_tracker_csv import Samples
-from gazerig.features.lab.analysis.fit_scanpath import fit_to_recording
-from gazerig.features.lab.analysis.fixations import PartBoxes
+from gazerig.features.lab.analysis.eye_tracker_csv import Samples, read_recording
+from gazerig.features.lab.analysis.fit_scanpath import PartBoxes, fit_to_recording
 from gazerig.gaze.scanpath.scanpath import (
     Scanpath,
     ScanpathParams,
@@ -41,7 +41,7 @@ NAN = float("nan")
 def boxes(tmp_path: Path) -> PartBoxes:
     path = tmp_path / "parts.yaml"
     path.write_text(BOXES_YAML)
-    return load(path, PartBoxes)
+    return PartBoxes.read(path)
 
 
 def walked(count: int, seed: int, dwell_s: float | None = None) -> Iterator[tuple[str, float]]:
@@ -65,8 +65,9 @@ def samples(boxes: PartBoxes, looks: Iterator[tuple[str, float]], seed: int) -> 
     places: list[np.ndarray] = []
     at, before = np.array([0.0, 0.0]), ""
     left = True
+    at_part = {str(code): box for code, box in boxes.boxes.items()}
     for part, dwell_s in looks:
-        x0, y0, x1, y1 = boxes.boxes[part]
+        x0, y0, x1, y1 = at_part[part]
         left = not left if part == before else left
         share = np.array([0.2 if left else 0.8, rng.uniform(0.3, 0.7)])
         goal = np.array([x0, y0]) + share * np.array([x1 - x0, y1 - y0])
@@ -117,6 +118,79 @@ def test_samples_of_a_known_walk_give_it_back(tmp_path: Path, boxes: PartBoxes) 
     assert "#   gaze.csv" in text and "95 %" in text and "# from RE" in text
 
 
+TOBII = """\
+Recording timestamp [\u03bcs]\tSensor\tEvent\tGaze point X [DACS px]\tGaze point Y [DACS px]
+0\t\tRecordingStart\t\t
+0\tEye Tracker\t\t400,5\t300
+1000\tMouse\tMouseEvent\t\t
+4000\tEye Tracker\t\t\t
+8000\tEye Tracker\t\t401\t300,25
+"""
+STUDIO = """\
+RecordingTimestamp\tGazePointX (ADCSpx)\tGazePointY (ADCSpx)
+0\t400.5\t300
+4\t\t
+8\t401\t300.25
+"""
+NEON = """\
+section id,timestamp [ns],gaze x [px],gaze y [px],worn,gaze position in reference image x [px],\
+gaze position in reference image y [px]
+a,1700000000000000000,7.5,7.5,1,400.5,300
+a,1700000000004000000,7.5,7.5,1,,
+a,1700000000008000000,7.5,7.5,1,401,300.25
+"""
+OWN = """\
+clock;horizontal;vertical
+0;400,5;300
+4000;NA;.
+8000;401;300,25
+"""
+MAPPED = {"time": "Clock", "x": "horizontal", "y": "vertical"}
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding", "mapping", "note"),
+    [
+        (TOBII, "utf-16", {}, "column Recording timestamp [\u03bcs] is in us (from its name)"),
+        (STUDIO, "utf-8-sig", {}, "column RecordingTimestamp is in ms (from a median of 4)"),
+        (NEON, "utf-8", {}, "column timestamp [ns] is in ns (from its name)"),
+        (OWN, "utf-8", MAPPED, "column clock is in us (from a median of 4000)"),
+        (OWN, "utf-8", {**MAPPED, "time": "clock [us]"}, "column clock is in us (from its name)"),
+    ],
+)
+def test_exports_of_trackers_are_read_by_their_own_columns(
+    tmp_path: Path, text: str, encoding: str, mapping: dict[str, str], note: str
+) -> None:
+    (tmp_path / "export.tsv").write_text(text, encoding=encoding)
+    read = read_recording(tmp_path / "export.tsv", mapping)
+    assert isinstance(read, Samples) and read.note == note
+    assert read.time_s - read.time_s[0] == pytest.approx([0.0, 0.004, 0.008], abs=1e-6)
+    assert read.x == pytest.approx([400.5, NAN, 401.0], nan_ok=True)
+    assert read.y == pytest.approx([300.0, NAN, 300.25], nan_ok=True)
+
+
+def test_fixations_of_neon_have_places_and_columns_are_mapped(tmp_path: Path) -> None:
+    lines = ["start timestamp [ns],took_ms,fixation x [px],fixation y [px]"]
+    for k in range(80):
+        place = "400,390" if k % 2 else "300,290"
+        lines.append(f"{1_700_000_000_000_000_000 + 300_000_000 * k},250,{place}")
+    recording, parts, out = (tmp_path / name for name in ("looks.csv", "parts.yaml", "mine.yaml"))
+    recording.write_text("\n".join(lines))
+    parts.write_text(BOXES_YAML)
+    words = "fit-scanpath", str(recording), "--out", str(out)
+    for wrong, why in (
+        (("--map=duration",), "not NAME=COLUMN"),
+        (("--map=duration=there",), "no column there for duration"),
+        (("--map=duration=took",), "fixations without parts need their rectangles"),
+    ):
+        done = invoked(*words, *wrong)
+        assert done.code == 2 and why in done.err and done.err.count("\n") == 1
+    assert invoked(*words, "--map=duration=took", "--parts", str(parts)).code == 0
+    walk = load(out, Walk)
+    assert normalise(walk.matrix)[walk.order.index("N"), walk.order.index("RE")] > 0.9
+    assert walk.dwell_mean_s == pytest.approx([0.25] * 8)
+
+
 SAMPLE_ROWS = [f"{0.004 * k:.3f},400,400" for k in range(200)]
 
 
@@ -128,7 +202,9 @@ SAMPLE_ROWS = [f"{0.004 * k:.3f},400,400" for k in range(200)]
         ("time,x,y\n0,1,2\n0.1,1\n", r"bad\.csv:3: 2 cells under 3 column names"),
         ("time,x,y\n0,1,2\n0.1,inf,2\n", r"bad\.csv:3: column x: 'inf' is not a finite"),
         ("time,x,y\n0,1,2\n0.2,1,2\n0.1,1,2\n", r"bad\.csv:4: column time: 0\.1 does not come"),
-        ("time,x,y\n0,1,2\n4000,1,2\n8000,1,2\n", "steps of 4000 are neither seconds nor"),
+        ("time [h],x,y\n0,1,2\n1,1,2\n", "h is no unit of time; known: s, ms, us, ns"),
+        ("time,x,y\nnull,1,2\n1,1,2\n", r"bad\.csv:2: column time: the number is missing"),
+        ("time,x,y\n0,na,2\n1,.,2\n", "the eye is lost in all 2 samples"),
         ("start,duration,part\n0,1,N\n1,0,N\n", r"bad\.csv:3: column duration: 0 is not above 0"),
         ("start,duration,part\n0,1,ear\n", r"bad\.csv:2: column part: no part 'ear'; known: DN"),
         ("\n".join(["time,x,y", *SAMPLE_ROWS]), "1 fixations on the face are too few"),
@@ -146,7 +222,23 @@ def test_files_that_cannot_be_trusted_are_refused(
 
 
 def test_the_smaller_of_two_overlapping_parts_is_meant() -> None:
-    boxes = PartBoxes(FR=(0.0, 0.0, 100.0, 100.0), RE=(20.0, 20.0, 60.0, 40.0))
+    boxes = PartBoxes({"FR": (0.0, 0.0, 100.0, 100.0), "RE": (20.0, 20.0, 60.0, 40.0)})
     assert boxes.part_at(30.0, 30.0) == "RE"
     assert boxes.part_at(30.0, 70.0) == "FR"
     assert boxes.part_at(130.0, 70.0) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("N: [0, 0, 1, 1]", "at least two parts are needed"),
+        ("N: [0, 0, 1, 1]\nM: [3, 3, 2, 4]", "M: .* needs x0 < x1"),
+        ("N: [0, 0, 1, 1]\nEAR: [3, 3, 2, 4]", "EAR"),
+        ("N: [0, 0, left, 1]", r"Expected `float`, got `str` - at `\$\[...\]\[2\]`"),
+    ],
+)
+def test_rectangles_that_are_none_are_refused(tmp_path: Path, text: str, why: str) -> None:
+    (tmp_path / "parts.yaml").write_text(text)
+    with pytest.raises(SetupError, match=why) as caught:
+        PartBoxes.read(tmp_path / "parts.yaml")
+    assert "\n" not in str(caught.value) and "parts.yaml" in str(caught.value)

@@ -2,6 +2,7 @@
 
 import json
 import re
+from base64 import b64decode
 from dataclasses import replace
 from html import unescape
 from math import cos, radians, sin
@@ -11,34 +12,23 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from command_line import invoked, typed
+from command_line import invoked
 from fakes.runs import play, simulated
 from msgspec import structs
 
 from gazerig.config.schema import Rig, load_walk
-from gazerig.features.lab.analysis import human_norms as bands
 from gazerig.features.lab.analysis import human_norms as human
-from gazerig.features.lab.analysis.blink_finder import BlinkEvent, BlinkFinder
+from gazerig.features.lab.analysis.blink_finder import BlinkEvent, find_blinks
 from gazerig.features.lab.analysis.event_detector import (
     CommandedSaccade,
-    EventDetector,
     FixationEvent,
-    MeasuredSaccade,
     SaccadeEvent,
-    SaccadeFinder,
+    find_saccades,
 )
-from gazerig.features.lab.report import face, landing, rests
-from gazerig.features.lab.report.face import published_walk
-from gazerig.features.lab.report.gaze_trace import (
-    GazeTrace,
-    GazeTraceBuilder,
-    TraceRow,
-)
+from gazerig.features.lab.analysis.human_norms import BY_KEY
+from gazerig.features.lab.report import face, saccades
+from gazerig.features.lab.report.gaze_trace import ROW, GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.measures import judge_run
-from gazerig.features.lab.report.page import (
-    RunHeader,
-    band_text,
-)
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
     MeasureResult,
@@ -54,7 +44,7 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
-EMPTY = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
+EMPTY = GazeTrace(np.zeros(0, ROW))
 
 
 def verdicts(run: GazeTrace) -> dict[str, MeasureResult]:
@@ -68,9 +58,8 @@ def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -
         for n, (a, d, v, at) in enumerate(saccades)
     )
     shuts = tuple(BlinkEvent(3.0 * n, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0) for n in range(blinks))
-    rows = np.full((600, len(TraceRow._fields)), np.nan)
-    rows[:, 0] = np.arange(600) * 0.05
-    rows[:, TraceRow._fields.index("mode")] = 0.0
+    rows = np.zeros(600, ROW)
+    rows["t"], rows["gaze"] = np.arange(600) * 0.05, np.nan
     return GazeTrace(rows, every, (), shuts, shuts)
 
 
@@ -92,10 +81,10 @@ def walking(desk_rig: Rig) -> GazeTrace:
 def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(walking: GazeTrace) -> None:
     seen = verdicts(walking)
     for key in ("on_parts", "eyes_share", "visit", "never_taken", "heat", "rate",
-                "below_15", "peak_small", "rest_error", "left_mm", "right_mm", "in_cone",
-                "vergence", "vergence_ok"):  # fmt: skip
+                "below_15", "peak_small", "rest_error", "in_cone",
+                "vergence_ok"):  # fmt: skip
         assert seen[key].verdict == "pass", seen[key]
-        assert seen[key].measured.events >= seen[key].band.min_events
+        assert seen[key].measured.events >= seen[key].band.least
         assert seen[key].low95 <= seen[key].value <= seen[key].high95
 
 
@@ -127,32 +116,26 @@ def test_blinks_of_a_human_shape_pass_and_are_counted_by_the_minute() -> None:
 
 
 def test_too_few_events_are_no_pass_and_nothing_is_too_few() -> None:
-    band = bands.BY_KEY["rate"]
-    ones = np.full(band.min_events - 1, 0.4)
-    few = judge(MeasuredValue("rate", ones, mean), band)
+    ones = np.full(BY_KEY["rate"].least - 1, 0.4)
+    few = judge(MeasuredValue("rate", ones, mean))
     assert few.verdict == "too few events" and np.isnan(few.low95)
     assert {finding.verdict for finding in judge_run(EMPTY)} == {"too few events"}
 
 
 def test_a_figure_outside_by_what_chance_may_do_is_uncertain() -> None:
-    """Express reactions may be 5 %: 1 of 14 is no proof of more, 100 of 1400 is."""
-    band = bands.BY_KEY["express"]
+    """Swings may be 10 %: 4 of 34 are no proof of more, 400 of 3400 are."""
     for times, verdict in ((1, "uncertain"), (100, "outside")):
-        rows = np.array([1.0] * times + [0.0] * 13 * times)
-        assert judge(MeasuredValue("express", rows, mean), band).verdict == verdict
-    inside = judge(MeasuredValue("express", np.zeros(14), mean), band)
-    assert inside.verdict == "pass" and inside.high95 > band.high  # as wide as 14 events are
+        rows = np.array([1.0] * 4 * times + [0.0] * 30 * times)
+        assert judge(MeasuredValue("unasked", rows, mean)).verdict == verdict
+    inside = judge(MeasuredValue("unasked", np.zeros(30), mean))
+    assert inside.verdict == "pass" and inside.high95 > inside.band.high  # 30 events are few
     one_look = MeasuredValue("longest_look", np.array([3.0, 15.4]), longest)
-    look = judge(one_look, bands.BY_KEY["longest_look"])
+    look = judge(one_look)
     assert look.verdict == "outside" and np.isnan(look.high95)  # it has happened
 
 
 def test_people_are_as_published() -> None:
-    walk = load_walk("nakamoto_tsuruno")
-    assert walk.order == PARTS
-    assert walk.dwell_mean_s == human.DWELL_MEAN_S and walk.dwell_sd_s == human.DWELL_SD_S
-    rows = np.array(walk.matrix)
-    assert human.transition_matrix() == pytest.approx(rows / rows.sum(axis=1, keepdims=True))
+    assert load_walk("nakamoto_tsuruno").order == PARTS
     share = [0.0654, 0.1146, 0.0580, 0.1077, 0.2012, 0.1073, 0.2892, 0.0566]
     assert face.human_share() == pytest.approx(share, abs=2e-4)
     visits = [0.244, 0.480, 0.173, 0.261, 0.288, 0.286, 0.286, 0.165]
@@ -160,17 +143,14 @@ def test_people_are_as_published() -> None:
         visits, abs=1e-3
     )
     assert human.mean_head_deg([20.0, 40.0, 80.0]) == pytest.approx([1.6, 17.0, 47.8], abs=0.1)
-    assert human.evoked_blink_probability([17.0, 33.0]) == pytest.approx([0.5, 0.97], abs=0.01)
-    assert published_walk().share(np.random.default_rng(0)) == pytest.approx(share, abs=0.02)
 
 
 def fixed(parts: list[int]) -> GazeTrace:
     """Make a run that looks at one part after the other."""
     every = tuple(
-        FixationEvent(n * 0.3, 0.3, PARTS[part], True, 1, "face", PARTS[part])
-        for n, part in enumerate(parts)
+        FixationEvent(n * 0.3, 0.3, PARTS[part], True, True) for n, part in enumerate(parts)
     )
-    return GazeTrace(np.zeros((0, len(TraceRow._fields))), (), every, ())
+    return replace(EMPTY, fixations=every)
 
 
 def test_a_walk_drawn_from_the_matrix_passes_and_its_reverse_does_not() -> None:
@@ -184,28 +164,40 @@ def test_a_walk_drawn_from_the_matrix_passes_and_its_reverse_does_not() -> None:
     assert back["transitions"].value > 1.5 * forth["transitions"].value
 
 
+def test_servos_without_bytes_are_not_judged(walking: GazeTrace) -> None:
+    """Their lag makes most small saccades too long; what the models choose is judged."""
+    seen = {result.band.key: result for result in judge_run(replace(walking, ideal_servos=True))}
+    for key in ("duration_small", "skew", "rest_error", "vor", "pursuit_lag", "blink_close"):
+        assert seen[key].verdict == "not judged" and np.isfinite(seen[key].value), key
+    for key in ("rate", "visit", "on_parts", "blink_rate", "head_roll"):
+        assert seen[key].verdict == verdicts(walking)[key].verdict == "pass", key
+
+
 @pytest.mark.slow
 def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None:
-    from gazerig.features.lab.report.report import DRAWINGS, make_report
+    from gazerig.features.lab.report.figures import DRAWINGS
+    from gazerig.features.lab.report.report import ReportedRun, make_report
 
-    about = RunHeader(
-        "a <run>", (("rig", "desk"),), frozenset({"saccade min_jerk"}), warnings=("cut & short",)
-    )
+    styles = frozenset({"saccade min_jerk"})
+    one = ReportedRun("a <run>", walking, {"rig": "desk"}, styles, "cut short", judge_run(walking))
+    outside = tuple(result._replace(verdict="outside") for result in one.results)
     out = tmp_path / "deep" / "report.html"
-    made = make_report(walking, about, out, lambda words, share: None)
+    make_report([one, replace(one, results=outside)], out, lambda words, share: None)
     raw = out.read_text()
     page = unescape(raw)
-    assert "a &lt;run&gt;" in raw and "cut &amp; short" in raw
-    assert page.count("data:image/png;base64,") == len(DRAWINGS) == len(made.figures)
+    assert "a &lt;run&gt;" in raw
+    pictures = re.findall(r"data:image/png;base64,([^\"]+)", page)
+    assert len(pictures) == len(DRAWINGS) == 9
     assert not re.search(r'(src|href)="(?!data:)', page)  # it needs no other file
-    assert "by design: Mitake et al. eq 5" in page
-    for path in made.figures:
-        picture = cv2.imread(str(path))
-        assert picture is not None and picture.std() > 5.0
-    numbers = json.loads(made.data.read_text())
-    assert {row["key"] for row in numbers} == {f.band.key for f in made.findings}
-    for finding in made.findings:
-        assert finding.band.title in page and band_text(finding.band) in page
+    assert "by design: Mitake et al. eq 5" in page  # outside, with that style
+    for picture in pictures:
+        drawn = cv2.imdecode(np.frombuffer(b64decode(picture), np.uint8), cv2.IMREAD_COLOR)
+        assert drawn is not None and drawn.std() > 5.0
+    numbers = json.loads((tmp_path / "deep" / "report_measures.json").read_text())
+    assert len(numbers) == 2 * len(one.results)
+    assert {row["key"] for row in numbers} == {result.band.key for result in one.results}
+    for result in one.results:
+        assert result.band.title in page and result.band.source in " ".join(page.split())
 
 
 def test_the_command_takes_a_file_or_a_scene() -> None:
@@ -213,7 +205,6 @@ def test_the_command_takes_a_file_or_a_scene() -> None:
         ((), "report takes either"),
         (("x.mcap", "--scene", "visitor"), "report takes either"),
         (("--scene", "nowhere", "--seconds", "5"), "unknown; scenes"),
-        (("nothing.mcap",), "nothing.mcap"),
     ):
         done = invoked("report", *words)
         assert done.code == 2 and text in done.err and done.err.count("\n") == 1
@@ -222,24 +213,13 @@ def test_the_command_takes_a_file_or_a_scene() -> None:
 # --- Files that a report reads and writes: nothing of the user's is lost
 
 
-@pytest.mark.parametrize(
-    "name", ["notes.html", "notes_measures.json", "notes_figures/overview.png"]
-)
-@pytest.mark.parametrize("files", [["a.mcap"], ["a.mcap", "b.mcap"]], ids=["one", "two"])
-def test_a_report_writes_over_nothing_that_no_report_has_made(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str, files: list[str]
-) -> None:
-    page, theirs = tmp_path / "notes.html", tmp_path / name
-    theirs.parent.mkdir(exist_ok=True)
-    theirs.write_text("somebody's own")
-    # Refused before any work: neither recording is there.
-    words = ["report", *files, "--out", str(page)]
-    for force, text in (((), "already exists: name another file, or use --force"),
-                        (("--force",), "was not made by gazerig report")):  # fmt: skip
-        assert typed(*words, *force) == 2
-        said = capfd.readouterr().err
-        assert said.count("\n") == 1 and str(theirs) in said and text in said
-        assert theirs.read_text() == "somebody's own"
+@pytest.mark.parametrize("name", ["notes.html", "notes_measures.json"])
+def test_a_report_writes_over_nothing_unless_forced(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("somebody's own")
+    # Refused before any work: the recording is not there.
+    done = invoked("report", "a.mcap", "--out", str(tmp_path / "notes.html"))
+    assert done.code == 2 and f"{name} already exists" in done.err
+    assert (tmp_path / name).read_text() == "somebody's own"
 
 
 # --- Saccades and blinks found in traces whose truth is known, and before an independent judge
@@ -268,10 +248,9 @@ def at(yaw_deg: float) -> Vec3:
     return cos(radians(yaw_deg)), sin(radians(yaw_deg)), 0.0
 
 
-def jumps(yaw_deg: np.ndarray, rate_hz: float) -> list[MeasuredSaccade]:
-    finder = SaccadeFinder()
-    found = (finder.update(k / rate_hz, at(float(yaw))) for k, yaw in enumerate(yaw_deg))
-    return [jump for jump in found if jump is not None]
+def jumps(yaw_deg: np.ndarray, rate_hz: float) -> list[SaccadeEvent]:
+    found, _ = find_saccades(np.arange(len(yaw_deg)) / rate_hz, np.array([*map(at, yaw_deg)]))
+    return [saccade for _, saccade in found]
 
 
 def stepped(yaw_deg: np.ndarray) -> np.ndarray:
@@ -317,20 +296,17 @@ def test_following_is_no_saccade_and_hides_none(slow_deg_s: float) -> None:
     assert sizes == pytest.approx([4.0 + moved, 6.0 - moved, 8.0 + moved], abs=0.6)
 
 
-def test_noise_and_a_gap_make_no_saccade() -> None:
+def test_noise_makes_no_saccade() -> None:
     noise = np.random.default_rng(1).normal(0.0, 0.03, 2000)
     assert jumps(noise, 200.0) == []
-    finder = SaccadeFinder()
-    times = [*np.arange(0.0, 1.0, 0.005), *np.arange(1.2, 2.0, 0.005)]
-    assert not any(finder.update(t, at(0.0 if t < 1.1 else 15.0)) for t in times)
 
 
 BLINK_S = 0.075, 0.035, 0.175
 
 
 def blinks(openings: list[tuple[float, float, float]]) -> list[BlinkEvent]:
-    finder = BlinkFinder()
-    return [blink for row in openings if (blink := finder.update(*row)) is not None]
+    t_s, left, right = np.array(openings).T
+    return list(find_blinks(t_s, np.maximum(left, right)))
 
 
 def test_a_blink_is_found_with_its_phases() -> None:
@@ -364,67 +340,47 @@ def test_the_run_is_told_as_the_models_know_it(ticks: list[Tick], gathered: Gaze
     assert abs(len(gathered.blinks) - asked.blinks) <= 2
     late_s = [s.onset_s - s.commanded.onset_s for s in found if s.commanded]
     assert 0.0 < np.median(late_s) < 0.03  # the servos' lag
-    ratio = [s.amplitude_deg / s.commanded.amplitude_deg for s in found if s.commanded]
-    assert np.median(ratio) == pytest.approx(1.0, abs=0.08)
-    assert all(f.duration_s > 0.03 for f in gathered.fixations)
 
 
-def test_what_is_not_measured_or_stopped_makes_no_events(ticks: list[Tick]) -> None:
-    missing = [
-        structs.replace(tick, joints=structs.replace(tick.joints, missing=("left_eye_pan",)))
-        for tick in ticks
-    ]
-    events = EventDetector()
-    found = [event for tick in missing[:4000] for event in events.update(tick)]
-    assert not any(isinstance(event, SaccadeEvent | FixationEvent) for event in found)
-    events = EventDetector()
-    stopped = [structs.replace(tick, stopped="somebody did") for tick in ticks[:4000]]
-    assert [event for tick in stopped for event in events.update(tick)] == []
+def test_what_is_not_measured_or_stopped_and_a_gap_make_no_events(ticks: list[Tick]) -> None:
+    builder = GazeTraceBuilder()
+    for tick in ticks[:4000]:
+        joints = structs.replace(tick.joints, missing=("left_eye_pan",))
+        builder.update(structs.replace(tick, joints=joints))
+    for tick in ticks[4000:4010]:  # a gap is no saccade
+        builder.update(structs.replace(tick, t_s=tick.t_s + 9.0, pose=ticks[0].pose))
+    for tick in ticks[4010:]:
+        builder.update(structs.replace(tick, stopped="somebody did"))
+    run = builder.trace()
+    assert len(run.rows) == 4010 and not run.saccades and not run.fixations
 
 
 # --- Measures of landings, rests, gains and blinks, from synthetic traces
 
 
-def flown(jumps: list[tuple[float, float, float]], over: float = 0.0) -> GazeTrace:
-    """Make a run of planned saccades to a goal at 12 deg, onset in s, from and to in deg of yaw.
-
-    over: how far the gaze swings beyond in flight, in deg
-    """
+def flown(jumps: list[tuple[float, float, float]]) -> GazeTrace:
+    """Make a run of planned saccades to a goal at 12 deg, onset in s, from and to in deg of yaw."""
     t = np.arange(0.0, 3.0, 0.005)
-    rows = np.zeros((len(t), len(TraceRow._fields)))
-    column = {name: at for at, name in enumerate(TraceRow._fields)}
-    rows[:, column["t"]], rows[:, column["target_yaw"]] = t, 12.0
+    rows = np.zeros(len(t), ROW)
+    rows["t"], rows["target"][:, 0] = t, 12.0
     gaze, events = np.full(len(t), jumps[0][1]), []
     for onset, start, end in jumps:
         s = np.clip((t - onset) / 0.05, 0.0, 1.0)
         gaze += (end - start) * s * s * (3.0 - 2.0 * s)
-        gaze += over * np.exp(-(((t - onset - 0.06) / 0.008) ** 2))
-        rows[(t >= onset) & (t < onset + 0.05), column["phase"]] = 1.0
+        rows["phase"][(t >= onset) & (t < onset + 0.05)] = 1.0
         size = abs(end - start)
         events.append(
             SaccadeEvent(onset, 0.05, size, 300.0, 0.4, CommandedSaccade(onset, 0.05, size, 300.0))
         )
-    rows[:, column["gaze_yaw"]] = gaze
-    return GazeTrace(rows, tuple(events), (), ())
+    rows["gaze"][:, 0] = gaze
+    return GazeTrace(rows, tuple(events))
 
 
-def test_a_landing_is_short_and_corrected_or_beyond() -> None:
-    short = landing.landing_errors(flown([(0.5, 0.0, 11.0), (0.7, 11.0, 12.0)]))
+def test_a_landing_is_short_and_corrected() -> None:
+    short = saccades.landing_errors(flown([(0.5, 0.0, 11.0), (0.7, 11.0, 12.0)]))
     assert short[0] == pytest.approx((11.0 / 12.0, 1.0), abs=0.01) and len(short) == 1
-    late = landing.landing_errors(flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)]))
+    late = saccades.landing_errors(flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)]))
     assert late[0, 1] == 0.0
-    assert landing.overshoots(flown([(0.5, 0.0, 12.0)])) == pytest.approx([0.0], abs=0.01)
-    assert landing.overshoots(flown([(0.5, 0.0, 12.0)], over=1.8)) == pytest.approx(
-        [0.15], abs=0.03
-    )
-
-
-def test_a_floor_under_rests_is_a_spike_and_a_smooth_law_is_none() -> None:
-    dice = np.random.default_rng(2)
-    smooth = [dice.lognormal(-1.4, 0.45, 600) for _ in range(40)]
-    found = [rests.largest_slot_excess(each) for each in smooth]
-    assert abs(np.mean(found)) < 0.005 and max(found) < 0.04  # chance makes none
-    assert all(rests.largest_slot_excess(np.maximum(each, 0.2)) > 0.2 for each in smooth)
 
 
 def test_density_keeps_the_time_and_lies_where_it_was_looked() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from gaze_targets import target
 
-from gazerig.features.lab.analysis.human_norms import BY_KEY
-from gazerig.features.lab.report.statistics import judge_without_interval
-from gazerig.features.lab.report.turns import STATES, Role, TurnTrace, measures
+from gazerig.features.lab.report.gaze_trace import ROW, STATES, GazeTrace
+from gazerig.features.lab.report.statistics import judge
+from gazerig.features.lab.report.turns import Role, measures
 from gazerig.gaze.angles import yaw_pitch
 from gazerig.gaze.attention.conversation import (
     AversionParams,
@@ -39,7 +39,7 @@ def scripted_turns(role: Role, rng: np.random.Generator) -> Iterator[tuple[TurnS
             yield "speaking", float(rng.uniform(20.0, 60.0))
 
 
-def model_alone(role: Role) -> TurnTrace:
+def model_alone(role: Role) -> GazeTrace:
     """Return 20 minutes of looks away and turns, without a robot, before a face at 1 m."""
     random = [np.random.default_rng((1, n)) for n in range(4)]
     attention: Any = type("Unused", (), {"converse": lambda *of: None})()
@@ -58,8 +58,10 @@ def model_alone(role: Role) -> TurnTrace:
             rests_s = t_s + float(random[3].exponential(0.3))  # looks at parts of the face
         yaw, pitch = yaw_pitch(look.p_world_m)
         rows.append((t_s, STATES.index(state), number, degrees(yaw), degrees(pitch)))
-    table = np.array(rows)
-    return TurnTrace(table[:, 0], table[:, 1], table[:, 2], table[:, 3:], np.zeros(len(table)))
+    table = np.zeros(len(rows), ROW)
+    table["t"], table["turn"], table["turn_number"], *off = np.array(rows).T
+    table["off_partner"] = np.column_stack(off)
+    return GazeTrace(table)
 
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -69,4 +71,4 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 def test_looks_away_have_the_share_rate_and_direction_of_people(role: Role) -> None:
     for one in measures(model_alone(role)):
         if one.key.endswith(role) or (one.key in ("turn_begins", "turn_ends") and len(one.rows)):
-            assert judge_without_interval(one, BY_KEY[one.key]).verdict == "pass", one.key
+            assert judge(one, interval=False).verdict == "pass", one.key

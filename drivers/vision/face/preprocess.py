@@ -71,7 +71,7 @@ _SAME = 0.5
 
 def is_new(boxes: Boxes, known: list[FoundFace]) -> NDArray[np.bool_]:
     """Return a mask of the boxes that are not those of known faces."""
-    others = np.array([one.box for one in known]).reshape(-1, 4)
+    others = _corners(known)
     low = np.maximum(boxes[:, np.newaxis, :2], others[:, :2])
     high = np.minimum(boxes[:, np.newaxis, 2:], others[:, 2:])
     common = np.prod(np.maximum(high - low, 0.0), axis=2)
@@ -84,9 +84,16 @@ def new_faces(found: list[FoundFace], known: list[FoundFace]) -> list[FoundFace]
     """Return the found faces that are not known and not duplicates of a more confident one."""
     kept: list[FoundFace] = []
     for one in sorted(found, key=lambda face: (not face.by_mtcnn, -face.face.confidence)):
-        if is_new(one.box[np.newaxis], [*known, *kept])[0]:
+        if is_new(_corners([one]), [*known, *kept])[0]:
             kept.append(one)
     return kept
+
+
+def _corners(found: list[FoundFace]) -> Boxes:
+    """Return the boxes of faces in this frame; their search boxes may be those for the next one."""
+    boxes = np.array([one.face.box_px for one in found]).reshape(-1, 4)
+    boxes[:, 2:] += boxes[:, :2]
+    return boxes
 
 
 def to_squares(boxes: Boxes) -> Boxes:

@@ -13,6 +13,7 @@ While the camera turns fast, and if the camera's motion cannot be separated from
 nothing is reported, like human vision during a saccade.
 """
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import cv2
@@ -29,13 +30,11 @@ from gazerig.drivers.vision.motion.clustering import (
     thing_pixel,
 )
 from gazerig.drivers.vision.motion.ego_motion import (
-    EgoMotion,
     estimate_ego_motion,
 )
 from gazerig.drivers.vision.motion.flow import (
     Floats,
     FlowSearch,
-    ImagePair,
     Plane,
     SmallImage,
     align_images,
@@ -63,8 +62,9 @@ _LEAST_KNOWN = 0.4
 _FASTEST_TURN_DEG_S, _LEAST_BACKGROUND_SHARE = 200.0, 0.35
 # Frames further apart in time are not compared.
 _LONGEST_GAP_S = 0.3
-# Margin at the image's edge, as a share of its width, where flow is unknown if the camera turns.
-_EDGE_SHARE = 0.065
+# Margin at the image's edge, as a share of its width, where flow is unknown if the camera turns;
+# unpredicted motion of the image above which everything there comes in at the side.
+_EDGE_SHARE, _PANS_PX = 0.065, 0.5
 # Distance from the edge at which a patch continues beyond it.
 _CUT_PX = 1
 
@@ -200,6 +200,7 @@ class MotionDetector:
             return (), ""
         pair = self._search.search(pair)
         ego = estimate_ego_motion(pair, now.K, R_now_before is not None)
+        pans = ego.unforeseen_px > _PANS_PX
         if (
             ego.background_share >= _LEAST_BACKGROUND_SHARE
             and ego.unforeseen_px >= _SEARCH_AGAIN_PX
@@ -208,8 +209,14 @@ class MotionDetector:
             pair = self._search.search(align_images(now, before, ego.total))
             ego = estimate_ego_motion(pair, now.K, True)
         turn = float(np.degrees(np.arctan(ego.shift_px / now.K[0, 0]))) / dt_s
-        why = self._separation_fault(pair, ego, turn)
-        if why:
+        why = ""
+        if not turn <= _FASTEST_TURN_DEG_S:
+            why = "the camera turns too fast"
+        elif pair.valid_mask.mean() < _LEAST_KNOWN:
+            why = "too little of the last frame in view"
+        elif ego.background_share < _LEAST_BACKGROUND_SHARE:
+            why = "no common motion of the background"
+        if why:  # ego-motion cannot be separated from the motion of objects
             self._tracks.predict(ego.total, now.captured_s, dt_s)
             return (), why
         groups = cluster_motion(segment_motion(pair, ego, R_now_before is None))
@@ -232,17 +239,9 @@ class MotionDetector:
             for group, motion, follow in zip(groups, motions, follows, strict=True)
             if self._tracks.is_confirmed(follow)
         )
+        if pans:
+            blobs = tuple([replace(blob, from_side=False) for blob in blobs])
         return blobs, ""
-
-    def _separation_fault(self, pair: ImagePair, ego: EgoMotion, turn_deg_s: float) -> str:
-        """Return why ego-motion cannot be separated from the motion of objects, "" if it can."""
-        if not turn_deg_s <= _FASTEST_TURN_DEG_S:
-            return "the camera turns too fast"
-        if pair.valid_mask.mean() < _LEAST_KNOWN:
-            return "too little of the last frame in view"
-        if ego.background_share < _LEAST_BACKGROUND_SHARE:
-            return "no common motion of the background"
-        return ""
 
     def _blob(
         self,

@@ -11,9 +11,6 @@ from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
 from gazerig.robot.cli.tracks import FolderOption, print_track_fit
 
-_TOLERANCE_DEG = 0.3
-"""Distance of a curve from dense samples; servos show no less."""
-
 app = typer.Typer()
 
 
@@ -77,7 +74,7 @@ def import_track(
             loaded,
             found.series,
             f"from {file.name}",
-            tolerance_deg=_TOLERANCE_DEG,
+            tolerance_deg=0.3,  # servos show no less
             owned=found.poses if owns is None else owns,
         )
         for note in (*found.notes, *made.notes):

@@ -1,23 +1,22 @@
-"""Saccades, fixations and blinks, detected tick by tick as by an eye tracker.
+"""Saccades and fixations in a trace of the gaze, found as by an eye tracker.
 
-All values are measured at the servos: the mean of both lines of sight in space, and the opening of
-the upper lids. Without feedback they are estimated from the goals. The commanded saccade is stored
-with the measured one, so that both can be compared.
+All values are measured at the servos: the mean of both lines of sight in space. Without feedback
+they are estimated from the goals. The commanded saccade is stored with the measured one, so that
+both can be compared.
 
 The speed is that of Engbert & Kliegl 2003, a central difference over five samples. It is relative
 to the slow motion of the last 50 ms, so that pursuit of a walking person is not a saccade. 30 deg/s
 above that is the usual threshold of velocity-based detection (I-VT).
 """
 
-from collections import Counter, deque
-from math import degrees, exp, inf, sqrt
-from typing import NamedTuple, TypeVar
+from collections import Counter
+from math import exp, inf
+from typing import NamedTuple
 
-from gazerig.features.lab.analysis.blink_finder import UPPER, BlinkEvent, BlinkFinder, lid_openings
-from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
-from gazerig.gaze.types import PARTS, Vec3
-from gazerig.robot.control.tick import Tick, cyclopean_direction
-from gazerig.robot.model.types import GAZE_JOINTS
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.gaze.types import PARTS, Floats
 
 THRESHOLD_DEG_S = 30.0
 """Relative speed at which a saccade begins; one servo step of both eyes per tick is half of it."""
@@ -39,198 +38,15 @@ saccade."""
 _LANDING_S = 0.15
 
 _SLOW_S = 0.05
-_FARTHEST_S = 0.022
-"""Samples farther apart in time do not give the speed of a saccade."""
+_FARTHEST_S = 0.044
+"""Five samples over a longer time do not give the speed of a saccade, three do."""
 
 _NEAREST_S = 0.0035
 """Samples at shorter intervals are skipped: their differences are only encoder steps."""
 
 _GAP_S = 0.06
+"""A longer gap between two rows ends a stretch."""
 _LONGEST_S = 0.4
-_KEPT = 160
-
-
-class MeasuredSaccade(NamedTuple):
-    """One saccade in a trace.
-
-    peak_share: time of the peak speed as a fraction of the duration
-    mean_deg_s: amplitude over duration; from_world, to_world: unit directions
-    """
-
-    onset_s: float
-    duration_s: float
-    amplitude_deg: float
-    peak_deg_s: float
-    peak_share: float
-    from_world: Vec3
-    to_world: Vec3
-
-    @property
-    def mean_deg_s(self) -> float:
-        """Return the mean speed."""
-        return self.amplitude_deg / self.duration_s
-
-
-class _DirectionSample(NamedTuple):
-    t_s: float
-    direction: Vec3
-
-
-class _SpeedSample(NamedTuple):
-    """One sample with its speed.
-
-    velocity_1_s: smoothed velocity of the unit vector; relative_deg_s: speed relative to the slow
-    motion; sharp_deg_s: speed over three samples only, for the peak
-    """
-
-    t_s: float
-    direction: Vec3
-    velocity_1_s: Vec3
-    relative_deg_s: float
-    unsmoothed_deg_s: float
-
-
-class SaccadeFinder:
-    """Finds saccades in a sequence of gaze directions; each is returned when it has ended."""
-
-    def __init__(self) -> None:
-        self.is_in_flight = False
-        self.clear()
-
-    def clear(self) -> None:
-        """Forget the trace: there was a gap."""
-        self._samples: deque[_DirectionSample] = deque(maxlen=5)
-        self._speeds: deque[_SpeedSample] = deque(maxlen=_KEPT)
-        self._slow: Vec3 = (0.0, 0.0, 0.0)
-        self._peak_deg_s = 0.0
-        self._before_deg_s = 0.0
-        self._began_s = 0.0
-        self._barrier_s = -inf
-        self._settles_s: float | None = None
-        self.is_in_flight = False
-
-    def update(self, t_s: float, direction: Vec3) -> MeasuredSaccade | None:
-        """Add a unit direction in the world; return the saccade that has just ended, if any."""
-        samples = self._samples
-        if samples:
-            since_s = t_s - samples[-1].t_s
-            if since_s > _GAP_S or since_s < 0.0:
-                self.clear()
-                samples = self._samples
-            elif since_s < _NEAREST_S:
-                return None
-        samples.append(_DirectionSample(t_s, direction))
-        if len(samples) < 5:
-            return None
-        speed = self._speed()
-        self._speeds.append(speed)
-        return self._advance_state(speed)
-
-    def _speed(self) -> _SpeedSample:
-        """Return the speed at the middle sample, and learn the slow motion from it."""
-        a, b, c, d, e = self._samples
-        (bx, by, bz), (dx, dy, dz) = b.direction, d.direction
-        sharp_s = d.t_s - b.t_s
-        x, y, z = (dx - bx), (dy - by), (dz - bz)
-        sharp = sqrt(x * x + y * y + z * z) / sharp_s
-        over_s = sharp_s
-        if e.t_s - a.t_s < 2.0 * _FARTHEST_S:
-            (ax, ay, az), (ex, ey, ez) = a.direction, e.direction
-            x, y, z = x + ex - ax, y + ey - ay, z + ez - az
-            over_s += e.t_s - a.t_s
-        vx, vy, vz = x / over_s, y / over_s, z / over_s
-        sx, sy, sz = self._slow
-        rx, ry, rz = vx - sx, vy - sy, vz - sz
-        relative = degrees(sqrt(rx * rx + ry * ry + rz * rz))
-        if not self.is_in_flight and relative <= THRESHOLD_DEG_S:
-            share = 1.0 - exp(-0.5 * sharp_s / _SLOW_S)
-            self._slow = (sx + share * rx, sy + share * ry, sz + share * rz)
-        return _SpeedSample(c.t_s, c.direction, (vx, vy, vz), relative, degrees(sharp))
-
-    def _advance_state(self, speed: _SpeedSample) -> MeasuredSaccade | None:
-        """Follow the three states: at rest, in flight, and settling after a landing."""
-        now, before = speed.relative_deg_s, self._before_deg_s
-        self._before_deg_s = now
-        if self._settles_s is not None:
-            long = speed.t_s - self._settles_s > _LANDING_S
-            if now < THRESHOLD_DEG_S or long:
-                self._settles_s, self.is_in_flight = None, False
-                if long:
-                    self._end_as_slow_motion(speed)
-                return None
-            if now <= _AGAIN_SHARE * self._peak_deg_s:
-                return None
-            self._settles_s = None
-        elif self.is_in_flight:
-            return self._await_landing(speed, before)
-        if now > THRESHOLD_DEG_S:
-            self.is_in_flight = True
-            self._peak_deg_s, self._began_s = now, speed.t_s
-        return None
-
-    def _await_landing(self, speed: _SpeedSample, before_deg_s: float) -> MeasuredSaccade | None:
-        """Wait for the landing: a low speed, or a minimum before the eye swings back."""
-        now = speed.relative_deg_s
-        # Relative to the peak so far: a saccade is also slow at its beginning.
-        swings = before_deg_s < _SWING_SHARE * self._peak_deg_s and now > before_deg_s
-        self._peak_deg_s = max(self._peak_deg_s, now)
-        if now < self._onset_speed_deg_s() or swings:
-            jump = self._measure_saccade(len(self._speeds) - (1 if swings else 0))
-            self._barrier_s = jump.onset_s + jump.duration_s
-            self.is_in_flight = now > THRESHOLD_DEG_S
-            self._settles_s = speed.t_s if self.is_in_flight else None
-            return jump if jump.amplitude_deg >= LEAST_DEG else None
-        if speed.t_s - self._began_s > _LONGEST_S:
-            self._end_as_slow_motion(speed)
-        return None
-
-    def _end_as_slow_motion(self, speed: _SpeedSample) -> None:
-        """Treat motion that lasts too long for a saccade as slow motion."""
-        self.is_in_flight, self._slow, self._barrier_s = False, speed.velocity_1_s, speed.t_s
-
-    def _onset_speed_deg_s(self) -> float:
-        return max(_FOOT_SHARE * self._peak_deg_s, _FOOT_DEG_S)
-
-    def _measure_saccade(self, end: int) -> MeasuredSaccade:
-        """Measure the saccade that ended at the last of the first ``end`` speeds."""
-        foot, speeds = self._onset_speed_deg_s(), self._speeds
-        first = end - 1
-        while first > 0 and speeds[first - 1].t_s >= self._barrier_s:
-            first -= 1
-            if speeds[first].relative_deg_s < foot and speeds[first].t_s < self._began_s:
-                break
-        part = [speeds[i] for i in range(first, end)]
-        onset_s, end_s = (
-            _crossing_time_s(part[0], part[1], foot),
-            _crossing_time_s(part[-1], part[-2], foot),
-        )
-        inner = part[1:-1] or part
-        peak = max(speed.unsmoothed_deg_s for speed in inner)
-        top = [speed.t_s for speed in inner if speed.unsmoothed_deg_s >= _TOP_SHARE * peak]
-        duration_s = end_s - onset_s
-        return MeasuredSaccade(
-            onset_s,
-            duration_s,
-            degrees(angle_between(part[0].direction, part[-1].direction)),
-            peak,
-            (0.5 * (top[0] + top[-1]) - onset_s) / duration_s,
-            part[0].direction,
-            part[-1].direction,
-        )
-
-
-def _crossing_time_s(below: _SpeedSample, above: _SpeedSample, level: float) -> float:
-    """Return the time when the speed crossed a level between two samples."""
-    span = above.relative_deg_s - below.relative_deg_s
-    share = (level - below.relative_deg_s) / span if span > 0.0 else 0.0
-    return below.t_s + min(1.0, max(0.0, share)) * (above.t_s - below.t_s)
-
-
-NEAR_PART_M = 0.03
-"""Largest distance at which a line of sight is on a part."""
-
-NEAR_FACE_M = 0.12
-"""Largest distance from the face's centre at which a line of sight is on the face."""
 
 _LOOK_EVERY_S = 0.024
 """Interval at which the part is determined during a fixation."""
@@ -241,9 +57,7 @@ SHORTEST_S = 0.04
 _SETTLING_S = 0.02
 """Delay after a saccade before the part is determined."""
 
-_LONGEST_FORESEEN_S = 0.3
 _COMMAND_BEFORE_S, _COMMAND_AFTER_S = 0.12, 0.03
-_EYE_JOINTS = frozenset(name for name in GAZE_JOINTS if "eye" in name)
 
 
 class CommandedSaccade(NamedTuple):
@@ -267,7 +81,7 @@ class SaccadeEvent(NamedTuple):
     amplitude_deg: float
     peak_deg_s: float
     peak_share: float
-    commanded: CommandedSaccade | None
+    commanded: CommandedSaccade | None = None
 
     @property
     def end_s(self) -> float:
@@ -279,17 +93,15 @@ class FixationEvent(NamedTuple):
     """Fixation of the gaze between two saccades, on one place or on a moving target.
 
     part: the face part nearest to the lines of sight, None off the parts
-    on_face: whether it was on any face; face: id of that face, -1 without one
-    target_kind, target_part: kind of the current target, and its face part
+    on_face: whether it was on any face
+    is_face: whether the target was a face
     """
 
     start_s: float
     duration_s: float
     part: str | None
     on_face: bool
-    face_id: int
-    target_kind: str
-    target_part: str | None
+    is_face: bool
 
     @property
     def end_s(self) -> float:
@@ -297,164 +109,166 @@ class FixationEvent(NamedTuple):
         return self.start_s + self.duration_s
 
 
-Event = SaccadeEvent | FixationEvent | BlinkEvent
-T = TypeVar("T")
+class _Speeds:
+    """Speeds of a stretch: all arrays are (n,), or (n, 3) for vectors.
 
+    velocity_1_s: smoothed velocity of the unit vector; sharp_deg_s: speed over three samples only,
+    for the peak; relative_deg_s: speed relative to the slow motion, as far as it is known
+    """
 
-class EventDetector:
-    """Finds events in ticks as they arrive; reports an event when it is over."""
+    def __init__(self, t_s: Floats, way: Floats) -> None:
+        self.t_s, self.way = t_s[2:-2], way[2:-2]
+        self.step_s, wide_s = t_s[3:-1] - t_s[1:-3], t_s[4:] - t_s[:-4]
+        near = way[3:-1] - way[1:-3]
+        wide_s = np.where(wide_s < _FARTHEST_S, wide_s, 0.0)
+        far = (way[4:] - way[:-4]) * (wide_s > 0.0)[:, None]
+        self.velocity_1_s = (near + far) / (self.step_s + wide_s)[:, None]
+        self.sharp_deg_s = np.degrees(np.linalg.norm(near, axis=1) / self.step_s)
+        self.relative_deg_s = np.zeros(len(near))
 
-    def __init__(self) -> None:
-        self._saccades = SaccadeFinder()
-        self._blinks = BlinkFinder()
-        self._commands: deque[CommandedSaccade] = deque(maxlen=4)
-        self._flight: _CommandedFlight | None = None
-        self._rest = _OpenFixation(None)
-
-    def update(self, tick: Tick) -> tuple[Event, ...]:
-        """Add a tick; return the events that have ended, in the order of their onset."""
-        if tick.stopped or (
-            tick.joints.missing and not _EYE_JOINTS.isdisjoint(tick.joints.missing)
-        ):
-            # The eyes were not measured, or not moved by the models.
-            if tick.stopped:
-                self._blinks.clear()
-            self._saccades.clear()
-            self._flight = None
-            self._rest = _OpenFixation(None)
-            return ()
-        self._follow_command(tick)
-        t_s = tick.t_s
-        direction = cyclopean_direction(tick)
-        jump = self._saccades.update(t_s, direction)
-        names, pose = tick.guard_result.joints, tick.pose
-        lids = lid_openings(pose.lid_left, pose.lid_right, names, UPPER)
-        blink = self._blinks.update(t_s, *lids) if lids is not None else None
-        if jump is None:
-            if not self._saccades.is_in_flight:
-                self._rest.update(tick, direction)
-            return () if blink is None else (blink,)
-        events: list[Event] = [] if blink is None else [blink]
-        fixation = self._rest.close(jump.onset_s)
-        if fixation is not None:
-            events.append(fixation)
-        events.append(SaccadeEvent(*jump[:5], self._find_command(jump.onset_s)))
-        self._rest = _OpenFixation(jump.onset_s + jump.duration_s)
-        return tuple(events)
-
-    def _follow_command(self, tick: Tick) -> None:
-        """Follow the current saccade of the models."""
-        flying = tick.gaze.phase == "saccade"
-        if not flying and self._flight is None:
-            return
-        direction = unit(sub(tick.gaze.gaze_point_world_m, tick.pose.p_world_head_m))
-        if self._flight is None:
-            self._flight = _CommandedFlight(tick.t_s, direction)
-            return
-        self._flight.update(tick.t_s, direction)
-        if not flying:
-            self._commands.append(self._flight.command)
-            self._flight = None
-
-    def _find_command(self, onset_s: float) -> CommandedSaccade | None:
-        """Find the command of a saccade, which is measured later by the lag of the servo."""
-        known = list(self._commands)
-        if self._flight is not None:
-            known.append(self._flight.command)
-        for command in reversed(known):
-            if -_COMMAND_AFTER_S <= onset_s - command.onset_s <= _COMMAND_BEFORE_S:
-                if command in self._commands:
-                    # An eye swings back without a command.
-                    self._commands.remove(command)
-                return command
-        return None
-
-
-class _CommandedFlight:
-    """A commanded saccade, followed from its first tick."""
-
-    def __init__(self, t_s: float, direction: Vec3) -> None:
-        self._start_s = self._last_s = t_s
-        self._start = self._last = direction
-        self._peak_rad_s = 0.0
-
-    def update(self, t_s: float, direction: Vec3) -> None:
-        """Add the commanded gaze direction at ``t_s``."""
-        if t_s > self._last_s:
-            speed = angle_between(self._last, direction) / (t_s - self._last_s)
-            self._peak_rad_s = max(self._peak_rad_s, speed)
-        self._last_s, self._last = t_s, direction
-
-    @property
-    def command(self) -> CommandedSaccade:
-        """Return the commanded saccade as far as it is known."""
-        return CommandedSaccade(
-            self._start_s,
-            self._last_s - self._start_s,
-            degrees(angle_between(self._start, self._last)),
-            degrees(self._peak_rad_s),
+    def saccade(self, end: int, foot: float, began_s: float, barrier_s: float) -> SaccadeEvent:
+        """Return the saccade whose last speed is the one before ``end``."""
+        t, first = self.t_s, end - 1
+        while first > 0 and t[first - 1] >= barrier_s:
+            first -= 1
+            if self.relative_deg_s[first] < foot and t[first] < began_s:
+                break
+        onset_s = self._crossing_s(first, first + 1, foot)
+        duration_s = self._crossing_s(end - 1, end - 2, foot) - onset_s
+        inner = slice(first + 1, end - 1) if end - first > 2 else slice(first, end)
+        sharp = self.sharp_deg_s[inner]
+        top = t[inner][sharp >= _TOP_SHARE * sharp.max()]
+        return SaccadeEvent(
+            onset_s,
+            duration_s,
+            float(angles_deg(self.way[first], self.way[end - 1])),
+            float(sharp.max()),
+            float((0.5 * (top[0] + top[-1]) - onset_s) / duration_s),
         )
 
-
-class _OpenFixation:
-    """Time between two saccades, and the fixated target."""
-
-    def __init__(self, start_s: float | None) -> None:
-        self._start_s = start_s
-        self._next_s = -1.0
-        self._parts: Counter[str | None] = Counter()
-        self._faces: Counter[int] = Counter()
-        self._kinds: Counter[tuple[str, str | None]] = Counter()
-
-    def update(self, tick: Tick, direction: Vec3) -> None:
-        """Determine at intervals the part under the gaze."""
-        t_s = tick.t_s
-        if self._start_s is None:
-            self._start_s = t_s
-        if t_s < self._next_s or t_s < self._start_s + _SETTLING_S:
-            return
-        self._next_s = t_s + _LOOK_EVERY_S
-        part, face = part_looked_at(tick, direction)
-        self._parts[part] += 1
-        self._faces[face] += 1
-        self._kinds[tick.target.kind, tick.target.part] += 1
-
-    def close(self, end_s: float) -> FixationEvent | None:
-        """Return the fixation, None if it was too short."""
-        if self._start_s is None or end_s - self._start_s < SHORTEST_S:
-            return None
-        part = _most_frequent(self._parts, None)
-        face = _most_frequent(self._faces, -1)
-        kind, wanted = _most_frequent(self._kinds, ("", None))
-        length_s = end_s - self._start_s
-        return FixationEvent(self._start_s, length_s, part, face >= 0, face, kind, wanted)
+    def _crossing_s(self, below: int, above: int, level: float) -> float:
+        """Return the time when the speed crossed a level between two samples."""
+        low, high = self.relative_deg_s[[below, above]].tolist()
+        share = (level - low) / (high - low) if high > low else 0.0
+        start_s, end_s = self.t_s[[below, above]].tolist()
+        return float(start_s + min(1.0, max(0.0, share)) * (end_s - start_s))
 
 
-def part_looked_at(tick: Tick, direction: Vec3) -> tuple[str | None, int]:
-    """Return the face part at the measured gaze, and the id of the face, -1 off all faces.
+def angles_deg(a: Floats, b: Floats) -> Floats:
+    """Return the angles between unit vectors (..., 3)."""
+    return np.asarray(np.degrees(2.0 * np.arcsin(0.5 * np.linalg.norm(a - b, axis=-1))))
 
-    direction: unit vector of the gaze in the world
+
+def find_saccades(
+    t_s: Floats, way: Floats
+) -> tuple[list[tuple[int, SaccadeEvent]], NDArray[np.bool_]]:
+    """Find the saccades in a stretch without gaps.
+
+    Args:
+        t_s: (n,) Times.
+        way: (n, 3) Unit directions of the gaze in the world.
+
+    Returns:
+        Each saccade with the row at which it is over; (n,) whether a row is in flight.
     """
-    if tick.percept is None:
-        return None, -1
-    head = tick.pose.p_world_head_m
-    since_s = min(max(0.0, tick.t_s - tick.percept.captured_s), _LONGEST_FORESEEN_S)
-    for face in tick.percept.faces:
-        moved = scale(face.v_world_m_s, since_s)
-        if miss_distance_m(direction, sub(add(face.p_world_m, moved), head)) <= NEAR_FACE_M:
-            shift_m = sub(moved, head)
-            apart = [miss_distance_m(direction, add(p, shift_m)) for p in face.parts_world_m]
-            least = min(apart)
-            return (PARTS[apart.index(least)] if least <= NEAR_PART_M else None), face.id
-    return None, -1
+    flying, kept = np.zeros(len(t_s), dtype=bool), list[int]()
+    for row, now_s in enumerate(t_s.tolist()):
+        if not kept or now_s - t_s[kept[-1]] >= _NEAREST_S:
+            kept.append(row)
+    if len(kept) < 5:
+        return [], flying
+    speeds, found = _Speeds(t_s[kept], way[kept]), list[tuple[int, SaccadeEvent]]()
+    slow, in_flight, settles_s, barrier_s = np.zeros(3), False, inf, -inf
+    peak = before = began_s = 0.0
+    for at, (row, end) in enumerate(zip(kept[4:], [*kept[5:], len(t_s)], strict=True)):
+        now_s, velocity = float(speeds.t_s[at]), speeds.velocity_1_s[at]
+        now = float(np.degrees(np.linalg.norm(velocity - slow)))
+        speeds.relative_deg_s[at] = now
+        if not in_flight and now <= THRESHOLD_DEG_S:
+            slow = slow + (1.0 - exp(-0.5 * speeds.step_s[at] / _SLOW_S)) * (velocity - slow)
+        lasts_long = False
+        if settles_s < inf:  # after a landing
+            lasts_long = now_s - settles_s > _LANDING_S
+            if now < THRESHOLD_DEG_S or lasts_long:
+                settles_s, in_flight = inf, False
+            elif now > _AGAIN_SHARE * peak:
+                settles_s, peak, began_s = inf, now, now_s
+        elif in_flight:
+            # Relative to the peak so far: a saccade is also slow at its beginning.
+            swings = before < _SWING_SHARE * peak and now > before
+            peak = max(peak, now)
+            foot = max(_FOOT_SHARE * peak, _FOOT_DEG_S)
+            lasts_long = now_s - began_s > _LONGEST_S
+            if now < foot or swings:
+                saccade = speeds.saccade(at + 1 - swings, foot, began_s, barrier_s)
+                barrier_s, in_flight, lasts_long = saccade.end_s, now > THRESHOLD_DEG_S, False
+                settles_s = now_s if in_flight else inf
+                if saccade.amplitude_deg >= LEAST_DEG:
+                    found.append((row, saccade))
+        elif now > THRESHOLD_DEG_S:
+            in_flight, peak, began_s = True, now, now_s
+        if lasts_long:  # slow motion
+            in_flight, slow, barrier_s = False, velocity, now_s
+        before = now
+        flying[row:end] = in_flight
+    return found, flying
 
 
-def miss_distance_m(direction: Vec3, rel_m: Vec3) -> float:
-    """Return the distance between a line of sight and a place; both are relative to the eye."""
-    if dot(direction, rel_m) <= 0.0:
-        return norm(rel_m)
-    return norm(cross(direction, rel_m))
+def find_events(
+    rows: NDArray[np.void], flies: NDArray[np.bool_]
+) -> tuple[tuple[SaccadeEvent, ...], tuple[FixationEvent, ...]]:
+    """Return the saccades of a run and the fixations before them.
+
+    Args:
+        rows: (n,) Columns t, way, plan, part, on_any_face, is_face and measured of a trace.
+        flies: (n,) Whether the models make a saccade.
+    """
+    saccades, fixations = list[SaccadeEvent](), list[FixationEvent]()
+    cuts = np.flatnonzero((np.diff(rows["t"]) > _GAP_S) | (np.diff(rows["measured"]) != 0.0)) + 1
+    for stretch, flight in zip(np.split(rows, cuts), np.split(flies, cuts), strict=True):
+        if not stretch["measured"].any():
+            continue
+        found, in_flight = find_saccades(stretch["t"], stretch["way"])
+        changes = np.flatnonzero(np.diff(flight.astype(int), prepend=0, append=0))
+        flights = [slice(a, b) for a, b in changes.reshape(-1, 2).tolist()]
+        start_s, first = float(stretch["t"][0]), 0
+        for row, saccade in found:
+            if saccade.onset_s - start_s >= SHORTEST_S:
+                still = stretch[first:row][~in_flight[first:row]]
+                fixations.append(_fixation(still, start_s, saccade.onset_s))
+            command = _take_command(stretch, flights, row, saccade.onset_s)
+            saccades.append(saccade._replace(commanded=command))
+            start_s, first = saccade.end_s, row + 1
+    return tuple(saccades), tuple(fixations)
 
 
-def _most_frequent(counts: Counter[T], otherwise: T) -> T:
-    return counts.most_common(1)[0][0] if counts else otherwise
+def _fixation(rows: NDArray[np.void], start_s: float, end_s: float) -> FixationEvent:
+    """Return what was fixated between two saccades."""
+    looks, next_s = list[int](), start_s + _SETTLING_S
+    for row, now_s in enumerate(rows["t"].tolist()):
+        if now_s >= next_s:
+            looks.append(row)
+            next_s = now_s + _LOOK_EVERY_S
+    part, on_face, is_face = (
+        Counter(rows[name][looks].tolist()).most_common(1)[0][0] if looks else -1.0
+        for name in ("part", "on_any_face", "is_face")
+    )
+    name = PARTS[int(part)] if part >= 0.0 else None
+    return FixationEvent(start_s, end_s - start_s, name, on_face > 0.0, is_face > 0.0)
+
+
+def _take_command(
+    rows: NDArray[np.void], flights: list[slice], row: int, onset_s: float
+) -> CommandedSaccade | None:
+    """Return the command of a saccade, which is measured later by the lag of the servo."""
+    for flight in reversed(flights):
+        late_s = onset_s - rows["t"][flight.start]
+        if flight.start <= row and -_COMMAND_AFTER_S <= late_s <= _COMMAND_BEFORE_S:
+            if flight.stop <= row:
+                flights.remove(flight)  # an eye swings back without a command
+            part = rows[flight.start : min(flight.stop, row) + 1]
+            t, plan = part["t"], part["plan"]
+            speeds = angles_deg(plan[1:], plan[:-1]) / np.diff(t)
+            size, fastest = float(angles_deg(plan[0], plan[-1])), float(speeds.max(initial=0.0))
+            return CommandedSaccade(float(t[0]), float(t[-1] - t[0]), size, fastest)
+    return None

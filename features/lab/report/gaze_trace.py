@@ -2,176 +2,145 @@
 
 from array import array
 from collections import defaultdict
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
-from math import atan2, degrees, inf, nan
-from typing import NamedTuple
+from math import atan2, degrees, nan
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.features.lab.analysis.blink_finder import LOWER, UPPER, BlinkEvent, lid_openings
-from gazerig.features.lab.analysis.event_detector import (
-    NEAR_FACE_M,
-    EventDetector,
-    FixationEvent,
-    SaccadeEvent,
-    miss_distance_m,
+from gazerig.features.lab.analysis.blink_finder import (
+    BlinkEvent,
+    blinks_of,
+    wider_opening,
 )
-from gazerig.features.lab.analysis.gaze_on_face import gaze_point_on_face
-from gazerig.features.lab.report.joint_basis import JointBasis, joints_of
-from gazerig.features.lab.report.lid_closure import blinks_of
-from gazerig.features.lab.report.turns import STATES, TurnTrace
-from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
+from gazerig.features.lab.analysis.event_detector import FixationEvent, SaccadeEvent, find_events
+from gazerig.gaze.angles import (
+    add,
+    angle_between,
+    cross,
+    dot,
+    norm,
+    rotate_back,
+    scale,
+    sub,
+    unit,
+    yaw_pitch,
+)
 from gazerig.gaze.attention.conversation import face_extent_deg
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
-from gazerig.gaze.types import Face, Floats, Vec3
-from gazerig.robot.control.feedback_basis import estimated_joints
+from gazerig.gaze.types import Floats, Mat3, Vec3
+from gazerig.robot.control.feedback_basis import Basis, basis_of, estimated_joints
 from gazerig.robot.control.tick import Tick, cyclopean_direction
 from gazerig.robot.model.commands import Ask
-
-_LONGEST_S = 1.0
-"""A later saccade is a choice, not a reaction."""
-
-
-class MeasuredReaction(NamedTuple):
-    """Saccade to a thing that has just come into view.
-
-    seen_s: exposure of the first frame with it; onset_s: the saccade's command; kind: its kind
-    """
-
-    seen_s: float
-    onset_s: float
-    kind: str
-
-    @property
-    def latency_s(self) -> float:
-        """Return the time from the frame to the command."""
-        return self.onset_s - self.seen_s
-
-
-class ReactionFinder:
-    """Finds reactions in ticks as they arrive."""
-
-    def __init__(self) -> None:
-        self._seen: dict[tuple[str, int], float] = {}
-        self._captured_s: float | None = None
-        self._saccades = -1
-
-    def update(self, tick: Tick) -> MeasuredReaction | None:
-        """Add a tick; return the reaction that begins in it, if any."""
-        percept = tick.percept
-        if percept is not None and percept.captured_s != self._captured_s:
-            # A thing in the first percept has not come into view.
-            since_s = -inf if self._captured_s is None else percept.captured_s
-            self._captured_s = percept.captured_s
-            for number, kind in zip(percept.bodies.ids, percept.bodies.kinds, strict=True):
-                self._seen.setdefault((kind, number), since_s)
-        began = 0 <= self._saccades < tick.gaze.saccades
-        self._saccades = tick.gaze.saccades
-        name = (tick.target.kind, tick.target.id)
-        if not began or tick.stopped or name not in self._seen:
-            return None
-        seen_s, self._seen[name] = self._seen[name], -inf
-        late = tick.t_s - seen_s > _LONGEST_S
-        return None if late else MeasuredReaction(seen_s, tick.t_s, tick.target.kind)
-
+from gazerig.robot.model.types import GAZE_JOINTS, order_joints
 
 PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""
 
 MODES = ("none", "talk", "listen", "think", "turns")
 """Modes of conversation; turns: a voice agent reports them."""
-_TURNS = MODES.index("turns")
+STATES = ("idle", "listening", "thinking", "speaking", "interrupted")
+"""States of a conversation with turns."""
 PHASES = ("fixate", "saccade", "pursue")
 """States of the eyes, in the order of ``phase``."""
 
 _IDLE = frozenset(("search", "glance", "rest"))
 _LONGEST_FORESEEN_S = 0.3
+_NEAR_PART_M, _NEAR_FACE_M = 0.03, 0.12
+"""Largest distances at which a line of sight is on a part, and on a face around its centre."""
+_ALONG = 0.05
+"""Cosine between a line of sight and a face's direction: from 87 deg it is parallel to the face."""
+_EYE_JOINTS = frozenset(name for name in GAZE_JOINTS if "eye" in name)
+
+_COLUMNS = {
+    "t": 1, "gaze": 2, "head": 3, "eye_pitch": 1, "target": 2, "target_rate": 2,
+    "vergence": 1, "vergence_due": 1, "off": 2, "face": 2, "face_off": 1, "on_face": 1,
+    "lid": 1, "asked_lid": 1, "asked_pitch": 1, "phase": 1, "is_face": 1,
+    "idle": 1, "eye_limited": 1, "shift": 1, "mode": 1, "turn": 1, "turn_number": 1,
+    "off_partner": 2, "face_edge": 1, "measured": 1, "part": 1, "on_any_face": 1, "way": 3,
+    "plan": 3,
+}  # fmt: skip
+ROW = np.dtype([(name, float, (size,) if size > 1 else ()) for name, size in _COLUMNS.items()])
+"""One tick; degrees (yaw, pitch, roll), seconds or metres; NaN if unknown.
+
+gaze: mean line of sight in space; head: neck; eye_pitch: mean of the eyes in the head
+target: direction of the current target from the head; target_rate: its speed
+vergence, vergence_due: measured, and required by the target's distance
+off: angles of the left and the right line of sight from the target
+face: intersection of the gaze with the face (y, z), from the tip of the nose
+face_off: angle of the person's face away from the robot; on_face: whether the gaze is on that face
+lid: the wider opening of the upper lids, 0 shut .. 1 open
+asked_lid, asked_pitch: the upper lids and the eyes as commanded by the models
+phase: index in PHASES; is_face: whether the target is a face; idle: one without a person
+eye_limited: whether an eye is at the end of its range, short of its target
+shift: the target's event count; mode: index in MODES
+turn, turn_number: state of conversation as an index in STATES, and its number
+off_partner: the gaze from the partner's face; face_edge: extent of that face there
+measured: whether all eyes reported their positions
+part, on_any_face: index of the face part under the gaze, -1 off the parts; if on any face
+way, plan: unit directions of the measured and of the planned gaze in the world
+"""
 
 
-class TraceRow(NamedTuple):
-    """One tick; degrees, seconds or metres unless the name has a unit; nan if unknown.
+LIDS = "Lids"
+"""Section of the report that lids decide; eyes and neck decide the others."""
 
-    gaze_*: mean line of sight in space; head_*, eye_*: neck, and mean eye in the head
-    idle: whether the target is one of those without a person
-    eye_limited: whether an eye is at the end of its range, short of its target
-    target_*: direction of the current target from the head; target_*_rate: its speed
-    vergence, vergence_due: measured, and required by the target's distance
-    off_left, off_right: angle of each line of sight from the target
-    left_y_mm ... right_z_mm: miss distance of each pupil axis, in the face's plane
-    face_y, face_z: intersection of the gaze with the face, from the tip of the nose
-    face_off: angle of the person's face away from the robot
-    lid, lower_lid: the wider opening of the upper and of the lower lids, 0 shut .. 1 open
-    shift: the target's event count; mode: index in MODES
-    turn, turn_number: state of conversation as an index in turns.STATES, and its number
-    off_yaw, off_pitch: the gaze from the partner's face; face_edge: extent of that face there
+
+@dataclass(frozen=True)
+class JointBasis:
+    """The joints of a run.
+
+    names: names in order; if empty, the joints are unknown and nothing is omitted
+    estimated: joints whose servos have no feedback
     """
 
-    t: float
-    gaze_yaw: float
-    gaze_pitch: float
-    head_yaw: float
-    head_pitch: float
-    head_roll: float
-    eye_yaw: float
-    eye_pitch: float
-    target_yaw: float
-    target_pitch: float
-    target_yaw_rate: float
-    target_pitch_rate: float
-    target_m: float
-    vergence: float
-    vergence_due: float
-    off_left: float
-    off_right: float
-    left_y_mm: float
-    left_z_mm: float
-    right_y_mm: float
-    right_z_mm: float
-    face_y: float
-    face_z: float
-    face_off: float
-    on_face: float
-    lid: float
-    lower_lid: float
-    phase: float
-    is_face: float
-    idle: float
-    eye_limited: float
-    shift: float
-    mode: float
-    turn: float
-    turn_number: float
-    off_yaw: float
-    off_pitch: float
-    face_edge: float
+    names: tuple[str, ...] = ()
+    estimated: tuple[str, ...] = ()
+
+    def has_any(self, wanted: Collection[str]) -> bool:
+        """Return whether the rig has any of some joints; True if none is wanted."""
+        return not wanted or not self.names or not {*wanted}.isdisjoint(self.names)
+
+    @property
+    def has_measured_eye(self) -> bool:
+        """Return whether an eye's servo reports its position."""
+        eyes = {name for name in self.names if "eye" in name}
+        return not eyes or not eyes <= {*self.estimated}
+
+    @property
+    def styles(self) -> frozenset[str]:
+        """Return the styles that select notes of the bands."""
+        return frozenset(("eyes parallel",) if "eyes_pan" in self.names else ())
+
+    def basis(self, group: str) -> Basis:
+        """Return the basis of a section of the report: its lids, or eyes and neck."""
+        lids = group == LIDS
+        return basis_of(self.names, self.estimated, lambda name: name.endswith("_lid") == lids)
 
 
 @dataclass(frozen=True)
 class GazeTrace:
-    """Trace of a whole run: columns (one value per tick), and events in the order of their start.
+    """Trace of a whole run: rows (one per tick), and events in the order of their start.
 
     asked_blinks: blinks as commanded by the models; kinds: seconds per kind of target
     joints: joints of the rig, and which of them are estimated
-    reactions: reactions to things that came into view
+    ideal_servos: whether the servos were a lag without bytes, which says nothing about servos
     """
 
-    rows: Floats
-    saccades: tuple[SaccadeEvent, ...]
-    fixations: tuple[FixationEvent, ...]
-    blinks: tuple[BlinkEvent, ...]
+    rows: NDArray[np.void]
+    saccades: tuple[SaccadeEvent, ...] = ()
+    fixations: tuple[FixationEvent, ...] = ()
+    blinks: tuple[BlinkEvent, ...] = ()
     asked_blinks: tuple[BlinkEvent, ...] = ()
     kinds: dict[str, float] = field(default_factory=dict)
     joints: JointBasis = JointBasis()
-    reactions: tuple[MeasuredReaction, ...] = ()
+    ideal_servos: bool = False
 
     def column(self, name: str) -> Floats:
-        """Return a column of Row by its name."""
-        return np.asarray(self.rows[:, TraceRow._fields.index(name)])
-
-    def columns(self, *names: str) -> Floats:
-        """Return columns (n, k) by their names."""
-        return self.rows[:, [TraceRow._fields.index(name) for name in names]]
+        """Return a column of ROW by its name, (n,) or (n, k)."""
+        return np.asarray(self.rows[name])
 
     @property
     def seconds(self) -> float:
@@ -188,19 +157,24 @@ class GazeTrace:
     @property
     def mode(self) -> str:
         """Return the mode of conversation with the longest time."""
-        modes = self.column("mode")
-        return MODES[int(np.bincount(modes.astype(int)).argmax())] if len(modes) else "none"
+        return MODES[int(np.bincount(self.column("mode").astype(int), minlength=1).argmax())]
 
-    def turns(self) -> TurnTrace:
-        """Return the turns of conversation, and the gaze from the partner's face."""
-        state, number = np.nan_to_num(self.columns("turn", "turn_number")).T
-        return TurnTrace(
-            self.column("t"),
-            state,
-            number,
-            self.columns("off_yaw", "off_pitch"),
-            self.column("face_edge"),
-        )
+    def slices(self, mask: NDArray[np.bool_], least_s: float | None = None) -> list[slice]:
+        """Return the stretches of rows with a true mask.
+
+        Args:
+            mask: (n,) One value a row.
+            least_s: Shortest stretch; stretches also end with their target. None: all.
+        """
+        t, changes = self.column("t"), np.diff(mask.astype(int), prepend=0, append=0) != 0
+        if least_s is not None:
+            changes[1:-1] |= np.diff(self.column("shift")) != 0
+        cuts = np.flatnonzero(changes).tolist()
+        return [
+            slice(a, b)
+            for a, b in zip(cuts, cuts[1:], strict=False)
+            if mask[a] and (least_s is None or (b - a > 2 and t[b - 1] - t[a] >= least_s))
+        ]
 
     def between(self, start_s: float, end_s: float) -> slice:
         """Return the rows from ``start_s`` to before ``end_s``."""
@@ -216,134 +190,96 @@ class GazeTrace:
 
 
 class GazeTraceBuilder:
-    """Builds the gaze trace of a run from its ticks."""
+    """Builds the gaze trace of a run from its ticks.
 
-    def __init__(self) -> None:
-        self._events = EventDetector()
+    Args:
+        ideal_servos: Whether the servos are a lag without bytes.
+    """
+
+    def __init__(self, ideal_servos: bool = False) -> None:
+        self._ideal_servos = ideal_servos
         self._flat = array("d")
-        self._saccades: list[SaccadeEvent] = []
-        self._fixations: list[FixationEvent] = []
-        self._asked_lids = array("d")
-        self._new, self._reactions = ReactionFinder(), list[MeasuredReaction]()
         self._kinds: defaultdict[str, float] = defaultdict(float)
-        self._mode = 0
+        self._mode = "none"
         self._last_s: float | None = None
         self._names: tuple[str, ...] = ()
-        self._estimated: dict[str, None] = {}
+        self._estimated = set[str]()
 
     def update(self, tick: Tick) -> None:
         """Add a tick; time while a user has stopped the robot does not count."""
         for command in tick.commands:
-            if (
-                isinstance(command, Ask)
-                and command.menu == "conversation"
-                and command.choice in MODES
-            ):
-                self._mode = MODES.index(command.choice)
-        for event in self._events.update(tick):
-            if isinstance(event, SaccadeEvent):
-                self._saccades.append(event)
-            elif isinstance(event, FixationEvent):
-                self._fixations.append(event)
-        reaction = self._new.update(tick)
-        if reaction is not None:
-            self._reactions.append(reaction)
+            if isinstance(command, Ask) and command.menu == "conversation":
+                self._mode = command.choice if command.choice in MODES else self._mode
         self._names = tick.guard_result.joints
-        self._estimated.update(dict.fromkeys(estimated_joints(tick)))
+        self._estimated.update(estimated_joints(tick))
         if self._last_s is not None:
             self._kinds[tick.target.kind] += tick.t_s - self._last_s
         self._last_s = tick.t_s
         if not tick.stopped:
-            turn = tick.conversation.state
-            self._flat.extend(trace_row(tick, self._mode if turn == "idle" else _TURNS))
-            gaze = tick.gaze
-            lids = lid_openings(gaze.lid_left, gaze.lid_right, self._names, UPPER)
-            pitch = 0.5 * (gaze.eye_left_rad[1] + gaze.eye_right_rad[1])
-            self._asked_lids.extend((max(lids or (nan,)), degrees(pitch)))
+            mode = self._mode if tick.conversation.state == "idle" else "turns"
+            self._flat.extend(_row(tick, MODES.index(mode)))
 
     def trace(self) -> GazeTrace:
         """Return the trace of all added ticks."""
-        rows = np.array(self._flat).reshape(-1, len(TraceRow._fields))
-        t_s, lid, pitch = (
-            rows[:, TraceRow._fields.index(name)] for name in ("t", "lid", "eye_pitch")
-        )
+        rows = np.array(self._flat).view(ROW)
         return GazeTrace(
             rows,
-            tuple(self._saccades),
-            tuple(self._fixations),
-            blinks_of(t_s, lid, pitch),
-            blinks_of(t_s, *np.array(self._asked_lids).reshape(-1, 2).T),
+            *find_events(rows, rows["phase"] == PHASES.index("saccade")),
+            blinks_of(rows["t"], rows["lid"], rows["eye_pitch"]),
+            blinks_of(rows["t"], rows["asked_lid"], rows["asked_pitch"]),
             dict(self._kinds),
-            joints_of(self._names, self._estimated),
-            tuple(self._reactions),
+            JointBasis(order_joints(self._names), order_joints(self._estimated)),
+            self._ideal_servos,
         )
 
 
-def trace_row(tick: Tick, mode: int) -> TraceRow:
-    """Return the columns of one tick."""
-    pose, target, names = tick.pose, tick.target, tick.guard_result.joints
+def _row(tick: Tick, mode: int) -> Iterator[float]:
+    """Yield the values of ROW of one tick."""
+    pose, target, gaze, names = tick.pose, tick.target, tick.gaze, tick.guard_result.joints
     head, left, right = pose.p_world_head_m, pose.p_world_eye_left_m, pose.p_world_eye_right_m
-    sight_left, sight_right = line_of_sight(pose, True), line_of_sight(pose, False)
     way = cyclopean_direction(tick)
     moved = scale(target.v_world_m_s, min(max(0.0, tick.t_s - target.at_s), _LONGEST_FORESEEN_S))
     point = add(target.p_world_m, moved)
     rel = sub(point, head)
-    yaw, pitch = yaw_pitch(way)
-    at_yaw, at_pitch = yaw_pitch(rel)
-    yaw_rate, pitch_rate = _rates(rel, target.v_world_m_s)
     x, y, _ = rotate_back(pose.R_world_head, rel)
     half = 0.5 * norm(sub(left, right))
-    face, seen = _face(tick, way)
-    on_left = on_right = gaze_at = (nan, nan)
-    off_deg = nan
-    if face is not None:
-        since_s = min(max(0.0, tick.t_s - face[1]), _LONGEST_FORESEEN_S)
-        R = face[0].R_world_face
-        ahead = R[0][0], R[1][0], R[2][0]
-        off_deg = degrees(angle_between(ahead, sub(head, face[0].p_world_m)))
-        # Where the gaze meets the plane of the face, (y, z) from the nose.
-        moved = scale(face[0].v_world_m_s, since_s)
-        centre = add(add(face[0].p_world_m, moved), scale(ahead, PLANE_M))
-        if dot(way, sub(centre, head)) > 0.0:
-            gaze_at = gaze_point_on_face(head, way, centre, R) or gaze_at
-        if target.kind == "face":
-            on_left = gaze_point_on_face(left, sight_left, point, R) or on_left
-            on_right = gaze_point_on_face(right, sight_right, point, R) or on_right
     eye_left, eye_right = pose.eye_left_rad, pose.eye_right_rad
-    turned = head_in_space(pose)
-    return TraceRow(
-        tick.t_s, degrees(yaw), degrees(pitch),
-        degrees(turned[0]), degrees(turned[1]), degrees(turned[2]),
-        degrees(0.5 * (eye_left[0] + eye_right[0])), degrees(0.5 * (eye_left[1] + eye_right[1])),
-        degrees(at_yaw), degrees(at_pitch), degrees(yaw_rate), degrees(pitch_rate), norm(rel),
-        degrees(eye_right[0] - eye_left[0]), degrees(atan2(y + half, x) - atan2(y - half, x)),
-        degrees(angle_between(sight_left, sub(point, left))),
-        degrees(angle_between(sight_right, sub(point, right))),
-        1e3 * on_left[0], 1e3 * on_left[1], 1e3 * on_right[0], 1e3 * on_right[1],
-        gaze_at[0], gaze_at[1], off_deg, float(seen),
-        max(lid_openings(pose.lid_left, pose.lid_right, names, UPPER) or (nan,)),
-        max(lid_openings(pose.lower_left, pose.lower_right, names, LOWER) or (nan,)),
-        PHASES.index(tick.gaze.phase),
-        float(target.kind == "face"), float(target.kind in _IDLE),
-        float(any("eye" in limited.axis for limited in tick.gaze.limited)), target.shift, mode,
-        STATES.index(tick.conversation.state), tick.conversation.number,
-        *_off_partner(tick, (yaw, pitch)),
-    )  # fmt: skip
+    yield tick.t_s
+    yield from map(degrees, (
+        *yaw_pitch(way), *head_in_space(pose), 0.5 * (eye_left[1] + eye_right[1]),
+        *yaw_pitch(rel), *_rates(rel, target.v_world_m_s),
+        eye_right[0] - eye_left[0], atan2(y + half, x) - atan2(y - half, x),
+        angle_between(line_of_sight(pose, True), sub(point, left)),
+        angle_between(line_of_sight(pose, False), sub(point, right)),
+    ))  # fmt: skip
+    yield from _face_gaze(tick, way)
+    yield wider_opening(pose.lid_left, pose.lid_right, names)
+    yield wider_opening(gaze.lid_left, gaze.lid_right, names)
+    yield degrees(0.5 * (gaze.eye_left_rad[1] + gaze.eye_right_rad[1]))
+    yield PHASES.index(gaze.phase)
+    yield target.kind == "face"
+    yield target.kind in _IDLE
+    yield any("eye" in limited.axis for limited in gaze.limited)
+    yield target.shift
+    yield mode
+    yield STATES.index(tick.conversation.state)
+    yield tick.conversation.number
+    yield from _off_partner(tick, way)
+    yield _EYE_JOINTS.isdisjoint(tick.joints.missing)
+    yield from _part_looked_at(tick, way)
+    yield from way
+    yield from unit(sub(gaze.gaze_point_world_m, head))
 
 
-def _off_partner(tick: Tick, gaze_rad: tuple[float, float]) -> tuple[float, float, float]:
+def _off_partner(tick: Tick, way: Vec3) -> tuple[float, float, float]:
     """Return yaw and pitch of the gaze from the partner's face, and its extent; nan if unknown."""
     now = tick.conversation
-    if now.state == "idle" or tick.percept is None:
-        return nan, nan, nan
     wanted = now.partner if now.partner is not None else tick.target.id
-    for face in tick.percept.faces:
+    for face in tick.percept.faces if tick.percept is not None and now.state != "idle" else ():
         if face.id == wanted:
             rel = sub(face.p_world_m, tick.pose.p_world_head_m)
-            at_yaw, at_pitch = yaw_pitch(rel)
-            yaw, pitch = gaze_rad[0] - at_yaw, gaze_rad[1] - at_pitch
-            edge = face_extent_deg(atan2(pitch, -yaw), norm(rel))
-            return degrees(yaw), degrees(pitch), edge
+            yaw, pitch = np.subtract(yaw_pitch(way), yaw_pitch(rel)).tolist()
+            return degrees(yaw), degrees(pitch), face_extent_deg(atan2(pitch, -yaw), norm(rel))
     return nan, nan, nan
 
 
@@ -359,17 +295,61 @@ def _rates(rel: Vec3, v: Vec3) -> tuple[float, float]:
     return yaw_rate, (level * v[2] - z * outward) / (level2 + z * z)
 
 
-def _face(tick: Tick, way: Vec3) -> tuple[tuple[Face, float] | None, bool]:
-    """Return the target's face, or else the gazed one, with its time; and whether it is gazed."""
-    if tick.percept is None:
-        return None, False
-    captured_s, found = tick.percept.captured_s, None
-    for face in tick.percept.faces:
-        if face.id == tick.target.id or found is None:
-            found = face
-    if found is None:
-        return None, False
-    since_s = min(max(0.0, tick.t_s - captured_s), _LONGEST_FORESEEN_S)
-    centre = add(found.p_world_m, scale(found.v_world_m_s, since_s))
-    seen = miss_distance_m(way, sub(centre, tick.pose.p_world_head_m)) <= NEAR_FACE_M
-    return (found, captured_s), seen
+def _part_looked_at(tick: Tick, way: Vec3) -> tuple[float, bool]:
+    """Return the index of the face part under the gaze, -1 off them, and if it is on a face."""
+    for face in tick.percept.faces if tick.percept is not None else ():
+        moved = sub(_moved_m(tick, face), tick.pose.p_world_head_m)
+        if miss_distance_m(way, add(face.p_world_m, moved)) <= _NEAR_FACE_M:
+            apart = [miss_distance_m(way, add(p, moved)) for p in face.parts_world_m]
+            least = min(apart)
+            return (apart.index(least) if least <= _NEAR_PART_M else -1), True
+    return -1, False
+
+
+def _face_gaze(tick: Tick, way: Vec3) -> tuple[float, float, float, float]:
+    """Return the gaze at the target's face, or else at the first one: face, face_off, on_face."""
+    percept, head = tick.percept, tick.pose.p_world_head_m
+    if percept is None or not percept.faces:
+        return nan, nan, nan, 0.0
+    face = next((one for one in percept.faces if one.id == tick.target.id), percept.faces[0])
+    nose = add(face.p_world_m, _moved_m(tick, face))
+    R = face.R_world_face
+    ahead = R[0][0], R[1][0], R[2][0]
+    centre = add(nose, scale(ahead, PLANE_M))
+    meets = None
+    if dot(way, sub(centre, head)) > 0.0:
+        meets = gaze_point_on_face(head, way, centre, R)
+    off_deg = degrees(angle_between(ahead, sub(head, face.p_world_m)))
+    return *(meets or (nan, nan)), off_deg, miss_distance_m(way, sub(nose, head)) <= _NEAR_FACE_M
+
+
+def _moved_m(tick: Tick, face: Any) -> Vec3:
+    """Return how far a face has moved since its frame."""
+    assert tick.percept is not None
+    since_s = min(max(0.0, tick.t_s - tick.percept.captured_s), _LONGEST_FORESEEN_S)
+    return scale(face.v_world_m_s, since_s)
+
+
+def gaze_point_on_face(
+    p_world_eye_m: Vec3, direction_world: Vec3, p_world_face_m: Vec3, R_world_face: Mat3
+) -> tuple[float, float] | None:
+    """Return the intersection of a line of sight with the plane of a face: (y, z) in its frame.
+
+    None if the line is parallel to the plane or points away, or the face is seen from behind.
+    """
+    out = (R_world_face[0][0], R_world_face[1][0], R_world_face[2][0])
+    towards = dot(direction_world, out)
+    before = dot(sub(p_world_eye_m, p_world_face_m), out)
+    if towards > -_ALONG or before <= 0.0:
+        return None
+    distance = before / -towards
+    meets = add(p_world_eye_m, scale(direction_world, distance))
+    _, y, z = rotate_back(R_world_face, sub(meets, p_world_face_m))
+    return (y, z)
+
+
+def miss_distance_m(direction: Vec3, rel_m: Vec3) -> float:
+    """Return the distance between a line of sight and a place; both are relative to the eye."""
+    if dot(direction, rel_m) <= 0.0:
+        return norm(rel_m)
+    return norm(cross(direction, rel_m))

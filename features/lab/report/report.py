@@ -1,122 +1,214 @@
-"""Creation of a report from ticks: collect, measure, compare with bands, draw, write."""
+"""The report of one run, or of two side by side: one HTML page, and its numbers as JSON."""
 
-from collections.abc import Callable, Iterable, Sequence
+import json
+from base64 import b64encode
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
+
+import jinja2
+import msgspec
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.lab.report import (
-    figures_face,
-    figures_head,
-    figures_lids,
-    figures_saccades,
-)
+from gazerig.drivers.files.file_output import make_folder, refuse_existing, write_file
+from gazerig.features.lab.analysis.human_norms import BANDS, GROUPS
+from gazerig.features.lab.report.figures import COLOURS, DRAWINGS, Drawing, ShownRun, draw_png
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.measures import judge_run
-from gazerig.features.lab.report.page import PageFigure, RunHeader, report_page, write_all
-from gazerig.features.lab.report.plotting import COLOURS, Drawing, ShownRun, basis_text, drawing_png
 from gazerig.features.lab.report.statistics import MeasureResult
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.feedback_basis import ESTIMATED
+from gazerig.robot.recording.read import RunRecording, report_bad_contents
+from gazerig.robot.recording.run_info import RunInfo
 
 Progress = Callable[[str, float], None]
 """Receives the current activity and its completed share, 0..1."""
 
-DRAWINGS: tuple[Drawing, ...] = (
-    *figures_saccades.DRAWINGS,
-    *figures_face.DRAWINGS,
-    *figures_head.DRAWINGS,
-    *figures_lids.DRAWINGS,
-)
-
-FIGURE_KEYS = tuple(drawing.key for drawing in DRAWINGS)
-
 _PROGRESS_EVERY, _LEAST_TICKS = 400, 20
-READING, DRAWING = "reading the run", "drawing figures"
+_PAGE = Path(__file__).with_name("report.html")
 
 
-class Report(NamedTuple):
-    """The findings, and the files with them: the page, its figures, and the numbers as JSON."""
+@dataclass(frozen=True)
+class ReportedRun:
+    """A run with its results.
 
-    findings: tuple[MeasureResult, ...]
-    page: Path
-    figures: tuple[Path, ...]
-    data: Path
+    Attributes:
+        name: Short name, for figures.
+        run: The run.
+        facts: (what, value) rows of the page's head.
+        styles: Styles of gaze that select notes of the bands, e.g. "saccade min_jerk".
+        warning: Defect of the recording, "" without one.
+    """
+
+    name: str
+    run: GazeTrace
+    facts: dict[str, str]
+    styles: frozenset[str]
+    warning: str = ""
+    results: tuple[MeasureResult, ...] = ()
+
+    @property
+    def banner(self) -> str:
+        """Return the warning about servos that were not measured, "" if all were."""
+        joints = self.run.joints
+        if self.run.ideal_servos:
+            return (
+                "The servos were ideal: a lag without bytes. Measures of servos are not judged; run "
+                "with emulated servos to see them."
+            )
+        if joints.estimated:
+            return (
+                f"Not all of this is measured: the servos of {', '.join(joints.estimated)} have no "
+                f"feedback. Results that depend on them are {ESTIMATED}; their sections are marked. "
+                "Real eyes may lag, stick or swing without an effect on the verdicts."
+            )
+        return ""
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Return the number of measures with each verdict."""
+        return Counter(result.verdict for result in self.results)
+
+    def of(self, verdict: str) -> list[MeasureResult]:
+        """Return the results with a verdict."""
+        return [result for result in self.results if result.verdict == verdict]
+
+
+def describe_run(name: str, info: RunInfo, run: GazeTrace, warning: str = "") -> ReportedRun:
+    """Return a run with its circumstances and results.
+
+    Raises:
+        ValueError, KeyError, TypeError: The recorded configuration is damaged.
+    """
+    gaze = msgspec.yaml.decode(info.config_yaml)["gaze"]
+    saccade, scanpath = gaze["saccade"]["profile"], gaze["scanpath"]["model"]
+    kinds = sorted(run.kinds.items(), key=lambda item: -item[1])
+    total = sum(run.kinds.values()) or 1.0
+    facts = {
+        "rig": info.rig,
+        "character": info.character or "none",
+        "profile": info.profile,
+        "saw": f"scene {info.scene}" if info.scene else info.eyes,
+        "servos": info.bus if info.mock else "real",
+        "time": "simulated" if info.fast else "real",
+        "seed": str(info.seed),
+        "started": info.started_utc.isoformat(),
+        "versions": ", ".join(f"{name} {v}" for name, v in sorted(info.versions.items())),
+        "saccades": saccade,
+        "face scanpath": scanpath,
+        "length": f"{run.seconds:.1f} s, {len(run.rows)} ticks at {run.rate_hz:.0f} Hz",
+        "events": f"{len(run.saccades)} saccades, {len(run.fixations)} fixations, "
+        f"{len(run.blinks)} blinks",
+        "looked at": ", ".join(f"{kind} {100 * s / total:.0f} %" for kind, s in kinds),
+        "conversation": run.mode,
+    }
+    styles = {
+        f"saccade {saccade}", f"scanpath {scanpath}",
+        f"conversation {run.mode}",
+    }  # fmt: skip
+    return ReportedRun(name, run, facts, run.joints.styles | styles, warning, judge_run(run))
+
+
+def read_run(recording: RunRecording, progress: Progress) -> ReportedRun:
+    """Read a recorded run in one pass.
+
+    Raises:
+        SetupError: the run is too short, or its contents are damaged.
+    """
+    info, name = recording.info, recording.path.stem
+    builder = GazeTraceBuilder(ideal_servos=info.mock and info.bus == "ideal")
+    first_s, count = None, 0
+    with report_bad_contents(recording.path):
+        for count, tick in enumerate(recording.ticks(), 1):
+            builder.update(tick)
+            first_s = tick.t_s if first_s is None else first_s
+            if recording.duration_s and count % _PROGRESS_EVERY == 0:
+                progress(f"reading {name}", min(1.0, (tick.t_s - first_s) / recording.duration_s))
+        if count < _LEAST_TICKS:
+            raise SetupError(f"{recording.path}: {count} ticks are too few for a report")
+        found = describe_run(name, info, builder.trace(), recording.note)
+    return replace(found, facts={"recording": str(recording.path)} | found.facts)
+
+
+def report_files(out: Path) -> tuple[Path, Path]:
+    """Return the page and the file of its numbers."""
+    return out, out.with_name(f"{out.stem}_measures.json")
 
 
 def make_report(
-    run: GazeTrace,
-    about: RunHeader,
-    out: Path,
-    progress: Progress,
-    force: bool = False,
-) -> Report:
-    """Write one HTML page, one PNG per figure, and the numbers as JSON; return the findings.
+    runs: Sequence[ReportedRun], out: Path, progress: Progress, force: bool = False
+) -> None:
+    """Write the page of one run or of two, and its numbers as JSON.
 
-    out: the page to write; the PNGs are written to the folder NAME_figures of the same parent
     force: replace existing files
 
     Raises:
         SetupError: a file cannot be written.
     """
-    findings = judge_run(run)
-    figures = draw_figures([ShownRun(about.name, run, COLOURS[0], about.model)], progress)
-    page = report_page(about, run, findings, figures)
-    numbers = [_finding_json(f, run) for f in findings]
-    written = write_all(out, page, figures, numbers, force)
-    return Report(findings, out, *written)
-
-
-def read_run(ticks: Iterable[Tick], about: RunHeader, progress: Progress) -> GazeTrace:
-    """Collect the data of a run in one pass.
-
-    Raises:
-        SetupError: the run is too short.
-    """
-    builder, first_s = GazeTraceBuilder(), None
-    progress(READING, 0.0)
-    for count, tick in enumerate(ticks):
-        builder.update(tick)
-        first_s = tick.t_s if first_s is None else first_s
-        if about.duration_s and count % _PROGRESS_EVERY == 0:
-            progress(READING, min(1.0, (tick.t_s - first_s) / about.duration_s))
-    progress(READING, 1.0)
-    run = builder.trace()
-    if len(run.rows) < _LEAST_TICKS:
-        raise SetupError(f"{about.name}: {len(run.rows)} ticks are too few for a report")
-    return run
-
-
-def draw_figures(runs: Sequence[ShownRun], progress: Progress) -> tuple[PageFigure, ...]:
-    """Draw every figure of one run, or of two runs together; skip runs without its joints."""
-    figures = []
+    page, data = report_files(out)
+    refuse_existing(page, data, force=force)
+    shown = [
+        ShownRun(one.name, one.run, colour) for one, colour in zip(runs, COLOURS, strict=False)
+    ]
+    figures: dict[str, list[tuple[Drawing, str]]] = {group: [] for group in GROUPS}
     for count, drawing in enumerate(DRAWINGS):
-        progress(DRAWING, count / len(DRAWINGS))
-        able = [shown for shown in runs if not shown.run.joints.left_out(drawing.key)]
+        progress("drawing figures", count / len(DRAWINGS))
+        able = [one for one in shown if one.run.joints.has_any(drawing.joints)]
         if able:
-            basis = basis_text(able, drawing.group)
-            caption = drawing.caption.replace("{measured}", basis)
-            png = drawing_png(drawing, able)
-            figures.append(PageFigure(drawing.title, png, caption, drawing.key, drawing.group))
-    progress(DRAWING, 1.0)
-    return tuple(figures)
+            picture = b64encode(draw_png(drawing, able)).decode()
+            figures[drawing.group].append((drawing, picture))
+    progress("drawing figures", 1.0)
+    text = _page(runs, figures)
+    make_folder(out.parent)
+    numbers = [_numbers(one, result) for one in runs for result in one.results]
+    write_file(data, json.dumps(numbers, indent=1) + "\n", force)
+    write_file(page, text, force)
 
 
-def _finding_json(finding: MeasureResult, run: GazeTrace) -> dict[str, object]:
-    """Return a finding as plain JSON; unknown values are null.
+def _page(runs: Sequence[ReportedRun], figures: dict[str, list[tuple[Drawing, str]]]) -> str:
+    """Return the page as HTML that needs no other file."""
+    rows: dict[str, list[Any]] = {group: [] for group in GROUPS}
+    left_out: dict[str, dict[str, None]] = {group: {} for group in GROUPS}
+    by_key = [{result.band.key: result for result in one.results} for one in runs]
+    for band in BANDS:
+        cells = [results.get(band.key) for results in by_key]
+        if any(cells):
+            rows[band.group].append((band, cells))
+        elif not any(one.run.joints.has_any(band.joints) for one in runs):
+            left_out[band.group][" or ".join(band.joints)] = None
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"number": format_number, "unit": with_unit}
+    return environment.from_string(_PAGE.read_text(encoding="utf-8")).render(
+        runs=runs, groups=GROUPS, rows=rows, left_out=left_out, figures=figures
+    )
 
-    basis: "measured", "partly estimated" or "estimated"
-    """
-    band = finding.band
+
+def _numbers(one: ReportedRun, result: MeasureResult) -> dict[str, object]:
+    """Return a result as plain JSON; unknown values are null."""
+    values = {
+        "value": result.value, "low95": result.low95, "high95": result.high95,
+        "commanded": result.measured.commanded_value,
+    }  # fmt: skip
     return {
-        "key": band.key, "title": band.title, "unit": band.unit,
-        "value": _or_none(finding.value), "low95": _or_none(finding.low95),
-        "high95": _or_none(finding.high95), "asked": _or_none(finding.measured.commanded_value),
-        "events": finding.measured.events, "least_events": band.min_events,
-        "band": [band.low, band.high], "verdict": finding.verdict, "source": band.source,
-        "basis": run.joints.basis(band.group),
+        "run": one.name, **msgspec.structs.asdict(result.band),
+        **{name: value if isfinite(value) else None for name, value in values.items()},
+        "events": result.measured.events, "verdict": result.verdict,
+        "basis": one.run.joints.basis(result.band.group),
     }  # fmt: skip
 
 
-def _or_none(value: float) -> float | None:
-    return value if isfinite(value) else None
+def with_unit(value: float, unit: str) -> str:
+    """Return a number with its unit, "" for an unknown one; shares have no unit."""
+    text = format_number(value)
+    return f"{text} {unit}" if text and unit not in ("", "share") else text
+
+
+def format_number(value: float) -> str:
+    """Return a number with three digits, "" for an unknown one."""
+    if not isfinite(value):
+        return ""
+    return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"

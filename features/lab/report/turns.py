@@ -5,21 +5,20 @@ and clear of the face, which is larger if it is near.
 Long turns are judged as speaking or listening, exchanges of short ones as dialogue.
 """
 
-from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.features.lab.report.statistics import MeasuredValue, mean
-from gazerig.gaze.types import Floats, TurnState
+from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.statistics import MeasuredValue, mean, rate
+from gazerig.gaze.types import Floats
 
 Role = Literal["speaking", "listening", "dialogue"]
 
-STATES: tuple[TurnState, ...] = get_args(TurnState)
 AVERTED_DEG = 6.0
 CLEAR_DEG = 1.0
-_, _LISTENS, _THINKS, _SPEAKS, _INTERRUPTED = range(5)
+_, _, _THINKS, _SPEAKS, _INTERRUPTED = range(5)
 _BRIDGED_S = 0.1
 """Shorter looks, and shorter times between two, do not count."""
 _EXCHANGE_S = 10.0
@@ -29,42 +28,15 @@ _LONG_S = 3.5
 _BEGINS_S, _ENDS_S = 0.3, 0.05
 """Time after the begin, and before the end of a turn, at which the gaze is judged."""
 _BLOCK_S = 20.0
-_MOVED_DEG = 1.0
-_LATEST_S = 3.0
-
-
-class TurnTrace(NamedTuple):
-    """Columns of a run, one value per tick.
-
-    Attributes:
-        t_s: Time.
-        state: Index in ``STATES``.
-        number: Number of the turn.
-        off_deg: (n, 2) Yaw and pitch of the gaze from the partner's face, NaN if unknown.
-        edge_deg: (n,) Extent of the face in that direction.
-    """
-
-    t_s: Floats
-    state: Floats
-    number: Floats
-    off_deg: Floats
-    edge_deg: Floats
 
 
 class Turn(NamedTuple):
-    """A turn: its state, and its first row and the one after its last."""
+    """A turn: its state, its first row and the one after its last, and its length."""
 
     state: int
     first: int
     end: int
-
-
-class LookAway(NamedTuple):
-    """A look away: its first row and the one after its last, and its direction."""
-
-    first: int
-    end: int
-    direction: Literal["side", "up", "down"]
+    length_s: float
 
 
 class TurnLooks:
@@ -74,24 +46,31 @@ class TurnLooks:
         averted: (n,) Whether the gaze is averted.
         known: (n,) Whether the partner is visible; only such times are judged.
         turns: Turns in the order of time.
-        looks: Looks away.
+        looks: (n, 2) First row of each look away, and the one after its last.
     """
 
-    def __init__(self, run: TurnTrace) -> None:
-        self.run = run
-        off = run.off_deg
+    def __init__(self, run: GazeTrace) -> None:
+        self.t_s, self.state = run.column("t"), run.column("turn")
+        self.off_deg = off = run.column("off_partner")
         far = np.nan_to_num(np.hypot(off[:, 0], off[:, 1])) > np.maximum(
-            AVERTED_DEG, np.nan_to_num(run.edge_deg) + CLEAR_DEG
+            AVERTED_DEG, np.nan_to_num(run.column("face_edge")) + CLEAR_DEG
         )
         self.known = ~np.isnan(off[:, 0])
-        self.averted = _bridge(run.t_s, _bridge(run.t_s, far, True), False)
-        self.turns = [Turn(int(run.state[first]), first, end) for first, end in _edges(run.number)]
-        starts = np.flatnonzero(np.diff(self.averted.astype(int), prepend=0, append=0))
-        self.looks = [self._look(a, b) for a, b in starts.reshape(-1, 2).tolist()]
+        self.averted = _bridge(self.t_s, _bridge(self.t_s, far, True), False)
+        cuts = [
+            0,
+            *(np.flatnonzero(np.diff(run.column("turn_number"))) + 1).tolist(),
+            len(run.column("turn_number")),
+        ]
+        self.turns = [
+            Turn(int(self.state[a]), a, b, float(self.t_s[b - 1] - self.t_s[a]))
+            for a, b in zip(cuts, cuts[1:], strict=False)
+        ]
+        self.looks = _true_rows(self.averted)
 
     def blocks(self, role: Role) -> Floats:
         """Return (n, 3) seconds averted, seconds and looks away of stretches of a role."""
-        t, begins = self.run.t_s, np.array([look.first for look in self.looks], dtype=int)
+        t, begins = self.t_s, self.looks[:, 0]
         rows = []
         for first, end in self._stretches(role):
             count = max(1, round(float(t[end - 1] - t[first]) / _BLOCK_S))
@@ -104,14 +83,20 @@ class TurnLooks:
                 rows.append((away_s, seen_s, float(((begins >= a) & (begins < b)).sum())))
         return np.array([row for row in rows if row[1] > 0.0]).reshape(-1, 3)
 
-    def directions(self, role: Role) -> list[str]:
-        """Return the direction of each look away that begins in a role and not in a thought."""
-        within = [(a, b) for a, b in self._stretches(role) if self.run.state[a] != _THINKS]
-        return [one.direction for one in self.looks if any(a <= one.first < b for a, b in within)]
+    def aside(self, role: Role) -> Floats:
+        """Return whether each look away goes aside, that begins in a role and not in a thought."""
+        rows = []
+        for first, end in self._stretches(role):
+            begins = (self.looks[:, 0] >= first) & (self.looks[:, 0] < end)
+            for a, b in self.looks[begins & (self.state[first] != _THINKS)]:
+                off = np.abs(self.off_deg[a:b])
+                yaw, pitch = off[np.nanargmax(np.hypot(*off.T))]
+                rows.append(float(yaw > pitch))
+        return np.array(rows)
 
     def begins(self) -> Floats:
         """Return for each long turn of speech whether it begins averted."""
-        at = [self._after(one) for one in self._long()]
+        at = [self._row_after(one.first, _BEGINS_S) for one in self._long()]
         return np.array([float(self.averted[row]) for row in at if self.known[row]])
 
     def ends(self) -> Floats:
@@ -119,126 +104,66 @@ class TurnLooks:
         found = []
         for one, after in zip(self.turns, self.turns[1:], strict=False):
             if one in self._long() and after.state != _INTERRUPTED:
-                last = int(np.searchsorted(self.run.t_s, self.run.t_s[one.end - 1] - _ENDS_S))
+                last = self._row_after(one.end - 1, -_ENDS_S)
                 if self.known[last]:
                     found.append(float(not self.averted[last]))
         return np.array(found)
 
-    def latencies(self, state: TurnState) -> Floats:
-        """Return the times from thinking to a look away, or from an interruption to the face.
-
-        Turns that begin so do not count.
-        """
-        wanted = state == "thinking"
-        found = []
-        for one in self.turns:
-            judged = one.state == STATES.index(state) and self.known[one.first]
-            if judged and self.averted[one.first] != wanted:
-                changed = np.flatnonzero(self.averted[one.first : one.end] == wanted)
-                if len(changed):
-                    at = one.first + int(changed[0])
-                    found.append(float(self.run.t_s[at] - self.run.t_s[one.first]))
-                else:
-                    found.append(_LATEST_S)
-        return np.array(found)
-
-    def first_motions(self) -> Floats:
-        """Return the times from states that look away or back to a motion of 1 deg."""
-        t, off, found = self.run.t_s, self.run.off_deg, list[float]()
-        for one in self.turns:
-            soon = int(np.searchsorted(t, t[one.first] + _BEGINS_S))
-            changes = soon < one.end and self.averted[one.first] != self.averted[soon]
-            if one.state in (_THINKS, _SPEAKS, _INTERRUPTED) and self.known[one.first] and changes:
-                moved = np.hypot(*(off[one.first : soon + 1] - off[one.first]).T) > _MOVED_DEG
-                found.append(float(t[one.first + int(np.argmax(moved))] - t[one.first]))
-        return np.array(found)
-
-    def _look(self, first: int, end: int) -> LookAway:
-        off = self.run.off_deg[first:end]
-        most = int(np.nanargmax(np.hypot(off[:, 0], off[:, 1])))
-        yaw, pitch = off[most]
-        aside = abs(yaw) > abs(pitch)
-        return LookAway(first, end, "side" if aside else "up" if pitch > 0.0 else "down")
-
     def _long(self) -> list[Turn]:
-        return [one for one in self.turns if one.state == _SPEAKS and self._lasts_s(one) >= _LONG_S]
+        return [one for one in self.turns if one.state == _SPEAKS and one.length_s >= _LONG_S]
 
-    def _lasts_s(self, turn: Turn) -> float:
-        return float(self.run.t_s[turn.end - 1] - self.run.t_s[turn.first])
-
-    def _after(self, turn: Turn) -> int:
-        return int(np.searchsorted(self.run.t_s, self.run.t_s[turn.first] + _BEGINS_S))
+    def _row_after(self, row: int, later_s: float) -> int:
+        return int(np.searchsorted(self.t_s, self.t_s[row] + later_s))
 
     def _stretches(self, role: Role) -> list[tuple[int, int]]:
         """Return the rows of a role: thinking between short turns belongs to their dialogue."""
         found = []
         for k, one in enumerate(self.turns):
-            beside = [self.turns[n] for n in (k - 1, k + 1) if 0 <= n < len(self.turns)]
-            talks = one.state in (_LISTENS, _SPEAKS, _INTERRUPTED)
-            long = self._lasts_s(one) >= _EXCHANGE_S
-            if one.state == _THINKS and all(self._lasts_s(b) < _EXCHANGE_S for b in beside):
-                mine: Role | None = "dialogue"
-            elif not talks:
+            near = self.turns[max(0, k - 1) : k + 2]
+            short = one.length_s < _EXCHANGE_S
+            mine: Role | None = "speaking" if one.state == _SPEAKS else "listening"
+            if one.state == _THINKS:
+                others = [turn.length_s for turn in near if turn is not one]
+                mine = "dialogue" if max(others, default=0.0) < _EXCHANGE_S else None
+            elif not one.state:
                 mine = None
-            elif not long:
+            elif short:
                 mine = "dialogue"
-            else:
-                mine = "speaking" if one.state == _SPEAKS else "listening"
             if mine == role:
                 found.append((one.first, one.end))
         return found
 
 
-def measures(run: TurnTrace) -> list[MeasuredValue]:
+def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of a run; none if no turn was reported."""
-    if not run.state.any():
+    if not run.column("turn").any():
         return []
     looks, found = TurnLooks(run), list[MeasuredValue]()
     for role in get_args(Role):
         blocks = looks.blocks(role)
-        aside = np.array([float(one == "side") for one in looks.directions(role)])
+        away = blocks[:, [2, 1]] * (60.0, 1.0)
         found += [
-            MeasuredValue(f"averted_{role}", blocks, share_averted),
-            MeasuredValue(f"aversions_{role}", blocks, looks_per_min),
-            MeasuredValue(f"aside_{role}", aside, mean),
+            MeasuredValue(f"averted_{role}", blocks[:, :2], rate),
+            MeasuredValue(f"aversions_{role}", away, rate),
+            MeasuredValue(f"aside_{role}", looks.aside(role), mean),
         ]
     return [
         *found,
         MeasuredValue("turn_begins", looks.begins(), mean),
         MeasuredValue("turn_ends", looks.ends(), mean),
-        MeasuredValue("turn_motion", 1e3 * looks.first_motions(), late),
-        MeasuredValue("turn_thinks", 1e3 * looks.latencies("thinking"), late),
-        MeasuredValue("turn_yields", 1e3 * looks.latencies("interrupted"), late),
     ]
 
 
-def share_averted(blocks: Floats) -> float:
-    """Return the share of the time averted."""
-    return float(blocks[:, 0].sum() / blocks[:, 1].sum())
-
-
-def looks_per_min(blocks: Floats) -> float:
-    """Return the looks away a minute."""
-    return float(60.0 * blocks[:, 2].sum() / blocks[:, 1].sum())
-
-
-def late(values: Floats) -> float:
-    """Return the 95th percentile."""
-    return float(np.percentile(values, 95.0))
-
-
-def _edges(values: Floats) -> Sequence[tuple[int, int]]:
-    """Return the first row of each run of equal values, and the one after its last."""
-    cuts = [0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values)]
-    return list(zip(cuts, cuts[1:], strict=False))
+def _true_rows(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return (n, 2) the first row of each run of true values, and the one after its last."""
+    return np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0)).reshape(-1, 2)
 
 
 def _bridge(t_s: Floats, mask: NDArray[np.bool_], value: bool) -> NDArray[np.bool_]:
     """Return a mask in which short times with a value have the other one."""
-    out: Any = mask.copy()
-    edges = np.flatnonzero(np.diff((mask == value).astype(int), prepend=0, append=0))
-    for first, end in edges.reshape(-1, 2).tolist():
-        lasts_s = t_s[min(end, len(t_s) - 1)] - t_s[first]
-        if lasts_s < _BRIDGED_S and first > 0 and end < len(t_s):
+    out = mask.copy()
+    for first, end in _true_rows(mask == value):
+        inside = first > 0 and end < len(t_s)
+        if inside and t_s[end] - t_s[first] < _BRIDGED_S:
             out[first:end] = not value
-    return np.asarray(out)
+    return out

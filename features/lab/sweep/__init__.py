@@ -1,1 +1,1 @@
-"""Many simulated runs: parameters varied over a grid or a sample, or fitted to people's gaze."""
+"""Many simulated runs: their points, on one machine or several, as a table."""

@@ -3,11 +3,10 @@
 // Headline and ring show the same moment: now.shown is the state at the capture of the picture.
 
 import { isSilent, now, on } from "/rig/connection.js";
-import { make, write } from "/rig/elements.js";
+import { make, showAge } from "/rig/elements.js";
 import { order } from "/rig/orders.js";
 import { isLed, personOf } from "/rig/words.js";
 
-const STALE_MS = 2500, AGE_MS = 500;
 const PICTURE_EVERY_MS = 700; // without a picture for this long the newest state is shown
 const KEPT_S = 2;
 const LATEST_S = 0.8; // a moment older than this is not kept while the eyes are under way
@@ -19,8 +18,7 @@ export const layers = { gaze: true, faces: false };
 
 const canvas = make("canvas", { tabIndex: 0, className: "pick", width: WIDTH, height: 400 });
 const mark = make("span", { className: "mark", hidden: true });
-const age = make("p", { className: "age", hidden: true });
-const frame = make("div", { className: "picture", hidden: true }, canvas, mark, age);
+const frame = make("div", { className: "picture", hidden: true }, canvas, mark);
 canvas.setAttribute("role", "button");
 canvas.setAttribute("aria-label", "what the camera sees");
 canvas.title = "click: the head looks there (or move the cross by the arrow keys, and Enter)";
@@ -138,12 +136,7 @@ function drawFindings(pen, px) {
   }
 }
 
-setInterval(() => {
-  const old = performance.now() - paintedAt, stale = old > STALE_MS;
-  frame.classList.toggle("stale", stale);
-  age.hidden = !stale;
-  if (stale) write(age, `as it was ${Math.round(old / 1000)} s ago`);
-}, AGE_MS);
+showAge(frame, () => paintedAt);
 
 // --- look at a place in the picture --------------------------------------------------------------
 

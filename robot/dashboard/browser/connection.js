@@ -6,7 +6,7 @@
 const AGAIN_MS = 500;
 const LOST_AFTER_MS = 3000; // the server sends at least once a second
 const ANSWER_MS = 10_000;
-const QUERY = "rate_hz=25&events=true&pictures=true&rig=true";
+const QUERY = "rate_hz=25&pictures=true&rig=true";
 
 /**
  * Newest messages: state, rig, run; shown: the state at the capture of the picture that is shown;
@@ -19,7 +19,7 @@ const waiting = new Map(); // tag -> {resolve, reject, timer}
 let socket = null, tag = 0, heardAt = performance.now(), heard = false, picture = null;
 
 /**
- * Call a function with each message of a kind: hello, state, event, rig, run, picture, panel, silent.
+ * Call a function with each message of a kind: state, rig, run, picture, panel, silent, closed.
  * Of state, rig and run also with the newest one before, as scripts are loaded in any order.
  */
 export function on(kind, handle) {
@@ -78,21 +78,19 @@ function receive(message) {
     Object.assign(now, message);
     emit(message.rig ? "rig" : "run", message.rig ?? message.run);
   } else if (message.picture) picture = message.picture; // its image follows
-  else if (message.event) emit("event", message.event);
   else if (message.panel) emit("panel", message.panel);
   else if (message.silent !== undefined) {
     now.silent = true;
     emit("silent", message.silent);
-  } else if (message.tag === "hello") {
-    now.you = message.ok?.you ?? "";
-    emit("hello", message.ok);
-  } else if (message.outcome) emit("outcome", message);
+  } else if (message.tag === "hello") now.you = message.ok?.you ?? "";
   else if (message.tag !== undefined) settle(message.tag, message);
 }
 
+/** Open a websocket at a path of the rig. */
+export const openSocket = (path) => new WebSocket(location.origin.replace(/^http/, "ws") + path);
+
 function connect() {
-  const scheme = location.protocol === "https:" ? "wss" : "ws";
-  const mine = new WebSocket(`${scheme}://${location.host}/api/v1/socket?${QUERY}`);
+  const mine = openSocket(`/api/v1/socket?${QUERY}`);
   mine.binaryType = "blob";
   socket = mine;
   mine.onmessage = ({ data }) => {

@@ -3,6 +3,7 @@
 // A control is {node, show(value)}. While a person uses it, `show` does not change it.
 
 const DRAG_MS = 50; // shortest time between two values of a dragged slider
+const STALE_MS = 2500, AGE_MS = 500;
 
 /** Create an element with properties and children. */
 export function make(name, props = {}, ...children) {
@@ -19,6 +20,18 @@ export function write(node, text) {
 export const note = (text) => make("div", { className: "note", textContent: text });
 export const chip = (text) => make("span", { className: "chip", textContent: text });
 export const pill = (text, kind) => make("span", { className: `pill-word ${kind}`, textContent: text });
+
+/** Show a picture in grey and with its age if none has come after it; freshAt: returns its time. */
+export function showAge(place, freshAt) {
+  const age = make("p", { className: "age", hidden: true });
+  place.append(age);
+  setInterval(() => {
+    const old = performance.now() - freshAt();
+    age.hidden = old <= STALE_MS;
+    place.classList.toggle("stale", !age.hidden);
+    if (!age.hidden) write(age, `as it was ${Math.round(old / 1000)} s ago`);
+  }, AGE_MS);
+}
 
 /** Heading of a table or drawing, with smaller text at its right end. */
 export function heading(text, aside = "") {
@@ -82,7 +95,29 @@ function inTurn(send) {
 }
 
 /** Text of a number, without the noise of binary fractions. */
-export const written = (value) => String(Number(value.toPrecision(6)));
+const written = (value) => String(Number(value.toPrecision(6)));
+
+/**
+ * Let a person type into a field: Enter commits, Escape restores the value in force.
+ * Returns {isTyped(): whether there is text that is not committed, commit()}.
+ */
+function typing(field, restore, take) {
+  const isTyped = () => field.classList.contains("typed");
+  const mark = (typed) => field.classList.toggle("typed", typed);
+  const commit = () => {
+    mark(false);
+    take();
+  };
+  field.addEventListener("input", () => mark(true));
+  field.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") commit();
+    if (event.key !== "Escape" || !isTyped()) return;
+    event.stopPropagation(); // it closes no drawer
+    restore();
+    mark(false);
+  });
+  return { isTyped, commit };
+}
 
 /**
  * Slider between two ends, whose number can also be typed.
@@ -94,7 +129,7 @@ export function slider({ name, unit = "", low, high, step, value, hint = "" }, s
   const number = make("input", { type: "number", className: "number", min: low, max: high, step });
   number.setAttribute("aria-label", `${name}, as a number${unit && ` in ${unit}`}`);
   for (const field of [range, number]) describe(field, hint);
-  let current = value, held = false, typed = false;
+  let current = value, held = false;
   const draw = () => { range.value = current; number.value = written(current); };
   const set = inTurn(async (next) => {
     current = next;
@@ -105,20 +140,10 @@ export function slider({ name, unit = "", low, high, step, value, hint = "" }, s
   for (const end of ["pointerup", "pointercancel", "blur"]) {
     range.addEventListener(end, () => { held = false; });
   }
-  const commit = () => {
-    typed = false;
-    number.classList.remove("typed");
+  const { isTyped, commit } = typing(number, draw, () => {
     const next = number.valueAsNumber;
     if (Number.isNaN(next)) draw();
     else if (next !== Number(written(current))) set(next);
-  };
-  number.addEventListener("input", () => { typed = true; number.classList.add("typed"); });
-  number.addEventListener("keydown", (event) => {
-    if (event.key === "Enter") commit();
-    if (event.key !== "Escape" || !typed) return;
-    event.stopPropagation(); // it closes no drawer
-    number.value = written(current);
-    commit();
   });
   number.addEventListener("change", commit); // by its arrow keys, or when the focus leaves
   number.addEventListener("wheel", () => number.blur()); // scrolling must not move a joint
@@ -129,7 +154,7 @@ export function slider({ name, unit = "", low, high, step, value, hint = "" }, s
     node: make("div", { className: "field" }, label(name, id),
       make("div", { className: "both" }, range, field)),
     show(next) {
-      if (held || typed) return;
+      if (held || isTyped()) return;
       current = next;
       draw();
     },
@@ -142,21 +167,10 @@ export function textField({ name, value = "", hint = "", enterOnly = false }, se
   const field = make("input", { id, type: "text", autocomplete: "off", spellcheck: false, value });
   describe(field, hint);
   let current = value;
-  const isTyped = () => field.classList.contains("typed");
-  const mark = (typed) => field.classList.toggle("typed", typed);
-  const commit = () => {
-    mark(false);
+  const { isTyped, commit } = typing(field, () => { field.value = current; }, () => {
     if (field.value === current && !enterOnly) return;
     current = field.value;
     send(current);
-  };
-  field.addEventListener("input", () => mark(true));
-  field.addEventListener("keydown", (event) => {
-    if (event.key === "Enter") commit();
-    if (event.key !== "Escape" || !isTyped()) return;
-    event.stopPropagation();
-    field.value = current;
-    mark(false);
   });
   field.addEventListener("blur", () => { if (!enterOnly) commit(); });
   return {

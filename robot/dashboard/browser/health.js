@@ -33,23 +33,10 @@ export default {
 /** The guard's action and reasons, of constant height. */
 function guard({ stopped, level, reasons }) {
   const name = stopped ? "stopped" : level;
-  const texts = stopped ? [stopped] : level === "limited" ? [grouped(reasons)] : reasons;
+  const texts = stopped ? [stopped] : level === "limited" ? [reasons.join("; ")] : reasons;
   const lines = texts.filter(Boolean).map((text) => make("div",
     { className: level === "limited" ? "line" : "", title: text, textContent: text }));
   return make("div", { className: "stay" }, pill(`guard: ${name.replace("_", " ")}`, LEVELS[name]), ...lines);
-}
-
-/** Each reason once, with its first joint: "too fast (neck yaw, +2)". */
-function grouped(reasons) {
-  const joints = new Map();
-  for (const text of reasons) {
-    const [joint, why] = text.includes(": ") ? text.split(/: (.*)/s) : ["", text];
-    joints.set(why, [...(joints.get(why) ?? []), spaced(joint)]);
-  }
-  return [...joints].map(([why, names]) => {
-    const more = names.length > 1 ? `, +${names.length - 1}` : "";
-    return names[0] ? `${why} (${names[0]}${more})` : why;
-  }).join(", ");
 }
 
 /** How many joints have no feedback; empty if all are measured. */
@@ -113,7 +100,7 @@ function timing(loop) {
 }
 
 /** Age of the newest frame, s; null before the first. */
-export const frameAge = ({ frame_s, t_s }) => (typeof frame_s === "number" ? t_s - frame_s : null);
+const frameAge = ({ frame_s, t_s }) => (typeof frame_s === "number" ? t_s - frame_s : null);
 
 function frame(state) {
   const age_s = frameAge(state);

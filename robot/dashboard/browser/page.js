@@ -12,16 +12,14 @@ import health, { alarm } from "/rig/health.js";
 import { order, say } from "/rig/orders.js";
 import play from "/rig/play.js";
 import scene from "/rig/scene.js";
-import { toggle } from "/rig/stage.js";
+import "/rig/stage.js";
 import steer from "/rig/steer.js";
 import talk from "/rig/talk.js";
-import timeline from "/rig/timeline.js";
-import traces from "/rig/traces.js";
 import tune from "/rig/tune.js";
 import watch from "/rig/watch.js";
 import { isLed, reason } from "/rig/words.js";
 
-const PANELS = [watch, timeline, traces, scene, steer, play, talk, tune, health];
+const PANELS = [watch, scene, steer, play, talk, tune, health];
 
 const $ = (selector) => document.querySelector(selector);
 
@@ -55,7 +53,6 @@ on("run", ({ busy }) => {
   $("#busy").hidden = !busy;
 });
 
-const REASONS_SHOWN = 4;
 let alarmed = "";
 
 on("state", (state) => { // banners for held joints and an old frame
@@ -63,10 +60,8 @@ on("state", (state) => { // banners for held joints and an old frame
   if (text === alarmed) return;
   alarmed = text;
   const [name, kind, reasons] = found ?? ["", "", []];
-  const lines = reasons.slice(0, REASONS_SHOWN);
-  if (reasons.length > lines.length) lines.push(`and ${reasons.length - lines.length} more`);
   const banner = make("div", { className: `banner ${kind}` }, make("b", { textContent: name }),
-    ...lines.map((line) => make("div", { textContent: line })));
+    ...reasons.map((line) => make("div", { textContent: line })));
   $("#alarm").replaceChildren(...(found ? [banner] : []));
 });
 
@@ -102,10 +97,6 @@ for (const button of moves) {
     order(track ? { do: "play", track } : { do: "ask", menu, choice });
   });
 }
-
-$("#swap").addEventListener("click", () => {
-  document.body.classList.toggle("swapped", toggle($("#swap")));
-});
 
 // --- panels -------------------------------------------------------------------------------------
 
@@ -147,12 +138,10 @@ setInterval(drawPanels, TICK_MS);
 const tabs = [...document.querySelectorAll("[role=tab]")];
 const nameOf = (tab) => tab.id.replace("tab-", "");
 const drawerOf = (tab) => $(`#drawer-${nameOf(tab)}`);
-const left = new Map(); // tab -> element with the focus when its drawer was closed
 let open = null;
 
 /** Open a tab's drawer and close the other; null closes all. */
 function choose(tab) {
-  if (open && drawerOf(open).contains(document.activeElement)) left.set(open, document.activeElement);
   open = tab;
   for (const each of tabs) {
     each.setAttribute("aria-selected", String(each === tab));
@@ -172,12 +161,7 @@ function closeDrawer() {
 }
 
 for (const tab of tabs) {
-  tab.addEventListener("click", () => {
-    if (tab === open) return closeDrawer();
-    choose(tab);
-    const before = left.get(tab);
-    if (before?.isConnected) before.focus();
-  });
+  tab.addEventListener("click", () => (tab === open ? closeDrawer() : choose(tab)));
   tab.addEventListener("keydown", (event) => {
     const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
     if (!step) return;

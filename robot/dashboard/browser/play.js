@@ -2,7 +2,7 @@
 
 import { prepare } from "/rig/charts.js";
 import { choices, onChoices } from "/rig/choices.js";
-import { buttons, checkbox, heading, make, note, section, slider } from "/rig/elements.js";
+import { buttons, checkbox, make, note, slider } from "/rig/elements.js";
 import { order } from "/rig/orders.js";
 import { spaced } from "/rig/words.js";
 
@@ -19,14 +19,12 @@ export default {
       (value) => { speed = value; });
     const loop = checkbox({ name: "loop", hint: "repeat until it is ended" });
     const timeline = make("div"), top = make("div");
-    const all = section("all tracks", false);
-    place.append(top, pace.node, loop.node, timeline, all.node);
+    place.append(top, pace.node, loop.node, timeline);
     onChoices(() => {
       const names = (choices.menus.track ?? []).filter((name) => name !== NONE).toSorted();
       row = buttons("play", [NONE, ...names], (name) => order(name === NONE
         ? { do: "end_track", track: "" } : { do: "play", track: name, speed, loop: loop.value }));
       top.replaceChildren(row.node);
-      all.body.replaceChildren(...Object.values(choices.tracks).flatMap(entry));
     });
     return ({ state }) => {
       const playing = state.tracks.filter((track) => !track.end_reason);
@@ -35,15 +33,6 @@ export default {
     };
   },
 };
-
-/** A track of the list: name, duration, description, or why the rig refuses it. */
-function entry({ name, description, duration_s, slowed_by, refused, sound }) {
-  const slower = slowed_by > 1.000001 ? `, ${slowed_by.toFixed(2)} times slower` : "";
-  const aside = refused ? "" : `${duration_s.toFixed(1)} s${slower}`;
-  const file = sound?.split("/").at(-1);
-  return [heading(spaced(name), aside),
-    ...[description, refused && `refused: ${refused}`, file].filter(Boolean).map(note)];
-}
 
 function draw(place, tracks) {
   if (!tracks.length) return place.replaceChildren(note("no track plays"));

@@ -2,7 +2,7 @@
 // over it, at which the head looks.
 
 import { isLost, now, on, tell } from "/rig/connection.js";
-import { write } from "/rig/elements.js";
+import { showAge } from "/rig/elements.js";
 import { say } from "/rig/orders.js";
 
 const $ = (selector) => document.querySelector(selector);
@@ -11,7 +11,7 @@ const stage = $("#stage"), view = $("#view");
 // --- loading and age ----------------------------------------------------------------------------
 
 const HEAD_TRIANGLES = 1000; // the frame draws less while it has no head
-const LOOK_MS = 200, AGE_MS = 500, STALE_MS = 2500;
+const LOOK_MS = 200;
 let freshAt = performance.now();
 
 on("state", () => { freshAt = performance.now(); });
@@ -39,13 +39,7 @@ function load() {
   }, LOOK_MS);
 }
 
-setInterval(() => {
-  const old = performance.now() - freshAt, stale = old > STALE_MS;
-  const note = $("#stage .age");
-  stage.classList.toggle("stale", stale);
-  note.hidden = !stale || stage.classList.contains("loading");
-  if (stale) write(note, `as it was ${Math.round(old / 1000)} s ago`);
-}, AGE_MS);
+showAge(stage, () => freshAt);
 
 // --- the pointer --------------------------------------------------------------------------------
 
@@ -66,7 +60,7 @@ let takesOver = false; // the button was pressed: replace any control
 let held = false; // a finger is on the view
 
 /** Press or release a button; return whether it is pressed now. */
-export function toggle(button) {
+function toggle(button) {
   const pressed = button.getAttribute("aria-pressed") !== "true";
   button.setAttribute("aria-pressed", String(pressed));
   return pressed;

@@ -1,10 +1,8 @@
 // Panel: parameters that a running rig applies; the others are changed in its file.
 
-import { onChoices } from "/rig/choices.js";
 import { ask, now, on } from "/rig/connection.js";
 import { buttons, checkbox, make, markUnsaved, section, slider, textField } from "/rig/elements.js";
 import { order, say } from "/rig/orders.js";
-import { gazeButtons, menu } from "/rig/steer.js";
 import { count } from "/rig/words.js";
 
 /** Parameters with which the drawer opens, and their plain names. */
@@ -14,7 +12,6 @@ const FIRST = {
   "gaze.lids.blinks_per_min": "blinks",
   "gaze.head.eye_only_range_deg": "range of the eyes alone",
 };
-const MENUS = { conversation: "conversation", behaviour: "activity", character: "character" };
 const LIVE = "next tick";
 const STEPS = 100; // of a slider
 const FAR = 20; // ratio of range to value above which a number is typed
@@ -24,7 +21,7 @@ export default {
   drawer: "tune",
   every_ms: 300,
   build(place) {
-    const first = make("div"), rows = make("div"), all = section("all live parameters", false);
+    const first = make("div"), all = section("all live parameters", false);
     const status = make("div"), file = make("div", { className: "note" });
     const groups = make("div");
     const keep = buttons("", ["save", "revert to the file"], (name) => (
@@ -34,14 +31,7 @@ export default {
       (name) => save(name.trim() || null),
     );
     all.body.append(status, file, keep.node, saveAs.node, groups);
-    place.append(gazeButtons().node, first, rows, all.node);
-
-    let menus = [];
-    onChoices(() => {
-      menus = Object.entries(MENUS).map(([name, title]) => menu(name, title)).filter(Boolean);
-      rows.replaceChildren(...menus.map(({ node }) => node));
-    });
-
+    place.append(first, all.node);
     on("rig", async () => {
       const parameters = (await ask({ do: "parameters" })).filter(({ live }) => live === LIVE);
       values = await ask({ do: "get" });
@@ -55,10 +45,7 @@ export default {
       version = now.run.version;
       read(status);
     }, READ_MS);
-    return ({ run, rig }) => {
-      for (const { refresh } of menus) refresh(run);
-      file.textContent = rig?.path ?? "";
-    };
+    return ({ rig }) => { file.textContent = rig?.path ?? ""; };
   },
 };
 

@@ -1,7 +1,7 @@
 // Panel: what the head looks at and why, in plain words; the terms of the equation in a fold.
 
+import { onShown } from "/rig/camera.js";
 import { chip, heading, make, note, pill, section } from "/rig/elements.js";
-import { targetSince } from "/rig/history.js";
 import { activity, isLed, reason, spaced, TERMS } from "/rig/words.js";
 
 const PHASES = { fixate: "ok", saccade: "saccade", pursue: "pursue", blink: "calm" };
@@ -10,6 +10,14 @@ const SOURCES = "translation, looming and rotation are motion across, along and 
   + "sight (Mitake et al., eq 1); onset is having just come into view, rule the behaviour's "
   + "constant, habituation the share that it leaves";
 
+let target = "", since_s = 0; // of the target that is shown
+
+onShown(({ t_s, gaze }) => {
+  const next = gaze.target.split(":")[0]; // without the part
+  if (next === target && t_s >= since_s) return;
+  [target, since_s] = [next, t_s];
+});
+
 export default {
   drawer: "watch",
   every_ms: 200,
@@ -17,14 +25,12 @@ export default {
     const what = make("div", { className: "big", textContent: "waiting for the rig" });
     const why = make("div", { className: "tall" });
     const chips = make("div", { className: "in-force" });
-    const silence = make("div", { className: "warn" });
     const terms = section("why: the terms of the equation", false);
     const estimated = note("The eyes' servos give no feedback: these are the movements that the eyes "
       + "should make, estimated from their goals, and no measurements.");
-    place.append(silence, what, why, chips, terms.node, estimated);
-    return ({ shown, state, run, silent }) => {
-      silence.textContent = silent ? "The rig has sent nothing for a second: this is the last data." : "";
-      what.textContent = activity(shown, targetSince(shown.t_s));
+    place.append(what, why, chips, terms.node, estimated);
+    return ({ shown, state, run }) => {
+      what.textContent = activity(shown, since_s);
       why.textContent = isLed(shown) ? "" : sentence(reason(shown, run));
       chips.replaceChildren(...present(shown, run));
       const joints = Object.entries(state.joints);

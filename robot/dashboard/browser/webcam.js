@@ -3,7 +3,7 @@
 // Images of 640 x 480 are sent as JPEGs to the door, each after the last was accepted, at most fifteen
 // a second, until the button is pressed again, the page is closed or the camera is gone.
 
-import { on } from "/rig/connection.js";
+import { on, openSocket } from "/rig/connection.js";
 import { say } from "/rig/orders.js";
 
 const EVERY_MS = 1000 / 15;
@@ -35,8 +35,7 @@ async function begin() {
   video.srcObject = stream;
   stream.getVideoTracks()[0].addEventListener("ended", end);
   await video.play();
-  const scheme = location.protocol === "https:" ? "wss" : "ws";
-  socket = new WebSocket(`${scheme}://${location.host}/api/v1/webcam`);
+  socket = openSocket("/api/v1/webcam");
   const mine = socket;
   const canvas = document.createElement("canvas");
   const send = () => {
