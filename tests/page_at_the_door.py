@@ -12,6 +12,7 @@ from typing import Any
 
 from page_visitor import VISER, fetch
 from websockets.sync.client import ClientConnection, connect
+from websockets.sync.connection import Connection
 
 from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.dashboard.door.page_door import PageDoor
@@ -114,7 +115,7 @@ def opened(host: str) -> Iterator[Rig]:
             rig.close()
 
 
-def answer_to(end: ClientConnection, **message: object) -> dict[str, Any]:
+def answer_to(end: Connection, **message: object) -> dict[str, Any]:
     """Send a message over a websocket; return its answer."""
     end.send(json.dumps({**message, "tag": "t"}))
     while True:

@@ -438,7 +438,12 @@ def test_neither_websockets_nor_slow_requests_shut_out_a_stop(near: Rig) -> None
 
 
 def test_a_flood_of_one_browser_does_not_hold_up_a_stop(near: Rig) -> None:
-    near.answer = lambda asked: time.sleep(0.05) or DONE  # as slow as a rig that is busy
+
+    def answer_slowly(asked: object) -> Any:
+        time.sleep(0.05)  # as a rig that is busy
+        return DONE
+
+    near.answer = answer_slowly
     before = len(near.stops)
     try:
         with near.knock(SOCKET) as end:

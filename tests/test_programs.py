@@ -96,7 +96,18 @@ def rig() -> Iterator[Rig]:
     address = f"127.0.0.1:{free_port()}"
     with pytest.MonkeyPatch.context() as patch, (folder / "log").open("w") as log:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))
-        words = ("run", file, "--mock", "--bus", "ideal", "--name", "eva", "--no-browser", "--page", address)
+        words = (
+            "run",
+            file,
+            "--mock",
+            "--bus",
+            "ideal",
+            "--name",
+            "eva",
+            "--no-browser",
+            "--page",
+            address,
+        )
         process = Branch(gazerig(*words), stdout=log, stderr=log, env=dict(os.environ), cwd=folder)
         try:
             client = reached(process)

@@ -87,7 +87,7 @@ def test_it_is_scanned_for_examined_and_mended(rig):
         servos = json.loads(out)["servos"]
         assert code == 0 and [s["model"] for s in servos[:7]] == ["scs0009"] * 6 + ["scs15"]
         code, out, _ = invoked("doctor", rig, "--port", given)
-        assert "Return Delay Time 250" in out and "an SCS has no bus watchdog" in out
+        assert "Return Delay Time 250" in out and "has no bus watchdog" in out
         code, out, _ = invoked("doctor", rig, "--port", given, "--fix")
         assert "its own position limits" in out
         code, out, _ = invoked("doctor", rig, "--port", given)

@@ -59,6 +59,7 @@ def write_files(folder: Path, step: int) -> None:
         path = folder / block.file
         if block.step > step:
             return
+        path.parent.mkdir(exist_ok=True)
         if block.language == "python":
             path.write_text(block.text, encoding="utf-8")
         elif block.language == "yaml":

@@ -314,7 +314,7 @@ def _build_components(
             rig.gaze.oculomotor.eye_lag_ms / 1e3,
             _sound_s,
             JointLatency([rig.joints[name].bus for name in rig.names]),
-            TrackFolder(rig_file).changes,
+            TrackFolder(rig_file),
         ),
     )
 

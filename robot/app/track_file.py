@@ -4,16 +4,18 @@ Such angles come from recordings and from animation programs.
 """
 
 import contextlib
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from math import degrees
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from gazerig.config.load import ConfigError
+from gazerig.config.load import ConfigError, load
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import format_value
+from gazerig.config.save_text import format_value, params_text
 from gazerig.config.shipped_files import is_path
 from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError
@@ -66,6 +68,17 @@ class TrackFolder:
                 except ConfigError as error:
                     found[path.stem] = str(error)
         return found
+
+    def to_text(self, track: Track) -> str:
+        """Return a track as YAML, with the name of its sound."""
+        return params_text(replace(track, sound=Path(track.sound).name))
+
+    def from_text(self, text: str) -> Track:
+        """Return the track of a YAML text, which a recording holds."""
+        with tempfile.NamedTemporaryFile("w", suffix=".yaml", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            return load(Path(file.name), Track)
 
     def _read_stamps(self) -> dict[Path, tuple[int, int]]:
         """Return time and size of each file."""

@@ -1,18 +1,13 @@
 """Tracks of a robot: the available ones, their fit to this rig, and their control."""
 
 import contextlib
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from msgspec import Struct, structs
 
-from gazerig.config.load import load
-from gazerig.config.save_text import params_text
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.mouth.speech_track import SPEECH, speech_track
 from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
@@ -84,6 +79,22 @@ class PreparedTrack(NamedTuple):
         return self.motion.duration_s + max(0.0, more_s) / self.motion.speed
 
 
+class TrackFiles(Protocol):
+    """Files of tracks, which may change during a run."""
+
+    def changes(self) -> Mapping[str, Track | str]:
+        """Return tracks whose files have changed since the last call, or the fault of a file."""
+        ...
+
+    def to_text(self, track: Track) -> str:
+        """Return a track as YAML."""
+        ...
+
+    def from_text(self, text: str) -> Track:
+        """Return the track of a YAML text, which a recording holds."""
+        ...
+
+
 class TrackChoices:
     """The tracks of one rig.
 
@@ -96,7 +107,7 @@ class TrackChoices:
         latency_s: Latency of joints that has not been measured yet.
         sound_s: Returns the duration of a track's sound.
         latency: Measures the latencies of the joints; None: as of joints on one bus.
-        newest: Returns tracks whose files have changed since the start, or the fault of a file.
+        files: Files of tracks, None for a rig without them.
     """
 
     def __init__(
@@ -109,12 +120,12 @@ class TrackChoices:
         latency_s: float = 0.0,
         sound_s: Callable[[str], float] = lambda path: 0.0,
         latency: JointLatency | None = None,
-        newest: Callable[[], Mapping[str, Track | str]] = dict,
+        files: TrackFiles | None = None,
     ) -> None:
         self.latency = latency or JointLatency(("",) * len(joints))
         self._tracks: dict[str, Track | str] = dict(tracks)
         self._player, self._joints, self._tables = player, joints, tables
-        self._sound_s, self._newest = sound_s, newest
+        self._sound_s, self._files = sound_s, files
         self._changed: set[str] = set()
         self._playing: dict[int, TrackState] = {}
         self._ended: dict[int, tuple[TrackState, float]] = {}
@@ -137,7 +148,7 @@ class TrackChoices:
 
     def _read_files(self) -> None:
         """Take over tracks whose files have changed."""
-        if changed := self._newest():
+        if self._files is not None and (changed := self._files.changes()):
             self._tracks |= changed
             self._changed |= changed.keys()
             self._prepared, self._names = {}, None
@@ -209,7 +220,8 @@ class TrackChoices:
 
     def _prepare_track(self, command: Play, limits: Sequence[JointLimit]) -> PreparedTrack:
         name = command.track
-        track = _track_of_text(command.yaml) if command.yaml else self._tracks.get(name)
+        files = self._files
+        track = files.from_text(command.yaml) if files and command.yaml else self._tracks.get(name)
         if track is None:
             known = ", ".join(self.names)
             raise ValueError(f"no track {name!r}; available: {known}")
@@ -234,11 +246,7 @@ class TrackChoices:
             length_s = max(again.length_s, sound_s)
             if start_s > length_s:
                 raise ValueError(f"{name} lasts {length_s:.2f} s: from_s must be less")
-        text = (
-            params_text(replace(track, sound=Path(track.sound).name))
-            if name in self._changed
-            else ""
-        )
+        text = files.to_text(track) if files and name in self._changed else ""
         return PreparedTrack(placed, motion, again, sound_s, text)
 
     def require(self, command: Play | Speak, limits: Sequence[JointLimit]) -> None:
@@ -433,11 +441,3 @@ class TrackChoices:
         return Target(
             *seen, 1.0, True, None, chosen.shift + self._shifts, why, saliences=chosen.saliences
         )
-
-
-def _track_of_text(text: str) -> Track:
-    """Return the track of a YAML text, which a recording holds."""
-    with tempfile.NamedTemporaryFile("w", suffix=".yaml", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        return load(Path(file.name), Track)
