@@ -63,7 +63,7 @@ def test_the_shapes_of_the_manual(cruise, ramp, ms):
         assert max(np.diff(path)) <= cruise + 1e-9
 
 
-FLOATS = st.floats(-5000, 5000)
+FLOATS = st.floats(-5000, 5000).map(lambda steps: round(steps, 3))  # goals are whole steps
 
 
 @given(FLOATS, FLOATS, st.integers(0, 400), st.floats(0.2, 20), st.floats(0.001, 1.0))
