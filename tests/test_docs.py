@@ -115,7 +115,14 @@ def _fits(shape: Declaration, value: Any, place: str) -> None:
 # ---- files, links, names
 
 
-READERS_OWN = ("study.yaml", "myrig.yaml", "my.yaml", "myhead.yaml", "tracks/agree.yaml", "greet.py")
+READERS_OWN = (
+    "study.yaml",
+    "myrig.yaml",
+    "my.yaml",
+    "myhead.yaml",
+    "tracks/agree.yaml",
+    "greet.py",
+)
 """Files that a reader writes."""
 
 
