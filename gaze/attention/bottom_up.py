@@ -39,7 +39,7 @@ from gazerig.params import Bounds
 _BLINK_S = 0.3
 """A body unseen for at most this time was missed by the detector and did not leave."""
 
-_TURNS_RAD_S, _TURNED_S = radians(40.0), 0.3
+_TURNS_RAD_S, _TURNED_S = radians(60.0), 0.3
 """Speed of the head at which it turns fast, and time after it in which pictures still show that."""
 _MOVES, _STILL_BELOW = 0.5, 0.15
 """Sums of eq 1 above which a body moves, and below which it rests."""

@@ -74,17 +74,20 @@ class Appearing(EmptyScene):
         return ()
 
 
-def reaction_ms(run: MeasuredRun, hand: int, start_s: float) -> float | None:
-    """Return the time from a hand's appearance to the start of the gaze towards it; None: never."""
+def reaction_ms(run: MeasuredRun, hand: int, share: float) -> float | None:
+    """Return the time from a hand's appearance to the start of the gaze towards it; None: never.
+
+    share: of the way to the hand that the gaze must go
+    """
     there = run.truth_deg(f"thing {hand}")
     shown = np.flatnonzero(np.isfinite(there[:, 0]))
     if not len(shown):
         return None
     first = shown[0]
     window = slice(first, first + np.searchsorted(run.t_s[first:], run.t_s[first] + _LATEST_S))
-    # Half of the angle to the hand at that time: a corrective saccade is no reaction.
+    # The way to the hand at that time: neither a correction nor a look away is a reaction.
     way, done = there[window] - run.gaze_deg[first], run.gaze_deg[window] - run.gaze_deg[first]
-    near = np.flatnonzero((done * way).sum(axis=1) > 0.5 * (way * way).sum(axis=1))
+    near = np.flatnonzero((done * way).sum(axis=1) > share * (way * way).sum(axis=1))
     if not len(near) or near[0] == 0:
         return None
     speed = np.linalg.norm(np.gradient(run.gaze_deg[window], run.t_s[window], axis=0), axis=1)
@@ -102,7 +105,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         made = run(Appearing(), seed=seed, seconds=seconds)
         for number, hand in enumerate(appearances(seconds - 0.5)):
             count[hand.near] += 1
-            each = reaction_ms(made, number, hand.start_s)
+            each = reaction_ms(made, number, 0.5 if hand.near else 0.8)  # a near one goes on
             if each is not None:
                 found[hand.near].append(each)
     still, near = np.array(found[False]), np.array(found[True])

@@ -14,6 +14,8 @@ from human.measured_run import MeasuredRun, Runner
 _FULL = 0.95
 _SMALL_DEG = (2.0, 4.5)
 _NEAR_S = 0.1
+_LEAST_S = 180.0
+"""Of all runs together: the bands of the rates are those of a count in three minutes."""
 
 WANTED = {
     "at rest, 1/min": (12.0, 21.0),
@@ -26,6 +28,7 @@ WANTED = {
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return the figures of a still person (at rest) and of a talking one."""
+    seconds = max(seconds, _LEAST_S / len(seeds))
     rest = [run("visitor", seed=seed, seconds=seconds) for seed in seeds]
     talk = [
         run("face-to-face", seed=seed, seconds=seconds, conversation="listen") for seed in seeds
