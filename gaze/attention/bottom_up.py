@@ -39,7 +39,7 @@ from gazerig.params import Bounds
 _BLINK_S = 0.3
 """A body unseen for at most this time was missed by the detector and did not leave."""
 
-_TURNS_RAD_S, _TURNED_S = radians(60.0), 0.3
+_TURNS_RAD_S, _TURNED_S = radians(40.0), 0.3
 """Speed of the head at which it turns fast, and time after it in which pictures still show that."""
 _MOVES, _STILL_BELOW = 0.5, 0.15
 """Sums of eq 1 above which a body moves, and below which it rests."""
@@ -209,7 +209,8 @@ class BottomUp:
             if state is None or t_s - state.seen_s > _BLINK_S:
                 moves = slide + abs(loom) + spin > _MOVES
                 # A body seen in the first moments was there before: it entered long ago.
-                was_there = turns or t_s - self._started_s <= _BLINK_S
+                turns_now = turns and head_rad_s > _TURNS_RAD_S
+                was_there = turns_now or t_s - self._started_s <= _BLINK_S
                 entered_s = -inf if was_there else t_s
                 state = states[id] = _BodyState(entered_s, fresh, moves, t_s)
                 self._onset_s = max(self._onset_s, state.entered_s)
