@@ -278,9 +278,10 @@ def kill_reader(run: Started) -> None:
 
 
 def broken_pipe(run: Started) -> None:
-    """The reader of standard error goes away; then a request to end."""
+    """The reader of standard error goes away, which is a request to end; then another one."""
     assert run.process.stderr is not None
     run.process.stderr.close()
+    wait_until(lambda: run.process.poll() is not None, 6.0)  # a second one skips the parking
     later(run)
 
 
