@@ -21,7 +21,7 @@ LARGEST = {
     "features/lab": 26_000,
     "features/study": 10_170,
     "features/world": 34_000,
-    "tests": 432_560,
+    "tests": 432_570,
 }
 TOKEN = re.compile(
     r"""(?P<comment>\#[^\n]*)

@@ -281,8 +281,9 @@ def broken_pipe(run: Started) -> None:
     """The reader of standard error goes away, which is a request to end; then another one."""
     assert run.process.stderr is not None
     run.process.stderr.close()
-    wait_until(lambda: run.process.poll() is not None, 6.0)  # a second one skips the parking
-    later(run)
+    # A second request would skip the parking, and a limp head sinks after it.
+    if not wait_until(lambda: run.process.poll() is not None, 6.0):
+        later(run)
 
 
 WAYS: dict[str, Callable[[Started], None]] = {
