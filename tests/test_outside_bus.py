@@ -19,7 +19,7 @@ from present import present
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_models import SERVOS
-from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
+from gazerig.robot.app.bus_wiring import release_plan
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.dashboard.feed.rig_feed import LiveRig, RigFeed, rig_message
 from gazerig.robot.description.build import describe
@@ -83,7 +83,6 @@ def test_its_section_is_checked(example, tmp_path):
 
 def test_the_guardian_switches_its_torque_off(example):
     rig, clock = load_rig(str(HEAD)), SimulatedClock(1.0)
-    assert not has_watchdog(rig, "")
     device: Any = build(pickle.loads(pickle.dumps(emulated_lines(rig)[""])), clock.now_s)
     port = InProcessPort(device, sleep_until=clock.sleep_until)
     for servo in device.servos.values():

@@ -193,9 +193,9 @@ class BottomUp:
         turns = False
         if par.form == "retinal":
             new, gain = par.onset_salience, 1.0 - exp(min(0.0, self._at_s - t_s) / _SMOOTHING_S)
-            if head_rad_s > _TURNS_RAD_S:
+            if turns := head_rad_s > _TURNS_RAD_S:
                 self._turned_s = t_s
-            if turns := t_s - self._turned_s < _TURNED_S:
+            if t_s - self._turned_s < _TURNED_S:
                 gain = 0.0
         found = []
         for i, id in enumerate(rows.ids):
@@ -209,8 +209,7 @@ class BottomUp:
             if state is None or t_s - state.seen_s > _BLINK_S:
                 moves = slide + abs(loom) + spin > _MOVES
                 # A body seen in the first moments was there before: it entered long ago.
-                turns_now = turns and head_rad_s > _TURNS_RAD_S
-                was_there = turns_now or t_s - self._started_s <= _BLINK_S
+                was_there = turns or t_s - self._started_s <= _BLINK_S
                 entered_s = -inf if was_there else t_s
                 state = states[id] = _BodyState(entered_s, fresh, moves, t_s)
                 self._onset_s = max(self._onset_s, state.entered_s)

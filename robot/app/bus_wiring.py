@@ -136,14 +136,6 @@ def can_be_released(rig: Rig, name: str) -> bool:
     return is_ours(BUS, kind) or load(BUS, kind, BusPlugin).release is not None
 
 
-def has_watchdog(rig: Rig, name: str) -> bool:
-    """Return whether the servos of one bus stop their motion when their program dies."""
-    config = rig.bus_named(name)
-    if is_ours(BUS, config.kind):
-        return config.kind == "dynamixel"
-    return not can_be_released(rig, name)
-
-
 def _join_buses(rig: Rig, shares: list[BusShare]) -> ServoBus:
     """Return several buses as one; a single one of ours is returned unchanged."""
     is_single = len(shares) == 1 and is_ours(BUS, rig.bus_named(bus_names(rig)[0]).kind)

@@ -28,7 +28,6 @@ from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, part_label, require_method
 from gazerig.robot.app.run_bus import CameraPoses, RunBus, TrueSteps
-from gazerig.robot.app.surroundings import RoomCamera
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import (
     CameraMount,
@@ -200,7 +199,7 @@ def _detector_factory(rig: Rig, own: ProgramParts) -> Callable[[], FaceDetector]
 
 def scene_start_s(camera: Camera) -> float | None:
     """Return the start of the scene of a camera without images, None before or without one."""
-    return camera.start_s if isinstance(camera, SceneCamera | RoomCamera) else None
+    return camera.start_s if isinstance(camera, SceneCamera) else None
 
 
 def camera_placement(

@@ -6,7 +6,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol
 
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import SURROUNDINGS, find, is_ours, registrations
@@ -70,19 +70,6 @@ class RunRoom(Protocol):
 
     def shapes(self) -> "WorldShapes | None":
         """Return its appearance for the page, None if it is not shown."""
-
-
-@runtime_checkable
-class RoomCamera(Protocol):
-    """A camera of a room that wraps another one."""
-
-    @property
-    def wrapped_camera(self) -> "Camera | None":
-        """Return the wrapped camera, None before it is known."""
-
-    @property
-    def start_s(self) -> float | None:
-        """Return the start of the scene in front of it, None before."""
 
 
 class Surroundings(ABC):
