@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.description.files import description_files
+from gazerig.robot.run.rig_description import description_of
 
 PICTURE = Path(__file__).parent / "figures" / "describe.png"
 _SIZE = (520, 640)

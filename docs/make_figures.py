@@ -27,11 +27,11 @@ from gazerig.gaze.oculomotor.head import HeadParams, HeadShare  # noqa: E402
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams  # noqa: E402
 from gazerig.gaze.scanpath.scanpath import ScanpathParams, markov_walk, normalise  # noqa: E402
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
-from gazerig.robot.app.options import RunOptions  # noqa: E402
-from gazerig.robot.control.loop import Tick, run  # noqa: E402
+from gazerig.robot.loop.loop import Tick, run  # noqa: E402
 from gazerig.robot.model.frames import PoseHistory  # noqa: E402
+from gazerig.robot.run.assemble import assemble
+from gazerig.robot.run.gaze_models import kinematics_and_oculomotor
+from gazerig.robot.run.options import RunOptions  # noqa: E402
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from true_gaze import (  # noqa: E402

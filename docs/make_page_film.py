@@ -18,10 +18,10 @@ from PIL import Image  # noqa: E402
 from shown_page import free_port, wait_for  # noqa: E402
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.robot.app.assemble import assemble  # noqa: E402
-from gazerig.robot.app.options import RunOptions  # noqa: E402
-from gazerig.robot.app.run_observers import RunObservers  # noqa: E402
-from gazerig.robot.control.loop import LoopCount  # noqa: E402
+from gazerig.robot.loop.loop import LoopCount  # noqa: E402
+from gazerig.robot.run.assemble import assemble  # noqa: E402
+from gazerig.robot.run.options import RunOptions  # noqa: E402
+from gazerig.robot.run.run_observers import RunObservers  # noqa: E402
 
 OUT = Path(__file__).parent / "page.webp"
 MOST_BYTES = 1_500_000

@@ -80,7 +80,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 
 A command is a ``gazerig.robot.cli.command_list.CommandEntry``, surroundings a subclass of
-``gazerig.robot.app.surroundings.Surroundings``, a door a ``gazerig.doors.door.Door``.
+``gazerig.robot.run.surroundings.Surroundings``, a door a ``gazerig.doors.door.Door``.
 """
 
 OUR_PACKAGE = "gazerig"
@@ -125,7 +125,7 @@ class DetectorPlugin(Plugin):
 class AttentionPlugin(Plugin):
     """A rule that selects the person to look at; its section is below ``gaze``.
 
-    ``make`` returns a ``gazerig.robot.control.chooser.Chooser``.
+    ``make`` returns a ``gazerig.robot.loop.chooser.Chooser``.
     """
 
 

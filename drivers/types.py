@@ -1,7 +1,7 @@
 """Values and protocols of the drivers.
 
 A servo bus uses its servos' own steps (Dynamixel, Feetech STS: 4096 per turn, 0.088 deg; a hobby
-servo on a Maestro: a quarter of a microsecond of pulse width). Only gazerig.robot.control.body
+servo on a Maestro: a quarter of a microsecond of pulse width). Only gazerig.robot.loop.body
 converts steps to joint angles. Times are host monotonic seconds.
 """
 

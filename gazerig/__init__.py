@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from gazerig.local_head import SimulatedHead as SimulatedHead
     from gazerig.opening import open as open
     from gazerig.remote_head import connect as connect
-    from gazerig.robot.control.head_state import GazeReading as GazeReading
-    from gazerig.robot.control.head_state import HeadEvent as HeadEvent
-    from gazerig.robot.control.head_state import HeadState as HeadState
-    from gazerig.robot.control.head_state import JointReading as JointReading
-    from gazerig.robot.control.head_state import Person as Person
+    from gazerig.robot.loop.head_state import GazeReading as GazeReading
+    from gazerig.robot.loop.head_state import HeadEvent as HeadEvent
+    from gazerig.robot.loop.head_state import HeadState as HeadState
+    from gazerig.robot.loop.head_state import JointReading as JointReading
+    from gazerig.robot.loop.head_state import Person as Person
     from gazerig.robot.model.conversation import CHARACTERS_PER_S as CHARACTERS_PER_S
     from gazerig.robot.model.outcome import Outcome as Outcome
 
@@ -41,18 +41,18 @@ _HOME = {
     "CHARACTERS_PER_S": "gazerig.robot.model.conversation",
     "ConfigError": "gazerig.config.faults",
     "Error": "gazerig.errors",
-    "GazeReading": "gazerig.robot.control.head_state",
+    "GazeReading": "gazerig.robot.loop.head_state",
     "Head": "gazerig.head",
     "HeadEnded": "gazerig.errors",
-    "HeadEvent": "gazerig.robot.control.head_state",
+    "HeadEvent": "gazerig.robot.loop.head_state",
     "HeadPose": "gazerig.geometry",
-    "HeadState": "gazerig.robot.control.head_state",
-    "JointReading": "gazerig.robot.control.head_state",
+    "HeadState": "gazerig.robot.loop.head_state",
+    "JointReading": "gazerig.robot.loop.head_state",
     "JointSolution": "gazerig.geometry",
     "NotFound": "gazerig.errors",
     "Order": "gazerig.head",
     "Outcome": "gazerig.robot.model.outcome",
-    "Person": "gazerig.robot.control.head_state",
+    "Person": "gazerig.robot.loop.head_state",
     "Refused": "gazerig.errors",
     "SetupError": "gazerig.drivers.errors",
     "SimulatedHead": "gazerig.local_head",

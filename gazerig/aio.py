@@ -11,8 +11,8 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from gazerig.head import Head, Order
 from gazerig.remote_head import RemoteHead
 from gazerig.remote_head import connect as connect_now
-from gazerig.robot.control.gaze_events import EventKind
-from gazerig.robot.control.head_state import HeadEvent, HeadState
+from gazerig.robot.loop.gaze_events import EventKind
+from gazerig.robot.loop.head_state import HeadEvent, HeadState
 from gazerig.robot.model.outcome import Outcome
 from gazerig.robot.model.reply import CommandReply
 

@@ -8,12 +8,12 @@ from gazerig.config.schema import load_rig
 from gazerig.errors import Refused
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles3, Target, Vec3
-from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
-from gazerig.robot.app.rig_limits import limits
-from gazerig.robot.control.reachability import look_reply, reached_joints
+from gazerig.robot.loop.reachability import look_reply, reached_joints
 from gazerig.robot.model.commands import LookAt, check_command
 from gazerig.robot.model.reply import JointReply
 from gazerig.robot.model.types import JointState
+from gazerig.robot.run.gaze_models import kinematics_and_oculomotor
+from gazerig.robot.run.rig_limits import limits
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ from typing import Literal, Self
 
 from gazerig.drivers.sound.params import KINDS
 from gazerig.errors import HeadEnded, Refused
-from gazerig.robot.control.gaze_events import EventKind
-from gazerig.robot.control.head_state import (
+from gazerig.robot.loop.gaze_events import EventKind
+from gazerig.robot.loop.head_state import (
     GazeReading,
     HeadEvent,
     HeadState,

@@ -15,19 +15,19 @@ from gazerig.drivers.errors import SetupError
 from gazerig.errors import Error, HeadEnded, Refused
 from gazerig.head import Head, Order
 from gazerig.program_signals import SIGNALS, interrupt, is_left_waiting_for
-from gazerig.robot.app import session
-from gazerig.robot.app.assemble import Substitutes
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.app.voice import RunVoice
-from gazerig.robot.control.head_state import HeadEvent, HeadState, head_state
-from gazerig.robot.control.interrupts import Interrupts
-from gazerig.robot.control.line_queue import LineQueue
-from gazerig.robot.control.loop import TickLoop
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_feed import TickFeed
+from gazerig.robot.loop.head_state import HeadEvent, HeadState, head_state
+from gazerig.robot.loop.interrupts import Interrupts
+from gazerig.robot.loop.line_queue import LineQueue
+from gazerig.robot.loop.loop import TickLoop
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.loop.tick_feed import TickFeed
 from gazerig.robot.model.commands import Command, Say, Value, set_client
 from gazerig.robot.model.outcome import Progress
+from gazerig.robot.run import session
+from gazerig.robot.run.assemble import Substitutes
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.param_store import ParamStore
+from gazerig.robot.run.voice import RunVoice
 
 _LOG = logging.getLogger("gazerig")
 _ENDED = "the program"

@@ -8,11 +8,11 @@ from gazerig.config.schema import layers_of
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.local_head import LocalHead, RunningHead, SimulatedHead
-from gazerig.robot.app.assemble import Substitutes
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.program_parts import ProgramParts
-from gazerig.robot.control.chooser import Chooser
+from gazerig.robot.loop.chooser import Chooser
 from gazerig.robot.recording.playback_devices import NoCamera
+from gazerig.robot.run.assemble import Substitutes
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.program_parts import ProgramParts
 
 
 @overload
@@ -74,7 +74,7 @@ def open(
             (``gazerig.drivers.types.Camera``).
         oak: use an OAK-D camera.
         detector: finds faces in frames (``gazerig.drivers.types.FaceDetector``).
-        attention: chooses targets (``gazerig.robot.control.chooser.Chooser``).
+        attention: chooses targets (``gazerig.robot.loop.chooser.Chooser``).
         character: name or path of a character, applied over the rig.
         profile: name or path of a gaze profile.
         seed: seed of all random numbers.

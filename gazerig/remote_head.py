@@ -7,10 +7,10 @@ from typing import Self
 
 from gazerig.errors import HeadEnded
 from gazerig.head import Head, Order
-from gazerig.robot.control.head_state import HeadEvent, HeadState
+from gazerig.robot.loop.head_state import HeadEvent, HeadState
 from gazerig.robot.model.commands import Command, Value, as_value
 from gazerig.robot.model.outcome import Progress
-from gazerig.robot.remote.client import RequestRejected, RobotClient
+from gazerig.robot.net.client import RequestRejected, RobotClient
 
 
 class RemoteHead(Head):

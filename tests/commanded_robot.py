@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from desk import GAZE_JOINTS
 from fakes.runs import go, simulated
 
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.run.assemble import Assembly
 
 YAW = GAZE_JOINTS.index("neck_yaw")
 NECK = slice(YAW, YAW + 3)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from recorded_run import Recorded
 
     from gazerig.config.schema import Rig
-    from gazerig.robot.app.assemble import Assembly
+    from gazerig.robot.run.assemble import Assembly
     from gazerig.sim_mock.device import Device
     from gazerig.sim_mock.devices import Emulated
 
@@ -113,7 +113,7 @@ def small_disk() -> Iterator[None]:
 @pytest.fixture
 def devices(monkeypatch: pytest.MonkeyPatch) -> "list[Device]":
     """Return a list that gets the emulated devices behind the runs of this test."""
-    from gazerig.robot.app import run_bus
+    from gazerig.robot.run import run_bus
 
     made: list[Device] = []
     build = run_bus.build

@@ -10,10 +10,10 @@ from gaze_targets import joints_at
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.types import Floats, GazeState
-from gazerig.robot.app.gaze_models import rig_kinematics
-from gazerig.robot.app.rig_limits import lid_ends
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.kinematics import LIDS
+from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.rig_limits import lid_ends
 
 SHIPPED = (
     "desk", "expressive", "feetech", "maker", "minimal", "six_hobby", "six_xl330", "nine_xl330",

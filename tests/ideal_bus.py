@@ -11,10 +11,10 @@ from dataclasses import replace
 import pytest
 
 from gazerig.config.schema import Rig
-from gazerig.robot.app import assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_bus import RunBus, run_bus
 from gazerig.robot.model.clock import Clock
+from gazerig.robot.run import assemble
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run_bus import RunBus, run_bus
 
 
 def _ideal(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:

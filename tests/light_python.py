@@ -11,7 +11,7 @@ from pathlib import Path
 
 _SERVES = """
 import atexit, json, os, sys, threading, traceback
-import gazerig.robot.app.session
+import gazerig.robot.run.session
 print("loaded", flush=True)
 for line in sys.stdin:
     asked = json.loads(line)
@@ -36,7 +36,7 @@ for line in sys.stdin:
 
 
 class LightPython:
-    """Runs code in a process that has imported gazerig.robot.app.session alone."""
+    """Runs code in a process that has imported gazerig.robot.run.session alone."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._count = folder, 0

@@ -20,8 +20,8 @@ from gazerig.config.rig import BusConfig, Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.types import LimpableBus
-from gazerig.robot.app.bus_wiring import bus_ports, guarded_rig_bus, rig_bus, servo_configs
-from gazerig.robot.app.run_bus import emulated_lines
+from gazerig.robot.run.bus_wiring import bus_ports, guarded_rig_bus, rig_bus, servo_configs
+from gazerig.robot.run.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
 SLOW_DEG_S = 4.0

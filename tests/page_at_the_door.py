@@ -14,9 +14,9 @@ from page_visitor import VISER, fetch
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 
-from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.dashboard.door.page_door import PageDoor
 from gazerig.robot.dashboard.door.viser_server import open_server
+from gazerig.robot.loop.tick_feed import TickFeed
 from gazerig.robot.model.requests import ShowView
 
 PATIENCE_S = 20.0

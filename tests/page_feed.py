@@ -12,14 +12,14 @@ from fakes.runs import play, simulated
 from msgspec import structs
 from present import present
 
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.rig_feed import LiveRig, ShownHead
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.loop.tick_stream import TickStream
 from gazerig.robot.model.types import LoopFigures
-from gazerig.robot.remote.topics import JointInfo, RigInfo, RunState
+from gazerig.robot.net.topics import JointInfo, RigInfo, RunState
+from gazerig.robot.run.assemble import Assembly
 
 IN_TIME = LoopFigures(200.0, 0.0, 0.0, 0.0, 0, 0, 10.0)
 STATE = RunState("wait", "", "shy", health="bus ok", timing=IN_TIME)

@@ -17,11 +17,11 @@ from fakes.runs import simulated
 from present import present
 from shown_page import free_port, wait_for
 
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.app.run_observers import RunObservers
-from gazerig.robot.control.loop import LoopCount, Tick
+from gazerig.robot.loop.loop import LoopCount, Tick
 from gazerig.robot.model.commands import Renew
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.param_store import ParamStore
+from gazerig.robot.run.run_observers import RunObservers
 
 YAW = GAZE_JOINTS.index("neck_yaw")
 TICK_S = 0.01

@@ -20,12 +20,12 @@ from msgspec.structs import replace
 
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
-from gazerig.robot.control.head_state import head_state
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.dashboard.door.page_files import PageFiles
+from gazerig.robot.loop.head_state import head_state
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.loop.track_choices import TrackInfo
 from gazerig.robot.model.types import LoopFigures
-from gazerig.robot.remote.topics import JointInfo, Picture, RigInfo, RunState, SeenFace
+from gazerig.robot.net.topics import JointInfo, Picture, RigInfo, RunState, SeenFace
 
 YOU = "browser 1a2b"
 LIMITS = JointInfo(-1.0, 1.0, 55.0, 65.0, 4.5, 8.4, 0.4)

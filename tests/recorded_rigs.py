@@ -7,7 +7,7 @@ from typing import NamedTuple
 from fakes.runs import VISIT, record
 
 from gazerig.config.schema import Rig
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.loop.loop import Tick
 from gazerig.robot.recording.read import RunRecording
 
 

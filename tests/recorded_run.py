@@ -12,11 +12,11 @@ from msgspec.structs import replace
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig, load_walk
 from gazerig.drivers.types import Detections
-from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.loop.loop import Tick, run
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
+from gazerig.robot.run.assemble import RIGS_OWN, Assembly, Substitutes
 
 STARTED = datetime(2026, 1, 31, 23, 59, 59, 250_000, UTC)
 

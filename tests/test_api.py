@@ -9,8 +9,8 @@ import pytest
 
 import gazerig
 from gazerig.gaze.types import GazeState, Percept, Vec3
-from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.run.resimulate import rerun
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

@@ -15,11 +15,11 @@ from msgspec import structs
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.scene_files import load_scene
-from gazerig.robot.app.scene_score import BehaviourScore, PlannerScore
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.run.assemble import RIGS_OWN, Assembly, Substitutes, assemble
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.scene_files import load_scene
+from gazerig.robot.run.scene_score import BehaviourScore, PlannerScore
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing, there_and_back

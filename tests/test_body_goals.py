@@ -7,7 +7,7 @@ functions is what a tick costs; counted here, as time on a shared machine means 
 import pytest
 from stand_in import StandIn
 
-from gazerig.robot.control.body import Body
+from gazerig.robot.loop.body import Body
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS
 

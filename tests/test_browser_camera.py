@@ -21,11 +21,11 @@ from gazerig.drivers.camera.browser_source import FIELD_DEG, LATENCY_S, BrowserS
 from gazerig.drivers.camera.shared_slots import MOST_BYTES, JpegSlot
 from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.types import Detections
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.browser_camera import SILENT_S, BrowserCamera
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.dashboard.door.page_door import HeadNews
 from gazerig.robot.model.frames import CameraMount, fixed_mount
+from gazerig.robot.run.assemble import assemble
+from gazerig.robot.run.browser_camera import SILENT_S, BrowserCamera
+from gazerig.robot.run.options import RunOptions
 
 
 def jpeg(grey: int = 90, size: tuple[int, int] = (48, 64)) -> bytes:

@@ -18,7 +18,7 @@ from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.recorder import CameraRecorder, RecordingWriter
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError, SetupError
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.run.options import RunOptions
 
 GO_ON = threading.Event()
 LENS = Intrinsics(310.5, 311.25, 31.5, 23.5, (0.1, -0.2, 0.001, -0.002, 0.3))

@@ -8,8 +8,8 @@ from test_webcam import Capture
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.webcam import Webcam
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.run.assemble import assemble
+from gazerig.robot.run.options import RunOptions
 from gazerig.testing import CameraBench, CameraSuite
 from gazerig.testing.camera_suite import of_source
 

@@ -6,8 +6,8 @@ import pytest
 from ticked_rig import TickedRig, connected, gazerig
 
 from gazerig.drivers.bus.servo_models import SERVOS
-from gazerig.robot.control.command_handler import CommandHandler
-from gazerig.robot.remote.request_handler import REAL, RequestHandler
+from gazerig.robot.loop.command_handler import CommandHandler
+from gazerig.robot.net.request_handler import REAL, RequestHandler
 from gazerig.sim_mock.device_spec import line_of
 from gazerig.sim_mock.devices import build
 

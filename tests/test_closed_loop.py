@@ -14,9 +14,9 @@ from true_gaze import gaze_angles, gaze_error_rad, true_part
 
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.loop.loop import Tick
 from gazerig.robot.model.commands import Value
+from gazerig.robot.run.gaze_models import kinematics_and_oculomotor
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 
 KEEPS_TO_THE_FACE: dict[str, Value] = {

@@ -14,10 +14,9 @@ from fakes.runs import go
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
 from gazerig.gaze.types import PART_NAMES, Floats
-from gazerig.robot.app.session import shut_down
-from gazerig.robot.control.head_state import head_state
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import head_activity, tick_control_source
+from gazerig.robot.loop.head_state import head_state
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.loop.tick_text import head_activity, tick_control_source
 from gazerig.robot.model.client_control import ARRIVED_RAD
 from gazerig.robot.model.commands import (
     AnyCommand,
@@ -40,6 +39,7 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlSource, control_sentence
 from gazerig.robot.model.requests import read_request
+from gazerig.robot.run.session import shut_down
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 GENTLE_RAD_S = radians(load_rig("desk").guard.soft_start_speed_deg_s)

@@ -4,12 +4,12 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.computer import (
+from gazerig.robot.run.computer import (
     ComputerFigures,
     load_level,
 )
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_rig import with_options
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run_rig import with_options
 
 CARD, SOFTWARE = False, True
 

@@ -12,7 +12,7 @@ import pytest
 from gazerig.config.load import ConfigError, shipped_path
 from gazerig.config.save import save
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.subprocess_call import in_subprocess
+from gazerig.robot.run.subprocess_call import in_subprocess
 
 
 def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -77,6 +77,6 @@ def test_a_process_that_fails_is_an_error_in_one_line(
         in_subprocess(fails)
     with pytest.raises(ConfigError, match="process for ends: ended unexpectedly: -9"):
         in_subprocess(ends)
-    monkeypatch.setattr("gazerig.robot.app.subprocess_call._LONGEST_S", 0.5)
+    monkeypatch.setattr("gazerig.robot.run.subprocess_call._LONGEST_S", 0.5)
     with pytest.raises(ConfigError, match="took more than 0.5 s"):
         in_subprocess(sleeps)

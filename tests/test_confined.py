@@ -8,10 +8,10 @@ from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
 from gazerig.config.rig_files import AllowedFolder
-from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.control.command_handler import CommandHandler
+from gazerig.robot.loop.command_handler import CommandHandler
 from gazerig.robot.model.parameter import SavedFile
-from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
+from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
+from gazerig.robot.run.param_store import ParamStore
 
 
 @pytest.fixture

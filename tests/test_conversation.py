@@ -20,8 +20,8 @@ from gazerig.gaze.attention.conversation import (
     ConversationParams,
 )
 from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.control.head_state import HeadState, head_state
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
+from gazerig.robot.loop.head_state import HeadState, head_state
 from gazerig.robot.model.commands import LookAt, Renew, Speak, Talk, TalkOrder
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.reply import CommandReply

@@ -16,12 +16,12 @@ from gazerig.config.load import shipped_path
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Feedback
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.bus_wiring import servo_configs
-from gazerig.robot.control.coupled_servos import CoupledServos
+from gazerig.robot.loop.coupled_servos import CoupledServos
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.mass_params import HeadMassParams, MassParams
+from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.bus_wiring import servo_configs
 
 PITCH, ROLL = 35.0, 25.0
 COUPLING = CouplingParams("neck_pitch", "neck_roll", 1.5, 1.2)

@@ -20,11 +20,6 @@ from gazerig.config.load import ConfigError
 from gazerig.config.rig_files import AllowedFolder
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.bus_wiring import rig_bus
-from gazerig.robot.app.rig_description import description_of, sag_compensation, shape_of, statics_of
-from gazerig.robot.app.rig_limits import park_rad
-from gazerig.robot.app.rig_weight import rest_park_deg
-from gazerig.robot.control.body import Body
 from gazerig.robot.description.build import joint_torques_nm
 from gazerig.robot.description.files import description_files
 from gazerig.robot.description.links import Description
@@ -32,8 +27,13 @@ from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.description.mjcf import Mjcf, mjcf
 from gazerig.robot.description.own_meshes import read_mesh
 from gazerig.robot.description.urdf import Urdf, urdf
+from gazerig.robot.loop.body import Body
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.mass_params import CounterweightParams, HeadMassParams, MassParams
+from gazerig.robot.run.bus_wiring import rig_bus
+from gazerig.robot.run.rig_description import description_of, sag_compensation, shape_of, statics_of
+from gazerig.robot.run.rig_limits import park_rad
+from gazerig.robot.run.rig_weight import rest_park_deg
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from features_there import needs_all_features
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, spans
 
 import gazerig
-from gazerig.robot.remote.client import RobotClient
+from gazerig.robot.net.client import RobotClient
 
 pytestmark = needs_all_features  # the documents describe every command
 

@@ -18,7 +18,7 @@ pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
 import gazerig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.door_processes import DoorEntry
+from gazerig.robot.run.door_processes import DoorEntry
 
 pytestmark = [
     pytest.mark.usefixtures("ideal_servos"),

@@ -9,11 +9,11 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.worker import CameraWorker
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.drawn_camera import DrawnSource, scene_pixels
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.model.frames import CameraMount
+from gazerig.robot.run.assemble import assemble
+from gazerig.robot.run.drawn_camera import DrawnSource, scene_pixels
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.scene_files import load_scene
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 LEFT = ((0.8, -0.6, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, 1.0))

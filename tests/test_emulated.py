@@ -4,8 +4,8 @@ import pickle
 from dataclasses import replace
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.model.mass_params import HeadMassParams, MassParams
+from gazerig.robot.run.run_bus import emulated_lines
 
 
 def test_the_servos_of_a_rig_can_be_sent():

@@ -17,7 +17,7 @@ from present import present
 
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import GazeState
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.recording.export_csv import columns, write_csv

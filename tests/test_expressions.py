@@ -14,12 +14,12 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.minimum_jerk import PEAK_SPEED, MinimumJerkBlend
 from gazerig.gaze.track.level import HOLD_S, LevelParams
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.rig_limits import pose_offset
 from gazerig.robot.cli import animation
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Express, SetLevel
+from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.rig_limits import pose_offset
 
 DT = 0.005
 

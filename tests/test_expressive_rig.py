@@ -11,8 +11,8 @@ from fakes.runs import ticks
 from gazerig.config.load import shipped_path
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.model.commands import Express, Value
+from gazerig.robot.run.assemble import Assembly
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

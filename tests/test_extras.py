@@ -131,8 +131,8 @@ LATER = ("asyncio", "ssl", "http.server", "gazerig.sim_mock.dynamixel.chain")
 RUN = """
 import sys
 from pathlib import PosixPath
-from gazerig.robot.app import session
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.run import session
+from gazerig.robot.run.options import RunOptions
 composed = session.compose(RunOptions(mock=True, **{options!r}).check_and_complete())
 run = session.Session(composed, lambda: None, lambda line: None)
 with run.power_on() as loop:
@@ -172,9 +172,9 @@ def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_pat
     """Nor does that of a world in real time know MuJoCo: it is in two other processes."""
     pytest.importorskip("gazerig.features.world")
     code = (
-        "import sys; from gazerig.robot.app.assemble import assemble; "
+        "import sys; from gazerig.robot.run.assemble import assemble; "
         "from gazerig.config.schema import load_rig; "
-        "from gazerig.robot.app.options import RunOptions; "
+        "from gazerig.robot.run.options import RunOptions; "
         "assemble(load_rig('desk'), RunOptions(mock=True, fast=True, scene='visitor')).close(); "
         "assert not [m for m in sys.modules if 'world.figure' in m or m.startswith('mujoco')]; "
         "made = assemble(load_rig('desk'), RunOptions(mock=True, world='living-room')); "

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gazerig.robot.remote.live_server import FileWatch
+from gazerig.robot.net.live_server import FileWatch
 
 OLD = "name: old\n"
 NEW = "name: new\n"

@@ -20,8 +20,7 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, angles_of, norm, rotate, rotate_back, rotation, sub
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import GazeCommand
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Express, Jog, LookAt
 from gazerig.robot.model.frames import (
     CameraMount,
@@ -33,6 +32,7 @@ from gazerig.robot.model.frames import (
 )
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.run.assemble import Assembly
 
 KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
 

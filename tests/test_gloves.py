@@ -12,8 +12,8 @@ from gazerig.drivers.types import ImageArray, MovingBlob
 from gazerig.drivers.vision.motion.detector import MotionDetector
 from gazerig.drivers.vision.motion.gloves import RADIUS_M, GloveDetector, exclude_gloves
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_rig import with_options
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run_rig import with_options
 
 LENS = intrinsics_of_view(radians(69.0), 640, 480)
 RED, BRICK, SKIN = (38, 30, 206), (70, 90, 140), (120, 150, 205)

@@ -18,7 +18,6 @@ from sts_rig import Rig as StsRig
 
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.process import child_process
-from gazerig.robot.app.bus_wiring import bus_ports, release_plans
 from gazerig.robot.guardian.guardian import HUNG_S, RETRY_S, GuardedBus, Guardian
 from gazerig.robot.guardian.heartbeat import (
     HANG_S,
@@ -29,6 +28,7 @@ from gazerig.robot.guardian.heartbeat import (
     Heartbeat,
 )
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
+from gazerig.robot.run.bus_wiring import bus_ports, release_plans
 
 PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 

@@ -14,14 +14,14 @@ from viser import transforms
 from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Floats
-from gazerig.robot.app.gaze_models import rig_kinematics
-from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.dashboard.feed.rig_feed import ShownHead
 from gazerig.robot.dashboard.view.head_view import HeadView, head_dimensions
 from gazerig.robot.dashboard.view.viewpoints import FACE, View, named_view
 from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh, stored_shape
 from gazerig.robot.description.parts import measures_of
 from gazerig.robot.description.people import head, part_of, torso
+from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.rig_description import shape_of
 
 RIGS = sorted(path.stem for path in shipped_path("rigs", "desk").parent.glob("*.yaml"))
 CANVASES = (1.6, 1280 / 720, 1.0, 0.9, 390 / 380)

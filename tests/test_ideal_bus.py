@@ -7,10 +7,10 @@ import pytest
 from command_line import invoked
 
 from gazerig.drivers.types import ServoConfig
-from gazerig.robot.app import session
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.run import session
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.resimulate import rerun
 from gazerig.sim_mock.ideal.bus import LAG_S, IdealBus
 
 CONFIGS = [ServoConfig(1, "xl330-m077", 1000, 3000, 1e4), ServoConfig(2, "mg90s", 1000, 3000, 1e4)]

@@ -9,11 +9,11 @@ import gazerig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.track.track import KeyFrame, Track
 from gazerig.gaze.track.track_player import TrackPlayer
-from gazerig.robot.app.rig_limits import lid_spans, limits
-from gazerig.robot.control.joint_latency import JointLatency
-from gazerig.robot.control.track_choices import TrackChoices
+from gazerig.robot.loop.joint_latency import JointLatency
+from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.commands import Play
 from gazerig.robot.model.types import JointState, further_joints
+from gazerig.robot.run.rig_limits import lid_spans, limits
 
 PERIOD_S, DEFAULT_S = 0.005, 0.02
 

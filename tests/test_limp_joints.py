@@ -10,7 +10,7 @@ import pytest
 import gazerig
 from gazerig.config.load import ConfigError, shipped_path
 from gazerig.config.schema import load_rig
-from gazerig.robot.control.limp_joints import LimpJoints
+from gazerig.robot.loop.limp_joints import LimpJoints
 
 BUSES = {
     "dynamixel": ("{kind: dynamixel, port: /dev/ttyUSB0}", "xl330-m077", "gains: [1200, 0, 12000]"),

@@ -10,10 +10,10 @@ from fakes.runs import simulated
 from slow_rigs import at_rate
 
 from gazerig.config.load import ConfigError
-from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.model.commands import Command, Tune
-from gazerig.robot.remote.client import connect_to_all
-from gazerig.robot.remote.live_server import LiveServer
+from gazerig.robot.net.client import connect_to_all
+from gazerig.robot.net.live_server import LiveServer
+from gazerig.robot.run.param_store import ParamStore
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 RATE = "loop.rate_hz"

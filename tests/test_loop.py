@@ -18,8 +18,7 @@ from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, Located, MovingBlob
 from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import PARTS
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.control.loop import PARK_S, Tick
+from gazerig.robot.loop.loop import PARK_S, Tick
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
@@ -29,6 +28,7 @@ from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
+from gazerig.robot.run.assemble import Assembly
 from gazerig.robot.safety.guard import SOFT_START_RAD_S2
 
 

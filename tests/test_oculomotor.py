@@ -41,9 +41,9 @@ from gazerig.gaze.oculomotor.head import HeadParams, HeadShare
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.oculomotor.saccade_trajectory import RedirectedTrajectory, SaccadeTrajectory
 from gazerig.gaze.types import ORDERED, Angles3, Target, Vec3
-from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState
+from gazerig.robot.run.gaze_models import rig_kinematics
 
 PEOPLE = OculomotorParams(refixations=False, eye_lag_ms=5.0)
 

@@ -17,10 +17,10 @@ from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, ImageArray
-from gazerig.robot.app.camera_factory import frame_orientation
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fits, project, rays
 from gazerig.robot.perception.frame_locator import FrameLocator
+from gazerig.robot.run.camera_factory import frame_orientation
 
 ALL = [FrameOrientation(r, m) for r in (0, 90, 180, 270) for m in (False, True)]
 NAMES = [f"{o.rotation}{' mirrored' if o.mirrored else ''}" for o in ALL]

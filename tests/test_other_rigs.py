@@ -9,8 +9,8 @@ from fakes.runs import go, simulated
 from mixed_rig import rig_of
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.run.assemble import Assembly
 
 
 def ran(rig: Rig, seconds: float) -> tuple[Assembly, list[Tick], tuple[str, ...]]:

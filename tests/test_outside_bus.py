@@ -19,13 +19,13 @@ from present import present
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_models import SERVOS
-from gazerig.robot.app.bus_wiring import release_plan
-from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.dashboard.feed.rig_feed import LiveRig, RigFeed, rig_message
 from gazerig.robot.description.build import describe
 from gazerig.robot.guardian.process import releaser
 from gazerig.robot.guardian.release_plan import decode, encode
 from gazerig.robot.model.clock import SimulatedClock
+from gazerig.robot.run.bus_wiring import release_plan
+from gazerig.robot.run.run_bus import emulated_lines
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort
 

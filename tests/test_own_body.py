@@ -7,10 +7,10 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Detections, MovingBlob
 from gazerig.gaze.angles import norm, rotate_back, sub
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.perception.perception import Perception
+from gazerig.robot.run.gaze_models import rig_kinematics
 
 BEHIND: Vec3 = (-0.5, 0.0, 0.12)
 """A camera on the base, behind the head, that sees it from the back."""

@@ -5,8 +5,8 @@ from pathlib import Path
 from outside_package import install, on_path
 from page_feed import shown
 
-from gazerig.robot.control.head_state import head_state
 from gazerig.robot.dashboard.package_panels import PackagePanels
+from gazerig.robot.loop.head_state import head_state
 
 CODE = """
 def phase(state): return f"<p>{state.gaze.phase}</p>"

@@ -26,10 +26,10 @@ from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.plugins import ATTENTION, CAMERA, DETECTOR
 from gazerig.drivers.types import ServoConfig
-from gazerig.robot.app import run_bus, session
-from gazerig.robot.app.assemble import RIGS_OWN, assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_bus import emulated_lines
+from gazerig.robot.run import run_bus, session
+from gazerig.robot.run.assemble import RIGS_OWN, assemble
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
 ODD = """

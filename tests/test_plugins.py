@@ -25,9 +25,9 @@ from gazerig.drivers.plugins import (
     SURROUNDINGS,
     Plugin,
 )
-from gazerig.robot.app.camera_factory import real_camera
-from gazerig.robot.app.options import RunOptions, parse_camera
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.run.camera_factory import real_camera
+from gazerig.robot.run.options import RunOptions, parse_camera
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 

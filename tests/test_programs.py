@@ -34,8 +34,8 @@ from gazerig.robot.dashboard.door import page_door
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.requests import REQUESTS
-from gazerig.robot.remote.client import RobotClient
-from gazerig.robot.remote.openapi import api_description
+from gazerig.robot.net.client import RobotClient
+from gazerig.robot.net.openapi import api_description
 
 ROOT = Path(__file__).parents[1]
 

@@ -22,24 +22,24 @@ from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.control.command_handler import CommandHandler
-from gazerig.robot.control.loop import Robot, Tick
+from gazerig.robot.loop.command_handler import CommandHandler
+from gazerig.robot.loop.loop import Robot, Tick
 from gazerig.robot.model import commands, lease
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import LookAt, Value
-from gazerig.robot.remote import client
-from gazerig.robot.remote import socket_io as remote_socket
-from gazerig.robot.remote import socket_server as server_module
-from gazerig.robot.remote.client import (
+from gazerig.robot.net import client
+from gazerig.robot.net import socket_io as remote_socket
+from gazerig.robot.net import socket_server as server_module
+from gazerig.robot.net.client import (
     ConnectionLost,
     NoRobotError,
     RequestRejected,
     RobotClient,
     connect_to_all,
 )
-from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
-from gazerig.robot.remote.socket_server import RemoteServer
+from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
+from gazerig.robot.net.socket_server import RemoteServer
+from gazerig.robot.run.param_store import ParamStore
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -309,7 +309,7 @@ def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(
 def test_an_endless_request_is_refused_and_hung_up_on(
     rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gazerig.robot.remote.socket_server._REST_S", 0.2)
+    monkeypatch.setattr("gazerig.robot.net.socket_server._REST_S", 0.2)
     with raw(folder) as end:
         end.sendall(b'{"do": "characters"}\n')
         assert "ok" in line_of(end)
@@ -332,7 +332,7 @@ def test_an_endless_request_is_refused_and_hung_up_on(
 def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
     rig: RobotClient, folder: Path, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gazerig.robot.remote.socket_server._TAKES_S", 0.2)
+    monkeypatch.setattr("gazerig.robot.net.socket_server._TAKES_S", 0.2)
     with raw(folder) as end:
         ticks = len(beat.ticks)
         with contextlib.suppress(OSError):

@@ -15,10 +15,8 @@ from recorded_run import exact
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.control.loop import Tick
-from gazerig.robot.control.tick import TickRecord
+from gazerig.robot.loop.loop import Tick
+from gazerig.robot.loop.tick import TickRecord
 from gazerig.robot.model.commands import (
     Ask,
     Command,
@@ -37,6 +35,8 @@ from gazerig.robot.model.commands import (
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.run_writer import RunWriter
+from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.resimulate import rerun
 
 NECK_YAW = 6
 PUPPET: dict[int, tuple[Command, ...]] = {

@@ -17,13 +17,13 @@ from recorded_run import exact
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.app.session import compose
-from gazerig.robot.app.session import run as run_composed
 from gazerig.robot.cli import recordings
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.loop.loop import Tick
 from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles, find_intervals, label_samples
+from gazerig.robot.run.resimulate import rerun
+from gazerig.robot.run.session import compose
+from gazerig.robot.run.session import run as run_composed
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

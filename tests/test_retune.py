@@ -14,11 +14,11 @@ from fakes.runs import simulated, ticks
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.parameters import NEXT_TICK, apply_changes, parameters, value_of
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.live_params import rig_in_effect
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.loop.loop import Tick
 from gazerig.robot.model.commands import AnyCommand, Jog, Resume, Stop, Tune, Value
 from gazerig.robot.model.parameter import Parameter
+from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.live_params import rig_in_effect
 
 DT_S = 1.0 / 200.0
 STEPS_PER_RAD = 4096.0 / (2.0 * pi)

@@ -21,9 +21,9 @@ from gazerig.config.parameters import (
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
 from gazerig.drivers.errors import SetupError
 from gazerig.params import Declaration, declarations
-from gazerig.robot.app.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import Parameter
+from gazerig.robot.run.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
 
 DESK = shipped_path("rigs", "desk")
 

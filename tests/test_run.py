@@ -19,8 +19,8 @@ from slow_rigs import at_rate
 
 import gazerig as gazerig_package
 from gazerig.config.faults import ConfigError
-from gazerig.robot.app import session
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.run import session
+from gazerig.robot.run.options import RunOptions
 
 
 @pytest.fixture(scope="module")

@@ -34,9 +34,8 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Detections
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Bodies, Face, Percept
-from gazerig.robot.app.assemble import Assembly, Substitutes
-from gazerig.robot.control.loop import Tick
-from gazerig.robot.control.tick import MeasuredJoints, TorqueEnabled
+from gazerig.robot.loop.loop import Tick
+from gazerig.robot.loop.tick import MeasuredJoints, TorqueEnabled
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.robot.model.control_source import ControlState, TrackState
 from gazerig.robot.recording import run_format as fmt
@@ -45,6 +44,7 @@ from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import FramePicker, Recorder
 from gazerig.robot.recording.run_info import PROFILE, RunEnd, RunInfo, as_text, read_text
 from gazerig.robot.recording.run_writer import RunWriter
+from gazerig.robot.run.assemble import Assembly, Substitutes
 
 
 def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:

@@ -14,8 +14,8 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.habituation import Habituation, HabituationParams
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app.assemble import Substitutes
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.run.assemble import Substitutes
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M

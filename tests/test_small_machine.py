@@ -11,7 +11,7 @@ from papers import ROOT
 
 from gazerig.config.load import shipped_names
 from gazerig.config.schema import load_rig
-from gazerig.robot.control.loop import PARK_S
+from gazerig.robot.loop.loop import PARK_S
 
 PAPER = (ROOT / "docs/raspberry-pi.md").read_text(encoding="utf-8")
 UNIT = ROOT / "docs/gazerig.service"
@@ -40,7 +40,7 @@ def unit() -> configparser.ConfigParser:
 
 def test_the_service_parks_before_anything_is_killed() -> None:
     service = unit()["Service"]
-    assert service["KillSignal"] == "SIGTERM"  # as gazerig.robot.control.interrupts heeds it
+    assert service["KillSignal"] == "SIGTERM"  # as gazerig.robot.loop.interrupts heeds it
     # With any other the guardian would be killed before it has switched the servos off.
     assert service["KillMode"] == "control-group"
     assert float(service["TimeoutStopSec"]) >= 2 * PARK_S + 10

@@ -17,9 +17,9 @@ from gazerig.gaze.angles import angle_between, sub
 from gazerig.gaze.attention.attention import STALE_S
 from gazerig.gaze.attention.idle import SEARCH_S
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app import run_rig
-from gazerig.robot.app.assemble import Substitutes
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.loop.loop import Tick
+from gazerig.robot.run import run_rig
+from gazerig.robot.run.assemble import Substitutes
 from gazerig.robot.safety.guard import FRAME_TIMEOUT_S
 from gazerig.sim_mock.scenes.scene import ScenePerson
 

@@ -9,10 +9,10 @@ from fakes.runs import play
 from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app import run_rig
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.loop.loop import Tick
+from gazerig.robot.run import run_rig
+from gazerig.robot.run.assemble import assemble
+from gazerig.robot.run.options import RunOptions
 from gazerig.sim_mock.scenes.scene import Thing
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")

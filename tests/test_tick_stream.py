@@ -8,8 +8,8 @@ from msgspec import UNSET
 from msgspec.structs import replace
 from recorded_run import Recorded, exact, record
 
-from gazerig.robot.control.tick import TickRecord
-from gazerig.robot.control.tick_stream import (
+from gazerig.robot.loop.tick import TickRecord
+from gazerig.robot.loop.tick_stream import (
     TickBatch,
     TickStream,
     all_finite,

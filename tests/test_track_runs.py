@@ -13,13 +13,13 @@ import gazerig
 from gazerig.config.load import shipped_path
 from gazerig.config.schema import Rig, load_rig
 from gazerig.errors import Refused
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import LookAt, Play
 from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.resimulate import rerun
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

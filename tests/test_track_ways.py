@@ -8,10 +8,10 @@ from ticked_rig import TickedRig, connected, gazerig
 from gazerig.gaze.attention.top_down import Rule
 from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Target
-from gazerig.robot.app import session
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.commands import Jog, Play, Resume, Stop, set_client
-from gazerig.robot.remote.client import RequestRejected, RobotClient
+from gazerig.robot.net.client import RequestRejected, RobotClient
+from gazerig.robot.run import session
+from gazerig.robot.run.options import RunOptions
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

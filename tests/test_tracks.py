@@ -21,16 +21,16 @@ from gazerig.gaze.track.track import LIMIT_SHARE, KeyFrame, Track
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.gaze.types import Floats, GazeCommand
-from gazerig.robot.app.gaze_models import rig_kinematics
-from gazerig.robot.app.rig_limits import lid_spans, limits
-from gazerig.robot.app.track_file import TOLERANCE_DEG
-from gazerig.robot.control.track_choices import TrackChoices
+from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.commands import EndTrack, Play, SyncTrack
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.motion_keys import fit_keys, smooth
 from gazerig.robot.model.reply import TrackReply
 from gazerig.robot.model.track_fit import RigTrack, TrackFit, TrackRefused
 from gazerig.robot.model.types import JointAngles, further_joints
+from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.rig_limits import lid_spans, limits
+from gazerig.robot.run.track_file import TOLERANCE_DEG
 
 RIGS = [name for name in shipped_names("rigs") if name != "minimal"]
 """The shipped rigs but the one without neck and lids, which has nothing to laugh or tilt with."""

@@ -13,7 +13,7 @@ from true_shafts import Bench, Judge, restless
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
-from gazerig.robot.app.rig_limits import limits
+from gazerig.robot.run.rig_limits import limits
 
 NAMES = ("desk", "feetech", "maker", "pca9685", "mixed")
 BEYOND_DEG = 0.8

@@ -11,8 +11,8 @@ from fakes.runs import simulated
 from gazerig.config.load import ConfigError
 from gazerig.config.parameters import values
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.model.commands import Command, Tune
+from gazerig.robot.run.param_store import ParamStore
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

@@ -16,7 +16,7 @@ from test_sound import needs_espeak
 import gazerig
 from gazerig.drivers.sound.sound_file import write_wav
 from gazerig.errors import Refused
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Say
 from gazerig.robot.model.control_source import TrackState

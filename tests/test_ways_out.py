@@ -12,14 +12,14 @@ from features_there import skip_without
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, SetupError
-from gazerig.robot.app import session
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_summary import Summary
 from gazerig.robot.cli.run import report_faults
-from gazerig.robot.control.interrupts import SAME_REQUEST_S, Interrupts
-from gazerig.robot.control.loop import Robot
-from gazerig.robot.control.power_down import PowerDown
+from gazerig.robot.loop.interrupts import SAME_REQUEST_S, Interrupts
+from gazerig.robot.loop.loop import Robot
+from gazerig.robot.loop.power_down import PowerDown
+from gazerig.robot.run import session
+from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run_summary import Summary
 from gazerig.sim_mock.device import Device
 
 # --- the door alone

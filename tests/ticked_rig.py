@@ -9,14 +9,14 @@ from expressive_rig import started
 from fakes.runs import ticks
 from typer.testing import CliRunner
 
-from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.cli.tune import app
-from gazerig.robot.control.command_handler import CommandHandler
-from gazerig.robot.control.track_choices import TrackInfo
+from gazerig.robot.loop.command_handler import CommandHandler
+from gazerig.robot.loop.track_choices import TrackInfo
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import Ticket
-from gazerig.robot.remote.client import RobotClient
-from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
+from gazerig.robot.net.client import RobotClient
+from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
+from gazerig.robot.run.assemble import Assembly
 
 
 class TickedRig:

@@ -13,19 +13,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import gazerig.robot.app.assemble as assembling
-import gazerig.robot.app.run_bus as run_bus
+import gazerig.robot.run.assemble as assembling
+import gazerig.robot.run.run_bus as run_bus
 from gazerig.config.schema import Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.bus_wiring import rig_bus
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.rig_description import sag_compensation
-from gazerig.robot.app.rig_limits import limits, park_rad
-from gazerig.robot.app.run_bus import emulated_lines, servo_index
-from gazerig.robot.control.body import Body
+from gazerig.robot.loop.body import Body
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.types import JointAngles
+from gazerig.robot.run.assemble import Assembly, assemble
+from gazerig.robot.run.bus_wiring import rig_bus
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.rig_description import sag_compensation
+from gazerig.robot.run.rig_limits import limits, park_rad
+from gazerig.robot.run.run_bus import emulated_lines, servo_index
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, build
@@ -37,7 +37,7 @@ SPEED_MS, ACCEL_MS = 5, 10
 PULSE_MS = 20
 GROUPS = {"eye": "eyes", "lid": "lids", "neck": "neck"}
 STOP_DEG = 4.0
-"""Emulated mechanical stops lie so far beyond a joint's range (robot/app/run_bus.py)."""
+"""Emulated mechanical stops lie so far beyond a joint's range (robot/run/run_bus.py)."""
 
 
 def group_of(joint: str) -> str:

@@ -9,8 +9,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from trace_figure import BEGIN_S, FACE, GAZE, HEAD, LID, SECONDS, Trace, recorded
 
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.scene_files import load_scene
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.scene_files import load_scene
 
 _HEAD_M = (0.04, 0.0, 0.13)
 

@@ -14,10 +14,10 @@ from gazerig.config.schema import load_rig
 from gazerig.features.lab.analysis.human_norms import mean_head_deg
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.gaze.angles import yaw_pitch
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_rig import with_options
-from gazerig.robot.app.scene_files import load_scene
-from gazerig.robot.control.tick import Tick, cyclopean_direction
+from gazerig.robot.loop.tick import Tick, cyclopean_direction
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run_rig import with_options
+from gazerig.robot.run.scene_files import load_scene
 
 BEGIN_S, SECONDS, RATE_HZ = 8.0, 20.0, 200.0
 PROFILES = ("robot", "mitake", "nakamoto")

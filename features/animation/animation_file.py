@@ -7,7 +7,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.features.animation import bottango, gltf_reader, servo_positions, table
 from gazerig.features.animation.animation import LARGEST, ImportedAnimation, JointMap
-from gazerig.robot.app.track_file import radians_hint
+from gazerig.robot.run.track_file import radians_hint
 
 
 def read_animation(

@@ -24,8 +24,8 @@ from gazerig.features.animation.animation import (
 )
 from gazerig.features.animation.glb import Clip, GltfFile
 from gazerig.gaze.types import Floats
-from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.description.links import Link
+from gazerig.robot.run.rig_description import description_of
 
 _COPY = re.compile(r"(\.\d{3}|_)+$")
 """Endings that Blender adds to names in use, and ``describe`` to names of links."""

@@ -12,7 +12,7 @@ from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.features.bringup.telemetry import TelemetrySample
 from gazerig.gaze.types import Floats
-from gazerig.robot.control.head_state import HeadState
+from gazerig.robot.loop.head_state import HeadState
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams
 

@@ -6,10 +6,10 @@ from typing import NamedTuple
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.session import ComposedRun, run
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.run.assemble import assemble
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.session import ComposedRun, run
 
 
 class SimulatedRun(NamedTuple):

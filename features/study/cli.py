@@ -13,13 +13,13 @@ from gazerig.config.load import shipped_path
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.robot.app.options import parse_camera, parse_host_port
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import is_desktop_here, open_page
 from gazerig.robot.cli.examples import complete_shipped
 from gazerig.robot.cli.progress_bar import progress_bar
 from gazerig.robot.cli.terminal import clear_errors, record_signals, say
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.run.options import parse_camera, parse_host_port
 
 HOME = Path(__file__).parent
 app = typer.Typer(

@@ -20,12 +20,12 @@ from gazerig.features.lab.film_writer import film_writer
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.study.design import SEED, Study
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.rig_description import description_of
-from gazerig.robot.app.scene_files import load_scene
-from gazerig.robot.control.tick import Tick
 from gazerig.robot.description.files import description_files
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.types import order_joints
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.rig_description import description_of
+from gazerig.robot.run.scene_files import load_scene
 
 SIZE_PX, RATE_HZ = 720, 25.0
 # Time of a simulated run before its film, in which the head finds the person, seconds.

@@ -24,7 +24,7 @@ from gazerig.features.study.design import (
 )
 from gazerig.features.study.journal import AnswerValue, Journal, JournalRecord
 from gazerig.local_head import LocalHead
-from gazerig.robot.control.head_state import HeadState
+from gazerig.robot.loop.head_state import HeadState
 
 WHOLE_SHARE = 0.9
 """Share of a film that must be played for a complete presentation."""

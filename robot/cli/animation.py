@@ -16,7 +16,7 @@ from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import NO_TRACK, Express, Play, Say, SetLevel
-from gazerig.robot.remote.client import RobotClient
+from gazerig.robot.net.client import RobotClient
 
 app = typer.Typer()
 _PIECE_S = 0.04

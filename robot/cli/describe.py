@@ -33,9 +33,9 @@ def describe(
     """Write a rig as a robot description: MJCF, URDF and glTF with meshes, or one of them."""
     with clear_errors(rig):
         from gazerig.config.schema import load_rig
-        from gazerig.robot.app.rig_description import description_of, mesh_faults
-        from gazerig.robot.app.servo_drives import servo_drives
         from gazerig.robot.description.files import FORMATS, description_files, file_name
+        from gazerig.robot.run.rig_description import description_of, mesh_faults
+        from gazerig.robot.run.servo_drives import servo_drives
 
         loaded = load_rig(rig, further=[mesh_faults])
         description = description_of(loaded).with_drives(servo_drives(loaded))

@@ -57,6 +57,6 @@ def complete_shipped(kind: str, home: Path | None = None) -> Callable[[str], lis
 
 def complete_world(incomplete: str) -> list[str]:
     """Complete a world with physics, or other surroundings."""
-    from gazerig.robot.app.surroundings import surroundings_names
+    from gazerig.robot.run.surroundings import surroundings_names
 
     return [name for name in surroundings_names() if name.startswith(incomplete)]

@@ -6,7 +6,7 @@ import typer
 
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors
-from gazerig.robot.remote.client import RobotClient
+from gazerig.robot.net.client import RobotClient
 
 app = typer.Typer()
 _NEGATIVE = {"ignore_unknown_options": True}

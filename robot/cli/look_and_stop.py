@@ -20,7 +20,7 @@ from gazerig.robot.model.commands import (
     LookAtPerson,
     LookAtPixel,
 )
-from gazerig.robot.remote.client import RobotClient, connect_to_all
+from gazerig.robot.net.client import RobotClient, connect_to_all
 
 app = typer.Typer()
 _LEADS_EVERY_S = 0.2

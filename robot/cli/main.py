@@ -120,7 +120,7 @@ def begin(
     """Make an animatronic head look at people as people look at each other."""
     if context.invoked_subcommand is None:
         from gazerig.drivers.serial.list_ports import serial_ports
-        from gazerig.robot.remote.client import connect_to_all
+        from gazerig.robot.net.client import connect_to_all
 
         print(next_steps(serial_ports(), rig_files(), bool(connect_to_all())))
 

@@ -22,8 +22,8 @@ from gazerig.robot.cli.terminal import (
 )
 
 if TYPE_CHECKING:
-    from gazerig.robot.app.resimulate import Resimulation
-    from gazerig.robot.control.loop import Tick
+    from gazerig.robot.loop.loop import Tick
+    from gazerig.robot.run.resimulate import Resimulation
 
 app = typer.Typer(add_completion=False)
 
@@ -61,7 +61,7 @@ def export(
 ) -> None:
     """Export a run as CSV for eye-tracking tools: samples and events, degrees, + left and + up."""
     with clear_errors():
-        from gazerig.robot.control.feedback_basis import ESTIMATED
+        from gazerig.robot.loop.feedback_basis import ESTIMATED
         from gazerig.robot.recording.export_csv import csv_files, write_csv
         from gazerig.robot.recording.gaze_angles import (
             collect_gaze_angles,
@@ -98,8 +98,8 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
 
     Results must be identical only if joints are replayed and nothing else has changed.
     """
-    from gazerig.robot.app import resimulate
     from gazerig.robot.recording.read import RunRecording, report_bad_contents
+    from gazerig.robot.run import resimulate
 
     recording = RunRecording(file)
     with report_bad_contents(file), _progress("running again", recording.duration_s) as read:

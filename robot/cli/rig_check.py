@@ -24,7 +24,7 @@ def check_line(rig: str) -> str:
     """
     from gazerig.config.rig import Rig
     from gazerig.config.schema import load_rig
-    from gazerig.robot.app.rig_description import mesh_faults
+    from gazerig.robot.run.rig_description import mesh_faults
 
     found: Rig = load_rig(rig, further=[mesh_faults])
     return f"{rig}: valid: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
@@ -43,7 +43,7 @@ def unit_lines(rig: str) -> list[str]:
     from gazerig.config.load import find_file
     from gazerig.config.schema import load_rig
     from gazerig.config.tracks import load_track
-    from gazerig.robot.app.track_file import radians_hint, track_angles_deg
+    from gazerig.robot.run.track_file import radians_hint, track_angles_deg
 
     loaded = load_rig(rig)
     ends = [end for one in loaded.joints.values() for end in (one.min_deg, one.max_deg)]
@@ -60,7 +60,7 @@ def weight_lines(rig: str) -> list[str]:
         ConfigError: the rig is not good.
     """
     from gazerig.config.schema import load_rig
-    from gazerig.robot.app.rig_weight import weight_findings
+    from gazerig.robot.run.rig_weight import weight_findings
 
     return [f"{rig}: {finding}" for finding in weight_findings(load_rig(rig))]
 
@@ -74,8 +74,8 @@ def track_lines(rig: str) -> list[str]:
     from gazerig.config.load import find_file
     from gazerig.config.schema import load_rig
     from gazerig.config.tracks import load_track
-    from gazerig.robot.app.track_file import fit_to_rig
     from gazerig.robot.model.track_fit import TrackRefused
+    from gazerig.robot.run.track_file import fit_to_rig
 
     loaded, lines = load_rig(rig), []
     for file in loaded.track_files:

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.app.computer import level_text
-from gazerig.robot.app.options import RunOptions, parse_camera
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import is_desktop_here, open_page
 from gazerig.robot.cli.rig_command import RigCommand
@@ -24,8 +22,10 @@ from gazerig.robot.cli.terminal import (
     say,
     status,
 )
-from gazerig.robot.control.joint_faults import JointFault, joints_text
 from gazerig.robot.dashboard.door.token_file import hide_token
+from gazerig.robot.loop.joint_faults import JointFault, joints_text
+from gazerig.robot.run.computer import level_text
+from gazerig.robot.run.options import RunOptions, parse_camera
 
 if TYPE_CHECKING:
     pass
@@ -87,7 +87,7 @@ def run(
         if shows is not None:
             shows("loading: a few seconds ...")
         # Vision and emulator are large; `check` and `--help` do not import them.
-        from gazerig.robot.app import session
+        from gazerig.robot.run import session
 
         browse = open_page if not no_browser and is_desktop_here() else None
         opening = StartLine("" if fast else start_text(asked))
@@ -149,7 +149,7 @@ def report_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> boo
             alike.setdefault(key, []).append(joint)
     held = [str(JointFault(joints_text(joints), *key)) for key, joints in alike.items()]
     if held:
-        from gazerig.robot.control.loop_timing import BUSY_SHARE  # with NumPy
+        from gazerig.robot.loop.loop_timing import BUSY_SHARE  # with NumPy
 
         late, ticks = figures.get("overruns", 0), figures.get("ticks", 0)
         share = late / (late + ticks) if late else 0.0

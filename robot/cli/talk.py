@@ -8,7 +8,7 @@ import typer
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.commands import Talk, TalkOrder
-from gazerig.robot.remote.client import RobotClient
+from gazerig.robot.net.client import RobotClient
 
 app = typer.Typer()
 _State = StrEnum("_State", {name: name for name in get_args(TalkOrder)})  # type: ignore[misc]

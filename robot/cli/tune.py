@@ -20,7 +20,7 @@ from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.commands import Ask
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.remote.client import RobotClient, connect_to_all
+from gazerig.robot.net.client import RobotClient, connect_to_all
 
 ctl = typer.Typer(
     name="ctl",

@@ -8,8 +8,8 @@ from html import escape
 from typing import Any
 
 from gazerig.drivers.plugins import PAGE_PANEL, describe_error, registrations
-from gazerig.robot.control.head_state import HeadState
-from gazerig.robot.remote.topics import PanelContent
+from gazerig.robot.loop.head_state import HeadState
+from gazerig.robot.net.topics import PanelContent
 
 
 class PackagePanels:

@@ -25,7 +25,6 @@ from pathlib import Path
 from gazerig.drivers.process import message_link
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.drivers.process.priority import lower_priority
-from gazerig.robot.control.head_state import head_state
 from gazerig.robot.dashboard.door.admission import page_url
 from gazerig.robot.dashboard.door.page_door import BACKLOG, HeadNews, PageDoor
 from gazerig.robot.dashboard.door.viser_server import open_server
@@ -42,8 +41,9 @@ from gazerig.robot.dashboard.feed.page_process import (
 from gazerig.robot.dashboard.feed.rig_feed import RigFeed
 from gazerig.robot.dashboard.package_panels import PackagePanels
 from gazerig.robot.dashboard.view.scene import HeadScene
+from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.remote.topics import PanelContent, RigInfo, RunState
+from gazerig.robot.net.topics import PanelContent, RigInfo, RunState
 
 _PAUSE_S = 0.02
 """Pause after a batch of ticks, s: the frame that follows it is then shown with it."""

@@ -7,8 +7,8 @@ decisions. With them a recorded run can be repeated bit for bit.
 from collections.abc import Callable, Mapping, Sequence
 
 from gazerig.drivers.errors import ServoFault, SetupError
-from gazerig.robot.control.body import Body
-from gazerig.robot.control.tick import BodyRecord, MeasuredJoints, TorqueEnabled, TorqueRefused
+from gazerig.robot.loop.body import Body
+from gazerig.robot.loop.tick import BodyRecord, MeasuredJoints, TorqueEnabled, TorqueRefused
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.types import JointAngles, JointState

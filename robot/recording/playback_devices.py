@@ -6,8 +6,8 @@ from typing import TypeVar
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Percept
-from gazerig.robot.control.body import Body
-from gazerig.robot.control.tick import (
+from gazerig.robot.loop.body import Body
+from gazerig.robot.loop.tick import (
     BodyRecord,
     MeasuredJoints,
     TickRecord,

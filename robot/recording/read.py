@@ -19,8 +19,8 @@ from msgspec import UNSET, structs
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.files.file_input import MAGIC, open_mcap
 from gazerig.gaze.types import Percept
-from gazerig.robot.control.tick import Tick, TickRecord
-from gazerig.robot.control.tick_stream import decode, to_array
+from gazerig.robot.loop.tick import Tick, TickRecord
+from gazerig.robot.loop.tick_stream import decode, to_array
 from gazerig.robot.model.commands import check_command
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, read_text

@@ -17,9 +17,9 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.drivers.process.passed_image import copy_image
 from gazerig.drivers.types import BusHealth, Detections
-from gazerig.robot.control.body import Body
-from gazerig.robot.control.tick import BodyRecord, MeasuredJoints, Tick
-from gazerig.robot.control.tick_stream import LIVE_S, SIMULATED_S, TickBatch, TickStream, encode
+from gazerig.robot.loop.body import Body
+from gazerig.robot.loop.tick import BodyRecord, MeasuredJoints, Tick
+from gazerig.robot.loop.tick_stream import LIVE_S, SIMULATED_S, TickBatch, TickStream, encode
 from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.joint_recorder import JointRecorder
 from gazerig.robot.recording.run_format import Health

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from gazerig.robot.control.tick import TickRecord
+from gazerig.robot.loop.tick import TickRecord
 from gazerig.robot.recording import viewer_messages as viewers
 
 TICK, HEALTH = "/rig/tick", "/rig/health"

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import msgspec
 from mcap.writer import CompressionType, Writer
 
-from gazerig.robot.control.tick_stream import to_plain
+from gazerig.robot.loop.tick_stream import to_plain
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.run_info import PROFILE, RunEnd, RunInfo, as_text, started_ns
 

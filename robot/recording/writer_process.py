@@ -24,8 +24,8 @@ from gazerig.drivers.process.passed_image import PassedImage, receive, take_imag
 from gazerig.drivers.process.priority import lower_priority
 from gazerig.drivers.types import ImageArray
 from gazerig.gaze.types import Percept
-from gazerig.robot.control.tick import Tick, TickRecord
-from gazerig.robot.control.tick_stream import all_finite, decode, encode
+from gazerig.robot.loop.tick import Tick, TickRecord
+from gazerig.robot.loop.tick_stream import all_finite, decode, encode
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import viewer_messages as viewers

@@ -15,10 +15,10 @@ from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import SetupError
 from gazerig.features.animation.animation import ImportedAnimation, Series, joint_map
 from gazerig.gaze.track.track import LIMIT_SHARE
-from gazerig.robot.app.rig_limits import lid_spans, limits
-from gazerig.robot.app.track_file import track_text, write_track
 from gazerig.robot.description.links import Link, LinkJoint
 from gazerig.robot.model.track_fit import TrackFit
+from gazerig.robot.run.rig_limits import lid_spans, limits
+from gazerig.robot.run.track_file import track_text, write_track
 
 
 def table(folder: Path, text: str) -> Path:

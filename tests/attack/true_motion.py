@@ -19,10 +19,10 @@ from mixed_rig import rig_of
 from true_shafts import Judge, Late, group_of, looked_at, on_time, run, sometimes_late
 
 from gazerig.config.schema import Rig
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.scene_files import scene_names
 from gazerig.robot.model.commands import LookAt
+from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.scene_files import scene_names
 
 RIGS = ("desk", "feetech", "maker", "pca9685", "mixed")
 LATES: dict[str, Callable[[], Late]] = {

@@ -38,8 +38,8 @@ from child_processes import running_as
 from present import present
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.rig_limits import park_rad
-from gazerig.robot.app.run_bus import emulated_lines
+from gazerig.robot.run.rig_limits import park_rad
+from gazerig.robot.run.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
 RIGS = {"desk": "dynamixel", "feetech": "feetech", "maker": "maestro", "pca9685": "pca9685"}
@@ -47,9 +47,9 @@ BOARDS = ("maker", "pca9685")
 LONGEST_S = 20.0
 # Broken on purpose, from outside: what a plug-in, a small machine or a bug of ours would do.
 BROKEN = {
-    "observer raises": "import gazerig.robot.control.joint_faults as m\n"
+    "observer raises": "import gazerig.robot.loop.joint_faults as m\n"
     "def update(self, tick):\n    raise RuntimeError('plug-in')\nm.JointFaults.update = update\n",
-    "MemoryError in the loop": "import gazerig.robot.control.loop as m\n"
+    "MemoryError in the loop": "import gazerig.robot.loop.loop as m\n"
     "tick, n = m.Robot.tick, []\n"
     "def update(self, *words):\n    n.append(0)\n"
     "    if len(n) > 200:\n        raise MemoryError\n"

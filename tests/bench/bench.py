@@ -93,8 +93,8 @@ def bench_tick() -> None:
     from ruckig import InputParameter, OutputParameter, Ruckig
 
     from gazerig.config.schema import load_rig
-    from gazerig.robot.app.assemble import assemble
-    from gazerig.robot.app.options import RunOptions
+    from gazerig.robot.run.assemble import assemble
+    from gazerig.robot.run.options import RunOptions
 
     planner, given, found = Ruckig(9, 0.005), InputParameter(9), OutputParameter(9)
     given.max_velocity, given.max_acceleration = [6.0] * 9, [60.0] * 9
@@ -170,9 +170,9 @@ def bench_camera() -> None:
     from gazerig.drivers.vision.face.detector import face_detector
     from gazerig.drivers.vision.face.params import FaceDetectorParams
     from gazerig.drivers.vision.motion.params import MotionParams
-    from gazerig.robot.app.assemble import assemble
-    from gazerig.robot.app.options import RunOptions
     from gazerig.robot.perception.motion_source import MotionSource
+    from gazerig.robot.run.assemble import assemble
+    from gazerig.robot.run.options import RunOptions
 
     cv2.setNumThreads(1)
     picture = background(640, 480).copy()

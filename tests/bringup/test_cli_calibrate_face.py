@@ -10,7 +10,7 @@ from gazerig.config.schema import load_rig
 from gazerig.features.bringup.cli.prompts import (
     split_words,
 )
-from gazerig.robot.control.command_handler import accept_only_stops
+from gazerig.robot.loop.command_handler import accept_only_stops
 from gazerig.robot.model.commands import Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 

@@ -26,10 +26,10 @@ from gazerig.gaze.angles import angle_between, compose, rotation, sub
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Bodies, Face, Percept, Target
-from gazerig.robot.app.assemble import Assembly, Substitutes
-from gazerig.robot.app.scene_files import load_scene
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.loop.loop import Tick
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
+from gazerig.robot.run.assemble import Assembly, Substitutes
+from gazerig.robot.run.scene_files import load_scene
 
 KEYS = st.lists(st.sampled_from(get_args(Key)), max_size=60)
 

@@ -11,10 +11,10 @@ from gazerig.config.schema import load_rig
 from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import DriverError
 from gazerig.features.bringup.hand_recording import record_live
-from gazerig.robot.app.rig_limits import lid_spans, limits
-from gazerig.robot.app.track_file import TOLERANCE_DEG, track_text, write_track
-from gazerig.robot.control.head_state import HeadState
+from gazerig.robot.loop.head_state import HeadState
 from gazerig.robot.model.track_fit import TrackFit
+from gazerig.robot.run.rig_limits import lid_spans, limits
+from gazerig.robot.run.track_file import TOLERANCE_DEG, track_text, write_track
 
 TURN = """description: the neck turns
 owns: [neck]

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig
 from gazerig.features.bringup.manual_control import ManualControl, Step
-from gazerig.robot.app.bus_wiring import rig_bus
-from gazerig.robot.app.rig_limits import limits, park_rad
-from gazerig.robot.control.body import Body
+from gazerig.robot.loop.body import Body
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
+from gazerig.robot.run.bus_wiring import rig_bus
+from gazerig.robot.run.rig_limits import limits, park_rad
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.devices import DynamixelLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec

@@ -6,10 +6,10 @@ import pytest
 from loop_deaths import RIGS, rig_of
 from mixed_rig import mixed_rig
 
-import gazerig.robot.app.run_bus as run_bus
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.rig_limits import limits
+import gazerig.robot.run.run_bus as run_bus
+from gazerig.robot.run.assemble import assemble
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.rig_limits import limits
 from gazerig.sim_mock.device import Device
 
 FAULTS = {

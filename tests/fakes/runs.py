@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_rig import run_info
-from gazerig.robot.app.session import shut_down
-from gazerig.robot.control.loop import LoopCount, run
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.loop import LoopCount, run
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.run.assemble import RIGS_OWN, Assembly, Substitutes, assemble
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run_rig import run_info
+from gazerig.robot.run.session import shut_down
 
 VISIT = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
 

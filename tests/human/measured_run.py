@@ -17,12 +17,12 @@ import pytest
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, scale, sub, yaw_pitch
-from gazerig.robot.app import run_rig
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_rig import with_options
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Value
 from gazerig.robot.recording.gaze_angles import GazeAngles, GazeAnglesBuilder, target_text
+from gazerig.robot.run import run_rig
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run_rig import with_options
 from gazerig.sim_mock.scenes.scene import Scene
 
 pytest.importorskip("gazerig.features.lab")  # its measures

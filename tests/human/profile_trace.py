@@ -15,8 +15,8 @@ from fakes.scenes import EmptyScene
 
 from gazerig.config.parameters import apply_changes, value_of
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app import run_rig
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.run import run_rig
+from gazerig.robot.run.options import RunOptions
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
 pytest.importorskip("gazerig.features.lab")  # its measures

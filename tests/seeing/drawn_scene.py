@@ -15,10 +15,10 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.gaze.angles import angle_between, rotation, sub
 from gazerig.gaze.types import Angles2, Angles3, Mat3, Percept, Vec3
-from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
+from gazerig.robot.run.drawn_motion import SyntheticMotionDetector
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.cameras.frame_times import FrameParams

@@ -14,10 +14,10 @@ from seeing.material import carphone
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
 from gazerig.gaze.types import Face, Vec3
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import run
-from gazerig.robot.control.tick import Tick, cyclopean_direction
+from gazerig.robot.loop.loop import run
+from gazerig.robot.loop.tick import Tick, cyclopean_direction
+from gazerig.robot.run.assemble import assemble
+from gazerig.robot.run.options import RunOptions
 
 NEAR_M, FRONTAL_RAD = 1.5, radians(45.0)
 BESIDE_DEG, FACE_M = 3.0, 0.09

@@ -11,8 +11,8 @@ from gazerig.config.faults import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError, install_command
 from gazerig.features.world.run.run_world import world_of
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.run import start_text
+from gazerig.robot.run.options import RunOptions
 
 ASKED = RunOptions(mock=True, world="living-room")
 

@@ -18,17 +18,17 @@ from gazerig.features.world.run.run_world import world_of, world_scene
 from gazerig.features.world.run.sight import ComputedCamera
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app.assemble import Assembly, assemble, with_options
-from gazerig.robot.app.camera_factory import frame_locator
-from gazerig.robot.app.gaze_models import rig_kinematics
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.app.run_bus import emulated_lines
-from gazerig.robot.app.session import compose, run
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import MoveOpponent
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.run.assemble import Assembly, assemble, with_options
+from gazerig.robot.run.camera_factory import frame_locator
+from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.resimulate import rerun
+from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.session import compose, run
 from gazerig.sim_mock.pty.line import BusSettings
 
 simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate

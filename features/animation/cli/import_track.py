@@ -64,7 +64,7 @@ def import_track(
     with clear_errors(rig):
         from gazerig.features.animation.animation import joint_map
         from gazerig.features.animation.animation_file import read_animation
-        from gazerig.robot.app.track_file import track_text, write_track
+        from gazerig.robot.run.track_file import track_text, write_track
 
         loaded = load_rig(rig)
         found = read_animation(

@@ -20,7 +20,7 @@ from typing import Literal
 from gazerig.gaze.angles import add, norm, rotate, scale, sub
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Face, GazeState, Mat3, Percept, Target, Vec3
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.kinematics import gaze_error
 
@@ -140,7 +140,7 @@ _PULL = 1.0
 
 
 class FaceSteering:
-    """Chooser (gazerig.robot.control.loop) that keys control.
+    """Chooser (gazerig.robot.loop.loop) that keys control.
 
     state: progress of the calibration
     face: the target face, None while no face is seen

@@ -34,9 +34,9 @@ from gazerig.features.bringup.doctor.diagnostics import (
     worst_level,
 )
 from gazerig.features.bringup.servo_kinds import servo_kind
-from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.app.rig_weight import weight_findings
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
+from gazerig.robot.run.bus_wiring import bus_names
+from gazerig.robot.run.rig_weight import weight_findings
 from gazerig.robot.safety.start_range import find_far_outside
 
 app = typer.Typer()

@@ -42,9 +42,9 @@ from gazerig.robot.cli.terminal import (
     say,
 )
 from gazerig.robot.cli.tracks import FolderOption, print_track_fit
-from gazerig.robot.control.head_state import HeadState
+from gazerig.robot.loop.head_state import HeadState
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.remote.client import RobotClient
+from gazerig.robot.net.client import RobotClient
 
 app = typer.Typer()
 
@@ -75,7 +75,7 @@ def record_track(
 ) -> None:
     """Record a track in YAML: by hand with torque off, or with --live of a running head."""
     with clear_errors(rig, port, mock):
-        from gazerig.robot.app.track_file import track_text, write_track
+        from gazerig.robot.run.track_file import track_text, write_track
 
         loaded = load_rig(rig)
         track_name(f"{name}.yaml")

@@ -24,9 +24,9 @@ from gazerig.features.bringup.cli.ports import (
     unopened_port,
 )
 from gazerig.features.bringup.servo_kinds import KINDS, servo_kind
-from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.app.run_bus import CHAINS
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, confirm, finish_lines, say
+from gazerig.robot.run.bus_wiring import bus_names
+from gazerig.robot.run.run_bus import CHAINS
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 app = typer.Typer()

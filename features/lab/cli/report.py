@@ -14,7 +14,7 @@ from gazerig.robot.cli.terminal import ForceOption, clear_errors, record_signals
 
 if TYPE_CHECKING:
     from gazerig.features.lab.report.report import ReportedRun
-    from gazerig.robot.app.options import RunOptions
+    from gazerig.robot.run.options import RunOptions
 
 app = typer.Typer(add_completion=False)
 
@@ -58,8 +58,8 @@ def report(
             raise SetupError("report compares two recordings: leave --scene out")
         # Drawing and models are slow to import; `--help` does not need them.
         from gazerig.features.lab.report.report import make_report, read_run, report_files
-        from gazerig.robot.app.options import RunOptions
         from gazerig.robot.recording.read import RunRecording
+        from gazerig.robot.run.options import RunOptions
 
         files = [path for path in (file, other) if path is not None]
         default = "compare" if other is not None else f"report-{scene}" if scene else files[0].stem
@@ -95,8 +95,8 @@ def _simulate_run(run_options: "RunOptions", tell: Steps) -> "ReportedRun":
     """Run a scene in simulated time; Ctrl-C ends the run early."""
     from gazerig.features.lab.report.report import describe_run
     from gazerig.features.lab.simulated_run import simulate
-    from gazerig.robot.app.run_rig import run_info, run_rig
-    from gazerig.robot.control.tick import Tick
+    from gazerig.robot.loop.tick import Tick
+    from gazerig.robot.run.run_rig import run_info, run_rig
 
     rig = run_rig(run_options)
     seconds, start_s = run_options.seconds or 0.0, list[float]()

@@ -8,7 +8,6 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.app.options import DEFAULT_SCENE, RunOptions
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.progress_bar import progress_bar
 from gazerig.robot.cli.rig_command import RigCommand
@@ -22,6 +21,7 @@ from gazerig.robot.cli.terminal import (
     say,
 )
 from gazerig.robot.cli.tune import read_value
+from gazerig.robot.run.options import DEFAULT_SCENE, RunOptions
 
 app = typer.Typer(add_completion=False)
 
@@ -69,8 +69,8 @@ def sweep(
         # Models are slow to import; `--help` does not need them.
         from gazerig.features.lab.sweep.points import check_points, grid
         from gazerig.features.lab.sweep.runs import FAILED, open_executor, run_all, table_text
-        from gazerig.robot.app.assemble import assemble
-        from gazerig.robot.app.run_rig import run_rig
+        from gazerig.robot.run.assemble import assemble
+        from gazerig.robot.run.run_rig import run_rig
 
         run_options = RunOptions(
             mock=True, fast=True, scene=scene, seconds=seconds, bus=bus, rig=rig, profile=profile,

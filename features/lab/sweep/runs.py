@@ -23,7 +23,7 @@ from gazerig.features.lab.report.measures import judge_run
 from gazerig.features.lab.report.statistics import VerdictWord
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.points import Point
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.run.options import RunOptions
 
 Row = dict[str, float | int | str | None]
 """One run: its parameters, seed, failure, measures with verdicts, and the summary's figures."""

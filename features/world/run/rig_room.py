@@ -18,30 +18,30 @@ from gazerig.features.world.run.sight import LATENCY_MS, ComputedCamera, Rendere
 from gazerig.features.world.serve import SentWorld
 from gazerig.features.world.shapes import SpecShapes
 from gazerig.features.world.world_spec import state_file
-from gazerig.robot.app.bus_wiring import guarded_rig_bus, servo_configs
-from gazerig.robot.app.camera_factory import frame_locator
-from gazerig.robot.app.drawn_camera import DrawnSource
-from gazerig.robot.app.gaze_models import rig_kinematics
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.program_parts import ProgramParts
-from gazerig.robot.app.run_bus import (
+from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.perception.motion_source import MotionSource
+from gazerig.robot.run.bus_wiring import guarded_rig_bus, servo_configs
+from gazerig.robot.run.camera_factory import frame_locator
+from gazerig.robot.run.drawn_camera import DrawnSource
+from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.program_parts import ProgramParts
+from gazerig.robot.run.run_bus import (
     CameraPoses,
     RunBus,
     emulated_lines,
     ideal_run_bus,
     in_process_run_bus,
 )
-from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
-from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.frames import CameraParams
-from gazerig.robot.perception.motion_source import MotionSource
 from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.scenes.scene import Scene
 
 
 @dataclass(frozen=True)
 class RigRoom:
-    """``RunRoom`` of gazerig.robot.app.surroundings: a world from the view of its rig."""
+    """``RunRoom`` of gazerig.robot.run.surroundings: a world from the view of its rig."""
 
     world: RunWorld
     clock: Clock
@@ -74,7 +74,7 @@ class RigRoom:
             return ComputedCamera(world.scene, sight.mount, field_deg, poses, rng, locate)
         rendered = RenderedWorld(world.spec, sight.mount, placed, rng, world.camera, poses)
         if isinstance(poses, SimulatedPoses):
-            from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
+            from gazerig.robot.run.drawn_motion import SyntheticMotionDetector
 
             return rendered.pixels(
                 poses.head,

@@ -17,11 +17,11 @@ from gazerig.features.world.room import HOME
 from gazerig.features.world.timeline import CHECKS
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import WorldSpec
-from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_bus import BOARDS, CHAINS, STOP_BEYOND_DEG, start_angles_rad
-from gazerig.robot.app.run_rig import refuse_missing_rules
-from gazerig.robot.app.scene_files import script_file
+from gazerig.robot.run.bus_wiring import bus_names
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run_bus import BOARDS, CHAINS, STOP_BEYOND_DEG, start_angles_rad
+from gazerig.robot.run.run_rig import refuse_missing_rules
+from gazerig.robot.run.scene_files import script_file
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import SceneScript, WorldCameraParams
 
@@ -45,8 +45,8 @@ def rig_in_world(
 def _body(rig: Rig, looks: bool) -> tuple[str, Mapping[str, bytes]]:
     """Return the body of a rig as MJCF, and the files that the MJCF names."""
     # Meshes and the texture writer: 30 MB that a control loop does not need.
-    from gazerig.robot.app.rig_description import description_of
     from gazerig.robot.description.mjcf import mjcf
+    from gazerig.robot.run.rig_description import description_of
 
     xml, assets = mjcf(description_of(rig, looks=looks), looks=looks)
     return xml, assets

@@ -16,10 +16,10 @@ from gazerig.features.world.gl_context import render_in_calling_thread
 from gazerig.features.world.run.poses import SimulatedPoses, WorldPoses
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.gaze.types import Mat3
-from gazerig.robot.app.drawn_camera import HeadPose, NoFaces
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.scene_view import PinholeView
+from gazerig.robot.run.drawn_camera import HeadPose, NoFaces
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Scene

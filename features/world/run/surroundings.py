@@ -3,9 +3,9 @@
 from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import shipped_names
 from gazerig.features.world.room import HOME
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.surroundings import RunRoom, Surroundings
 from gazerig.robot.model.clock import Clock
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.surroundings import RunRoom, Surroundings
 from gazerig.sim_mock.scenes.scene import Scene
 
 

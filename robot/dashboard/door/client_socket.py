@@ -12,8 +12,8 @@ from gazerig.robot.model.commands import COMMANDS, REPEATED, ControlCommand
 from gazerig.robot.model.outcome import Progress, command_outcome
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.requests import ORDERS
-from gazerig.robot.remote.excess import STOPPED
-from gazerig.robot.remote.topics import ShownPicture
+from gazerig.robot.net.excess import STOPPED
+from gazerig.robot.net.topics import ShownPicture
 
 NO_OUTCOME = {name for name, kind in COMMANDS.items() if kind in REPEATED}
 CONTROLS = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))

@@ -29,9 +29,6 @@ import msgspec
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from gazerig.robot.control.head_state import HeadEvent, HeadReport, head_state
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.dashboard.door.admission import API, Admission
 from gazerig.robot.dashboard.door.browsers import Connections, TabLimits, browser_name
 from gazerig.robot.dashboard.door.client_socket import (
@@ -53,11 +50,14 @@ from gazerig.robot.dashboard.door.sockets import (
 )
 from gazerig.robot.dashboard.door.viser_server import VIEW, ViewProxy, view_client
 from gazerig.robot.dashboard.door.waveforms import waveform
+from gazerig.robot.loop.head_state import HeadEvent, HeadReport, head_state
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.loop.tick_feed import TickFeed
 from gazerig.robot.model.commands import HEARTBEAT_S, ClientCommand, Resume, Stop
 from gazerig.robot.model.outcome import command_outcome
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.requests import ORDERS, ShowView, State, read_request
-from gazerig.robot.remote.excess import (
+from gazerig.robot.net.excess import (
     CLOSED,
     REST_S,
     TOO_MANY,
@@ -65,9 +65,9 @@ from gazerig.robot.remote.excess import (
     TokenBucket,
     find_stop,
 )
-from gazerig.robot.remote.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
-from gazerig.robot.remote.socket_io import REQUEST_BYTES, VERSION
-from gazerig.robot.remote.topics import PanelContent, RigInfo, RunState, ShownPicture
+from gazerig.robot.net.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
+from gazerig.robot.net.socket_io import REQUEST_BYTES, VERSION
+from gazerig.robot.net.topics import PanelContent, RigInfo, RunState, ShownPicture
 
 BASE = f"{API}v{VERSION}"
 MOST_CLIENTS = 32

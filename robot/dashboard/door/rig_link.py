@@ -11,8 +11,8 @@ import msgspec
 
 from gazerig.robot.dashboard.door.sockets import until_one_ends
 from gazerig.robot.model.requests import SLOW
-from gazerig.robot.remote.excess import TOO_MANY
-from gazerig.robot.remote.socket_io import ANSWER_BYTES
+from gazerig.robot.net.excess import TOO_MANY
+from gazerig.robot.net.socket_io import ANSWER_BYTES
 
 Answer = dict[str, Any]
 NO_RIG = "no head takes requests here: it starts or has ended"

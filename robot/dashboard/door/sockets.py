@@ -8,7 +8,7 @@ import aiohttp
 from aiohttp import web
 
 from gazerig.drivers.camera.shared_slots import MOST_BYTES
-from gazerig.robot.remote.excess import TokenBucket
+from gazerig.robot.net.excess import TokenBucket
 
 MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
 """Rate limit of one browser's viewpoints."""

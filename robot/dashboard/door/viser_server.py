@@ -27,7 +27,7 @@ from gazerig.robot.dashboard.door.sockets import (
     relay_out,
     until_one_ends,
 )
-from gazerig.robot.remote.excess import TokenBucket
+from gazerig.robot.net.excess import TokenBucket
 
 BROWSER_HEADER = "X-Gazerig-Browser"
 """Header with the name of a websocket's browser."""

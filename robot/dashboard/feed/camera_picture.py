@@ -9,7 +9,7 @@ from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Detections, ImageArray
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.remote.topics import (
+from gazerig.robot.net.topics import (
     Picture,
     Pixel,
     SeenFace,

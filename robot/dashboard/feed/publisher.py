@@ -10,7 +10,6 @@ from math import inf
 
 from gazerig.drivers.process.passed_image import copy_image
 from gazerig.drivers.types import Detections
-from gazerig.robot.control.tick_stream import TickBatch
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.rig_feed import (
     TICKS,
@@ -19,8 +18,9 @@ from gazerig.robot.dashboard.feed.rig_feed import (
     rig_message,
     state_message,
 )
+from gazerig.robot.loop.tick_stream import TickBatch
 from gazerig.robot.model.commands import Command, Tune
-from gazerig.robot.remote.topics import RunState
+from gazerig.robot.net.topics import RunState
 
 _FRAME_S = 0.08
 _STATE_S = 0.5

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from math import inf
 
 from gazerig.drivers.types import BusHealth
-from gazerig.robot.control.loop_timing import busy_text
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import (
+from gazerig.robot.loop.loop_timing import busy_text
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.loop.tick_text import (
     camera_conditions,
     guard_text,
     head_activity,

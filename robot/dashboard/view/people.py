@@ -7,13 +7,13 @@ import numpy as np
 import viser
 
 from gazerig.gaze.types import PARTS, Face, Percept, Vec3
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import head_activity
 from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glow_disc, painted_glb
 from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose, set_rotation
 from gazerig.robot.description.mesh import Colour
 from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.description.people import SHIRTS, head, part_of, torso
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.loop.tick_text import head_activity
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import quaternion
 

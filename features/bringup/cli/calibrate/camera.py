@@ -45,8 +45,6 @@ from gazerig.features.bringup.cli.rig_writer import (
     refuse_unwritable,
     write_values,
 )
-from gazerig.robot.app.camera_factory import frame_orientation
-from gazerig.robot.app.rig_limits import lid_ends, neck_span
 from gazerig.robot.cli.terminal import (
     ForceOption,
     RigArgument,
@@ -55,12 +53,14 @@ from gazerig.robot.cli.terminal import (
     say,
     status,
 )
-from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.loop.interrupts import Interrupts
 from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import NECK, Kinematics
+from gazerig.robot.run.camera_factory import frame_orientation
+from gazerig.robot.run.rig_limits import lid_ends, neck_span
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 _GENTLE_DEG_S = 15.0

@@ -35,15 +35,15 @@ from gazerig.features.bringup.cli.rig_writer import (
 )
 from gazerig.gaze.attention.idle import REST_M
 from gazerig.gaze.attention.top_down import TopDown
-from gazerig.robot.app.assemble import Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.session import prepare_shutdown
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
-from gazerig.robot.control.event_text import group_events
-from gazerig.robot.control.interrupts import Interrupts
-from gazerig.robot.control.loop import LoopCount, Tick
-from gazerig.robot.control.loop import run as run_loop
-from gazerig.robot.remote.live_server import StopOnlyServer
+from gazerig.robot.loop.event_text import group_events
+from gazerig.robot.loop.interrupts import Interrupts
+from gazerig.robot.loop.loop import LoopCount, Tick
+from gazerig.robot.loop.loop import run as run_loop
+from gazerig.robot.net.live_server import StopOnlyServer
+from gazerig.robot.run.assemble import Substitutes, assemble
+from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.session import prepare_shutdown
 
 STILL_SCENE = "sits-still"
 

@@ -44,13 +44,13 @@ from gazerig.features.bringup.cli.rig_writer import (
     write_values,
 )
 from gazerig.features.bringup.servo_kinds import servo_kind
-from gazerig.robot.app.bus_wiring import release_plan
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
-from gazerig.robot.control.interrupts import Interrupts
-from gazerig.robot.control.power_down import PowerDown
 from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.loop.interrupts import Interrupts
+from gazerig.robot.loop.power_down import PowerDown
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling import joint_partners
+from gazerig.robot.run.bus_wiring import release_plan
 
 
 def calibrate_joints(

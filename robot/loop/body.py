@@ -1,0 +1,340 @@
+"""Conversion between joints and servos; the only place that converts steps to joint angles."""
+
+import contextlib
+from collections.abc import Callable, Collection, Mapping, Sequence
+from math import isfinite, radians
+from operator import add, mul, sub
+
+from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
+from gazerig.drivers.errors import BusLost, DriverError, ServoMissing, SetupError
+from gazerig.drivers.types import Feedback, LimpableBus, ServoBus, ServoConfig
+from gazerig.robot.loop.coupled_servos import CoupledServos
+from gazerig.robot.loop.limp_joints import LimpJoints
+from gazerig.robot.loop.sag import SagCompensation
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.coupling import CouplingParams, pair_setups
+from gazerig.robot.model.joint import JointLimit, JointParams, LinearLinkage
+from gazerig.robot.model.types import JointAngles, JointState, order_joints
+from gazerig.robot.safety.start_range import find_far_outside
+
+_FIRST_S = 0.5
+"""Longest time until every servo has reported its position before torque is switched on."""
+_AGAIN_S = 0.02
+_INSIDE_RAD = radians(1.0)
+"""Distance from its range at which friction may stop a joint that has moved inside."""
+
+
+def servo_setups(
+    joints: Mapping[str, JointParams],
+    park_rad: Mapping[str, float],
+    gentle_deg_s: float = ENTRY_DEG_S,
+    pairs: Collection[CouplingParams] = (),
+) -> tuple[ServoConfig, ...]:
+    """Return the configuration of all servos for a bus.
+
+    Args:
+        joints: The joints by name.
+        park_rad: Parking pose by joint, default 0; the assumed start of servos without feedback.
+        gentle_deg_s: Highest speed at which joints outside their ranges move inside.
+        pairs: Joints that two servos move together.
+    """
+    coupled: dict[str, ServoConfig] = {}
+    for pair in pairs:
+        coupled |= pair_setups(pair, joints, park_rad, gentle_deg_s)
+    return tuple(
+        coupled.get(name) or joints[name].setup(name, park_rad.get(name, 0.0), gentle_deg_s)
+        for name in order_joints(joints)
+    )
+
+
+class Body:
+    """All joints of a rig on its bus, or on its buses as one.
+
+    Attributes:
+        names: Names of the joints, in the order of every sequence of joints.
+
+    Args:
+        bus: Bus with the configuration from ``servo_setups``.
+        joints: The joints by name.
+        park_rad: As in ``servo_setups``.
+        pairs: As in ``servo_setups``.
+        sag: Changes of the goals that make up for the weight; None: none.
+        recover: Receives a line about each joint that is far outside its range, which then moves
+            inside slowly; None: such a joint prevents the torque of all.
+    """
+
+    def __init__(
+        self,
+        bus: ServoBus,
+        joints: Mapping[str, JointParams],
+        park_rad: Mapping[str, float] | None = None,
+        pairs: Collection[CouplingParams] = (),
+        sag: SagCompensation | None = None,
+        recover: Callable[[str], object] | None = None,
+    ) -> None:
+        self.bus = bus
+        self._sag, self._read_s = sag, 0.0
+        self._recover, self._recovering = recover, set[int]()
+        self.names = order_joints(joints)
+        self._pairs = tuple(pairs)
+        self._coupled = CoupledServos(pairs, self.names) if pairs else None
+        self._park_rad = dict(park_rad or {})
+        self._torque_off = False
+        self._joints = self._set_up = tuple(joints[name] for name in self.names)
+        self._limp = LimpJoints([joint.limp_when_idle_s for joint in self._joints])
+        linkages = [joint.make_linkage() for joint in self._joints]
+        # All joints are computed as if every linkage were straight; the other joints are then
+        # corrected.
+        lines = [linkage.line or LinearLinkage(0.0, 0.0, 0.0) for linkage in linkages]
+        self._zeros, self._slopes, self._rates = zip(*lines, strict=True)
+        self._bent = [(i, one) for i, one in enumerate(linkages) if one.line is None]
+        # Before the first answer: the centre, infinitely old.
+        self._nothing = Feedback.create_missing(len(self.names))
+        self._last = self._nothing._replace(
+            position_steps=tuple(self._steps((0.0,) * len(self.names))),
+            velocity_steps_s=(0.0,) * len(self.names),
+            load=(0.0,) * len(self.names),
+            torque=(True,) * len(self.names),  # it was switched on, and no servo reports otherwise
+            measured=tuple([joint.model_facts.measures_position for joint in self._joints]),
+        )
+
+    def retune(self, joints: Mapping[str, JointParams], gentle_deg_s: float) -> None:
+        """Apply new limits of joints; the servos are set up again when torque is switched on."""
+        self._joints = tuple(joints[name] for name in self.names)
+        self.bus.retune(servo_setups(joints, self._park_rad, gentle_deg_s, self._pairs))
+
+    def configured_limits(self) -> tuple[JointLimit, ...]:
+        """Return the ranges and speeds of the servos' configuration."""
+        return tuple([joint.limit() for joint in self._set_up])
+
+    def start(self, clock: Clock) -> JointAngles:
+        """Open the bus and switch the torque on at the present angles; return the goals.
+
+        Raises:
+            SetupError: The port or the servos do not match the configuration, or a joint is far
+                outside its range.
+        """
+        self.bus.open()
+        try:
+            self._read_first(clock)
+            return self.enable_torque()
+        except BaseException:
+            self.stop()
+            raise
+
+    def _read_first(self, clock: Clock) -> None:
+        """Read every servo that measures its position.
+
+        Raises:
+            ServoMissing: One does not answer.
+        """
+        if True not in self._last.measured:
+            return
+        end_s = clock.now_s() + _FIRST_S
+        while True:
+            now_s = clock.now_s()
+            self.read(now_s)
+            unread = [
+                name
+                for name, measured, at_s in zip(
+                    self.names, self._last.measured, self._last.at_s, strict=True
+                )
+                if measured and not isfinite(at_s)
+            ]
+            if not unread:
+                return
+            if now_s >= end_s:
+                raise ServoMissing(f"no position from {', '.join(unread)}: check its cable")
+            clock.sleep_until(now_s + _AGAIN_S)
+
+    def read(self, t_s: float) -> JointState:
+        """Read all joints; a joint that does not answer keeps its last value and its age.
+
+        Raises:
+            BusLost: No servo has answered for too long while the torque was on. With the torque
+                off, a lost bus is not an error.
+        """
+        self._read_s = t_s
+        try:
+            feedback = self.bus.read(t_s)
+        except BusLost:
+            if not self._torque_off:
+                raise
+            feedback = self._nothing
+        if feedback.missing:
+            feedback = feedback.fill_missing(self._last)
+        self._last = feedback
+        if self._coupled is not None:
+            feedback = self._coupled.share_feedback(feedback, self._torque_off)
+        steps, speeds, load, at_s, celsius, volts, torque, fault, measured, rearmed, gone = feedback
+        rates = tuple(map(mul, speeds, self._rates))
+        if self._bent or self._coupled is not None:
+            angles = self.angles(steps)
+            right = list(rates)
+            for i, linkage in self._bent:
+                right[i] = speeds[i] * linkage.rate_rad(steps[i])
+            rates = tuple(right if self._coupled is None else self._coupled.joints(right))
+        else:
+            angles = tuple(map(mul, map(sub, steps, self._zeros), self._rates))
+        if self._recovering:
+            self._report_recovered(angles)
+        missing = tuple([self.names[i] for i in gone]) if gone else ()
+        return JointState(
+            angles, rates, at_s, missing, torque, fault, load, celsius, volts, rearmed, measured
+        )
+
+    def relax_idle(
+        self, desired_rad: JointAngles, joints: JointState, t_s: float, held: bool
+    ) -> frozenset[int]:
+        """Switch the torque of joints off that are idle, and on again before they move.
+
+        Args:
+            desired_rad: Desired angles of this tick.
+            joints: Measured joints.
+            t_s: Present time.
+            held: Whether a client holds the joints, which are not idle then.
+
+        Returns:
+            The numbers of the joints that have no torque in this reading on purpose.
+        """
+        before = self._limp.limp
+        if self._limp.step(desired_rad, joints.torque, t_s, held):
+            self._set_limp()
+        return before
+
+    def wake(self) -> None:
+        """Switch the torque of idle joints on, at their present angles."""
+        if self._limp.limp:
+            self._limp.reset()
+            self._set_limp()
+
+    def _set_limp(self) -> None:
+        if isinstance(self.bus, LimpableBus):
+            self.bus.set_limp(self._limp.limp)
+
+    def write(self, command_rad: JointAngles) -> None:
+        """Send one goal to every servo.
+
+        Raises:
+            ValueError: An angle is not a number, or the number of angles is wrong.
+        """
+        steps = self._steps(command_rad)
+        if self._sag is not None:
+            for i, offset in self._sag.offsets(command_rad, self._read_s):
+                steps[i] += round(offset)
+        self.bus.write(steps)
+
+    def _steps(self, angles_rad: JointAngles) -> list[int]:
+        """Return the servo positions of joint angles."""
+        if len(angles_rad) != len(self.names):
+            raise ValueError(f"{len(angles_rad)} angles for {len(self.names)} joints")
+        angles: Sequence[float] = angles_rad
+        if self._coupled is not None:
+            angles = self._coupled.shafts(angles_rad)
+        steps = [*map(round, map(add, self._zeros, map(mul, self._slopes, angles)))]
+        for i, linkage in self._bent:
+            steps[i] = round(linkage.steps(angles[i]))
+        return steps
+
+    def angles(self, steps: Sequence[float]) -> JointAngles:
+        """Return the joint angles of servo positions."""
+        shafts = self._shafts(steps)
+        return tuple(shafts if self._coupled is None else self._coupled.joints(shafts))
+
+    def _shafts(self, steps: Sequence[float]) -> list[float]:
+        """Return the angles of servo positions; for coupled servos those of their shafts."""
+        angles = [*map(mul, map(sub, steps, self._zeros), self._rates)]
+        for i, linkage in self._bent:
+            angles[i] = linkage.angle_rad(steps[i])
+        return angles
+
+    def disable_torque(self) -> None:
+        """Switch the torque off immediately; the bus stays open and reading continues.
+
+        Raises:
+            BusLost: The port is lost; the torque is switched off when it reconnects.
+        """
+        self._torque_off = True
+        self._limp.reset()
+        self.bus.disable_torque()
+
+    def enable_torque(self) -> JointAngles:
+        """Switch the torque on again at the present angles; return the goals.
+
+        Raises:
+            SetupError: A servo does not answer, refuses or has latched a fault, or a joint is far
+                outside its range.
+            BusLost: The port is gone.
+        """
+        self._refuse_far_outside()
+        if self._sag is not None:
+            self._sag.restart()
+        goals = self.bus.enable_torque()
+        self._torque_off = False
+        # A servo that has not answered since then has torque.
+        self._last = self._last._replace(torque=(True,) * len(self.names))
+        self._set_up = self._joints
+        return self.angles(goals)
+
+    def _refuse_far_outside(self) -> None:
+        """Refuse torque if a joint is far outside its range, or report that it moves inside.
+
+        A joint within the range of the last torque-on is not refused: its range was changed.
+
+        Raises:
+            SetupError: A joint is far outside, and its recovery was not requested.
+        """
+        rows = zip(self.names, self._last.measured, self._last.position_steps, strict=True)
+        steps = {name: at for name, measured, at in rows if measured}
+        far, before = (
+            find_far_outside(dict(zip(self.names, joints, strict=True)), self._pairs, steps)
+            for joints in (self._joints, self._set_up)
+        )
+        far = {name: text for name, text in far.items() if name in before}
+        self._recovering.clear()
+        if not far:
+            return
+        where = [f"{name} {text}" for name, text in far.items()]
+        if self._recover is None:
+            raise SetupError(
+                f"{'; '.join(where)} Torque stays off: gazerig doctor examines it, gazerig run "
+                "--recover moves it slowly into its range"
+            )
+        self._recovering = {self.names.index(name) for name in far}
+        for text in where:
+            self._recover(f"{text} It moves slowly into its range")
+
+    def _report_recovered(self, angles: JointAngles) -> None:
+        """Report the joints that have arrived in their ranges."""
+        for i in tuple(self._recovering):
+            limit = self._joints[i].limit()
+            if limit.low_rad - _INSIDE_RAD <= angles[i] <= limit.high_rad + _INSIDE_RAD:
+                self._recovering.discard(i)
+                if self._recover is not None:
+                    self._recover(f"{self.names[i]} is in its range again")
+
+    def stop(self) -> tuple[str, ...]:
+        """Switch the torque off and close the bus; return the bus's messages about it.
+
+        A message is, e.g., "left_lid (servo 7): torque-off not confirmed: cut the servo power".
+        """
+        try:
+            with contextlib.suppress(Exception):  # nothing may prevent switching the torque off
+                self.bus.events()  # discards earlier messages
+            self._release()
+            with contextlib.suppress(Exception):
+                return self.bus.events()
+            return ()
+        finally:
+            self.bus.close()
+
+    def _release(self) -> None:
+        try:
+            self.bus.disable_torque()
+        except DriverError:
+            raise
+        except Exception:  # not a fault of the bus, such as no memory: try once more
+            self.bus.disable_torque()
+        except BaseException:
+            self.bus.disable_torque()
+            raise

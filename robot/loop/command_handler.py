@@ -1,0 +1,232 @@
+"""Requests to a running rig: the same for all clients, handled in one place.
+
+The live page, other programs, the command line and Python all send the classes of
+``gazerig.robot.model.commands`` and ``gazerig.robot.model.requests``.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.loop.track_choices import TrackInfo
+from gazerig.robot.model.commands import Command, Request, Resume, Say, Speak, Stop, Value, as_value
+from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
+from gazerig.robot.model.reply import CommandTaker, Ticket
+from gazerig.robot.model.requests import (
+    Character,
+    Characters,
+    Get,
+    Parameters,
+    ReadMenus,
+    Revert,
+    Save,
+    SayPiece,
+    Set,
+    Tracks,
+    Unsaved,
+)
+
+FIXED = "these parameters cannot be changed while the rig runs"
+
+
+class ParamAccess(Protocol):
+    """The parameters of a running rig, such as ``gazerig.robot.run.param_store.ParamStore``."""
+
+    @property
+    def version(self) -> int:
+        """Return the number of changes."""
+
+    @property
+    def path(self) -> Path:
+        """Return the rig's file."""
+
+    @property
+    def character_name(self) -> str:
+        """Return the present character."""
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return all parameters."""
+
+    def values(self) -> Mapping[str, Value]:
+        """Return all present values."""
+
+    def get(self, prefix: str) -> Mapping[str, Value]:
+        """Return the present values whose keys start with ``prefix``."""
+
+    def set(self, changes: Mapping[str, Value]) -> Iterable[str]:
+        """Apply values from the next tick on; return notes for the user."""
+
+    def unsaved(self) -> Sequence[ParamChange]:
+        """Return the present values that are not in the file."""
+
+    def save(self, path: Path | None = None) -> SavedFile:
+        """Write the present values to a file."""
+
+    def revert(self) -> object:
+        """Restore the values of the file."""
+
+    def characters(self) -> Sequence[str]:
+        """Return the available characters."""
+
+    def apply_character(self, name: str) -> object:
+        """Apply another character to the rig."""
+
+
+class PathGuard(Protocol):
+    """Rules for the files that a client may name (``config.rig_files.AllowedFolder``)."""
+
+    def check_file(self, given: str, kind: str = "") -> str:
+        """Return a shipped name or an absolute path; raise if it is not allowed."""
+
+    def check_changes(self, changes: Mapping[str, object]) -> None:
+        """Raise if a value names a file that is not allowed."""
+
+
+class Speaker(Protocol):
+    """The voice of a head (``gazerig.robot.run.voice.RunVoice``)."""
+
+    def prepare(self, command: Say, confined: bool = False, /) -> Speak:
+        """Return the command that says a file or a text; raise if it cannot be said.
+
+        confined: only files in the folders of sounds
+        """
+
+    def feed(self, pcm: bytes, rate_hz: int, channels: int, volume: float, /) -> float:
+        """Say a piece of a stream; return the length that has not been heard, s."""
+
+    def finish(self) -> None:
+        """Mark the end of the stream."""
+
+
+def accept_only_stops(command: CommandTaker, reason: str) -> CommandTaker:
+    """Return a taker of stop and resume; it refuses other commands with the reason."""
+
+    def take(asked: Command) -> Ticket | None:
+        if not isinstance(asked, Stop | Resume):
+            raise ValueError(f"{reason}: only stop and resume are accepted")
+        return command(asked)
+
+    return take
+
+
+class CommandHandler:
+    """The handler of all requests. All methods are thread-safe.
+
+    Args:
+        command: Queues a command for the next tick.
+        params: The parameters, None if they cannot be read or changed.
+        refusals: Exceptions of ``params`` for a value that breaks a rule, besides ValueError;
+            the attribute contains all exceptions of ``handle``.
+        saved: Called with each written file.
+        fixed: Reason why parameters cannot be changed.
+        voice: Says sounds and texts; None if the head has no voice.
+        menus: Returns the menus.
+        tracks: Returns the available tracks.
+    """
+
+    def __init__(
+        self,
+        command: CommandTaker,
+        params: ParamAccess | None,
+        refusals: tuple[type[Exception], ...] = (),
+        saved: Callable[[Path], None] | None = None,
+        fixed: str = FIXED,
+        voice: Speaker | None = None,
+        menus: Callable[[], Mapping[str, tuple[str, ...]]] = dict,
+        tracks: Callable[[], Sequence[TrackInfo]] = tuple,
+    ) -> None:
+        self._command, self.params, self._voice = command, params, voice
+        self._menus, self._tracks = menus, tracks
+        self._saved, self._fixed = saved, fixed
+        self.refusals: tuple[type[Exception], ...] = (
+            ValueError, DriverError, OSError, *refusals,
+        )  # fmt: skip
+
+    def handle(self, request: Request, paths: PathGuard | None = None) -> object:
+        """Handle a request.
+
+        Args:
+            request: A question, a change of parameters or a command.
+            paths: Rules for file names, None if any file is allowed.
+
+        Returns:
+            The answer to a question; the notes for the user of a change, from the next tick on; the
+            saved file; or the ticket for the reply to a command, None without one.
+
+        Raises:
+            Exception: One of ``refusals``, with every broken rule.
+        """
+        match request:
+            case ReadMenus():
+                return self._menus()
+            case Tracks():
+                return self._tracks()
+            case SayPiece():
+                return self._say_piece(request)
+            case Say():
+                return self._command(self._require_voice().prepare(request, paths is not None))
+            case Command():
+                return self._command(request)
+        if self.params is None:
+            if isinstance(request, Get | Parameters | Unsaved | Characters):
+                return {} if isinstance(request, Get) else ()
+            raise ValueError(self._fixed)
+        return self._handle_params(request, self.params, paths)
+
+    def _handle_params(
+        self, request: Request, params: ParamAccess, paths: PathGuard | None
+    ) -> object:
+        match request:
+            case Parameters(prefix):
+                return [one for one in params.parameters() if one.key.startswith(prefix)]
+            case Get(prefix):
+                return params.get(prefix)
+            case Unsaved():
+                return params.unsaved()
+            case Characters():
+                return params.characters()
+            case Set(changes):
+                if paths is not None:
+                    paths.check_changes(changes)
+                return _notes(params.set({key: as_value(one) for key, one in changes.items()}))
+            case Save(path):
+                return self._save(params, path, paths)
+            case Revert():
+                return _notes(params.revert())
+            case Character(name):
+                if paths is not None and name not in params.characters():
+                    name = paths.check_file(name, "characters")
+                return _notes(params.apply_character(name))
+        raise ValueError(f"{type(request).__name__} is not available here")
+
+    def _say_piece(self, piece: SayPiece) -> float:
+        """Say a piece of a stream; return the length that has not been heard, s."""
+        voice = self._require_voice()
+        ahead_s = voice.feed(piece.pcm, piece.rate_hz, piece.channels, piece.volume)
+        if piece.last:
+            voice.finish()
+        return ahead_s
+
+    def _require_voice(self) -> Speaker:
+        if self._voice is None:
+            raise ValueError("this head has no voice")
+        return self._voice
+
+    def _save(self, params: ParamAccess, path: str | None, paths: PathGuard | None) -> SavedFile:
+        if path and paths is not None:
+            path = paths.check_file(path)
+        file = Path(path).expanduser() if path else None
+        if file is not None and not file.is_absolute():
+            raise ValueError(f"{path}: give the absolute path; the rig has its own folder")
+        saved = params.save(file)
+        if self._saved is not None:
+            self._saved(saved.path)
+        return saved
+
+
+def _notes(notes: object) -> tuple[str, ...]:
+    """Return the notes for the user in the result of a change."""
+    if isinstance(notes, str) or not isinstance(notes, Iterable):
+        return ()
+    return tuple(map(str, notes))

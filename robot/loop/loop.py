@@ -1,0 +1,491 @@
+"""The tick of a robot, and the loop that keeps its time."""
+
+import contextlib
+from collections.abc import Callable
+from math import inf, radians
+from typing import Any, NamedTuple
+
+from msgspec import structs
+
+from gazerig.drivers.camera.capture_loop import CLOSING
+from gazerig.drivers.errors import DriverError
+from gazerig.drivers.plugins import describe_error, plugin_error
+from gazerig.drivers.types import Camera
+from gazerig.gaze.attention.conversation import ConversationGaze
+from gazerig.gaze.lids.lids import Lids
+from gazerig.gaze.oculomotor.oculomotor import Oculomotor
+from gazerig.gaze.scanpath.scanpath import Scanpath
+from gazerig.gaze.track.animation import Animation
+from gazerig.gaze.types import Percept, Vec3
+from gazerig.robot.loop.body import Body
+from gazerig.robot.loop.chooser import TargetChooser
+from gazerig.robot.loop.command_choices import (
+    Menus,
+    refuse_impossible,
+    refuse_out_of_range,
+)
+from gazerig.robot.loop.command_executor import CommandExecutor
+from gazerig.robot.loop.command_queue import CommandQueue
+from gazerig.robot.loop.look_point import LastObservation, LookPoints
+from gazerig.robot.loop.real_time import freeze_objects
+from gazerig.robot.loop.stop_control import StopControl
+from gazerig.robot.loop.tick import Tick as Tick
+from gazerig.robot.loop.tick import stopped_result
+from gazerig.robot.loop.track_choices import TrackChoices, TrackInfo
+from gazerig.robot.model.client_control import ClientControl
+from gazerig.robot.model.clock import Clock, RealClock
+from gazerig.robot.model.commands import (
+    NO_TRACK,
+    AnyCommand,
+    Ask,
+    Command,
+    Jog,
+    MoveOpponent,
+    Play,
+    Speak,
+    Tune,
+    check_command,
+)
+from gazerig.robot.model.conversation import Conversation
+from gazerig.robot.model.frames import PoseHistory
+from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.loop_params import LoopParams
+from gazerig.robot.model.moved_opponent import TickClockOpponent
+from gazerig.robot.model.reply import Ticket
+from gazerig.robot.model.types import JointAngles
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.pixel_to_world import PixelToWorld
+from gazerig.robot.safety.guard import Guard
+
+PARK_S = 4.0
+"""Longest time for parking before torque is switched off."""
+
+
+class LoopCount(NamedTuple):
+    """Counts of a loop: ticks, overrun slots, and the reason for the end."""
+
+    ticks: int
+    overruns: int
+    stopped_by: str
+
+
+class Robot:
+    """One head, which reads, decides and writes in each tick.
+
+    Args:
+        body: The joints on their bus.
+        kinematics: Joint angles to head pose and gaze, and back.
+        camera: Source of detections.
+        perception: Detections to people and things in the world.
+        poses: History of the head's pose.
+        attention: Chooses the target.
+        scanpath: Chooses the part of a face.
+        conversation: Looks away from faces, and follows reported turns.
+        oculomotor: Target to eyes, head and lids; reports whether the gaze has arrived.
+        lids: Lids, for winks and sleepiness.
+        animation: Tracks and expressions on top of the gaze.
+        tracks: Tracks that can be played.
+        guard: Guard between desired angles and the bus.
+        tune: Applies changed parameters and returns messages about it.
+        pixels: Converts pixels of a camera frame to points in the world.
+        messages: Lines for the events of the next tick; other components add theirs.
+
+    closing_events: the camera's messages as it was closed
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        kinematics: Kinematics,
+        camera: Camera,
+        perception: Perception,
+        poses: PoseHistory,
+        attention: TargetChooser,
+        scanpath: Scanpath,
+        conversation: ConversationGaze,
+        oculomotor: Oculomotor,
+        lids: Lids,
+        animation: Animation,
+        tracks: TrackChoices,
+        guard: Guard,
+        tune: Callable[[Tune, float], tuple[str, ...]],
+        pixels: PixelToWorld,
+        messages: list[str] | None = None,
+    ) -> None:
+        self.body = body
+        self.camera = camera
+        self.perception = perception
+        self.attention: TargetChooser = attention
+        self._kinematics = kinematics
+        self._poses = poses
+        self._scanpath = scanpath
+        self._conversation_gaze = conversation
+        self._oculomotor = oculomotor
+        self._menus = Menus(conversation, lids, animation.expressions, tracks)
+        self._animation = animation
+        self._tracks = tracks
+        self._guard = guard
+        self._gaze_m: Vec3 | None = None
+        self._commands = CommandQueue()
+        self._lead = ClientControl()
+        self._conversation = Conversation()
+        self._messages: list[str] = messages if messages is not None else []
+        self.closing_events: tuple[str, ...] = ()
+        self._stop = StopControl(self._messages)
+        self._looks = LookPoints(pixels)
+        self._executor = CommandExecutor(
+            body, self._lead, self._stop, self._menus, attention, oculomotor, animation, tracks,
+            kinematics, guard, tune, self._messages, self._looks, self._conversation,
+        )  # fmt: skip
+
+    @property
+    def stopped(self) -> str:
+        """Return the reason for a stop, "" while the robot moves."""
+        return self._stop.stop_reason
+
+    def command(self, command: Command) -> Ticket:
+        """Queue a command for the next tick. Thread-safe.
+
+        Returns:
+            The ticket of the reply, which the loop gives when it executes the command.
+
+        Raises:
+            ValueError: The command is invalid, or the queue is full; the message lists the
+                available choices.
+        """
+        command = check_command(command)
+        if isinstance(command, Jog):
+            refuse_out_of_range(command, self.body.names, self._guard.limits)
+        if isinstance(command, MoveOpponent) and self._executor.opponent is None:
+            raise ValueError("no opponent to move: the run is in no world with a boxer")
+        if isinstance(command, Play):  # only a recording has the text of a track
+            command = structs.replace(command, yaml="")
+        return self.replay_command(command)
+
+    def replay_command(self, command: Command) -> Ticket:
+        """Queue a command that a recorded run accepted, without a check of the present ranges.
+
+        Raises:
+            ValueError: As ``command``.
+        """
+        command = check_command(command)
+        refuse_impossible(
+            command, self.menus, self.body.names, self._animation, self._tracks, self._guard.limits
+        )
+        return self._commands.add(command)
+
+    def set_opponent(self, opponent: TickClockOpponent) -> None:
+        """Let commands move a boxer of the emulated world."""
+        self._executor.opponent = opponent
+
+    def report(self, line: str) -> None:
+        """Add a line to the events of the next tick; only for the loop's thread."""
+        self._messages.append(line)
+
+    def ask(self, menu: str, choice: str) -> None:
+        """Choose a behaviour, a mode of conversation or a wink from the next tick on.
+
+        Thread-safe.
+
+        Raises:
+            ValueError: There is no such menu or choice; the message lists the available ones.
+        """
+        self.command(Ask(menu, choice))
+
+    def menus(self) -> dict[str, tuple[str, ...]]:
+        """Return the choices of ``ask``: menu -> choices, the present one first."""
+        return self._menus.choices(self.attention.top_down)
+
+    def tracks(self) -> tuple[TrackInfo, ...]:
+        """Return all tracks with their fit to this rig."""
+        return self._tracks.all_tracks(self._guard.limits)
+
+    def joint_latencies_s(self) -> tuple[float, ...]:
+        """Return the time of every joint from a command to its motion. Thread-safe."""
+        return self._tracks.latencies_s()
+
+    def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
+        """Open camera and bus, switch the torque on and start from the present angles.
+
+        Args:
+            clock: Clock of the loop.
+            ready: Called just before torque is switched on; its exception cancels the start.
+
+        Raises:
+            SetupError: A device is missing or does not match the configuration.
+        """
+        if isinstance(clock, RealClock):
+            freeze_objects()
+        try:
+            self._open(clock, ready)
+        except Exception as error:
+            if (named := plugin_error(error)) is not None:
+                raise named from error
+            raise
+
+    def _open(self, clock: Clock, ready: Callable[[], None] | None) -> None:
+        self.camera.open()
+        try:
+            if ready is not None:
+                ready()
+            goals = self.body.start(clock)
+        except BaseException:
+            self._close_camera()
+            raise
+        try:
+            self._initialize(clock.now_s(), goals)
+        except BaseException:
+            with contextlib.suppress(DriverError):
+                self.stop()
+            raise
+
+    def _initialize(self, t_s: float, goals: JointAngles) -> None:
+        """Initialize every component with the present angles of the joints."""
+        self._guard.reset(t_s, goals)
+        joints = self.body.read(t_s)
+        pose = self._kinematics.forward(joints)
+        self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
+        self._looks.newest = LastObservation(pose)
+        self.attention.reset(t_s)
+        self._conversation_gaze.reset(t_s)
+        self._scanpath.reset(t_s)
+        self._gaze_m = None
+        self._oculomotor.reset(t_s, pose)
+        self._animation.reset(t_s)
+        self._executor.reset()
+        self._executor.commanded_rad = goals
+
+    def tick(self, t_s: float, dt_s: float, watch: Callable[[Tick], None] | None = None) -> Tick:
+        """Read, perceive, choose, plan, guard, write; then reply to the commands.
+
+        Args:
+            t_s: Present time.
+            dt_s: Time since the last tick.
+            watch: Called with the tick before the replies, so that a client that has its reply
+                finds the tick, or a newer one.
+
+        Raises:
+            DriverError: The bus or the camera is lost, or a part of another package fails.
+        """
+        try:
+            tick = self._tick(t_s, dt_s)
+            if watch is not None:
+                watch(tick)
+            return tick
+        except Exception as error:
+            if (named := plugin_error(error)) is not None:
+                raise named from error
+            raise
+        finally:
+            self._commands.give_replies(t_s)
+
+    def _tick(self, t_s: float, dt_s: float) -> Tick:
+        commands = self._execute_commands(t_s)
+        joints = self.body.read(t_s)
+        pose = self._kinematics.forward(joints)
+        self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
+        if self._executor.models_took_over():
+            self._oculomotor.reset(t_s, pose)
+        detections = self.camera.latest(t_s)
+        percept = self.perception.see(detections, self._poses)
+        if self._conversation.active:
+            self._executor.follow_turn(self._conversation_gaze, t_s)
+        chosen = self.attention.choose(percept, pose, t_s)
+        chosen = self._executor.direct_by_track(chosen, percept, pose, t_s)
+        target = self._lead.target(chosen, percept, t_s)
+        rests_s = self._scanpath.rests_until_s
+        target = self._conversation_gaze.look(
+            target, pose.p_world_head_m, t_s, self._lead.active, rests_s, percept
+        )
+        # What appears delays the saccades under way (Reingold & Stampe 2002), so the gaze stays.
+        settled = self._oculomotor.has_arrived and not self.attention.reacts
+        target = self._scanpath.wander(
+            target, percept, t_s, settled, pose.p_world_head_m, self._gaze_m
+        )
+        offset = self._animation.step(t_s)
+        loudness = self._animation.loudness
+        if loudness is None and self._conversation.state.state == "speaking":
+            loudness = 1.0
+        self._oculomotor.speak(loudness)
+        gaze = self._oculomotor.step(target, pose, t_s, dt_s, offset)
+        self._gaze_m = gaze.gaze_point_world_m
+        desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)
+        if stopped := self._stop.stop_reason:
+            self._stop.keep_released(self.body, joints, t_s)
+            self._tracks.latency.interrupt()
+            guard_result = stopped_result(joints, desired, stopped, self.body.names)
+        else:
+            held = bool(self._lead.pose_rad)
+            self._guard.limp = self.body.relax_idle(desired, joints, t_s, held)
+            guard_result = self._guard.check(desired, joints, self._frame_age_s(percept, t_s), t_s)
+            self._messages += self._guard.take_reports()
+            self.body.write(guard_result.command_rad)
+            self._tracks.latency.add(t_s, guard_result.command_rad, joints)
+        self._executor.commanded_rad = guard_result.command_rad
+        converges = not self._kinematics.one_pan
+        lead = self._lead.measure(target, pose, joints.position_rad, converges, t_s)
+        events = (*self._messages, *self.body.bus.events(), *self.camera.events())
+        self._messages.clear()
+        tick = Tick(
+            t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
+            stopped, self._lead.controlled_by, lead, self._tracks.states(t_s), False,
+            self._conversation.state,
+        )  # fmt: skip
+        self._looks.see(tick)
+        return tick
+
+    def park(
+        self,
+        pose_rad: JointAngles,
+        clock: Clock,
+        params: LoopParams,
+        again: Callable[[], bool] | None = None,
+        watch: Callable[[Tick], object] | None = None,
+    ) -> bool:
+        """Move slowly to the parking pose; return whether it was reached in time.
+
+        A user's stop ends parking with the torque off. Other commands no longer get a reply.
+
+        Args:
+            pose_rad: Joint angles of the parking pose.
+            clock: Clock of the loop.
+            params: Rate of the loop.
+            again: Returns whether to skip the rest; called at every step.
+            watch: Called at every step with the last tick and the changes since.
+        """
+        self._guard.start_gently()
+        self.body.wake()
+        newest = self._looks.newest
+        rate_hz, start_s, slot = params.rate_hz, clock.now_s(), 0
+        end_s = start_s + PARK_S + 0.5 / rate_hz
+        last = int(PARK_S * rate_hz)
+        while (slot := max(slot, int((clock.now_s() - start_s) * rate_hz + 1e-6)) + 1) <= last:
+            clock.sleep_until(start_s + slot / rate_hz)
+            t_s = clock.now_s()
+            # A slow bus must not prolong parking; missed slots are skipped.
+            if t_s > end_s or (again is not None and again()):
+                return False
+            if stops := self._commands.take_stops():
+                for stop in stops:
+                    self._commands.reply(stop, self._executor.execute(stop.command, t_s))
+                if watch is not None and isinstance(newest, Tick):
+                    watch(newest.stopped_tick(t_s, self._stop.stop_reason, self.body.bus.events()))
+                self._commands.give_replies(t_s)
+                return False
+            joints = self.body.read(t_s)
+            guard_result = self._guard.check(pose_rad, joints, 0.0, t_s)
+            self.body.write(guard_result.command_rad)
+            if watch is not None and isinstance(newest, Tick):
+                pose, events = self._kinematics.forward(joints), self.body.bus.events()
+                watch(newest.parking_tick(t_s, joints, pose, pose_rad, guard_result, events))
+            errors = zip(pose_rad, joints.position_rad, strict=True)
+            if max(abs(desired - now) for desired, now in errors) < radians(2.0):
+                return True
+        return False
+
+    def stop(self) -> tuple[str, ...]:
+        """Switch the torque off, close bus and camera; return the bus's messages."""
+        try:
+            return self.body.stop()
+        finally:
+            self._close_camera()
+
+    def _close_camera(self) -> None:
+        """Close the camera; its error must not hide the reason of the end."""
+        try:
+            self.camera.close()
+            self.closing_events = tuple([e for e in self.camera.events() if e.startswith(CLOSING)])
+        except Exception as error:
+            named = plugin_error(error) or describe_error(error)
+            self.closing_events = (f"{CLOSING}: {named}",)
+
+    def _execute_commands(self, t_s: float) -> tuple[AnyCommand, ...]:
+        """Execute and return the queued commands, and end a control that was not renewed."""
+        taken: list[Any] = []
+        for waiting in self._commands.take() if self._commands else ():
+            command = self._looks.resolve_pixel(waiting.command)
+            if isinstance(command, Ask) and command.menu == "track":
+                command = Play("" if command.choice == NO_TRACK else command.choice)
+            if isinstance(command, Play | Speak):
+                command = self._tracks.complete(command, self._guard.limits)
+            taken.append(command)
+            self._commands.reply(waiting, self._executor.execute(command, t_s))
+        self._executor.end_expired(t_s)
+        return tuple(taken)
+
+    def _frame_age_s(self, percept: Percept | None, t_s: float) -> float:
+        """Return the age of the frame that the gaze depends on.
+
+        A target chosen by a client, and a neck or a point of a track, do not depend on the camera.
+        """
+        if not self._lead.needs_camera or self._animation.tracks.replaces_gaze:
+            return 0.0
+        return t_s - percept.captured_s if percept is not None else inf
+
+
+class TickLoop:
+    """A loop of ticks at absolute slots, one per call of ``step``.
+
+    Slots that a long tick overruns are counted and skipped, never caught up in a burst.
+
+    Args:
+        robot: Reads, decides and writes once per tick.
+        clock: The host's clock or a simulated one.
+        params: Rate of the loop.
+        stop: Takes the seconds since the start; returns the reason to stop, or None.
+        watch: Called with every tick.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        clock: Clock,
+        params: LoopParams,
+        stop: Callable[[float], str | None],
+        watch: Callable[[Tick], None],
+    ) -> None:
+        self._robot, self._clock, self._stop, self._watch = robot, clock, stop, watch
+        self._period_s = 1.0 / params.rate_hz
+        self._start_s = self._last_s = clock.now_s()
+        self._slot = self._ticks = self._overruns = 0
+
+    def step(self) -> str | None:
+        """Wait for the next slot and tick; return the reason for the end, otherwise None."""
+        clock, period = self._clock, self._period_s
+        self._slot += 1
+        clock.sleep_until(self._start_s + self._slot * period)
+        t_s = clock.now_s()
+        reason = self._stop(t_s - self._start_s)
+        if reason is not None:
+            return reason
+        try:
+            tick = self._robot.tick(t_s, t_s - self._last_s, self._watch)
+        except DriverError as error:
+            return f"fault: {error}"
+        if tick.guard_result.level == "torque_off" and not tick.stopped:
+            return f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
+        self._last_s = t_s
+        self._ticks += 1
+        late = int((clock.now_s() - self._start_s) / period) - self._slot
+        if late > 0:
+            self._overruns += late
+            self._slot += late
+        return None
+
+    def count(self, stopped_by: str) -> LoopCount:
+        """Return the counts of the loop."""
+        return LoopCount(self._ticks, self._overruns, stopped_by)
+
+
+def run(
+    robot: Robot,
+    clock: Clock,
+    params: LoopParams,
+    stop: Callable[[float], str | None],
+    watch: Callable[[Tick], None],
+) -> LoopCount:
+    """Tick until ``stop(seconds)`` returns a reason or a driver fails; see ``TickLoop``."""
+    loop = TickLoop(robot, clock, params, stop, watch)
+    while (reason := loop.step()) is None:
+        pass
+    return loop.count(reason)

@@ -1,0 +1,146 @@
+"""Stream of ticks to other processes, encoded in batches, once for all receivers.
+
+If each tick is encoded at its end, neither code nor encoder are in the processor's cache; a
+batch several times per second takes a third of that time. MessagePack keeps every number bit for
+bit.
+"""
+
+import re
+from collections.abc import Callable
+from math import inf
+from typing import Any, NamedTuple, TypeVar
+
+import msgspec
+import numpy as np
+from msgspec import UNSET, UnsetType
+from msgspec.structs import replace
+
+from gazerig.gaze.types import Percept
+from gazerig.robot.loop.observers import failure_text
+from gazerig.robot.loop.tick import BodyRecord, Tick, TickRecord
+
+T = TypeVar("T")
+LIVE_S = 0.0399  # slightly below 40 ms, so that rounding does not make it 45
+"""Time between two batches of a run in real time."""
+SIMULATED_S = 0.2
+"""Time between two batches in simulated time, without viewers."""
+
+
+class TickBatch(NamedTuple):
+    """A batch of ticks in the order of time.
+
+    Attributes:
+        data: A list of ``TickRecord``.
+        ticks: Number of ticks.
+        newest: The last tick.
+    """
+
+    data: bytes
+    ticks: int
+    newest: Tick
+
+
+class TickStream:
+    """A stream of ticks to sinks in batches; used only in the loop's thread.
+
+    Args:
+        report: Receives one line about each sink that fails and is removed.
+        every_s: Time between two batches.
+    """
+
+    def __init__(self, report: Callable[[str], None], every_s: float = LIVE_S) -> None:
+        self._report, self._every_s = report, every_s
+        self._sinks: tuple[tuple[str, Callable[[TickBatch], bool]], ...] = ()
+        self._records: list[TickRecord] = []
+        self._newest: Tick | None = None
+        self._due_s = -inf
+        self._percept: Percept | None | UnsetType = UNSET
+
+    def add_sink(self, name: str, take: Callable[[TickBatch], bool]) -> None:
+        """Add a sink, which returns False if it loses a batch."""
+        self._sinks = (*self._sinks, (name, take))
+
+    def update(self, tick: Tick) -> None:
+        """Add a tick of a run that is not recorded."""
+        self.append(tick, 0.0)
+
+    def append(self, tick: Tick, dt_s: float, before: tuple[BodyRecord, ...] = ()) -> None:
+        """Add a tick with its further inputs, and send a batch when it is due."""
+        percept = UNSET if tick.percept is self._percept else tick.percept
+        self._percept, self._newest = tick.percept, tick
+        plain = replace(tick, detections=None, percept=None)
+        self._records.append(TickRecord(plain, dt_s, percept, before))
+        if not 0.0 <= self._due_s - tick.t_s <= self._every_s:
+            self.flush()
+            self._due_s = tick.t_s + self._every_s
+
+    def flush(self) -> None:
+        """Send the ticks since the last batch."""
+        records, newest = self._records, self._newest
+        if newest is None or not records:
+            return
+        self._records = []
+        if not self._sinks:
+            return
+        batch = TickBatch(encode(records), len(records), newest)
+        for sink in self._sinks:
+            try:
+                if not sink[1](batch):
+                    self._percept = UNSET  # it may have lost the present percept
+            except Exception as error:
+                self._sinks = tuple([one for one in self._sinks if one is not sink])
+                self._report(failure_text(sink[0], error))
+
+
+def encode(value: object) -> bytes:
+    """Return a value as MessagePack.
+
+    Raises:
+        TypeError: A part of it has a type that msgspec does not support.
+    """
+    try:
+        return _encoder.encode(value)
+    except UnicodeEncodeError:  # a file or device name that is not text
+        return _encoder.encode(_to_utf8(msgspec.to_builtins(value, enc_hook=to_plain)))
+
+
+def decode(data: bytes, kind: type[T]) -> T:
+    """Return the value of a type that ``encode`` wrote.
+
+    Raises:
+        msgspec.MsgspecError: The data is not such a value.
+    """
+    return msgspec.msgpack.decode(data, type=kind, dec_hook=to_array)
+
+
+def all_finite(data: bytes) -> bool:
+    """Return True if all numbers in MessagePack are finite, False if one may not be."""
+    return _NOT_FINITE.search(data) is None
+
+
+def to_plain(value: Any) -> Any:
+    """Return a NumPy array or number as a list or a Python number, for msgspec's encoders."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is not part of a tick")
+
+
+def to_array(kind: Any, value: Any) -> Any:
+    """Return a list as a NumPy array, for msgspec's decoders."""
+    return np.array(value, float)
+
+
+def _to_utf8(value: Any) -> Any:
+    """Replace texts that cannot be written as UTF-8."""
+    if isinstance(value, str):
+        return value.encode(errors="replace").decode()
+    if isinstance(value, tuple | list):
+        return [_to_utf8(item) for item in value]
+    if isinstance(value, dict):
+        return {_to_utf8(key): _to_utf8(item) for key, item in value.items()}
+    return value
+
+
+_NOT_FINITE = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]")
+"""A double whose exponent has all bits set: nan, inf or, by chance, other equal bytes."""
+_encoder = msgspec.msgpack.Encoder(enc_hook=to_plain)

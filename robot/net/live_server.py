@@ -1,0 +1,270 @@
+"""Inputs of a running rig except the page: requests of programs, and edits of its files.
+
+A rig that is being calibrated accepts only stops: ``StopOnlyServer``.
+
+Files that users edit are watched. Editors overwrite a file, write it in two steps, rename a new
+file over it, or delete it for a moment. New content is therefore accepted when two checks in a row
+found the same, and a missing file when it is missing for several checks.
+"""
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Protocol
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.files.file_input import read_limited
+from gazerig.robot.loop.command_handler import (
+    CommandHandler,
+    ParamAccess,
+    PathGuard,
+    Speaker,
+    accept_only_stops,
+)
+from gazerig.robot.loop.loop import Robot
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.reply import CommandTaker
+from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
+from gazerig.robot.net.socket_server import RemoteServer
+
+EVERY_S = 0.5
+_LARGEST = 10_000_000  # bytes; no rig is as large, so more counts as missing
+_LOOKS = 2
+"""Checks in a row that must find the same content before it is read."""
+_LOOKS_CUT = 6
+"""Such checks of a missing file, or one without a final line end, which is probably not whole."""
+
+
+def read_content(path: Path) -> bytes:
+    """Return the content of a file, b"" if it cannot be read: absent, empty or not permitted."""
+    try:
+        return read_limited(path, _LARGEST)
+    except OSError:
+        return b""
+
+
+class WatchedFile:
+    """Detects when a file has new content that no longer changes; b"" is that of no file."""
+
+    def __init__(self, content: bytes) -> None:
+        self._known = self._last = content
+        self._looks = 0
+
+    def update(self, content: bytes) -> bool:
+        """Add a content of the file; return whether the file, new or missing, should be read."""
+        self._looks = self._looks + 1 if content == self._last else 1
+        self._last = content
+        enough = _LOOKS if content.endswith(b"\n") else _LOOKS_CUT
+        if content == self._known or self._looks < enough:
+            return False
+        self._known = content
+        return True
+
+
+class FileWatch:
+    """Thread that checks some files periodically.
+
+    Args:
+        files: Returns the files in use.
+        changed: Called in this thread with a path of ``files`` that should be read again, also if
+            the file is missing.
+    """
+
+    def __init__(
+        self,
+        files: Callable[[], Iterable[Path]],
+        changed: Callable[[Path], None],
+    ) -> None:
+        self._files = files
+        self._changed = changed
+        self._lock = threading.Lock()
+        self._watched: dict[Path, WatchedFile] = {}
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="file watch", daemon=True)
+
+    def start(self) -> None:
+        """Start watching; the present content of the files counts as read."""
+        self.look()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop watching."""
+        self._over.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=2.0)
+
+    def saved(self, path: Path) -> None:
+        """Treat a file as known: it was written by this program; for any thread.
+
+        A file that is not watched yet is watched from now on, so that an edit before the next check
+        is noticed.
+        """
+        same = path.resolve()
+        with self._lock:
+            known = [one for one in self._watched if one.resolve() == same]
+            for watched in known or [path]:
+                self._watched[watched] = WatchedFile(read_content(watched))
+
+    def look(self) -> None:
+        """Check all files once and report those that are new or stay missing."""
+        with self._lock:
+            files = dict.fromkeys(self._files())
+            self._watched = {
+                path: self._watched.get(path) or WatchedFile(read_content(path)) for path in files
+            }
+            new = [
+                path
+                for path, watched in self._watched.items()
+                if watched.update(read_content(path))
+            ]
+        # Not under the lock: the receiver may wait for a thread that saves.
+        for path in new:
+            self._changed(path)
+
+    def _watch(self) -> None:
+        while not self._over.wait(EVERY_S):
+            self.look()
+
+
+class FileTuning(ParamAccess, Protocol):
+    """Parameters of a running rig, and the files that define them."""
+
+    def files(self) -> Iterable[Path]:
+        """Return the files in use: the rig's file and its overlays."""
+
+    def reload(self, path: Path) -> object:
+        """Apply the contents of a file; on errors change nothing and raise with all of them."""
+
+
+class LiveServer:
+    """Remote control and file watch of one running rig.
+
+    Args:
+        robot: Executes commands.
+        tuning: Parameters and their files.
+        refusals: Exceptions that ``tuning`` raises if a value breaks a rule.
+        clock: Clock of the loop.
+        about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
+        say: Prints a line on the terminal.
+        fault: Executes a fault command of emulated servos; None if the servos are real.
+        changing: Returns the other fields of the status, e.g. {"page": address}.
+        paths: Rules for the files that a client of the network may name; None if any.
+        voice: Says sounds and texts; None if the head has no voice.
+
+    Attributes:
+        serve: Answers the page's process over a connection.
+        update: Stores the newest tick, for the loop.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        tuning: FileTuning,
+        refusals: tuple[type[Exception], ...],
+        clock: Clock,
+        about: Mapping[str, object],
+        say: Callable[[str], None],
+        fault: Callable[[str], str] | None = None,
+        changing: Callable[[], Mapping[str, object]] = dict,
+        paths: PathGuard | None = None,
+        voice: Speaker | None = None,
+    ) -> None:
+        self._tuning = tuning
+        self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
+        self._say = say
+        self._pulse = LoopMonitor(clock)
+        self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
+        self._watch = FileWatch(self._files, self._read_again)
+        handler = CommandHandler(
+            robot.command, tuning, refusals, self._watch.saved, voice=voice, menus=robot.menus,
+            tracks=robot.tracks,
+        )  # fmt: skip
+        self._server = RemoteServer(
+            RequestHandler(handler, self._pulse, about, fault, changing), say
+        )
+        # Apart from programs of this computer, so that neither uses up the other's time.
+        self._page_server = RemoteServer(
+            RequestHandler(handler, self._pulse, about, fault, changing, paths), say
+        )
+        self.serve, self.update = self._page_server.serve, self._pulse.update
+
+    def open(self) -> None:
+        """Listen to other programs and watch the files; print a line if listening fails."""
+        try:
+            self._server.open()
+        except SetupError as error:  # the head runs without remote control
+            self._say(f"gazerig ctl set and stop cannot find this rig: {error}")
+        self._watch.start()
+
+    def close(self) -> None:
+        """Close all connections and stop watching the files."""
+        self._watch.stop()
+        self._page_server.close()
+        self._server.close()
+
+    def _files(self) -> tuple[Path, ...]:
+        """Return the files in use; if the present ones cannot be determined, the previous ones."""
+        version, files = self._in_use
+        now = self._tuning.version
+        if now != version:
+            with contextlib.suppress(*self._refusals):
+                files = tuple(self._tuning.files())
+            self._in_use = now, files
+        return files
+
+    def _read_again(self, path: Path) -> None:
+        """Apply an edited file, or report all of its errors."""
+        try:
+            notes = self._tuning.reload(path)
+        except self._refusals as error:
+            self._say(f"{path} changed but has errors; the previous values stay:\n{error}")
+            return
+        lines = [str(note) for note in notes] if isinstance(notes, tuple | list) else []
+        if lines:
+            self._say("\n".join([f"{path} was edited: its values are applied", *lines]))
+        else:
+            self._say(f"{path} was written again without changes")
+
+
+_CALIBRATED = "it is being calibrated"
+
+
+class StopOnlyServer:
+    """Server that executes stop and resume, and refuses all other commands.
+
+    Args:
+        command: Queues a command for the next tick.
+        clock: Clock of the loop.
+        about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
+        say: Prints a line on the terminal.
+
+    Attributes:
+        serve: Answers the page's process over a connection.
+        update: Stores the newest tick, for the loop.
+    """
+
+    def __init__(
+        self,
+        command: CommandTaker,
+        clock: Clock,
+        about: Mapping[str, object],
+        say: Callable[[str], None],
+    ) -> None:
+        self._say = say
+        pulse = LoopMonitor(clock)
+        only = accept_only_stops(command, _CALIBRATED)
+        handler = CommandHandler(only, None, fixed=f"{_CALIBRATED}: its parameters are fixed")
+        self._server = RemoteServer(RequestHandler(handler, pulse, about), say)
+        self.serve, self.update = self._server.serve, pulse.update
+
+    def open(self) -> None:
+        """Listen to other programs; print a line if that fails."""
+        try:
+            self._server.open()
+        except SetupError as error:  # the head runs without remote control
+            self._say(f"gazerig stop cannot find this rig: {error}")
+
+    def close(self) -> None:
+        """Close all connections."""
+        self._server.close()

@@ -1,0 +1,108 @@
+"""Figures of a run, collected tick by tick and returned as one JSON object at the end."""
+
+from collections import Counter, defaultdict, deque
+from collections.abc import Mapping
+from math import degrees, inf, radians
+
+import numpy as np
+
+from gazerig.gaze.angles import add, angle_between, scale, sub, unit
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import Vec3
+from gazerig.robot.loop.feedback_basis import estimated_joints
+from gazerig.robot.loop.tick import Tick
+
+_FIXATION_RAD_S = radians(40.0)
+"""Largest speed of a fixation; 30 is usual, and a servo step in 20 ms is already 4.4 deg/s."""
+
+_EVENTS_KEPT = 100
+"""Number of newest values stored; a rig that runs for weeks must not fill the memory."""
+
+_PERIOD_S = 0.02
+"""Least time between two samples of the gaze, as those of an eye tracker at 50 Hz."""
+
+
+class Summary:
+    """Counts and shares over a run."""
+
+    def __init__(self) -> None:
+        self._target_s: defaultdict[str, float] = defaultdict(float)
+        self._part_s: defaultdict[str, float] = defaultdict(float)
+        self._limited: Counter[str] = Counter()
+        self._events: deque[tuple[float, str]] = deque(maxlen=_EVENTS_KEPT)
+        # Counts by thousandths of a degree: a list would grow while the rig runs.
+        self._errors_mdeg: Counter[int] = Counter()
+        self._first_s: float | None = None
+        self._last: Tick | None = None
+        self._sampled_s = -inf
+        self._gaze: Vec3 | None = None
+
+    def update(self, tick: Tick) -> None:
+        """Add one tick."""
+        if self._first_s is None:
+            self._first_s = tick.t_s
+        self._last = tick
+        for event in tick.events:
+            self._events.append((tick.t_s - self._first_s, event))
+        for reason in tick.guard_result.reasons:
+            self._limited[reason.partition(": ")[2]] += 1
+        if tick.t_s - self._sampled_s >= _PERIOD_S - 1e-9:
+            self._sample(tick)
+
+    def _sample(self, tick: Tick) -> None:
+        """Count the target, and the error of the gaze during a fixation."""
+        t_s, pose, target = tick.t_s, tick.pose, tick.target
+        left, right = line_of_sight(pose, True), line_of_sight(pose, False)
+        before, self._gaze = self._gaze, unit(add(left, right))
+        dt_s, self._sampled_s = t_s - self._sampled_s, t_s
+        if before is None:
+            return
+        self._target_s[target.kind] += dt_s
+        if target.part is not None:
+            self._part_s[target.part] += dt_s
+        # As in an eye tracker, the speed of the gaze defines a fixation.
+        still = angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s
+        if still and tick.gaze.phase != "saccade":
+            # Eyes that one linkage turns sideways stay parallel: the remaining error counts too.
+            point = add(target.p_world_m, scale(target.v_world_m_s, max(0.0, t_s - target.at_s)))
+            off_left = angle_between(left, sub(point, pose.p_world_eye_left_m))
+            off_right = angle_between(right, sub(point, pose.p_world_eye_right_m))
+            error_rad = 0.5 * (off_left + off_right)
+            self._errors_mdeg[round(1000.0 * degrees(error_rad))] += 1
+
+    def figures(self) -> dict[str, object]:
+        """Return the figures of the ticks; the caller adds bus, loop and frames."""
+        last = self._last
+        return {
+            "seconds": round(last.t_s - (self._first_s or 0.0), 6) if last else 0.0,
+            "fixations": last.gaze.fixations if last else 0,
+            "saccades": last.gaze.saccades if last else 0,
+            "blinks": last.gaze.blinks if last else 0,
+            "target_share": _shares(self._target_s),
+            "part_share": _shares(self._part_s),
+            "gaze_error_deg": {
+                "median": _percentile_deg(self._errors_mdeg, 50.0),
+                "p95": _percentile_deg(self._errors_mdeg, 95.0),
+            },
+            "estimated": list(estimated_joints(last)) if last else [],
+            "limited": dict(sorted(self._limited.items())),
+            "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
+        }
+
+
+def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:
+    """Return a percentile of counted thousandths of a degree, None without values."""
+    if not counts_mdeg:
+        return None
+    values = sorted(counts_mdeg)
+    reached = np.cumsum([counts_mdeg[value] for value in values])
+    return values[int(np.searchsorted(reached, percent / 100.0 * reached[-1]))] / 1000.0
+
+
+def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
+    """Return shares of the total, largest first."""
+    total = sum(seconds.values())
+    if total <= 0.0:
+        return {}
+    by_time = sorted(seconds.items(), key=lambda item: -item[1])
+    return {name: round(time / total, 4) for name, time in by_time}
