@@ -24,7 +24,7 @@ from gazerig.config.validation import fault_at, fill, suggestion_text, validate
 from gazerig.params import Declaration, declarations
 
 T = TypeVar("T")
-_FILES = re.compile(r"\.track_files\.\d+|\.meshes\..*\.file")
+_FILES = re.compile(r"\.track_files\.\d+")
 """Keys of a rig with file paths, relative to the folder of the file that contains them."""
 _PATH = re.compile(r"[^~]*[./]")
 """Start of a path to resolve; a name alone selects a shipped track."""

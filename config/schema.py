@@ -1,12 +1,11 @@
 """Rigs, rule sets and face walks by name or path, and rules between the sections of a rig."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from math import inf, sqrt
 from pathlib import Path
 
 from gazerig.config.load import (
-    Check,
     ConfigError,
     ConfigFault,
     find_file,
@@ -43,7 +42,6 @@ def load_rig(
     name_or_path: str,
     character: str | None = None,
     profile: str | None = None,
-    further: Sequence[Check[Rig]] = (),
 ) -> Rig:
     """Return a rig by shipped name or path, after checking every rule.
 
@@ -52,13 +50,12 @@ def load_rig(
         character: name or path of a file with differences, merged over rig and profile, instead of
             the rig's; "none" for none.
         profile: name or path of a style of gaze, instead of the rig's.
-        further: additional rules, such as those that read other files.
 
     Raises:
         gazerig.config.load.ConfigError: lists every fault.
     """
     layers = layers_of(name_or_path, character, profile)
-    return load(layers[-1], Rig, defaults=layers[:-1], checks=(*RULES, *further))
+    return load(layers[-1], Rig, defaults=layers[:-1], checks=RULES)
 
 
 def layers_of(

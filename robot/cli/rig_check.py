@@ -24,9 +24,8 @@ def check_line(rig: str) -> str:
     """
     from gazerig.config.rig import Rig
     from gazerig.config.schema import load_rig
-    from gazerig.robot.run.rig_description import mesh_faults
 
-    found: Rig = load_rig(rig, further=[mesh_faults])
+    found: Rig = load_rig(rig)
     return f"{rig}: valid: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
 
 

@@ -14,7 +14,6 @@ from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.params import choices_of
 from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.rig_description import mesh_faults
 from gazerig.robot.run.scene_files import load_scene
 from gazerig.robot.run.surroundings import surroundings
 from gazerig.sim_mock.scenes.scene import Scene
@@ -30,7 +29,7 @@ def run_rig(options: RunOptions) -> Rig:
         SetupError: an option names an unknown model.
     """
     names = (options.rig, options.character, options.profile)
-    return with_options(load_rig(*names, further=[mesh_faults]), options)
+    return with_options(load_rig(*names), options)
 
 
 def with_options(rig: Rig, options: RunOptions) -> Rig:
