@@ -5,7 +5,7 @@ decisions. With them a recorded run can be repeated bit for bit.
 """
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import TypeVar
 
 from gazerig.drivers.errors import ServoFault, SetupError
@@ -21,7 +21,6 @@ from gazerig.robot.loop.tick import (
 )
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, PoseHistory
-from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
 
@@ -29,50 +28,15 @@ H = TypeVar("H", bound=BodyRecord)
 
 
 class ForwardingBody(Body):
-    """A body that forwards every call to the wrapped body."""
+    """A body that forwards to the wrapped body every call that a subclass does not define."""
 
     def __init__(self, body: Body) -> None:
         # The initializer of Body is not called: the joints are those of the wrapped body.
         self.bus, self.names = body.bus, body.names
         self._body = body
-
-    def retune(self, joints: Mapping[str, JointParams], gentle_deg_s: float) -> None:
-        """Apply new limits of joints."""
-        self._body.retune(joints, gentle_deg_s)
-
-    def configured_limits(self) -> tuple[JointLimit, ...]:
-        """Return the ranges and speeds in the servos' configuration."""
-        return self._body.configured_limits()
-
-    def relax_idle(
-        self, desired_rad: JointAngles, joints: JointState, t_s: float, held: bool
-    ) -> frozenset[int]:
-        """Switch the torque of idle joints."""
-        return self._body.relax_idle(desired_rad, joints, t_s, held)
-
-    def wake(self) -> None:
-        """Switch the torque of idle joints on."""
-        self._body.wake()
-
-    def write(self, command_rad: JointAngles) -> None:
-        """Send one goal to every servo."""
-        self._body.write(command_rad)
-
-    def angles(self, steps: Sequence[float]) -> JointAngles:
-        """Return the joint angles of servo positions."""
-        return self._body.angles(steps)
-
-    def disable_torque(self) -> None:
-        """Switch the torque off immediately.
-
-        Raises:
-            BusLost: The port is gone.
-        """
-        self._body.disable_torque()
-
-    def stop(self) -> tuple[str, ...]:
-        """Switch the torque off and close the bus; return the bus's messages."""
-        return self._body.stop()
+        for name, method in vars(Body).items():
+            if not name.startswith("_") and getattr(type(self), name) is method:
+                setattr(self, name, getattr(body, name))
 
 
 class JointRecorder(ForwardingBody):
