@@ -20,8 +20,8 @@ from gazerig.config.plugin_sections import put_plugins, take_plugins
 from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import SHIPPED, is_path
 from gazerig.config.shipped_files import shipped_names as shipped_names
-from gazerig.config.validation import fault_at, fill, suggestion_text, validate
-from gazerig.params import Declaration, declarations
+from gazerig.config.validation import fault_at, fill, validate
+from gazerig.params import Declaration, declarations, suggestion_text
 
 T = TypeVar("T")
 _FILES = re.compile(r"\.track_files\.\d+")

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
 from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.params import unknown_text
 
 NEUTRAL = "neutral"
 """The initial expression. It always exists; without an entry all its offsets are 0."""
@@ -55,8 +56,8 @@ class Expressions:
     def require(self, name: str) -> None:
         """Raise ValueError for an unknown expression; the message lists the known ones."""
         if name not in self._offsets:
-            there = ", ".join(self.names) or "none: add a table expressions to the rig"
-            raise ValueError(f"no expression {name!r}; available: {there}")
+            remedy = "none: add a table expressions to the rig"
+            raise ValueError(unknown_text("expression", name, self.names, remedy))
 
     def step(self, t_s: float) -> PoseOffset:
         """Return the offset at a time; at rest it is the same object."""

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
 from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
-from gazerig.params import Bounds
+from gazerig.params import Bounds, unknown_text
 
 HOLD_S = 0.5
 """A level that was not set for this time returns to 0, as its program may have ended."""
@@ -84,8 +84,8 @@ class Levels:
     def require(self, name: str) -> None:
         """Raise ValueError for an unknown level; the message lists the known ones."""
         if name not in self._ranges:
-            known = ", ".join(self._ranges) or "none: add a table levels to the rig"
-            raise ValueError(f"no level {name!r}; available: {known}")
+            remedy = "none: add a table levels to the rig"
+            raise ValueError(unknown_text("level", name, self._ranges, remedy))
 
     def drop_lapsed(self, t_s: float) -> tuple[str, ...]:
         """Drop levels to 0 that were not set for ``HOLD_S``; return their names."""

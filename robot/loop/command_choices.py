@@ -8,6 +8,7 @@ from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.track.expression import Expressions
+from gazerig.params import unknown_text
 from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.commands import (
     NO_TRACK,
@@ -121,10 +122,9 @@ def refuse_unknown(command: Ask, menus: Mapping[str, Sequence[str]]) -> None:
         ValueError: The message lists the available choices.
     """
     if command.menu not in menus:
-        raise ValueError(f"no menu {command.menu!r}; available: {', '.join(menus)}")
+        raise ValueError(unknown_text("menu", command.menu, menus))
     if command.choice not in menus[command.menu]:
-        there = ", ".join(menus[command.menu])
-        raise ValueError(f"no {command.menu} {command.choice!r}; available: {there}")
+        raise ValueError(unknown_text(command.menu, command.choice, menus[command.menu]))
 
 
 def refuse_absent(command: Jog, joints: Sequence[str]) -> None:
@@ -135,7 +135,7 @@ def refuse_absent(command: Jog, joints: Sequence[str]) -> None:
     """
     for name, _ in command.angles_rad:
         if name not in joints:
-            raise ValueError(f"this rig has no joint {name!r}; available: {', '.join(joints)}")
+            raise ValueError(unknown_text("joint", name, joints))
 
 
 def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> None:

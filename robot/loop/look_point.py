@@ -7,6 +7,7 @@ from msgspec import structs
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, direction, rotate, scale
 from gazerig.gaze.types import Face, GazeState, Percept, Vec3
+from gazerig.params import unknown_text
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import (
     Command,
@@ -101,6 +102,5 @@ class LookPoints:
         for face in faces:
             if face.id == id and percept is not None:
                 return face, percept.captured_s
-        there = ", ".join(str(face.id) for face in faces)
-        seen = f"visible: {there}" if there else "nobody is visible"
-        raise ValueError(f"person {id} is not visible; {seen}")
+        visible = [str(face.id) for face in faces]
+        raise ValueError(unknown_text("visible person", str(id), visible, "nobody"))

@@ -15,6 +15,7 @@ from gazerig.gaze.track.track import BLEND_IN_S, BLEND_OUT_S, KEEP, Track
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.track.track_player import TrackPlayer, Voice
 from gazerig.gaze.types import ORDERED, Percept, Target, Vec3
+from gazerig.params import unknown_text
 from gazerig.robot.loop.joint_latency import JointLatency
 from gazerig.robot.model.commands import EndTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import FINISHED, SHOWN_S, TrackState
@@ -223,15 +224,13 @@ class TrackChoices:
         files = self._files
         track = files.from_text(command.yaml) if files and command.yaml else self._tracks.get(name)
         if track is None:
-            known = ", ".join(self.names)
-            raise ValueError(f"no track {name!r}; available: {known}")
+            raise ValueError(unknown_text("track", name, self.names))
         if isinstance(track, str):
             raise ValueError(f"{name}: {track}")
         start_s = command.from_s
         if isinstance(start_s, str):
             if start_s not in track.cues:
-                known = ", ".join(track.cues) or "none"
-                raise ValueError(f"{name} has no cue {start_s!r}; available: {known}")
+                raise ValueError(f"{name} has {unknown_text('cue', start_s, track.cues)}")
             start_s = track.cues[start_s]
         try:
             placed = self._fit.place(track, command.times)

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 import msgspec
 from msgspec import Meta, structs
 
+from gazerig.params import unknown_text
 from gazerig.robot.model.commands import (
     COMMANDS,
     AnyCommand,
@@ -145,7 +146,8 @@ def read_request(data: object) -> Request:
     except msgspec.ValidationError as error:
         kind = REQUESTS.get(str(data.get("do"))) if isinstance(data, dict) else None
         if kind is None:
-            raise ValueError(f"unknown request; available: {', '.join(REQUESTS)}") from None
+            name = str(data.get("do", "")) if isinstance(data, dict) else ""
+            raise ValueError(unknown_text("request", name, REQUESTS)) from None
         raise ValueError(f"{error}; {_fields_text(kind)}") from None
     if isinstance(request, Tune | Speak):
         raise ValueError("this is done by the requests set and say, which check it")

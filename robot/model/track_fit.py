@@ -23,6 +23,7 @@ from gazerig.gaze.track.track import (
 )
 from gazerig.gaze.track.track_motion import ChannelKeys, Strain, TrackEvents, TrackMotion
 from gazerig.gaze.types import Floats
+from gazerig.params import unknown_text
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.kinematics import NECK
 from gazerig.robot.model.reply import TrackReply
@@ -135,9 +136,9 @@ class TrackFit:
         ]
         faces = [(f.time_s, (f.express, f.strength)) for f in frames if f.express]
         for time_s, (face, _) in faces:
-            if face not in (NEUTRAL, *self._tables.expressions):
-                known = ", ".join((NEUTRAL, *self._tables.expressions))
-                raise TrackRefused(f"at {time_s:g} s: no expression {face!r}; available: {known}")
+            known = (NEUTRAL, *self._tables.expressions)
+            if face not in known:
+                raise TrackRefused(f"at {time_s:g} s: {unknown_text('expression', face, known)}")
         cues = sorted((time_s, name) for name, time_s in track.cues.items())
         if not (rows or looks or faces or cues or track.sound):
             raise TrackRefused(f"this rig has none of the joints that it moves: {', '.join(keys)}")

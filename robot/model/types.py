@@ -9,6 +9,8 @@ from typing import Literal, NamedTuple
 
 from msgspec import Struct
 
+from gazerig.params import unknown_text
+
 GAZE_JOINTS = (
     "left_eye_pan",
     "left_eye_tilt",
@@ -135,7 +137,7 @@ class GuardResult(Struct, frozen=True, gc=False):
             ValueError: There is no such joint; the message lists the joints.
         """
         if joint not in self.joints:
-            raise ValueError(f"no joint {joint!r}; available: {', '.join(self.joints)}")
+            raise ValueError(unknown_text("joint", joint, self.joints))
         i = self.joints.index(joint)
         return JointOutcome(
             self.desired_rad[i], self.command_rad[i], self.why[i] if self.why else ""

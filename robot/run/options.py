@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
+from gazerig.params import unknown_text
 from gazerig.robot.dashboard.door.token_file import read_token
 from gazerig.robot.run.computer import LEVELS, LoadLevel
 
@@ -180,7 +181,7 @@ class RunOptions:
             SetupError: the level is unknown.
         """
         if self.computer is not None and self.computer not in LEVELS:
-            raise SetupError(f"--computer {self.computer}: unknown; available: {', '.join(LEVELS)}")
+            raise SetupError(unknown_text("--computer", self.computer, LEVELS))
         return None if self.computer is None else LEVELS[self.computer]
 
     def _refuse_bus(self) -> None:
@@ -188,7 +189,7 @@ class RunOptions:
         if self.bus is None:
             return
         if self.bus not in BUSES:
-            raise SetupError(f"--bus {self.bus}: unknown; available: {', '.join(BUSES)}")
+            raise SetupError(unknown_text("--bus", self.bus, BUSES))
         if self.port is not None:
             raise SetupError(
                 f"--bus {self.bus} and --port exclude each other: servos at a port are real"

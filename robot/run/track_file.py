@@ -29,6 +29,7 @@ from gazerig.gaze.track.track import (
     Track,
 )
 from gazerig.gaze.types import Floats
+from gazerig.params import unknown_text
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.motion_keys import GRID_S, fit_keys, resample, smooth
 from gazerig.robot.model.reply import TrackReply
@@ -122,9 +123,7 @@ def track_text(
     channels = {channel_of_joint(name) for name in rig.names}
     unknown = [name for name in series if channel_of_joint(name) not in channels]
     if unknown:
-        raise SetupError(
-            f"no joint {unknown[0]!r}; available: {', '.join(rig.names)}; rename the column"
-        )
+        raise SetupError(f"{unknown_text('joint', unknown[0], rig.names)}; rename the column")
     start_s = min(float(times[0]) for times, _ in series.values())
     length_s = max(float(times[-1]) for times, _ in series.values()) - start_s
     if not GRID_S < length_s <= MAX_DURATION_S:
