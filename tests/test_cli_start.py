@@ -12,7 +12,8 @@ from command_line import gazerig, typed
 
 from gazerig import __version__
 from gazerig.drivers.serial.list_ports import SerialPort
-from gazerig.robot.cli.main import CommandsByName, next_steps
+from gazerig.robot.cli.command_list import Commands
+from gazerig.robot.cli.main import next_steps
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, exit_on_signals
 
 ON_BOARD = SerialPort("/dev/ttyS0", "n/a", "", None)
@@ -41,12 +42,12 @@ def test_gazerig_alone_shows_it_and_is_no_error() -> None:
 
 
 def test_the_list_of_commands_is_that_of_their_modules() -> None:
-    listed = CommandsByName()
-    for name, shown in dict(listed.data).items():
+    listed = Commands()
+    for name, entry in listed.entries.items():
         command = listed[name]
-        assert command.name == name and command.rich_help_panel == shown.rich_help_panel
+        assert command.name == name and command.rich_help_panel == entry.panel
         first = " ".join(command.help.split("\n\n")[0].split())
-        assert shown.help == first, f"{name}: mend cli/command_list.py"
+        assert entry.summary == first, f"{name}: mend cli/command_list.py"
 
 
 def test_the_version_is_that_of_the_package(capfd: Terminal) -> None:

@@ -5,9 +5,7 @@ Only the module of the typed command is imported. Without arguments, next steps 
 
 import logging
 import sys
-from collections import UserDict
-from collections.abc import Iterable, Mapping
-from importlib import import_module
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,52 +14,11 @@ from typer.core import TyperCommand, TyperGroup
 
 import gazerig
 from gazerig.drivers.plugins import COMMAND, SHIPPED, find
-from gazerig.robot.cli.command_list import (
-    CommandEntry,
-    package_commands,
-    shipped_commands,
-    sort_by_panel,
-)
-from gazerig.robot.cli.examples import add_examples, core_examples
+from gazerig.robot.cli.command_list import Commands
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, clear_errors, run_app
 
 if TYPE_CHECKING:
     from gazerig.drivers.serial.list_ports import SerialPort
-
-
-class CommandsByName(UserDict[str, Any]):
-    """Commands by name, each imported on access.
-
-    data: commands imported so far; for the others only name, summary and panel are known
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._imported: set[str] = set()
-        self.entries: dict[str, CommandEntry] = {}
-        self._add(shipped_commands())
-
-    def add_packages(self) -> None:
-        """Add the commands of installed packages; existing names are not replaced."""
-        self._add(package_commands())
-
-    def _add(self, entries: Mapping[str, CommandEntry]) -> None:
-        self.entries = {**entries, **self.entries}
-        for name, entry in entries.items():
-            listed = TyperCommand(name, help=entry.summary, rich_help_panel=entry.panel)
-            self.data.setdefault(name, listed)
-
-    def __getitem__(self, name: str) -> Any:
-        """Return a complete command; raise KeyError if the name is unknown."""
-        if name in self.data and name not in self._imported:
-            app = typer.Typer()
-            app.add_typer(import_module(self.entries[name].module).app)
-            add_examples(app, {**core_examples(), **self.entries[name].examples})
-            command: Any = typer.main.get_group(app).commands[name]
-            command.rich_help_panel = self.entries[name].panel
-            self.data[name] = command
-            self._imported.add(name)
-        return self.data[name]
 
 
 class CommandGroup(TyperGroup):
@@ -69,21 +26,24 @@ class CommandGroup(TyperGroup):
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        self.commands = self._every = CommandsByName()
+        self.commands = self._every = Commands()
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands, in the order of the help."""
         self._every.add_packages()
-        return sort_by_panel(self._every.entries)
+        return self._every.names()
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command with the data for a list, None if the name is unknown."""
-        if cmd_name not in self._every.data:
+        if cmd_name not in self._every.entries:
             self._every.add_packages()
-        if cmd_name not in self._every.data and cmd_name in SHIPPED[COMMAND]:
+        entry = self._every.entries.get(cmd_name)
+        if entry is not None:
+            return TyperCommand(cmd_name, help=entry.summary, rich_help_panel=entry.panel)
+        if cmd_name in SHIPPED[COMMAND]:
             with clear_errors():
                 find(COMMAND, cmd_name).load()  # its feature is missing: one line
-        return self._every.data.get(cmd_name)
+        return None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name and the complete command at the start of the arguments, and the rest."""

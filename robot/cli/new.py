@@ -78,7 +78,7 @@ def new(
         rig = NewRig(
             file.stem, chosen, joints_of(wanted), seen, distance, port or _plugged_in(chosen)
         )
-        from gazerig.robot.cli.rig_check import check_line
+        from gazerig.robot.cli.check import check_line
 
         write_file(file, rig_text(rig), force)
         try:

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.robot.cli.console import Console
-from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.options import RigCommand
 from gazerig.robot.cli.terminal import (
     FAULT,
     ForceOption,
