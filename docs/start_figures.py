@@ -16,7 +16,7 @@ from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.patches import Arc, Circle, Ellipse, FancyBboxPatch, Rectangle, Wedge  # noqa: E402
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.robot.cli.new_rig import MECHANISMS  # noqa: E402
+from gazerig.robot.cli.new import MECHANISMS  # noqa: E402
 from gazerig.robot.description.parts import EYE_RADIUS  # noqa: E402
 
 HERE = Path(__file__).parent / "figures"

@@ -10,7 +10,7 @@ from command_line import invoked, typed
 from gazerig.config.schema import load_rig
 from gazerig.config.shipped_files import SHIPPED
 from gazerig.robot.cli import new as command
-from gazerig.robot.cli.new_rig import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
+from gazerig.robot.cli.new import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
 from gazerig.robot.cli.terminal import LineWriter
 
 TEMPLATES = {

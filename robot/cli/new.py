@@ -1,33 +1,157 @@
-"""Command new: a new rig from a few answers."""
+"""Command new: a new rig's file from a few answers, the shortest working one."""
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
-from typing import Annotated
+from typing import Annotated, NamedTuple, TypeVar
 
 import typer
 
 from gazerig.config.faults import ConfigError
+from gazerig.config.save_text import format_value
 from gazerig.drivers.errors import SetupError, install_command
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.cli.new_rig import (
-    BOARDS,
-    CAMERAS,
-    MECHANISMS,
-    NewRig,
-    joints_of,
-    rig_text,
-    usual_port,
-)
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, finish_lines, say
 
 app = typer.Typer()
+T = TypeVar("T")
 
 _EYES_MM = 62.0
 _BOARD, _JOINTS, _CAMERA = "none", "eyes-lids", "webcam"
 """Defaults if there is no option and nobody can be asked."""
+
+BOARDS: Mapping[str, str] = {
+    "dynamixel": "Dynamixel servos on a U2D2, an OpenRB-150 or another adaptor",
+    "feetech": "Feetech STS servos on their adaptor",
+    "maestro": "hobby servos on a Pololu Maestro",
+    "pca9685": "hobby servos on a PCA9685 board, over I2C",
+    "none": "no board yet: emulated servos",
+}
+"""Boards of servos, with their descriptions."""
+
+CAMERAS: Mapping[str, str] = {
+    "webcam": "a webcam",
+    "oak": "an OAK-D",
+    "none": "no camera yet: a simulated visitor",
+}
+"""Cameras, with their descriptions."""
+
+_EYES = ("eyes_pan", "eyes_tilt")
+_BOTH_EYES = ("left_eye_pan", "left_eye_tilt", "right_eye_pan", "right_eye_tilt")
+_UPPER = ("left_upper_lid", "right_upper_lid")
+_LOWER = ("left_lower_lid", "right_lower_lid")
+_NECK = ("neck_yaw", "neck_pitch", "neck_roll")
+
+
+class Mechanism(NamedTuple):
+    """A common mechanism: its description, and its joints, one servo each."""
+
+    summary: str
+    joints: tuple[str, ...]
+
+
+MECHANISMS: Mapping[str, Mechanism] = {
+    "eyes": Mechanism("two servos: one turns both eyes left and right, one up and down", _EYES),
+    "eyes-lids": Mechanism("six: the same, and four lids", (*_EYES, *_UPPER, *_LOWER)),
+    "two-eyes": Mechanism("six: each eye separately, two upper lids", (*_BOTH_EYES, *_UPPER)),
+    "head": Mechanism("nine: the same, and a neck", (*_BOTH_EYES, *_UPPER, *_NECK)),
+}
+"""Mechanisms by the name for ``gazerig new --joints``, which also accepts names of joints."""
+
+
+class NewRig(NamedTuple):
+    """The rig to write.
+
+    board, camera: keys of BOARDS and CAMERAS
+    joints: names, in the order of their ids
+    eyes_mm: distance between the eye centres
+    port: serial port or I2C bus; empty: the usual one of the board
+    """
+
+    name: str
+    board: str
+    joints: tuple[str, ...]
+    camera: str
+    eyes_mm: float = 62.0
+    port: str = ""
+
+    @property
+    def has_neck(self) -> bool:
+        """Return whether a neck turns the head."""
+        return any(name in _NECK for name in self.joints)
+
+
+class _Servo(NamedTuple):
+    """Drive of a joint: its servo model, its function, and further settings in its line."""
+
+    model: str
+    speed_deg_s: int
+    accel_deg_s2: int
+    further_settings: str = ""
+
+
+class _Board(NamedTuple):
+    """Properties of a board.
+
+    port: its usual port; first_id: usual first id of its servos
+    eye, lid, neck: drives of the joints; gaze: settings for servos slower than the fastest ones
+    """
+
+    port: str
+    bus: str
+    first_id: int
+    id_comment: str
+    eye: _Servo
+    lid: _Servo
+    neck: _Servo
+    gaze: tuple[str, ...] = ()
+
+
+_NECKLESS_GAZE = "idle: {reach_deg: 28}"
+"""Idle gaze without a neck goes no farther than the eyes alone can turn."""
+_HOBBY = "servo_speed_deg_s: 600"
+_HOBBY_GAZE = (
+    "saccade: {max_speed_deg_s: 380}",
+    "oculomotor: {eye_lag_ms: 35, refixations: false}",
+    "lids: {close_ms: 170, open_ms: 260}",
+)
+_DYNAMIXEL = _Board(
+    "/dev/ttyUSB0", "kind: dynamixel", 1, "the servo's id",
+    _Servo("xl330-m077", 600, 45000, "gains: [1200, 0, 12000]"),
+    _Servo("xl330-m077", 1200, 60000, "gains: [700, 0, 5500]"),
+    _Servo("xc330-m288", 200, 2000, "gains: [2000, 0, 14000]"),
+)  # fmt: skip
+_TABLE: Mapping[str, _Board] = {
+    "dynamixel": _DYNAMIXEL,
+    "none": _DYNAMIXEL,
+    "feetech": _Board(
+        "/dev/ttyACM0", "kind: feetech", 1, "the servo's id",
+        _Servo("sts3215", 300, 15000, "gains: [48, 0, 64]"),
+        _Servo("sts3215", 300, 15000, "gains: [32, 0, 64]"),
+        _Servo("sts3215", 180, 1500, "gains: [32, 0, 64]"),
+        ("saccade: {max_speed_deg_s: 260, max_acceleration_deg_s2: 5400}",
+         "oculomotor: {eye_lag_ms: 15}", "lids: {close_ms: 290, open_ms: 400}"),
+    ),
+    "maestro": _Board(
+        "/dev/ttyACM0", "kind: maestro", 0, "the board's channel",
+        _Servo("hobby", 420, 30000, _HOBBY), _Servo("hobby", 500, 40000, _HOBBY),
+        _Servo("hobby", 120, 1000, _HOBBY), _HOBBY_GAZE,
+    ),
+    "pca9685": _Board(
+        "/dev/i2c-1", "kind: pca9685", 0, "the board's channel",
+        _Servo("hobby", 420, 30000, _HOBBY), _Servo("hobby", 500, 40000, _HOBBY),
+        _Servo("hobby", 120, 1000, _HOBBY), _HOBBY_GAZE,
+    ),
+}  # fmt: skip
+
+_PAN_DEG, _TILT_DEG, _UPPER_DEG, _LOWER_DEG, _OTHER_DEG = 35, 30, (-30, 25), (-10, 25), 30
+_NECK_DEG = {"neck_yaw": 70, "neck_pitch": 35, "neck_roll": 25}
+_HOBBY_TILT_DEG = 22
+_UPPER_ENDS, _LOWER_ENDS = (-25, 20), (-8, 20)
+_MIRRORED = ("right_eye_tilt", *_UPPER[1:], *_LOWER[1:])
+"""Joints whose servo is mounted mirrored to that on the left."""
 
 
 @app.command()
@@ -62,22 +186,20 @@ def new(
         if file.suffix not in (".yaml", ".yml"):
             raise SetupError(f"{file}: a rig's file ends in .yaml: gazerig new {file.stem}.yaml")
         refuse_existing(file, force=force)
-        asked = Questions(sys.stdin.isatty())
-        chosen = asked.ask_choice("Which board drives the servos?", "board", board, BOARDS, _BOARD)
         mechanisms = {name: one.summary for name, one in MECHANISMS.items()}
-        wanted = asked.ask_choice(
+        chosen = _choose("Which board drives the servos?", "board", board, BOARDS, _BOARD)
+        wanted = _choose(
             "Which joints do the servos move? (a mechanism, or names of joints: eyes_pan,eyes_tilt,jaw)",
             "joints", joints, mechanisms, _JOINTS, others=True,
         )  # fmt: skip
-        seen = asked.ask_choice(
-            "Which camera does the head use?", "camera", camera, CAMERAS, _CAMERA
-        )
-        distance = asked.ask_number(
-            "What is the distance between the eyes, in mm?", "eyes-mm", eyes_mm, _EYES_MM
-        )
+        seen = _choose("Which camera does the head use?", "camera", camera, CAMERAS, _CAMERA)
+        if eyes_mm is None and sys.stdin.isatty():
+            question = "What is the distance between the eyes, in mm? 10 to 500"
+            eyes_mm = _ask(question, f"{_EYES_MM:g}", "eyes-mm", _read_length)
         rig = NewRig(
-            file.stem, chosen, joints_of(wanted), seen, distance, port or _plugged_in(chosen)
-        )
+            file.stem, chosen, joints_of(wanted), seen, eyes_mm or _EYES_MM,
+            port or _plugged_in(chosen),
+        )  # fmt: skip
         from gazerig.robot.cli.check import check_line
 
         write_file(file, rig_text(rig), force)
@@ -90,70 +212,65 @@ def new(
             print(line)
 
 
-class Questions:
-    """Questions on the terminal for missing options; without a terminal, defaults are used.
+def _choose(
+    question: str, option: str, given: str | None, choices: Mapping[str, str], usual: str,
+    others: bool = False,
+) -> str:  # fmt: skip
+    """Return a choice: the value of an option, an answer by name or number, or the default.
 
-    terminal: whether a person can answer
+    Args:
+        question: Its text.
+        option: The option that answers it.
+        given: The value of that option.
+        choices: Choices with their descriptions.
+        usual: Default, chosen with Enter and if nobody can answer.
+        others: Whether names of joints are valid too.
+
+    Raises:
+        SetupError: the option's value is invalid, or there is no answer.
     """
-
-    def __init__(self, terminal: bool) -> None:
-        self._terminal = terminal
-
-    def ask_choice(
-        self, question: str, option: str, given: str | None, choices: Mapping[str, str],
-        usual: str, others: bool = False,
-    ) -> str:  # fmt: skip
-        """Return a choice, given by its name or its number.
-
-        Args:
-            question: Its text.
-            option: The option that answers it.
-            given: The value of that option.
-            choices: Choices with their descriptions.
-            usual: Default, chosen with Enter.
-            others: Whether other answers are valid too.
-
-        Raises:
-            SetupError: the option's value is invalid, or there is no answer.
-        """
-        names = list(choices)
-        if given is not None:
-            if given in choices or (others and given):
-                return given
+    names = list(choices)
+    if given is not None:
+        if given not in choices and not (others and given):
             raise SetupError(f"--{option} {given}: expected {', '.join(names)}")
-        if not self._terminal:
-            say(f"{option}: {usual} ({choices[usual]}); choices for --{option}: {', '.join(names)}")
-            return usual
-        say(question)
-        for number, (name, what) in enumerate(choices.items(), 1):
-            say(f"  {number}  {name:10} {what}")
-        while True:
-            answer = _missing_answer(f"1 to {len(names)}", str(names.index(usual) + 1), option)
-            if answer.isdecimal() and 0 < int(answer) <= len(names):
-                return names[int(answer) - 1]
-            if answer in choices or (others and "_" in answer):
-                return answer
-            say(f"{answer!r} is not a choice: give a number from 1 to {len(names)}, or a name")
+        return given
+    if not sys.stdin.isatty():
+        say(f"{option}: {usual} ({choices[usual]}); choices for --{option}: {', '.join(names)}")
+        return usual
 
-    def ask_number(self, question: str, option: str, given: float | None, usual: float) -> float:
-        """Return a length in mm.
+    def read(answer: str) -> str:
+        if answer.isdecimal() and 0 < int(answer) <= len(names):
+            return names[int(answer) - 1]
+        if answer in choices or (others and "_" in answer):
+            return answer
+        raise SetupError(f"{answer!r} is not a choice: give a number or a name")
 
-        Raises:
-            SetupError: there is no answer.
-        """
-        if given is not None:
-            return given
-        if not self._terminal:
-            return usual
-        say(question)
-        while True:
-            answer = _missing_answer("10 to 500", f"{usual:g}", option)
-            try:
-                if 10.0 <= (value := float(answer)) <= 500.0:
-                    return value
-            except ValueError:
-                pass
-            say(f"{answer!r} is not a length from 10 to 500 mm")
+    lines = (f"  {number}  {name:10} {choices[name]}" for number, name in enumerate(names, 1))
+    return _ask("\n".join((question, *lines)), str(names.index(usual) + 1), option, read)
+
+
+def _read_length(answer: str) -> float:
+    try:
+        if 10.0 <= (value := float(answer)) <= 500.0:
+            return value
+    except ValueError:
+        pass
+    raise SetupError(f"{answer!r} is not a length from 10 to 500 mm")
+
+
+def _ask(question: str, usual: str, option: str, read: Callable[[str], T]) -> T:
+    """Ask a question until the answer can be read."""
+    say(question)
+    while True:
+        finish_lines()
+        try:
+            answer = input(f"[{usual}]: ").strip() or usual
+        except EOFError:
+            raise SetupError(f"no answer: use the option --{option}") from None
+        try:
+            return read(answer)
+        except SetupError as error:
+            say(str(error))
 
 
 def next_steps(rig: NewRig, file: str) -> Iterable[str]:
@@ -186,9 +303,106 @@ def _plugged_in(board: str) -> str:
     return (usb[0].by_id or usb[0].device) if len(usb) == 1 else ""
 
 
-def _missing_answer(what: str, usual: str, option: str) -> str:
-    finish_lines()
-    try:
-        return input(f"{what} [{usual}]: ").strip() or usual
-    except EOFError:
-        raise SetupError(f"no answer: use the option --{option}") from None
+def rig_text(new: NewRig) -> str:
+    """Return the YAML of a rig.
+
+    Raises:
+        KeyError: there is no such board or camera.
+    """
+    return "".join(f"{line}\n" for line in _lines(new, _TABLE[new.board], new.camera))
+
+
+def usual_port(board: str) -> str:
+    """Return the usual port of a board."""
+    return _TABLE[board].port
+
+
+def joints_of(text: str) -> tuple[str, ...]:
+    """Return the joints of a mechanism's name, or of joint names separated by commas."""
+    if text in MECHANISMS:
+        return MECHANISMS[text].joints
+    return tuple(name for word in text.split(",") if (name := word.strip()))
+
+
+def _lines(new: NewRig, board: _Board, camera: str) -> Iterator[str]:
+    there = "no board yet: only with --mock" if new.board == "none" else "`gazerig scan` lists it"
+    yield f"# A head of {len(new.joints)} servos. All keys, with units and ranges: docs/parameters.md."
+    yield f"name: {format_value(new.name)}"
+    yield "profile: robot"
+    yield f"bus: {{{board.bus}, port: {format_value(new.port or board.port)}}}  # port: {there}"
+    yield "# Measure in mm: the eyes' centres ahead of and above the neck's pitch axis (or the table)."
+    height, ahead, above = (70, 38, 55) if new.has_neck else (0, 0, 90)
+    yield "geometry:"
+    yield (
+        f"  {{pitch_axis_height_mm: {height}, eyes_ahead_mm: {ahead}, eyes_above_mm: {above}, "
+        f"interocular_mm: {new.eyes_mm:g}}}"
+    )
+    yield f"joints:  # id: {board.id_comment}; `gazerig calibrate` measures zero, sign and range of each"
+    for number, name in enumerate(new.joints):
+        yield f"  {name}: {{id: {board.first_id + number}, {_joint(name, board)}}}"
+    yield from _lids_and_park(new.joints)
+    yield from _camera_lines(new, camera)
+    gaze = list(board.gaze)
+    if "neck_yaw" not in new.joints:
+        gaze.append(_NECKLESS_GAZE)
+    if gaze:
+        yield "gaze:  # differences from a head with a neck and fast servos"
+        yield from (f"  {line}" for line in gaze)
+
+
+def _lids_and_park(joints: tuple[str, ...]) -> Iterator[str]:
+    """Return the shut and open angles of the lids, and the pose before torque is switched off."""
+    lids = [name for name in joints if name in (*_UPPER, *_LOWER)]
+    if lids:
+        yield "lid_joints:  # each lid shut and fully open"
+        for name in lids:
+            shut, wide = _lid_ends_deg(name)
+            key = name.removesuffix("_lid").removesuffix("_upper")
+            yield f"  {key}_deg: [{shut}, {wide}]"
+    park = [f"{name}: {_lid_ends_deg(name)[0]}" for name in lids]
+    if "neck_pitch" in joints:
+        park = ["neck_pitch: -12", *park]
+    if park:
+        yield f"park_deg: {{{', '.join(park)}}}"
+
+
+def _joint(name: str, board: _Board) -> str:
+    """Return the settings in a joint's line after its id."""
+    low, high = _range_deg(name, board)
+    servo = board.eye
+    if name.endswith("_lid"):
+        servo = board.lid
+    elif "eye" not in name:
+        servo = board.neck
+    parts = [
+        f"model: {servo.model}", f"min_deg: {low}", f"max_deg: {high}",
+        f"max_speed_deg_s: {servo.speed_deg_s}", f"max_accel_deg_s2: {servo.accel_deg_s2}",
+        *(["sign: -1"] if name in _MIRRORED else []), servo.further_settings,
+    ]  # fmt: skip
+    return ", ".join(part for part in parts if part)
+
+
+def _range_deg(name: str, board: _Board) -> tuple[int, int]:
+    if name in _UPPER or name in _LOWER:
+        return _UPPER_DEG if name in _UPPER else _LOWER_DEG
+    if name.endswith("_tilt") and board.eye.model == "hobby":
+        return -_HOBBY_TILT_DEG, _HOBBY_TILT_DEG
+    way = {"pan": _PAN_DEG, "tilt": _TILT_DEG}.get(name.rpartition("_")[2], _OTHER_DEG)
+    half = _NECK_DEG.get(name, way)
+    return -half, half
+
+
+def _lid_ends_deg(lid: str) -> tuple[int, int]:
+    return _UPPER_ENDS if lid in _UPPER else _LOWER_ENDS
+
+
+def _camera_lines(new: NewRig, camera: str) -> Iterator[str]:
+    """Return the mount of the camera: on the head if a neck turns it, otherwise next to it."""
+    if CAMERAS[camera] == CAMERAS["none"]:
+        return
+    where = ("head", "[20, 0, 45]") if new.has_neck else ("base", "[10, 0, 140]")
+    field = 69 if camera == "oak" else 60
+    yield "# position_mm: the lens ahead, left and above of " + (
+        "the point between the eyes." if new.has_neck else "the point on the table below the eyes."
+    )
+    yield f"camera: {{mount: {where[0]}, position_mm: {where[1]}, horizontal_field_deg: {field}}}"
