@@ -2,15 +2,14 @@
 
 The list is static, because a short command must not import the modules of all others;
 tests/test_cli_start.py compares it with them. Commands of features and packages come from entry
-points. Examples of the core's commands are in command_examples.json.
+points, those of the core are in commands.json.
 """
 
 from collections import UserDict
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import typer
@@ -18,11 +17,11 @@ import typer
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import COMMAND, SHIPPED, Registration, find, registrations
 
-Examples = Iterable[tuple[str, str]]
+Examples = tuple[tuple[str, str], ...]
 """Arguments of ``gazerig``, and their purpose."""
 
 
-class CommandEntry(NamedTuple):
+class CommandEntry(msgspec.Struct, frozen=True):
     """One command in the list; the object of an entry point of the group ``gazerig.command``.
 
     Attributes:
@@ -35,7 +34,7 @@ class CommandEntry(NamedTuple):
     module: str
     summary: str
     panel: str = "Tools"
-    examples: Mapping[str, Examples] = MappingProxyType({})
+    examples: Mapping[str, Examples] = {}
 
 
 PANELS = ("Run", "Look back", "Study", "Bring-up", "Tools", "For specialists")
@@ -43,63 +42,11 @@ PANELS = ("Run", "Look back", "Study", "Bring-up", "Tools", "For specialists")
 SPECIALIST = PANELS[-1]
 """Panel of commands that are not needed for a first head."""
 
-_CORE: dict[str, tuple[str, str, str]] = {
-    "run": (
-        "run", "Run",
-        "Run the head: gazerig run --mock, then open the page at the printed address.",
-    ),
-    "ctl": (
-        "ctl", "Run",
-        "Control a rig that runs in another terminal: parameters, gaze target, behaviour.",
-    ),
-    "stop": (
-        "ctl", "Run",
-        "Switch the torque of every running rig off at once; nothing parks, the programs continue.",
-    ),
-    "rerun": (
-        "recordings", "Look back",
-        "Run a recording's input through the present models: same input, same bytes.",
-    ),
-    "export": (
-        "recordings", "Look back",
-        "Export a run as CSV for eye-tracking tools: samples and events, degrees, + left and + up.",
-    ),
-    "new": (
-        "new", "Tools",
-        "Write a new rig's YAML from a few answers, check it, and print the next command.",
-    ),
-    "check": (
-        "check", "Tools", "Check a rig's YAML and list all faults at once; no servo is contacted."
-    ),
-    "door": (
-        "door", "Tools",
-        "Let a voice assistant or agent take part with the running head; without a name, list all.",
-    ),
-    "models": (
-        "models", "Tools",
-        "List and download model files that detect faces, people, hands and eyes.",
-    ),
-    "describe": (
-        "describe", SPECIALIST,
-        "Write a rig as a robot description: MJCF, URDF and glTF with meshes, or one of them.",
-    ),
-    "emulate": (
-        "emulate", SPECIALIST,
-        "Emulate servos on a pseudo-terminal; print its path as JSON and accept fault commands.",
-    ),
-}  # fmt: skip
-"""Command -> its module in this folder, panel and summary."""
-
 
 def shipped_commands() -> dict[str, CommandEntry]:
     """Return the commands of the core and of the installed features, by name."""
-    text = Path(__file__).with_name("command_examples.json").read_bytes()
-    examples = msgspec.json.decode(text, type=dict[str, dict[str, str]])
-    given = {command: tuple(some.items()) for command, some in examples.items()}
-    core = {
-        name: CommandEntry(f"gazerig.robot.cli.{module}", summary, panel, given)
-        for name, (module, panel, summary) in _CORE.items()
-    }
+    text = Path(__file__).with_name("commands.json").read_bytes()
+    core = msgspec.json.decode(text, type=dict[str, CommandEntry])
     return core | _load_entries(find(COMMAND, name) for name in SHIPPED[COMMAND])
 
 
