@@ -1,6 +1,6 @@
 """Draw the pictures of docs/start.md: mechanisms with their ids, wiring, and what to measure.
 
-What stands in them is the program's: joints and ids from gazerig.robot.cli.new_rig, whose file a
+What stands in them is the program's: joints and ids from gazerig.robot.cli.new, whose file a
 reader writes with ``gazerig new``.
 """
 

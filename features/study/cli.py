@@ -14,7 +14,7 @@ from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
 from gazerig.robot.cli.options import complete_shipped, run_option
-from gazerig.robot.cli.progress_bar import progress_bar
+from gazerig.robot.cli.progress import progress_bar
 from gazerig.robot.cli.run import is_desktop_here, open_page
 from gazerig.robot.cli.terminal import clear_errors, record_signals, say
 from gazerig.robot.model.clock import RealClock
@@ -100,7 +100,7 @@ def run(
             journal = Journal(folder.participant(participant))
             stack.callback(journal.close)
             if shown.on == "film":
-                with progress_bar(remaining=True) as steps:
+                with progress_bar() as steps:
                     made = films(found, folder.path / "films", steps)
             else:
                 seen = parse_camera(camera)

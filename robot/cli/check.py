@@ -1,86 +1,62 @@
 """Command check, for files of rigs; no hardware is used."""
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import typer
 
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, say
 
+if TYPE_CHECKING:
+    from gazerig.config.rig import Rig
+
 app = typer.Typer()
+_SMALLEST_DEG = 4.0
+"""Larger than pi: ranges of joints in radians are within."""
 
 
 @app.command()
 def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and list all faults at once; no servo is contacted."""
     with clear_errors(rig):
-        lines = (check_line(rig), *unit_lines(rig), *weight_lines(rig), *track_lines(rig))
-        for line in lines:
+        from gazerig.config.schema import load_rig
+        from gazerig.robot.run.rig_weight import weight_findings
+
+        loaded = load_rig(rig)
+        say(good_text(rig, loaded))
+        for finding in (*_find_radians(loaded), *weight_findings(loaded)):
+            say(f"{rig}: {finding}")
+        for line in _track_lines(loaded):
             say(line)
 
 
-def check_line(rig: str) -> str:
-    """Load a rig and return one line of success.
-
-    Raises:
-        ConfigError: lists every fault of its files.
-    """
-    from gazerig.config.rig import Rig
-    from gazerig.config.schema import load_rig
-
-    found: Rig = load_rig(rig)
-    return f"{rig}: valid: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
+def good_text(name: str, rig: "Rig") -> str:
+    """Return one line about a rig without faults."""
+    return f"{name}: valid: rig {rig.name!r}, {len(rig.joints)} joints, profile {rig.profile}"
 
 
-_SMALLEST_DEG = 4.0
-"""Larger than pi: ranges of joints in radians are within."""
+def _find_radians(rig: "Rig") -> Iterator[str]:
+    """Return a hint if the ranges of the joints look like radians."""
+    from gazerig.robot.run.track_file import radians_hint
+
+    ends = [end for one in rig.joints.values() for end in (one.min_deg, one.max_deg)]
+    if hint := radians_hint(ends, _SMALLEST_DEG):
+        yield f"min_deg and max_deg of all joints: {hint}"
 
 
-def unit_lines(rig: str) -> list[str]:
-    """Return a hint for ranges and for each own track whose angles look like radians.
-
-    Raises:
-        ConfigError: the rig is invalid.
-    """
+def _track_lines(rig: "Rig") -> Iterator[str]:
+    """Return how a rig plays each of its own tracks, and whether its angles look like radians."""
     from gazerig.config.load import find_file
-    from gazerig.config.schema import load_rig
-    from gazerig.config.tracks import load_track
-    from gazerig.robot.run.track_file import radians_hint, track_angles_deg
-
-    loaded = load_rig(rig)
-    ends = [end for one in loaded.joints.values() for end in (one.min_deg, one.max_deg)]
-    hints = {f"{rig}: min_deg and max_deg of all joints": radians_hint(ends, _SMALLEST_DEG)}
-    for file in loaded.track_files:
-        hints[file] = radians_hint(track_angles_deg(load_track(find_file("tracks", file))))
-    return [f"{where}: {hint}" for where, hint in hints.items() if hint]
-
-
-def weight_lines(rig: str) -> list[str]:
-    """Return what the neck of a good rig holds at rest.
-
-    Raises:
-        ConfigError: the rig is not good.
-    """
-    from gazerig.config.schema import load_rig
-    from gazerig.robot.run.rig_weight import weight_findings
-
-    return [f"{rig}: {finding}" for finding in weight_findings(load_rig(rig))]
-
-
-def track_lines(rig: str) -> list[str]:
-    """Return how a good rig plays each of its own tracks.
-
-    Raises:
-        ConfigError: the rig is not good.
-    """
-    from gazerig.config.load import find_file
-    from gazerig.config.schema import load_rig
     from gazerig.config.tracks import load_track
     from gazerig.robot.model.track_fit import TrackRefused
-    from gazerig.robot.run.track_file import fit_to_rig
+    from gazerig.robot.run.track_file import fit_to_rig, radians_hint, track_angles_deg
 
-    loaded, lines = load_rig(rig), []
-    for file in loaded.track_files:
+    for file in rig.track_files:
         path = find_file("tracks", file)
+        track = load_track(path)
+        if hint := radians_hint(track_angles_deg(track)):
+            yield f"{file}: {hint}"
         try:
-            lines.append(f"{file}: {fit_to_rig(loaded, path.stem, load_track(path)).text()}")
+            yield f"{file}: {fit_to_rig(rig, path.stem, track).text()}"
         except TrackRefused as refused:
-            lines.append(f"{file}: {loaded.name} cannot play it: {refused}")
-    return lines
+            yield f"{file}: {rig.name} cannot play it: {refused}"

@@ -15,6 +15,7 @@ from gazerig.config.faults import ConfigError
 from gazerig.config.save_text import format_value
 from gazerig.drivers.errors import SetupError, install_command
 from gazerig.drivers.files.file_output import refuse_existing, write_file
+from gazerig.robot.cli.check import good_text
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, finish_lines, say
 
 app = typer.Typer()
@@ -158,11 +159,11 @@ def new(
             file.stem, chosen, joints_of(wanted), seen, eyes_mm or _EYES_MM,
             port or _plugged_in(chosen),
         )  # fmt: skip
-        from gazerig.robot.cli.check import check_line
+        from gazerig.config.schema import load_rig
 
         write_file(file, rig_text(rig), force)
         try:
-            say(check_line(str(file)))
+            say(good_text(str(file), load_rig(str(file))))
         except ConfigError:  # an invalid file is deleted
             file.unlink()
             raise

@@ -10,7 +10,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.robot.cli.ctl import read_value
 from gazerig.robot.cli.options import RigCommand, run_option
-from gazerig.robot.cli.progress_bar import progress_bar
+from gazerig.robot.cli.progress import progress_bar
 from gazerig.robot.cli.terminal import (
     FAULT,
     INTERRUPTED,
@@ -86,7 +86,7 @@ def sweep(
         check_points(own, points)
         runs = [(point, seed + number) for point in points for number in range(seeds)]
         with (
-            progress_bar(remaining=True) as tell,
+            progress_bar() as tell,
             record_signals() as stopped,
             open_executor(jobs, scheduler) as executor,
         ):
