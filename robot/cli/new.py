@@ -1,11 +1,11 @@
 """Command new: a new rig's file from a few answers, the shortest working one."""
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
-from typing import Annotated, Literal, NamedTuple, TypeVar
+from typing import Annotated, Literal, NamedTuple
 
 import msgspec
 import typer
@@ -16,10 +16,9 @@ from gazerig.config.save_text import format_value
 from gazerig.drivers.errors import SetupError, install_command
 from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.robot.cli.check import good_text
-from gazerig.robot.cli.terminal import ForceOption, clear_errors, finish_lines, say
+from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
 
 app = typer.Typer()
-T = TypeVar("T")
 
 _EYES_MM = 62.0
 _BOARD, _JOINTS, _CAMERA = "none", "eyes-lids", "webcam"
@@ -153,8 +152,8 @@ def new(
         )  # fmt: skip
         seen = _choose("Which camera does the head use?", "camera", camera, CAMERAS, _CAMERA)
         if eyes_mm is None and sys.stdin.isatty():
-            question = "What is the distance between the eyes, in mm? 10 to 500"
-            eyes_mm = _ask(question, f"{_EYES_MM:g}", "eyes-mm", _read_length)
+            question = "What is the distance between the eyes, in mm?"
+            eyes_mm = typer.prompt(question, f"{_EYES_MM:g}", value_proc=_read_length, err=True)
         rig = NewRig(
             file.stem, chosen, joints_of(wanted), seen, eyes_mm or _EYES_MM,
             port or _plugged_in(chosen),
@@ -202,10 +201,11 @@ def _choose(
             return names[int(answer) - 1]
         if answer in choices or (others and "_" in answer):
             return answer
-        raise SetupError(f"{answer!r} is not a choice: give a number or a name")
+        raise typer.BadParameter(f"{answer!r} is not a choice: give a number or a name")
 
     lines = (f"  {number}  {name:10} {choices[name]}" for number, name in enumerate(names, 1))
-    return _ask("\n".join((question, *lines)), str(names.index(usual) + 1), option, read)
+    text = "\n".join((question, *lines, "choice"))
+    return str(typer.prompt(text, str(names.index(usual) + 1), value_proc=read, err=True))
 
 
 def _read_length(answer: str) -> float:
@@ -214,22 +214,7 @@ def _read_length(answer: str) -> float:
             return value
     except ValueError:
         pass
-    raise SetupError(f"{answer!r} is not a length from 10 to 500 mm")
-
-
-def _ask(question: str, usual: str, option: str, read: Callable[[str], T]) -> T:
-    """Ask a question until the answer can be read."""
-    say(question)
-    while True:
-        finish_lines()
-        try:
-            answer = input(f"[{usual}]: ").strip() or usual
-        except EOFError:
-            raise SetupError(f"no answer: use the option --{option}") from None
-        try:
-            return read(answer)
-        except SetupError as error:
-            say(str(error))
+    raise typer.BadParameter(f"{answer!r} is not a length from 10 to 500 mm")
 
 
 def next_steps(rig: NewRig, file: str) -> Iterable[str]:

@@ -34,8 +34,7 @@ from gazerig.robot.model.commands import Jog, Stop
 Ints = NDArray[np.int64]
 
 MOVEMENTS = ("", "fixation", "saccade", "pursuit")
-"""Movements of the eyes; "" if none of these: they were moved by hand, had no torque, or were at
-their limit while the head carried them to the target."""
+"""Movements of the eyes; "" if none of these: they were moved by hand or had no torque."""
 
 _CODE = {"fixate": 1, "saccade": 2, "pursue": 3}
 _ARRIVED_RAD = 0.009  # half a degree: a new target within this distance needs no saccade
@@ -219,11 +218,6 @@ SHORTEST_PURSUIT_S = 0.1
 """A target's velocity fluctuates about the motion threshold; a shorter pursuit is part of the
 movements around it."""
 
-# The head carries eyes at their limit if the gaze, over this time, moves faster than this, farther
-# than this from the planned direction. No eye's limit is smaller than the fourth; beyond the last
-# the eyes are always behind.
-_CARRIED_S, _CARRIED_DEG_S, _CARRIED_DEG, _LEAST_LIMIT_DEG, _FAR_DEG = 0.1, 3.0, 2.0, 8.0, 10.0
-
 _LAGS_S = np.arange(0.0, LONGEST_LAG_S, 0.001)
 _FIXATION, _SACCADE, _PURSUIT = 1, 2, 3
 
@@ -280,35 +274,7 @@ def label_samples(trace: GazeAngles) -> Labels:
             after = out[last + 1] if last + 1 < len(out) else 0
             if wanted == _PURSUIT or (before == other and after == other):
                 out[first : last + 1] = other
-    carried = (out == _FIXATION) & _is_carried(trace, source)
-    for first, last in _value_runs(carried.astype(np.int64)):
-        if carried[first] and time_s[last] - time_s[first] >= SHORTEST_PURSUIT_S:
-            out[first : last + 1] = 0
     return Labels(lag_s, out, trace.blink[source], trace.looked_at[source])
-
-
-def _is_carried(trace: GazeAngles, source: Ints) -> NDArray[np.bool_]:
-    """Return where the head carries the gaze to the plan, with the eyes at their limit.
-
-    The limit is the largest angle of the eyes in the head in the run.
-
-    source: sample of the plan that each measured sample follows
-    """
-    t, seen = trace.time_s, trace.cyclopean_deg
-    before = np.searchsorted(t, t - 0.5 * _CARRIED_S)
-    after = np.minimum(np.searchsorted(t, t + 0.5 * _CARRIED_S), len(t) - 1)
-    shrink = np.cos(np.radians(seen[:, 1]))
-
-    def size_deg(way: Floats) -> Floats:
-        return np.hypot(way[:, 0] * shrink, way[:, 1])
-
-    moves = size_deg(seen[after] - seen[before]) > _CARRIED_DEG_S * (t[after] - t[before])
-    aside = np.abs(seen - trace.head_deg[:, :2])
-    most = np.max(np.where(np.isfinite(aside), aside, 0.0), axis=0)
-    limited = (aside > np.maximum(most - _CARRIED_DEG, _LEAST_LIMIT_DEG)).any(axis=1)
-    off_deg = size_deg(trace.planned_deg[source] - seen)
-    carried: NDArray[np.bool_] = (limited & (off_deg > _CARRIED_DEG)) | (off_deg > _FAR_DEG)
-    return moves & carried
 
 
 def estimate_lag(trace: GazeAngles) -> float:
