@@ -489,27 +489,16 @@ def _talk_lines(now: Mapping[str, Any]) -> list[str]:
     return [f"conversation: {talk['state']}{partner}, reported by {talk['who'] or 'a client'}"]
 
 
-def _table(found: Iterable[Parameter], values: dict[str, Any], unsaved: set[str]) -> list[str]:
+def _table(found: Iterable[Parameter], values: dict[str, Any], unsaved: set[str]) -> Iterator[str]:
     """Format parameters in columns without cutting text, as programs read the lines too."""
-    rows = [("", "key", "value", "unit", "default", "")]
+    row = "{:1} {:40} {:12} {:8} {:12} {}"
+    yield row.format("", "key", "value", "unit", "default", "").rstrip()
     for param in found:
-        value = _value_text(values[param.key])
-        default = _value_text(param.default)
-        rows.append(
-            (
-                "*" if param.key in unsaved else "",
-                param.key,
-                value,
-                param.unit,
-                "" if default == value else default,
-                "next start" if param.live.startswith("next start") else "",
-            )
-        )
-    widths = [min(max(map(len, column)), 40) for column in zip(*rows, strict=True)]
-    return [
-        " ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
+        value, default = _value_text(values[param.key]), _value_text(param.default)
+        mark = "*" if param.key in unsaved else ""
+        usual = "" if default == value else default
+        later = "next start" if param.live.startswith("next start") else ""
+        yield row.format(mark, param.key, value, param.unit, usual, later).rstrip()
 
 
 def _rule_text(param: Parameter) -> str:

@@ -1,6 +1,5 @@
 """Commands under models: a list of model files, and their download."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -26,14 +25,9 @@ _NAMES = list(dict.fromkeys(file.name for file in MODEL_FILES))
 
 
 @models.command("list")
-def list_models(
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-) -> None:
+def list_models() -> None:
     """List model files: what each is for, its licence, and whether it is here."""
     rows = [file._asdict() | {"state": file.state()} for file in MODEL_FILES]
-    if as_json:
-        print(json.dumps({"folder": str(models_folder()), "models": rows}))
-        return
     table = Table("name", "file", "purpose", "licence", "MB", "state")
     for row in rows:
         size = f"{row['size_bytes'] / 1e6:.1f}"

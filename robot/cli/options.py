@@ -110,8 +110,4 @@ class RigCommand(TyperCommand):
         named = first in shipped_names("rigs") or folder or first.endswith((".yaml", ".yml"))
         if not all(one.nargs == 1 for one in positional):
             return named
-        missing = positional[1 + len(given) - named :]
-        if missing and given and missing[0].required and not ctx.resilient_parsing:
-            needed = [f"{one.metavar} ({(one.help or '').rstrip('.')})" for one in positional[1:]]
-            ctx.fail(f"needs {', '.join(needed)}: {missing[0].metavar} is missing")
         return named or len(given) >= len(positional)
