@@ -4,16 +4,15 @@ import contextlib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from math import isfinite, radians
 from operator import add, mul, sub
+from typing import Any
 
 from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
 from gazerig.drivers.errors import BusLost, DriverError, ServoMissing, SetupError
-from gazerig.drivers.types import Feedback, LimpableBus, ServoBus, ServoConfig
-from gazerig.robot.loop.coupled_servos import CoupledServos
-from gazerig.robot.loop.limp_joints import LimpJoints
+from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
 from gazerig.robot.loop.sag import SagCompensation
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling import CouplingParams, pair_setups
-from gazerig.robot.model.joint import JointLimit, JointParams, LinearLinkage
+from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.types import JointAngles, JointState, order_joints
 from gazerig.robot.safety.start_range import find_far_outside
 
@@ -81,12 +80,12 @@ class Body:
         self._park_rad = dict(park_rad or {})
         self._torque_off = False
         self._joints = self._set_up = tuple(joints[name] for name in self.names)
-        self._limp = LimpJoints([joint.limp_when_idle_s for joint in self._joints])
         linkages = [joint.make_linkage() for joint in self._joints]
         # All joints are computed as if every linkage were straight; the other joints are then
         # corrected.
-        lines = [linkage.line or LinearLinkage(0.0, 0.0, 0.0) for linkage in linkages]
-        self._zeros, self._slopes, self._rates = zip(*lines, strict=True)
+        lines = [linkage.line or (0.0, 1.0) for linkage in linkages]
+        self._zeros, self._slopes = zip(*lines, strict=True)
+        self._rates = tuple([1.0 / slope for slope in self._slopes])
         self._bent = [(i, one) for i, one in enumerate(linkages) if one.line is None]
         # Before the first answer: the centre, infinitely old.
         self._nothing = Feedback.create_missing(len(self.names))
@@ -168,49 +167,17 @@ class Body:
             feedback = self._coupled.share_feedback(feedback, self._torque_off)
         steps, speeds, load, at_s, celsius, volts, torque, fault, measured, rearmed, gone = feedback
         rates = tuple(map(mul, speeds, self._rates))
-        if self._bent or self._coupled is not None:
-            angles = self.angles(steps)
-            right = list(rates)
-            for i, linkage in self._bent:
-                right[i] = speeds[i] * linkage.rate_rad(steps[i])
-            rates = tuple(right if self._coupled is None else self._coupled.joints(right))
-        else:
-            angles = tuple(map(mul, map(sub, steps, self._zeros), self._rates))
+        for i, linkage in self._bent:
+            rates = (*rates[:i], speeds[i] * linkage.rate_rad(steps[i]), *rates[i + 1 :])
+        if self._coupled is not None:
+            rates = tuple(self._coupled.joints(rates))
+        angles = self.angles(steps)
         if self._recovering:
             self._report_recovered(angles)
         missing = tuple([self.names[i] for i in gone]) if gone else ()
         return JointState(
             angles, rates, at_s, missing, torque, fault, load, celsius, volts, rearmed, measured
         )
-
-    def relax_idle(
-        self, desired_rad: JointAngles, joints: JointState, t_s: float, held: bool
-    ) -> frozenset[int]:
-        """Switch the torque of joints off that are idle, and on again before they move.
-
-        Args:
-            desired_rad: Desired angles of this tick.
-            joints: Measured joints.
-            t_s: Present time.
-            held: Whether a client holds the joints, which are not idle then.
-
-        Returns:
-            The numbers of the joints that have no torque in this reading on purpose.
-        """
-        before = self._limp.limp
-        if self._limp.step(desired_rad, joints.torque, t_s, held):
-            self._set_limp()
-        return before
-
-    def wake(self) -> None:
-        """Switch the torque of idle joints on, at their present angles."""
-        if self._limp.limp:
-            self._limp.reset()
-            self._set_limp()
-
-    def _set_limp(self) -> None:
-        if isinstance(self.bus, LimpableBus):
-            self.bus.set_limp(self._limp.limp)
 
     def write(self, command_rad: JointAngles) -> None:
         """Send one goal to every servo.
@@ -238,15 +205,10 @@ class Body:
 
     def angles(self, steps: Sequence[float]) -> JointAngles:
         """Return the joint angles of servo positions."""
-        shafts = self._shafts(steps)
-        return tuple(shafts if self._coupled is None else self._coupled.joints(shafts))
-
-    def _shafts(self, steps: Sequence[float]) -> list[float]:
-        """Return the angles of servo positions; for coupled servos those of their shafts."""
         angles = [*map(mul, map(sub, steps, self._zeros), self._rates)]
         for i, linkage in self._bent:
             angles[i] = linkage.angle_rad(steps[i])
-        return angles
+        return tuple(angles if self._coupled is None else self._coupled.joints(angles))
 
     def disable_torque(self) -> None:
         """Switch the torque off immediately; the bus stays open and reading continues.
@@ -255,7 +217,6 @@ class Body:
             BusLost: The port is lost; the torque is switched off when it reconnects.
         """
         self._torque_off = True
-        self._limp.reset()
         self.bus.disable_torque()
 
     def enable_torque(self) -> JointAngles:
@@ -338,3 +299,64 @@ class Body:
         except BaseException:
             self.bus.disable_torque()
             raise
+
+
+class CoupledServos:
+    """The pairs of servos of one body that together move two joints.
+
+    Args:
+        pairs: The pairs with the names of their joints.
+        names: Names of all joints in their order.
+    """
+
+    def __init__(self, pairs: Collection[CouplingParams], names: Sequence[str]) -> None:
+        # The positions of both joints in every sequence, and their coupling.
+        self._pairs = [(names.index(one.first), names.index(one.second), one) for one in pairs]
+        self._last: dict[int, Feedback] = {}
+
+    def joints(self, shafts_rad: Sequence[float]) -> list[float]:
+        """Return the joint angles of servo angles, or the joint speeds of servo speeds."""
+        angles = list(shafts_rad)
+        for i, j, coupling in self._pairs:
+            angles[i], angles[j] = coupling.joint_rad((shafts_rad[i], shafts_rad[j]))
+        return angles
+
+    def shafts(self, joints_rad: Sequence[float]) -> list[float]:
+        """Return the servo angles of joint angles."""
+        angles = list(joints_rad)
+        for i, j, coupling in self._pairs:
+            angles[i], angles[j] = coupling.servo_rad((joints_rad[i], joints_rad[j]))
+        return angles
+
+    def share_feedback(self, feedback: Feedback, released: bool) -> Feedback:
+        """Return feedback in which both servos of a pair share the values for both joints.
+
+        If one servo did not answer, both joints are stale, at their last common position. The
+        higher load, a fault, and torque that was switched on again apply to both. The torque is on
+        if both servos have it; after a release (``released``), if one has it.
+        """
+        column: dict[str, list[Any]] = {
+            name: list(values) for name, values in feedback._asdict().items()
+        }
+        for i, j, _ in self._pairs:
+            both = [i, j]
+            if {*both}.isdisjoint(feedback.missing):
+                self._last[i] = feedback
+            else:
+                column["missing"] = sorted({*column["missing"], *both})
+            last = self._last.get(i, feedback)
+            for k in both:
+                column["position_steps"][k] = last.position_steps[k]
+                column["velocity_steps_s"][k] = last.velocity_steps_s[k]
+                if fault := feedback.fault[i + j - k]:
+                    column["fault"][k] = feedback.fault[k] or f"{fault} (of its coupled servo)"
+            on = [feedback.torque[k] for k in both]
+            shared = {
+                "at_s": min(last.at_s[i], last.at_s[j]),
+                "load": max((feedback.load[k] for k in both), key=abs),
+                "torque": any(on) if released else all(on),
+                "rearmed": any(feedback.rearmed[k] for k in both),
+            }
+            for name, value in shared.items():
+                column[name][i] = column[name][j] = value
+        return Feedback(**{name: tuple(values) for name, values in column.items()})

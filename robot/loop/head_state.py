@@ -6,23 +6,29 @@ roll + right ear down; lengths in m; times in s of the rig's own clock.
 
 from collections.abc import Mapping, Sequence
 from math import degrees
-from typing import Any
+from typing import Any, Literal
 
 from msgspec import Struct
 
 from gazerig.gaze.angles import add, unit, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Salience, Vec3
-from gazerig.robot.loop.gaze_events import EventKind
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.loop.tick_text import head_activity, target_name, tick_control_source
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
+    NO_CONVERSATION,
     ControlSource,
     ControlState,
+    ConversationState,
     TrackState,
 )
-from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
+
+EventKind = Literal[
+    "message", "saccade_start", "saccade_landing", "blink", "target", "person_arrived",
+    "person_left", "track_finished", "cue",
+]  # fmt: skip
+"""message: of the bus, the camera or a program's request; all others are found in the ticks."""
 
 
 class JointReading(Struct, frozen=True):
@@ -36,8 +42,7 @@ class JointReading(Struct, frozen=True):
         velocity_rad_s: Measured speed.
         estimated: Whether the servo has no feedback: ``measured_rad`` is then its goal, moved at
             its known speed.
-        limited: Reason why ``commanded_rad`` differs from ``desired_rad``, "" if it does not;
-            "limp" if the joint has no torque because it is idle.
+        limited: Reason why ``commanded_rad`` differs from ``desired_rad``, "" if it does not.
         torque: Whether the torque is on, None if unknown.
         fault: Latched hardware errors, "" for none.
         load: Share of the stall torque, signed, -1..1, None if unknown.
@@ -153,9 +158,7 @@ class HeadEvent(Struct, frozen=True):
         number: Number of the event, from 1.
         t_s: The rig's own time.
         text: Description in one line.
-        kind: "message" (of the bus, the camera or a program's request), "saccade_start",
-            "saccade_landing", "blink", "target", "person_arrived", "person_left", "track_finished"
-            or "cue".
+        kind: Kind of event.
         subject: Number of the person, name of the target, of the track or of the cue, "" for none.
     """
 

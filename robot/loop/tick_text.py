@@ -1,7 +1,8 @@
 """Texts about one tick: target, control, guard, percept."""
 
+from collections.abc import Callable, Collection
 from math import degrees
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from gazerig.drivers.process.host_lateness import LATE_COMPUTER
 from gazerig.drivers.types import BusHealth
@@ -141,8 +142,7 @@ _FAULT_TEXTS = {
 def guard_text(guard_result: GuardResult) -> str:
     """Return the guard's effect on the desired angles, e.g. "limited (neck_yaw: too fast, +2)"."""
     if not guard_result.reasons:
-        limp = f" ({', '.join(guard_result.limp)}: limp)" if guard_result.why else ""
-        return guard_result.level.replace("_", " ") + limp
+        return guard_result.level.replace("_", " ")
     more = f", +{len(guard_result.reasons) - 1}" if len(guard_result.reasons) > 1 else ""
     return f"{guard_result.level.replace('_', ' ')} ({guard_result.reasons[0]}{more})"
 
@@ -155,3 +155,35 @@ def health_text(health: BusHealth) -> str:
         if n and kind != LATE_COMPUTER
     ]
     return f"bus: {', '.join(errors)}" if errors else "bus ok"
+
+
+Basis = Literal["measured", "partly estimated", "estimated"]
+
+ESTIMATED = "estimated from commands and known servo speeds, not measured"
+
+
+def estimated_joints(tick: Tick) -> tuple[str, ...]:
+    """Return the joints whose servos have no feedback."""
+    has_feedback = tick.joints.measured
+    if not has_feedback:
+        return ()
+    return tuple(
+        [n for n, one in zip(tick.guard_result.joints, has_feedback, strict=True) if not one]
+    )
+
+
+def basis_of(
+    joints: Collection[str], estimated: Collection[str], counts: Callable[[str], bool]
+) -> Basis:
+    """Return whether a figure is measured or estimated.
+
+    Args:
+        joints: Joints of the rig.
+        estimated: Joints without feedback.
+        counts: Returns whether the figure depends on a joint of this name.
+    """
+    hidden = [counts(name) for name in estimated]
+    if not any(hidden):
+        return "measured"
+    whole = sum(hidden) == sum(counts(name) for name in joints)
+    return "estimated" if whole else "partly estimated"

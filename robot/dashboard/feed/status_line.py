@@ -4,7 +4,6 @@ from collections.abc import Callable
 from math import inf
 
 from gazerig.drivers.types import BusHealth
-from gazerig.robot.loop.loop_timing import busy_text
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.loop.tick_text import (
     camera_conditions,
@@ -12,6 +11,7 @@ from gazerig.robot.loop.tick_text import (
     head_activity,
     health_text,
 )
+from gazerig.robot.loop.timing import busy_text
 from gazerig.robot.model.types import LoopFigures
 
 _LINE_S = 0.2
