@@ -2,8 +2,7 @@
 
 import contextlib
 from collections.abc import Callable, Collection, Mapping, Sequence
-from math import isfinite, radians
-from operator import add, mul, sub
+from math import isfinite
 from typing import Any
 
 from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
@@ -19,8 +18,6 @@ from gazerig.robot.safety.start_range import find_far_outside
 _FIRST_S = 0.5
 """Longest time until every servo has reported its position before torque is switched on."""
 _AGAIN_S = 0.02
-_INSIDE_RAD = radians(1.0)
-"""Distance from its range at which friction may stop a joint that has moved inside."""
 
 
 def servo_setups(
@@ -73,20 +70,14 @@ class Body:
     ) -> None:
         self.bus = bus
         self._sag, self._read_s = sag, 0.0
-        self._recover, self._recovering = recover, set[int]()
+        self._recover = recover
         self.names = order_joints(joints)
         self._pairs = tuple(pairs)
-        self._coupled = CoupledServos(pairs, self.names) if pairs else None
+        self._coupled = CoupledServos(pairs, self.names)
         self._park_rad = dict(park_rad or {})
         self._torque_off = False
         self._joints = self._set_up = tuple(joints[name] for name in self.names)
-        linkages = [joint.make_linkage() for joint in self._joints]
-        # All joints are computed as if every linkage were straight; the other joints are then
-        # corrected.
-        lines = [linkage.line or (0.0, 1.0) for linkage in linkages]
-        self._zeros, self._slopes = zip(*lines, strict=True)
-        self._rates = tuple([1.0 / slope for slope in self._slopes])
-        self._bent = [(i, one) for i, one in enumerate(linkages) if one.line is None]
+        self._linkages = [joint.make_linkage() for joint in self._joints]
         # Before the first answer: the centre, infinitely old.
         self._nothing = Feedback.create_missing(len(self.names))
         self._last = self._nothing._replace(
@@ -163,17 +154,11 @@ class Body:
         if feedback.missing:
             feedback = feedback.fill_missing(self._last)
         self._last = feedback
-        if self._coupled is not None:
-            feedback = self._coupled.share_feedback(feedback, self._torque_off)
+        feedback = self._coupled.share_feedback(feedback, self._torque_off)
         steps, speeds, load, at_s, celsius, volts, torque, fault, measured, rearmed, gone = feedback
-        rates = tuple(map(mul, speeds, self._rates))
-        for i, linkage in self._bent:
-            rates = (*rates[:i], speeds[i] * linkage.rate_rad(steps[i]), *rates[i + 1 :])
-        if self._coupled is not None:
-            rates = tuple(self._coupled.joints(rates))
-        angles = self.angles(steps)
-        if self._recovering:
-            self._report_recovered(angles)
+        rows = zip(self._linkages, speeds, steps, strict=True)
+        shaft_rates = [speed * linkage.rate_rad(at) for linkage, speed, at in rows]
+        angles, rates = self.angles(steps), tuple(self._coupled.joints(shaft_rates))
         missing = tuple([self.names[i] for i in gone]) if gone else ()
         return JointState(
             angles, rates, at_s, missing, torque, fault, load, celsius, volts, rearmed, measured
@@ -195,20 +180,13 @@ class Body:
         """Return the servo positions of joint angles."""
         if len(angles_rad) != len(self.names):
             raise ValueError(f"{len(angles_rad)} angles for {len(self.names)} joints")
-        angles: Sequence[float] = angles_rad
-        if self._coupled is not None:
-            angles = self._coupled.shafts(angles_rad)
-        steps = [*map(round, map(add, self._zeros, map(mul, self._slopes, angles)))]
-        for i, linkage in self._bent:
-            steps[i] = round(linkage.steps(angles[i]))
-        return steps
+        rows = zip(self._linkages, self._coupled.shafts(angles_rad), strict=True)
+        return [round(linkage.steps(angle)) for linkage, angle in rows]
 
     def angles(self, steps: Sequence[float]) -> JointAngles:
         """Return the joint angles of servo positions."""
-        angles = [*map(mul, map(sub, steps, self._zeros), self._rates)]
-        for i, linkage in self._bent:
-            angles[i] = linkage.angle_rad(steps[i])
-        return tuple(angles if self._coupled is None else self._coupled.joints(angles))
+        rows = zip(self._linkages, steps, strict=True)
+        return tuple(self._coupled.joints([linkage.angle_rad(at) for linkage, at in rows]))
 
     def disable_torque(self) -> None:
         """Switch the torque off immediately; the bus stays open and reading continues.
@@ -252,7 +230,6 @@ class Body:
             for joints in (self._joints, self._set_up)
         )
         far = {name: text for name, text in far.items() if name in before}
-        self._recovering.clear()
         if not far:
             return
         where = [f"{name} {text}" for name, text in far.items()]
@@ -261,18 +238,8 @@ class Body:
                 f"{'; '.join(where)} Torque stays off: gazerig doctor examines it, gazerig run "
                 "--recover moves it slowly into its range"
             )
-        self._recovering = {self.names.index(name) for name in far}
         for text in where:
             self._recover(f"{text} It moves slowly into its range")
-
-    def _report_recovered(self, angles: JointAngles) -> None:
-        """Report the joints that have arrived in their ranges."""
-        for i in tuple(self._recovering):
-            limit = self._joints[i].limit()
-            if limit.low_rad - _INSIDE_RAD <= angles[i] <= limit.high_rad + _INSIDE_RAD:
-                self._recovering.discard(i)
-                if self._recover is not None:
-                    self._recover(f"{self.names[i]} is in its range again")
 
     def stop(self) -> tuple[str, ...]:
         """Switch the torque off and close the bus; return the bus's messages about it.
@@ -294,11 +261,10 @@ class Body:
             self.bus.disable_torque()
         except DriverError:
             raise
-        except Exception:  # not a fault of the bus, such as no memory: try once more
+        except BaseException as error:  # not a fault of the bus, such as no memory: try once more
             self.bus.disable_torque()
-        except BaseException:
-            self.bus.disable_torque()
-            raise
+            if not isinstance(error, Exception):
+                raise
 
 
 class CoupledServos:
@@ -335,6 +301,8 @@ class CoupledServos:
         higher load, a fault, and torque that was switched on again apply to both. The torque is on
         if both servos have it; after a release (``released``), if one has it.
         """
+        if not self._pairs:
+            return feedback
         column: dict[str, list[Any]] = {
             name: list(values) for name, values in feedback._asdict().items()
         }

@@ -210,7 +210,7 @@ class ClientControl:
         else:
             since_s = max(0.0, t_s - target.at_s)
             point = add(target.p_world_m, scale(target.v_world_m_s, since_s))
-            error = gaze_error(point, pose, converges).whole
+            error = gaze_error(point, pose, converges)
         arrived = self.state.arrived or error <= ARRIVED_RAD
         self.state = replace(self.state, arrived=arrived, error_rad=error)
         return self.state

@@ -116,27 +116,12 @@ def _distance_text(tick: Tick) -> str:
     limited = tick.gaze.limited
     if tick.target.kind != ORDERED or not limited:
         return ""
-    error = degrees(gaze_error(tick.target.p_world_m, tick.pose).whole)
+    error = degrees(gaze_error(tick.target.p_world_m, tick.pose))
     ends = (
         f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
         for one in limited
     )
     return f"; {error:.0f} deg off: {', '.join(ends)}"
-
-
-_FAULT_TEXTS = {
-    "timeout": "no answer",
-    "damaged": "answer damaged",
-    "corrupt": "damaged answer",
-    "incomplete": "answer incomplete",
-    "implausible": "implausible answer",
-    "refused": "order refused",
-    "unconfirmed": "unconfirmed command",
-    "rearmed": "torque switched on again",
-    "restarted": "servo restarted",
-    "alert": "servo reported a fault",
-}
-"""Texts for kinds of bus faults; other kinds are clear by name."""
 
 
 def guard_text(guard_result: GuardResult) -> str:
@@ -148,9 +133,9 @@ def guard_text(guard_result: GuardResult) -> str:
 
 
 def health_text(health: BusHealth) -> str:
-    """Return the state of the bus, e.g. "bus: no answer 3 times"; lateness is not counted."""
+    """Return the state of the bus, e.g. "bus: timeout 3 times"; lateness is not counted."""
     errors = [
-        f"{_FAULT_TEXTS.get(kind, kind)} {n} time{'s' if n > 1 else ''}"
+        f"{kind} {n} time{'s' if n > 1 else ''}"
         for kind, n in sorted(health.errors.items())
         if n and kind != LATE_COMPUTER
     ]

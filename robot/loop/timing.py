@@ -30,7 +30,7 @@ class LoopTiming:
     def __init__(self, rate_hz: float) -> None:
         self._rows: deque[tuple[float, float, int, float]] = deque()
         self._overruns = 0
-        self._rate_hz, self._period_s = rate_hz, 1.0 / rate_hz
+        self._period_s = 1.0 / rate_hz
         self._last_s: float | None = None
 
     def update(self, t_s: float) -> None:

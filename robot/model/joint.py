@@ -76,18 +76,22 @@ class Linkage:
 
     def steps(self, angle_rad: float) -> float:
         """Return the servo position of a joint angle, not rounded."""
+        if self.line is not None:
+            return self.line[0] + self.line[1] * angle_rad
         i = self._segment(self._angles, angle_rad)
         return self._steps[i] + self._slopes[i] * (angle_rad - self._angles[i])
 
     def angle_rad(self, steps: float) -> float:
         """Return the joint angle of a servo position."""
         if self.line is not None:
-            return (steps - self._steps[0]) * self._rate
+            return (steps - self.line[0]) * self._rate
         i = self._segment(self._keys, self._order * steps)
         return self._angles[i] + (steps - self._steps[i]) / self._slopes[i]
 
     def rate_rad(self, steps: float) -> float:
         """Return the signed angle in rad per step at a servo position."""
+        if self.line is not None:
+            return self._rate
         return 1.0 / self._slopes[self._segment(self._keys, self._order * steps)]
 
     def _segment(self, points: Sequence[float], at: float) -> int:
