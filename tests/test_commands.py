@@ -16,7 +16,7 @@ from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
 from gazerig.gaze.types import PART_NAMES, Floats
 from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import head_activity, tick_control_source
+from gazerig.robot.loop.tick_text import tick_control_source
 from gazerig.robot.model.commands import (
     AnyCommand,
     Ask,
@@ -465,7 +465,7 @@ def test_a_point_and_a_pointer_are_led_by_who_chose_them(
         running.order(LookAt((1.0, 0.2, 0.3), who="ann", pointer=pointer))
         tick = running.go(0.2)[-1]
     assert tick_control_source(tick).kind == kind
-    assert head_activity(tick).headline == said
+    assert head_state(tick).headline == said
 
 
 def test_stopped_says_that_and_nothing_else(running: Running) -> None:
@@ -487,7 +487,7 @@ def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) ->
     ticks: list[Tick] = []
     assert made.robot.park(made.park_rad, made.clock, made.loop, watch=ticks.append)
     assert {tick_control_source(tick).kind for tick in ticks} == {"parking"} and len(ticks) > 5
-    assert head_activity(ticks[-1]).headline == control_sentence(ControlSource("parking"), 0.0)
+    assert head_state(ticks[-1]).headline == control_sentence(ControlSource("parking"), 0.0)
     yaw = [
         tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
     ]

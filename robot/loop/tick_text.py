@@ -1,21 +1,17 @@
 """Texts about one tick: target, control, guard, percept."""
 
 from collections.abc import Callable, Collection
-from math import degrees
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from gazerig.drivers.process.host_lateness import LATE_COMPUTER
 from gazerig.drivers.types import BusHealth
 from gazerig.gaze.angles import norm, sub
-from gazerig.gaze.types import ORDERED, PART_NAMES, Target, body_name
+from gazerig.gaze.types import PART_NAMES, Target, body_name
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.control_source import (
     ControlSource,
-    control_sentence,
     control_source,
-    control_title,
 )
-from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.types import GuardResult
 
 
@@ -50,78 +46,9 @@ def target_name(target: Target) -> str:
     return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
 
 
-class Activity(NamedTuple):
-    """The head's present activity as text.
-
-    Attributes:
-        headline: One sentence.
-        target: Gaze target, or the source of control.
-        reason: Reason for it.
-        phase: Phase of the eyes; "held" while joints are held, "stopped", "parking".
-    """
-
-    headline: str
-    target: str
-    reason: str
-    phase: str
-
-
 def tick_control_source(tick: Tick) -> ControlSource:
     """Return the source of control of the head."""
     return control_source(tick.stopped, tick.parking, tick.client_control, tick.tracks)
-
-
-def head_activity(tick: Tick) -> Activity:
-    """Return the head's activity; while a client is in control, only that."""
-    leads = tick_control_source(tick)
-    phase: str = "blink" if tick.gaze.blink else tick.gaze.phase
-    said = control_sentence(leads, tick.t_s)
-    found = tick.guard_result
-    if found.level == "torque_off" and leads.kind not in ("stopped", "parking"):
-        limp = f"the torque is off: {' and '.join(found.critical_reasons[:1]) or 'guard'}"
-        return Activity(limp, target_name(tick.target), limp, phase)
-    if leads.overrides_gaze:
-        phase = {"joint": "held", "stopped": "stopped", "parking": "parking"}.get(leads.kind, phase)
-        distance = _distance_text(tick) if leads.kind in ("person", "pointer") else ""
-        return Activity(said + distance, control_title(leads), said + distance, phase)
-    looks = _gaze_text(tick.target)
-    headline = f"{said}, and {looks}" if leads.kind == "track" else looks
-    return Activity(headline, target_name(tick.target), tick.target.why, phase)
-
-
-def _gaze_text(target: Target) -> str:
-    """Return the gaze's activity as the predicate of a sentence about the head."""
-    match target.kind:
-        case "rest":
-            return "looks ahead: nobody is visible"
-        case "glance":
-            return "looks around: nobody is visible"
-        case "search":
-            return "looks for a person who has left"
-        case "away":
-            return "looks away for a moment"
-        case "face":
-            part = f" ({PART_NAMES[target.part]})" if target.part is not None else ""
-            return f"looks at person {target.id}{part}"
-        case "thing":
-            return "looks at a moving object"
-        case kind if kind == ORDERED:
-            return "looks at its point"
-        case kind:
-            return f"looks at a {kind}"
-
-
-def _distance_text(tick: Tick) -> str:
-    """Return the gaze's distance from the chosen point, "" if it reaches the point."""
-    limited = tick.gaze.limited
-    if tick.target.kind != ORDERED or not limited:
-        return ""
-    error = degrees(gaze_error(tick.target.p_world_m, tick.pose))
-    ends = (
-        f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
-        for one in limited
-    )
-    return f"; {error:.0f} deg off: {', '.join(ends)}"
 
 
 def guard_text(guard_result: GuardResult) -> str:

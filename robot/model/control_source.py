@@ -187,19 +187,6 @@ def control_source(
     return ControlSource()
 
 
-def control_title(leader: ControlSource) -> str:
-    """Return the source of control in two or three words, e.g. "neck_yaw held", "stopped"."""
-    match leader.kind:
-        case "person":
-            return f"controlled by {leader.who}"
-        case "pointer":
-            return "looks at the pointer"
-        case "joint":
-            return f"{' and '.join(leader.joints)} held"
-        case _:
-            return leader.kind
-
-
 def control_sentence(leader: ControlSource, t_s: float) -> str:
     """Return the source of control as a sentence, "ann holds neck_yaw at 17.2 deg, for 3 s".
 
