@@ -36,7 +36,6 @@ PREFIX = struct.Struct("<cII")
 _CHUNK_BYTES = 1 << 20
 _POSES_EVERY_S = 0.0399  # slightly below 40 ms, so that rounding does not make it 45
 _FLUSH_S = 0.4
-_SYNC_S = 1.0
 _WAIT_S = 0.1
 _NICE = 5
 _QUALITY = 80
@@ -154,11 +153,8 @@ class RunWriter:
         self._writer.add_message(self._channels[topic], at_ns, data, at_ns, number)
 
     def flush(self) -> None:
-        """Write the present chunk to the operating system."""
+        """Write the present chunk to the disk."""
         self._attempt(self._writer.flush)
-
-    def sync(self) -> None:
-        """Make the operating system write everything to the disk."""
         self._attempt(lambda: os.fdatasync(self._file.fileno()))
 
     def close(self, end: RunEnd) -> Report:
@@ -167,7 +163,7 @@ class RunWriter:
         self._attempt(lambda: self._writer.add_metadata(fmt.END, as_text(end)))
         self._attempt(self._writer.finish)
         self._attempt(self._file.flush)
-        self.sync()
+        self._attempt(lambda: os.fdatasync(self._file.fileno()))
         with contextlib.suppress(OSError):  # after a failure it tries to write the rest
             self._file.close()
         count = self._counts.get
@@ -209,7 +205,7 @@ def main(file_fd: int) -> None:
 def write(messages: Iterator[Message | None], writer: RunWriter, clock: Clock) -> RunEnd:
     """Write the messages; return the end of the run."""
     end = RunEnd()
-    flushed_s = synced_s = clock.now_s()
+    flushed_s = clock.now_s()
     reported = False
     for kind, body, pixels in (message or Message(b"", b"") for message in messages):
         if kind == END:
@@ -224,9 +220,6 @@ def write(messages: Iterator[Message | None], writer: RunWriter, clock: Clock) -
         if now_s - flushed_s >= _FLUSH_S:
             flushed_s = now_s
             writer.flush()
-        if now_s - synced_s >= _SYNC_S:
-            synced_s = now_s
-            writer.sync()
         if writer.failed and not reported:
             reported = True
             report(Report(writer.failed))
