@@ -46,6 +46,7 @@ from gazerig.robot.dashboard.door.sockets import (
     TakePicture,
     WebcamSocket,
     close_socket,
+    send_uncompressed,
     until_one_ends,
 )
 from gazerig.robot.dashboard.door.viser_server import VIEW, ViewProxy, view_client
@@ -320,6 +321,7 @@ class PageDoor:
         for topic, text in zip(news.topics, texts, strict=True):
             self._lasting[type(topic), getattr(topic, "title", "")] = text
         silent = [_line(silent=news.silent_s)] if news.silent_s else []
+        picture = _line(picture=news.picture.picture) if news.picture is not None else ""
         for client in self._clients:
             wishes = client.wishes
             for text in (
@@ -329,7 +331,7 @@ class PageDoor:
             ):
                 client.queue_text(text)
             if news.picture is not None and wishes.pictures:
-                client.add_picture(news.picture)
+                client.add_picture(picture, news.picture.jpeg)
 
     # --- admission ---------------------------------------------------------------------
 
@@ -519,9 +521,8 @@ class PageDoor:
                     await socket.pong(ping)
             while message := client.outgoing():
                 async with asyncio.timeout(TAKES_S):
-                    if isinstance(message, ShownPicture):
-                        await socket.send_str(_line(picture=message.picture))
-                        await socket.send_bytes(message.jpeg)
+                    if isinstance(message, bytes):
+                        await send_uncompressed(socket, message)
                     else:
                         await socket.send_str(message)
 
