@@ -388,7 +388,7 @@ class PageDoor:
                         raise MessageRefused("no track of this name has a sound", 404)
                     return _answer({"ok": wave}, 200)
                 case "GET", "openapi.json":
-                    return _answer(api_description(BASE), 200)
+                    return _answer(api_description(), 200)
             raise MessageRefused(
                 f"{request.method} {request.path:.60} is not here: version {VERSION} is at {BASE}/",
                 404,
