@@ -8,7 +8,7 @@ After an error or a restart a board outputs no pulses, and has perhaps lost its 
 channels are then enabled again, one after another; if that happens again soon, all stay without.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from math import inf
 
 from gazerig.drivers.bus.goal_limits import clip_goals
@@ -145,24 +145,6 @@ class HobbyBoardBus(PortBus):
             return ""
         channel.on = pulses[0] > 0
         return channel.difference_text(pulses[0])
-
-    def set_limp(self, servos: Collection[int]) -> None:
-        """Stop the pulses of these servos, by index; all others that were limp get them again.
-
-        A joint that was moved by hand returns to its last pulse at the servo's own speed, as its
-        position is not known. A channel that does not stop, is held.
-        """
-        if not self._engaged or self._is_down or self._fault:
-            return
-        wanted = [self._channels[i] for i in servos]
-        limp = [one for one in self._channels if not (one.held or one.due or one in wanted)]
-        try:
-            if off := [channel for channel in wanted if channel.held or channel.due]:
-                self._switch_off(off)
-            for channel in limp:
-                channel.due = bool(self._hold(channel))
-        except BusLost as lost:
-            self._record_loss(lost)
 
     # --- every tick
 
