@@ -13,7 +13,7 @@ from ticked_rig import TickedRig, connected, gazerig
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.minimum_jerk import PEAK_SPEED, MinimumJerkBlend
-from gazerig.gaze.track.level import HOLD_S, LevelParams
+from gazerig.gaze.track.animation import HOLD_S, LevelParams
 from gazerig.robot.cli import animation
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.clock import SimulatedClock

@@ -7,7 +7,6 @@ from gazerig.gaze.attention.conversation import MODES, ConversationGaze
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.track.animation import Animation
-from gazerig.gaze.track.expression import Expressions
 from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.commands import (
     NO_TRACK,
@@ -37,11 +36,11 @@ class Menus:
     """The menus of behaviours, conversation, lids, expressions and tracks."""
 
     def __init__(
-        self, gaze: ConversationGaze, lids: Lids, expressions: Expressions, tracks: TrackChoices
+        self, gaze: ConversationGaze, lids: Lids, animation: Animation, tracks: TrackChoices
     ) -> None:
         self._gaze = gaze
         self._lids = lids
-        self._expressions = expressions
+        self._animation = animation
         self._tracks = tracks
 
     def choices(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
@@ -51,8 +50,8 @@ class Menus:
             "conversation": _put_first(self._gaze.chosen_mode, MODES),
             "lids": tuple(LID_COMMANDS),
         }
-        if names := self._expressions.names:
-            menus["expression"] = _put_first(self._expressions.name, names)
+        if names := self._animation.expressions:
+            menus["expression"] = _put_first(self._animation.expression, names)
         menus["track"] = _put_first(
             self._tracks.playing or NO_TRACK, (NO_TRACK, *self._tracks.names)
         )
@@ -66,7 +65,7 @@ class Menus:
             self._gaze.choose_mode(command.choice, t_s)
             self._set_blinks()
         elif command.menu == "expression":
-            self._expressions.express(command.choice)
+            self._animation.express(command.choice)
         else:
             LID_COMMANDS[command.choice](self._lids, t_s)
 
@@ -105,9 +104,9 @@ def refuse_impossible(
     elif isinstance(command, Jog):
         refuse_absent(command, joints)
     elif isinstance(command, Express):
-        animation.expressions.require(command.expression)
+        animation.require("expression", command.expression)
     elif isinstance(command, SetLevel):
-        animation.levels.require(command.level)
+        animation.require("level", command.level)
     elif isinstance(command, Say):
         raise ValueError("this run has no voice")
     elif isinstance(command, Play | Speak):

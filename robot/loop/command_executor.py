@@ -8,7 +8,6 @@ from gazerig.gaze.attention.conversation import ConversationGaze
 from gazerig.gaze.attention.startle import FLINCH, Startle
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.track.animation import Animation
-from gazerig.gaze.track.track import KEEP
 from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import GazeState, Percept, Target
 from gazerig.robot.loop.body import Body
@@ -112,7 +111,7 @@ class CommandExecutor:
         """End a client's control that was not renewed or has expired, and expired levels."""
         if self.opponent is not None:
             self.opponent.update(t_s)
-        lead, levels = self._lead, self._animation.levels
+        lead = self._lead
         if lead.controlled_by and (why := lead.expiry_reason(t_s)):
             self._messages.append(
                 f"{lead.controlled_by}: {why}, so the gaze models are in control again"
@@ -125,7 +124,7 @@ class CommandExecutor:
             )
             self._conversation.end(talk, t_s)
             self._menus.converse(self._conversation.state, t_s)
-        for name in levels.drop_lapsed(t_s):
+        for name in self._animation.drop_lapsed(t_s):
             self._messages.append(f"level {name}: not set any more, so it returns to 0")
 
     def execute(self, command: Command, t_s: float) -> CommandReply:
@@ -144,13 +143,13 @@ class CommandExecutor:
                     return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
                 return self._play(command, t_s)
             case EndTrack():
-                return self._tracks.end(command, t_s, self._guard.limits)
+                return self._tracks.end(command, t_s)
             case SyncTrack():
                 self._tracks.sync(command, t_s)
             case Express(name, strength):
-                return _call_or_refuse(lambda: self._animation.expressions.express(name, strength))
+                return _call_or_refuse(lambda: self._animation.express(name, strength))
             case SetLevel(name, value):
-                return _call_or_refuse(lambda: self._animation.levels.set(name, value, t_s))
+                return _call_or_refuse(lambda: self._animation.set_level(name, value, t_s))
             case MoveOpponent(p):
                 if self.opponent is not None:  # a repeated run has no world
                     self.opponent.move(p, t_s)
@@ -242,13 +241,12 @@ class CommandExecutor:
         if reply.refused:
             self._messages.append(f"track for {command.who} {reply.text()}")
 
-    def direct_by_track(
+    def react_by_track(
         self, target: Target, percept: Percept | None, pose: GazeState, t_s: float
-    ) -> Target:
-        """Return the gaze target of a track, or else attention's.
+    ) -> None:
+        """Play the track of the present rule when the gaze reaches the rule's target.
 
-        The track of the present rule is played when the gaze reaches the rule's target, and that
-        of the startle when something flies at the face.
+        That of the startle is played when something flies at the face.
 
         Args:
             target: Target that attention has chosen.
@@ -265,9 +263,6 @@ class CommandExecutor:
         startles = top_down.startles and not top_down.plans  # a boxer watches the fists
         if startles and self._startle.step(percept, pose.p_world_head_m, t_s):
             self._play_by_itself(Play(FLINCH, who="startle"), t_s)
-        if self._animation.tracks.look is KEEP:
-            return target
-        return self._tracks.target(target, percept, pose.p_world_head_m, t_s)
 
     def _change_control(self, change: Callable[[], None]) -> None:
         """Change the client in control; the models start slowly if they take over joints."""

@@ -3,11 +3,12 @@
 from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
+from gazerig.gaze.track.track import FINISHED
 from gazerig.gaze.types import ORDERED, Target
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.loop.tick_text import target_name
 from gazerig.robot.model.client_control import GONE_S
-from gazerig.robot.model.control_source import FINISHED, TrackState
+from gazerig.robot.model.control_source import TrackState
 
 EventKind = Literal[
     "message", "saccade_start", "saccade_landing", "blink", "target", "person_arrived",

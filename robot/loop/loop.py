@@ -121,7 +121,7 @@ class Robot:
         self._scanpath = scanpath
         self._conversation_gaze = conversation
         self._oculomotor = oculomotor
-        self._menus = Menus(conversation, lids, animation.expressions, tracks)
+        self._menus = Menus(conversation, lids, animation, tracks)
         self._animation = animation
         self._tracks = tracks
         self._guard = guard
@@ -158,8 +158,8 @@ class Robot:
             refuse_out_of_range(command, self.body.names, self._guard.limits)
         if isinstance(command, MoveOpponent) and self._executor.opponent is None:
             raise ValueError("no opponent to move: the run is in no world with a boxer")
-        if isinstance(command, Play):  # only a recording has the text of a track
-            command = structs.replace(command, yaml="")
+        if isinstance(command, Play):  # only a recording defines a track
+            command = structs.replace(command, definition=None)
         return self.replay_command(command)
 
     def replay_command(self, command: Command) -> Ticket:
@@ -291,7 +291,7 @@ class Robot:
         if self._conversation.active:
             self._executor.follow_turn(self._conversation_gaze, t_s)
         chosen = self.attention.choose(percept, pose, t_s)
-        chosen = self._executor.direct_by_track(chosen, percept, pose, t_s)
+        self._executor.react_by_track(chosen, percept, pose, t_s)
         target = self._lead.target(chosen, percept, t_s)
         rests_s = self._scanpath.rests_until_s
         target = self._conversation_gaze.look(
@@ -416,7 +416,7 @@ class Robot:
     def _frame_age_s(self, percept: Percept | None, t_s: float) -> float:
         """Return the age of the frame that the gaze depends on.
 
-        A target chosen by a client, and a neck or a point of a track, do not depend on the camera.
+        A target chosen by a client, and the neck of a track, do not depend on the camera.
         """
         if not self._lead.needs_camera or self._animation.tracks.replaces_gaze:
             return 0.0

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 import msgspec
 from msgspec import Meta, Struct, structs
 
-from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED, Track
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """Value of a key in a rig's YAML."""
@@ -207,7 +207,7 @@ class Play(ClientCommand, frozen=True):
         lead_s: Latencies of all joints, by which the motion of a track with sound is early; set on
             execution for the recording.
         sound_s: Duration of its sound, set on execution.
-        yaml: The track, set on execution if its file is newer than the run.
+        definition: The track, set on execution if its file is newer than the run.
     """
 
     track: _Name
@@ -217,7 +217,7 @@ class Play(ClientCommand, frozen=True):
     loop: bool = False
     lead_s: _Lead | None = None
     sound_s: _Position = 0.0
-    yaml: str = ""
+    definition: Track | None = None
 
 
 class EndTrack(ClientCommand, frozen=True):
@@ -298,7 +298,7 @@ class Speak(ClientCommand, frozen=True):
     sound: str
     duration_s: Annotated[float, Meta(gt=0.0, le=MAX_SPEECH_S)]
     level: str = ""
-    mouth: Annotated[tuple[tuple[_SpeechTime, _Share], ...], Meta(max_length=40_000)] = ()
+    mouth: Annotated[tuple[tuple[_SpeechTime, _Share], ...], Meta(max_length=61_000)] = ()
     volume: _Share = 1.0
     lead_s: _Lead | None = None
 

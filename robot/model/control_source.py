@@ -46,10 +46,6 @@ class ControlState(Struct, frozen=True):
     since_s: float = 0.0
 
 
-FINISHED = "finished"
-"""End reason of a track that was played to its end."""
-
-
 class TrackState(Struct, frozen=True):
     """One track after a tick; an ended one is shown for ``SHOWN_S``, the newest one always.
 

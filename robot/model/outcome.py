@@ -4,13 +4,9 @@ from typing import Literal
 
 from msgspec import Struct
 
+from gazerig.gaze.track.track import FINISHED
 from gazerig.robot.model.client_control import ARRIVED_RAD
-from gazerig.robot.model.control_source import (
-    FINISHED,
-    NO_CLIENT_CONTROL,
-    ControlState,
-    TrackState,
-)
+from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlState, TrackState
 from gazerig.robot.model.reply import CommandReply
 
 Outcome = Literal["arrived", "refused", "out of reach", "taken over", "timed out"]

@@ -4,18 +4,16 @@ Such angles come from recordings and from animation programs.
 """
 
 import contextlib
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from math import degrees
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from gazerig.config.load import ConfigError, load
+from gazerig.config.load import ConfigError
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import format_value, params_text
+from gazerig.config.save_text import format_value
 from gazerig.config.shipped_files import is_path
 from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError
@@ -23,6 +21,7 @@ from gazerig.drivers.files.file_output import write_file
 from gazerig.gaze.track.track import (
     EYE_CHANNELS,
     HEAD_CHANNELS,
+    LEVEL,
     LID_CHANNELS,
     MAX_DURATION_S,
     MAX_FRAMES,
@@ -34,7 +33,7 @@ from gazerig.robot.model.motion_keys import GRID_S, fit_keys, resample, smooth
 from gazerig.robot.model.reply import TrackReply
 from gazerig.robot.model.track_fit import TrackFit, TrackRefused, channel_of_joint
 from gazerig.robot.model.types import GAZE_JOINTS
-from gazerig.robot.run.rig_limits import animation_tables, lid_spans, limits
+from gazerig.robot.run.rig_limits import face_tables, lid_spans, limits
 
 TOLERANCE_DEG = 0.7
 """Largest distance of the curve through fitted keys from the samples."""
@@ -68,17 +67,6 @@ class TrackFolder:
                 except ConfigError as error:
                     found[path.stem] = str(error)
         return found
-
-    def to_text(self, track: Track) -> str:
-        """Return a track as YAML, with the name of its sound."""
-        return params_text(replace(track, sound=Path(track.sound).name))
-
-    def from_text(self, text: str) -> Track:
-        """Return the track of a YAML text, which a recording holds."""
-        with tempfile.NamedTemporaryFile("w", suffix=".yaml", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            return load(Path(file.name), Track)
 
     def _read_stamps(self) -> dict[Path, tuple[int, int]]:
         """Return time and size of each file."""
@@ -190,17 +178,13 @@ def write_track(
 
 
 def fit_to_rig(rig: Rig, name: str, track: Track) -> TrackReply:
-    """Return how a rig plays a track from the middle of its ranges.
+    """Return how a rig plays a track.
 
     Raises:
         TrackRefused: it cannot.
     """
-    bounds = limits(rig.joints)
-    middle = np.clip(0.0, [one.low_rad for one in bounds], [one.high_rad for one in bounds])
-    fit = TrackFit(rig.names, lid_spans(rig), animation_tables(rig))
-    placed = fit.place(track)
-    _, reduced = fit.sizes(placed, middle, bounds)
-    return fit.reply(name, placed, fit.motion(placed, bounds), reduced)
+    fit = TrackFit(rig.names, lid_spans(rig), face_tables(rig))
+    return fit.motion(name, track, limits(rig.joints))[1]
 
 
 def radians_hint(angles_deg: Iterable[float], below: float = 1.0) -> str:
@@ -220,9 +204,9 @@ def radians_hint(angles_deg: Iterable[float], below: float = 1.0) -> str:
 
 def track_angles_deg(track: Track) -> Iterator[float]:
     """Yield the angles of a track's frames."""
-    for frame in (*track.frames, *track.frames_without_neck):
+    for frame in track.frames:
         for channel, value in frame.values().items():
-            if channel not in LID_CHANNELS:
+            if channel not in LID_CHANNELS and not channel.startswith(LEVEL):
                 yield degrees(value)
 
 

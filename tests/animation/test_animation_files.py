@@ -282,7 +282,7 @@ def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(
     track = load_track(tmp_path / "far.yaml")
     assert track.owns == ("neck_yaw",)
     fit, bounds = TrackFit(desk_rig.names, lid_spans(desk_rig)), limits(desk_rig.joints)
-    motion = fit.motion(fit.place(track), bounds)
+    motion, _ = fit.motion("x", track, bounds)
     lead_s = 0.02 - motion.position_at(0.0)
     yaw = np.degrees(motion.sample_at(np.array(times) + lead_s)[0, :, 0])
     assert yaw == pytest.approx([40.0, -20.0, 30.0], abs=1e-3)

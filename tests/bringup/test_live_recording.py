@@ -75,7 +75,7 @@ def test_a_puppeteered_jaw_becomes_a_track_of_its_own(tmp_path: Path) -> None:
     track = load_track(path)
     assert track.owns == ("jaw",)
     fit = TrackFit(rig.names, lid_spans(rig))
-    motion = fit.motion(fit.place(track), limits(rig.joints))
+    motion, _ = fit.motion("x", track, limits(rig.joints))
     played = np.degrees(motion.sample_at(times + 0.02 - motion.position_at(0.0))[0])
     (column,) = np.flatnonzero(np.ptp(played, axis=0) > 1.0)
     assert np.abs(played[:, column] - angles).max() < TOLERANCE_DEG + 0.8

@@ -212,7 +212,7 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(
     track = load_track(path)
     assert len(track.frames) < 40 and on_rig.slowed_by == 1.0
     fit = TrackFit(desk_rig.names, lid_spans(desk_rig))
-    motion = fit.motion(fit.place(track), limits(desk_rig.joints))
+    motion, _ = fit.motion("x", track, limits(desk_rig.joints))
     at = np.linspace(0.1, 2.3, 50)
     played = np.degrees(motion.sample_at(at)[0])
     wanted = np.array([how(t)["neck_pitch"] for t in at])
