@@ -40,7 +40,7 @@ def unit() -> configparser.ConfigParser:
 
 def test_the_service_parks_before_anything_is_killed() -> None:
     service = unit()["Service"]
-    assert service["KillSignal"] == "SIGTERM"  # as gazerig.robot.loop.interrupts heeds it
+    assert service["KillSignal"] == "SIGTERM"  # as gazerig.robot.loop.power_down heeds it
     # With any other the guardian would be killed before it has switched the servos off.
     assert service["KillMode"] == "control-group"
     assert float(service["TimeoutStopSec"]) >= 2 * PARK_S + 10

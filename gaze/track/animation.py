@@ -92,7 +92,7 @@ class Animation:
         self.expression = NEUTRAL
         self._until_s: dict[str, float] = {}
         self._shares = dict.fromkeys(self._ranges, 0.0)
-        self._speaking = False
+        self._speaks = False
         self._face, self._at_rest = self._low, False
         self.tracks.reset()
         self._sum = PoseOffset.from_flat(self._low.tolist())
@@ -164,16 +164,14 @@ class Animation:
         return self._sum
 
     def _speak(self, t_s: float) -> None:
-        """Let the mouth follow a speech that knows its openings; it shuts at the end."""
-        mouth = self._tables.mouth
-        speech = self.tracks.speech if mouth else None
-        if speech is not None and speech.motion.mouth is not None:
-            ahead_s = speech.position_s(t_s) + speech.lead_s
-            self.set_level(mouth, float(np.interp(ahead_s, *speech.motion.mouth)), t_s)
-            self._speaking = True
-        elif self._speaking:
-            self._speaking = False
+        """Let the mouth follow a speech that knows its openings; it shuts at the end of any."""
+        mouth, speech = self._tables.mouth, self.tracks.speech
+        if mouth and speech is not None and speech.motion.mouth is not None:
+            at_s = speech.position_s(t_s) + speech.lead_s
+            self.set_level(mouth, float(np.interp(at_s, *speech.motion.mouth)), t_s)
+        elif mouth and speech is None and self._speaks:
             self.set_level(mouth, 0.0, t_s)
+        self._speaks = speech is not None
 
     @property
     def loudness(self) -> float | None:

@@ -13,7 +13,6 @@ from gazerig.gaze.track.animation import NO_TABLES, FaceTables
 from gazerig.gaze.track.track import MAX_DURATION_S, Track
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.track.track_player import BLEND_IN_S, SPEECH, TrackPlayer, Voice
-from gazerig.robot.loop.joint_latency import JointLatency
 from gazerig.robot.model.commands import EndTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
@@ -60,8 +59,7 @@ class TrackChoices:
         joints: Joints of the rig, in the order of all sequences of joints.
         lid_spans_rad: Range of each lid from shut to open, by joint.
         tables: Expressions and levels of the rig.
-        latency_s: Latency of joints that has not been measured yet.
-        latency: Measures the latencies of the joints; None: as of joints on one bus.
+        latency_s: Latency of the joints, by which motion is ahead of its sound.
         changes: Returns the tracks whose files have changed since the last call, or the fault of
             a file.
     """
@@ -74,10 +72,8 @@ class TrackChoices:
         lid_spans_rad: Mapping[str, float],
         tables: FaceTables = NO_TABLES,
         latency_s: float = 0.0,
-        latency: JointLatency | None = None,
         changes: Callable[[], Mapping[str, Track | str]] = dict,
     ) -> None:
-        self.latency = latency or JointLatency(("",) * len(joints))
         self._tracks: dict[str, Track | str] = dict(tracks)
         self._player, self._joints, self._tables = player, joints, tables
         self._changes, self._changed = changes, set[str]()
@@ -179,26 +175,14 @@ class TrackChoices:
             motion, _ = self.prepare(command, limits)
             _start_s(command, motion)
 
-    def complete(self, command: Play | Speak, limits: Sequence[JointLimit]) -> Play | Speak:
-        """Return a command with what a recording needs: lead and duration of a sound, its track."""
-        if command.lead_s is not None or (isinstance(command, Play) and not command.track):
-            return command
-        if isinstance(command, Speak):
-            return structs.replace(command, lead_s=self.latencies_s())
+    def complete(self, command: Play, limits: Sequence[JointLimit]) -> Play:
+        """Return a command with what a recording needs: the duration of a sound, a new track."""
         try:
             motion, _ = self.prepare(command, limits)
         except ValueError:  # ``play`` reports it
             return command
-        if motion.sound_s:
-            lead_s = self.latencies_s()
-            command = structs.replace(command, lead_s=lead_s, sound_s=motion.sound_s)
-        if command.track in self._changed:
-            command = structs.replace(command, definition=motion.track)
-        return command
-
-    def latencies_s(self) -> tuple[float, ...]:
-        """Return the latencies of all joints, measured or assumed. Thread-safe."""
-        return self.latency.estimates_s(self._latency_s)
+        new = motion.track if command.track in self._changed else command.definition
+        return structs.replace(command, sound_s=motion.sound_s, definition=new)
 
     # --- playing
 
@@ -269,9 +253,7 @@ class TrackChoices:
             base[owned] = (fit.channel_means(commanded_rad) - player.rest)[owned]
             entry_s = motion.blend_s(motion.time_at(from_s), base, BLEND_IN_S, rising=True)
         player.end(staying, ended, t_s, begins_s + entry_s)
-        lead_s = 0.0
-        if command.lead_s:
-            lead_s = float(fit.channel_means(command.lead_s)[[*motion.channels]].max(initial=0.0))
+        lead_s = self._latency_s if motion.sound_s else 0.0
         if motion.mouth is not None:
             lead_s += 0.5 * self._tables.levels[self._tables.mouth].smoothing_s
         rounds = 1

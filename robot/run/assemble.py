@@ -24,14 +24,12 @@ from gazerig.gaze.track.animation import Animation
 from gazerig.robot.dashboard.feed.rig_feed import ShownRig
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.chooser import TargetChooser
-from gazerig.robot.loop.joint_latency import JointLatency
 from gazerig.robot.loop.loop import Robot
 from gazerig.robot.loop.track_choices import TrackChoices
-from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
+from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClock
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.moved_opponent import BoxingScene, TickClockOpponent
+from gazerig.robot.model.scene import BoxingScene
 from gazerig.robot.model.types import JointAngles, further_joints
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
@@ -206,7 +204,7 @@ def assemble(
             browser = browser_camera(rig, clock, use, messages.append)
             close = partial(_close, browser, own_camera, opened)
         if room is not None and isinstance(scene, BoxingScene) and scene.opponent is not None:
-            robot.set_opponent(TickClockOpponent(scene.opponent, room.start_s))
+            robot.set_opponent(scene.opponent, room.start_s)
     except BaseException:
         opened.close()
         raise
@@ -307,7 +305,6 @@ def _build_components(
             lid_spans(rig),
             face_tables(rig),
             rig.gaze.oculomotor.eye_lag_ms / 1e3,
-            JointLatency([rig.joints[name].bus for name in rig.names]),
             TrackFolder(rig_file).changes,
         ),
     )

@@ -7,12 +7,12 @@ the position that is really heard corrects the track's clock. In simulated time 
 """
 
 import contextlib
-import shutil
 import tempfile
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from msgspec import structs
@@ -21,6 +21,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import file_in_folders
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.sound.params import KINDS, SILENT_DEVICE
+from gazerig.drivers.sound.playback import SoundEvent
 from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
 from gazerig.drivers.sound.sound_file import check_sound, read_samples, write_wav
 from gazerig.drivers.sound.speech import speak
@@ -46,7 +47,8 @@ from gazerig.robot.model.reply import CommandTaker
 STREAM_DELAY_S = 0.15
 """Time from the arrival of a stream's first piece until it is heard."""
 
-_STREAM_TRACK_S = 600.0
+_STREAM, _STREAM_TRACK_S = "stream", 600.0
+"""Sound and longest duration of the track of a stream."""
 _WATCH_S = 0.02
 _SYNC_EVERY_S, _SYNC_ERROR_S = 0.25, 0.003
 _AGAIN_S = 0.1
@@ -62,13 +64,11 @@ _LEAD_IN_S = 0.05
 
 
 class _Stream(NamedTuple):
-    """A stream that is being said; ``lead_s``: latency of the mouth's joint."""
+    """A stream that is being said."""
 
     mouth: Mouth
     rate_hz: int
     channels: int
-    track: int
-    lead_s: float
 
 
 class RunVoice:
@@ -79,7 +79,6 @@ class RunVoice:
         rig: Returns the present rig.
         clock: Clock of the loop.
         folder: Folder of the rig's file, for relative paths.
-        latencies_s: Returns the latencies of all joints.
         fast: Whether time is simulated: nothing is played.
         report: Takes a line for the events of the next tick; called in ``update``.
     """
@@ -90,12 +89,11 @@ class RunVoice:
         rig: Callable[[], Rig],
         clock: Clock,
         folder: Path,
-        latencies_s: Callable[[], Sequence[float]],
         fast: bool,
         report: Callable[[str], object],
     ) -> None:
         self._command, self._rig, self._clock, self._report = command, rig, clock, report
-        self._folder, self._latencies_s, self._fast = folder, latencies_s, fast
+        self._folder, self._fast = folder, fast
         self._player: SoundPlayer | None = None
         self._device = ""
         self._lock = threading.RLock()
@@ -104,11 +102,10 @@ class RunVoice:
         self._closed = False
         self._tick: Tick | None = None
         self._played: TrackState | None = None
-        self._synced_s = self._watched_s = self._fed_s = 0.0
+        self._watched_s = self._fed_s = 0.0
         self._over = False
         self._stream: _Stream | None = None
-        self._texts = 0
-        self._scratch: Path | None = None
+        self._files = deque[Any](maxlen=_KEPT_FILES)
 
     # --- speech
 
@@ -134,7 +131,7 @@ class RunVoice:
             silent_s = _LEAD_IN_S + params.latency_ms / 1e3
             pcm = bytes(2 * round(silent_s * said.rate_hz)) + said.pcm
             phonemes = [(name, t_s + silent_s) for name, t_s in said.phonemes]
-            path = "" if self._fast else str(self._write(pcm, said.rate_hz))
+            path = "" if self._fast else self._write(pcm, said.rate_hz)
             speech = self._speech(path, _mono(pcm, 1), said.rate_hz, phonemes)
         self._open_loudspeaker(params.device)
         return structs.replace(speech, volume=command.volume, who=command.who)
@@ -179,15 +176,12 @@ class RunVoice:
         except ValueError as error:
             raise SoundError(f"{name}: {error}; see sound.folders") from None
 
-    def _write(self, pcm: bytes, rate_hz: int) -> Path:
+    def _write(self, pcm: bytes, rate_hz: int) -> str:
         """Write samples to a file that exists until the run ends, or some texts later."""
-        with self._lock:
-            if self._scratch is None:
-                self._scratch = Path(tempfile.mkdtemp(prefix="gazerig-voice-"))
-            self._texts += 1
-            path = Path(self._scratch, f"{self._texts % _KEPT_FILES}.wav")
-        write_wav(path, pcm, rate_hz)
-        return path
+        file = tempfile.NamedTemporaryFile(prefix="gazerig-voice-", suffix=".wav")  # noqa: SIM115
+        self._files.append(file)
+        write_wav(Path(file.name), pcm, rate_hz)
+        return file.name
 
     def _open_loudspeaker(self, device: str) -> None:
         """Open a loudspeaker, so that the sound begins with the motion.
@@ -249,19 +243,13 @@ class RunVoice:
                 raise SoundError("the run has ended")
             if tick is not None and tick.stopped:
                 raise SoundError("the head is stopped: resume it first")
-            begins = self._stream is None
             stream = self._stream or self._start_stream(player, rate_hz, channels, volume)
             if (rate_hz, channels) != (stream.rate_hz, stream.channels):
                 raise SoundError(
                     f"the stream has {stream.channels} channels at {stream.rate_hz} Hz: "
                     "finish it before another one"
                 )
-            try:
-                player.feed(pcm, now_s)
-            except SoundError:
-                if begins:
-                    self._end_stream(tick)
-                raise
+            player.feed(pcm, now_s)
             self._fed_s = now_s
             stream.mouth.add(_mono(pcm, channels))
             return player.ahead_s(now_s)
@@ -269,19 +257,15 @@ class RunVoice:
     def _start_stream(
         self, player: SoundPlayer, rate_hz: int, channels: int, volume: float
     ) -> _Stream:
-        rig = self._rig()
         check_format(rate_hz, channels)
-        ticket = self._command(Speak("", _STREAM_TRACK_S, self._level))
+        ticket = self._command(Speak(_STREAM, _STREAM_TRACK_S, self._level))
         reply = ticket.wait(_REPLY_S) if ticket is not None else None
         if reply is None or reply.track is None:
             raise SoundError(reply.refused if reply is not None else "the control loop hangs")
-        self._played = None  # the stream replaces it; to stop it later would stop the stream
+        self._played = TrackState(reply.track.number, SPEECH, sound=_STREAM)
         heard_s = self._clock.now_s() + STREAM_DELAY_S
-        player.open_stream(rate_hz, channels, heard_s, volume * rig.sound.volume)
-        lead_s = 0.0
-        if self._level:
-            lead_s = self._latencies_s()[rig.names.index(rig.levels[self._level].joint)]
-        self._stream = _Stream(Mouth(rate_hz), rate_hz, channels, reply.track.number, lead_s)
+        player.open_stream(rate_hz, channels, heard_s, volume * self._rig().sound.volume)
+        self._stream = _Stream(Mouth(rate_hz), rate_hz, channels)
         return self._stream
 
     def finish(self) -> None:
@@ -308,112 +292,97 @@ class RunVoice:
             self._lock.release()
 
     def _follow(self, tick: Tick) -> None:
-        player, now_s, opener = self._player, self._clock.now_s(), self._opener
+        player, played, opener = self._player, self._played, self._opener
         if opener is not None and not opener.is_alive():
-            opener.join()
-            self._opener = None
-            if self._fault:
-                raise SoundError(self._fault)
-        if player is not None and (self._stream is not None or self._played is not None):
+            self._opener, fault, self._fault = None, self._fault, ""
+            if fault:
+                raise SoundError(fault)
+        if player is not None and played is not None:
             for event in player.events():
-                if event.kind == "failed":
-                    self._fail(event.reason, tick)
-                elif event.kind == "stalled":
-                    self._report("the stream has stalled: the mouth closes until it continues")
-                elif event.kind == "ended":
-                    self._over = True
-                    self._end_stream(tick)
+                self._handle(event, tick)
+            if played.number > max([one.number for one in tick.tracks], default=0):
+                return  # the tick is older than the stream
+        wanted = _sounding_track(tick)
+        if played is not None and (wanted is None or wanted.number != played.number):
+            if player is not None and not _has_finished(played, tick):
+                player.stop()
+            self._played = self._stream = None
+        if wanted is None:
+            return
+        if wanted.sound == _STREAM:
+            if player is not None and self._stream is not None:
+                self._follow_stream(self._stream, player)
+        elif player is None or self._device != self._rig().sound.device or self._opener:
+            self._open_aside()
+        else:
+            self._follow_sound(player, wanted, tick)
+
+    def _handle(self, event: SoundEvent, tick: Tick) -> None:
+        if event.kind == "failed":
+            self._fail(event.reason, tick)
+        elif event.kind == "stalled":
+            self._report("the stream has stalled: the mouth closes until it continues")
+        elif event.kind == "ended":
+            self._over = True
             if self._stream is not None:
-                self._follow_stream(self._stream, player, tick, now_s)
-        self._follow_tracks(player, tick, now_s)
+                self._stream = None
+                self._try(EndTrack(SPEECH))
 
     def _fail(self, reason: str, tick: Tick) -> None:
         """Report a failure once, and end the track of the sound."""
         self._report(reason)
-        self._over, self._fault = True, ""
-        self._end_stream(tick)
+        self._over, self._stream = True, None
         if (failed := self._played or _sounding_track(tick)) is not None:
             self._try(EndTrack(failed.name))
 
-    def _follow_tracks(self, player: SoundPlayer | None, tick: Tick, now_s: float) -> None:
-        """Start, stop or synchronise the sound of the newest track that has one."""
-        wanted, before, stream = _sounding_track(tick), self._played, self._stream
-        if wanted is None or (stream is not None and wanted.number < stream.track):
-            if player is not None and before is not None and not _has_finished(before, tick):
-                player.stop()
-            self._played = None
-            return
-        rig = self._rig()
-        if player is None or self._device != rig.sound.device or self._opener is not None:
-            self._open_aside(rig.sound.device)
-            return
-        again = before is not None and wanted.position_s < before.position_s - _AGAIN_S
-        self._played = wanted
-        latency_s = rig.sound.latency_ms / 1e3
-        if before is None or wanted.number != before.number or again:
-            self._end_stream(tick)
-            self._over = False
-            start_s = tick.t_s - wanted.position_s - latency_s
-            volume = wanted.volume * rig.sound.volume
-            player.play(wanted.sound, wanted.position_s, start_s, volume)
-            return
-        heard_s = player.position_s(now_s)
-        if heard_s is None or self._over or now_s - self._synced_s < _SYNC_EVERY_S:
-            return
-        self._synced_s = now_s
-        track_s = wanted.position_s + now_s - tick.t_s
-        error_s = heard_s - latency_s - track_s
-        if abs(error_s) > _SYNC_ERROR_S:
-            # The command is executed in the next tick.
-            until_s = max(0.0, tick.t_s + 1.0 / rig.loop.rate_hz - now_s)
-            self._try(SyncTrack(wanted.number, track_s + error_s + until_s, "sound"))
-
-    def _open_aside(self, device: str) -> None:
+    def _open_aside(self) -> None:
         """Open the loudspeaker of a track in another thread, as it takes longer than a tick."""
         if self._opener is not None:
             return
 
         def open_device() -> None:
             try:
-                self._open_loudspeaker(device)
+                self._open_loudspeaker(self._rig().sound.device)
             except SetupError as error:
                 self._fault = str(error)
 
         self._opener = threading.Thread(target=open_device, name="loudspeaker", daemon=True)
         self._opener.start()
 
-    def _follow_stream(
-        self, stream: _Stream, player: SoundPlayer, tick: Tick, now_s: float
-    ) -> None:
-        """Open the mouth by the part of the stream that will be heard when it has moved."""
-        if tick.stopped or _has_ended(stream.track, tick):
-            player.stop()
-            self._end_stream(tick)
+    def _follow_sound(self, player: SoundPlayer, wanted: TrackState, tick: Tick) -> None:
+        """Start the sound of a track, or let the track follow it."""
+        before, self._played = self._played, wanted
+        sound = self._rig().sound
+        latency_s, now_s = sound.latency_ms / 1e3, self._clock.now_s()
+        if before is None or wanted.position_s < before.position_s - _AGAIN_S:
+            self._over = False
+            start_s = tick.t_s - wanted.position_s - latency_s
+            player.play(wanted.sound, wanted.position_s, start_s, wanted.volume * sound.volume)
             return
+        heard_s = player.position_s(now_s)
+        if heard_s is None or self._over or now_s - self._watched_s < _SYNC_EVERY_S:
+            return
+        self._watched_s = now_s
+        track_s = wanted.position_s + now_s - tick.t_s
+        error_s = heard_s - latency_s - track_s
+        if abs(error_s) > _SYNC_ERROR_S:
+            # The command is executed in the next tick.
+            until_s = max(0.0, tick.t_s + 1.0 / self._rig().loop.rate_hz - now_s)
+            self._try(SyncTrack(wanted.number, track_s + error_s + until_s, "sound"))
+
+    def _follow_stream(self, stream: _Stream, player: SoundPlayer) -> None:
+        """Open the mouth by the part of the stream that will be heard when it has moved."""
+        now_s, rig, level = self._clock.now_s(), self._rig(), self._level
         if now_s - self._watched_s < _WATCH_S:
             return
         self._watched_s = now_s
         if now_s - self._fed_s > _ABANDONED_S and player.ahead_s(now_s) < _WATCH_S:
             player.finish_stream()
-        if not self._level:
-            return
-        heard_s, opening = player.position_s(now_s), 0.0
-        if heard_s is not None:
-            rig = self._rig()
-            smoothing_s = rig.levels[self._level].smoothing_ms / 1e3
-            ahead_s = smoothing_s * _SMOOTHING_LAG + stream.lead_s + 0.5 * _WATCH_S
-            opening = stream.mouth.opening_at(heard_s + ahead_s - rig.sound.latency_ms / 1e3)
-        self._try(SetLevel(self._level, opening))
-
-    def _end_stream(self, tick: Tick | None) -> None:
-        """End the stream: the mouth shuts, and its track ends unless another has replaced it."""
-        stream, self._stream = self._stream, None
-        if stream is None:
-            return
-        if self._level:
-            self._try(SetLevel(self._level, 0.0))
-        if tick is not None and not _has_ended(stream.track, tick):
-            self._try(EndTrack(SPEECH))
+        heard_s = player.position_s(now_s)
+        if level and heard_s is not None:
+            ahead_s = rig.levels[level].smoothing_ms / 1e3 * _SMOOTHING_LAG + 0.5 * _WATCH_S
+            ahead_s += (rig.gaze.oculomotor.eye_lag_ms - rig.sound.latency_ms) / 1e3
+            self._try(SetLevel(level, stream.mouth.opening_at(heard_s + ahead_s)))
 
     @property
     def _level(self) -> str:
@@ -439,8 +408,7 @@ class RunVoice:
             if self._player is not None:
                 self._player.close()
             self._player = None
-            if self._scratch is not None:
-                shutil.rmtree(self._scratch, ignore_errors=True)
+            self._files.clear()
 
 
 def _sounding_track(tick: Tick) -> TrackState | None:
@@ -449,14 +417,6 @@ def _sounding_track(tick: Tick) -> TrackState | None:
         return None
     found = [one for one in tick.tracks if one.sound and one.is_playing and one.speed == 1.0]
     return max(found, key=lambda one: one.number, default=None)
-
-
-def _has_ended(number: int, tick: Tick) -> bool:
-    """Return whether a track has ended; the tick may be older than the track."""
-    newest = max([one.number for one in tick.tracks], default=0)
-    return newest >= number and not any(
-        one.number == number and one.is_playing for one in tick.tracks
-    )
 
 
 def _has_finished(played: TrackState, tick: Tick) -> bool:

@@ -6,38 +6,23 @@ Boards"). Board frame: origin at its upper left corner, x right, y down, z into 
 Pixels have their centres at whole numbers.
 """
 
-from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.types import ImageArray
-from gazerig.params import Bounds
 
 Floats = NDArray[np.float64]
 
+COLUMNS, ROWS = 7, 5
+SQUARE_MM, MARKER_MM = 36.0, 27.0
+"""Squares, and the side lengths of squares and markers: fits on A4 and on Letter in landscape."""
 # Markers with few and large modules can be read from farther away.
 _MARKERS = cv2.aruco.DICT_4X4_50
 # Fewer corners, or corners on one line, determine neither lens nor pose.
-LEAST_CORNERS = 6
-
-
-@dataclass(frozen=True)
-class BoardParams:
-    """Dimensions of the board. The default fits on A4 and on Letter in landscape format."""
-
-    columns: Annotated[int, Bounds(3, 20), "number of squares from left to right"] = 7
-    rows: Annotated[int, Bounds(3, 20), "number of squares from top to bottom"] = 5
-    square_mm: Annotated[float, Bounds(2, 500), "side length of a square"] = 36.0
-    marker_mm: Annotated[float, Bounds(1, 500), "side length of a marker"] = 27.0
-
-    def scaled(self, factor: float) -> "BoardParams":
-        """Return the board as printed with a scale factor."""
-        return BoardParams(
-            self.columns, self.rows, self.square_mm * factor, self.marker_mm * factor
-        )
+_LEAST_CORNERS = 6
 
 
 class DetectedBoard(NamedTuple):
@@ -55,19 +40,24 @@ class DetectedBoard(NamedTuple):
 
 
 class CharucoBoard:
-    """A ChArUco board, which can be drawn and found in images."""
+    """The board, which can be drawn and found in images.
 
-    def __init__(self, params: BoardParams | None = None) -> None:
-        self.params = par = params if params is not None else BoardParams()
+    Attributes:
+        corners_m: (n, 3) Positions of all inner corners in the board frame.
+        size_m: Width and height.
+
+    Args:
+        scale: Factor by which the print is larger than defined.
+    """
+
+    def __init__(self, scale: float = 1.0) -> None:
+        square_m, marker_m = scale * SQUARE_MM / 1e3, scale * MARKER_MM / 1e3
         self._board = cv2.aruco.CharucoBoard(
-            (par.columns, par.rows),
-            par.square_mm / 1e3,
-            par.marker_mm / 1e3,
-            cv2.aruco.getPredefinedDictionary(_MARKERS),
+            (COLUMNS, ROWS), square_m, marker_m, cv2.aruco.getPredefinedDictionary(_MARKERS)
         )
         self._detector = cv2.aruco.CharucoDetector(self._board)
         self.corners_m: Floats = np.array(self._board.getChessboardCorners(), dtype=np.float64)
-        self.size_m = (par.columns * par.square_mm / 1e3, par.rows * par.square_mm / 1e3)
+        self.size_m = COLUMNS * square_m, ROWS * square_m
 
     def find(self, image: ImageArray) -> DetectedBoard | None:
         """Find the board's inner corners; return None if too few are visible.
@@ -75,11 +65,13 @@ class CharucoBoard:
         Args:
             image: (h, w), (h, w, 1), BGR or BGRA.
         """
-        grey = _grey(image)
-        if grey is None:
+        if image.ndim not in (2, 3) or min(image.shape[:2]) < 16:
             return None
+        if image.ndim == 3 and image.shape[2] >= 3:
+            image = np.asarray(cv2.cvtColor(image[..., :3], cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        grey = np.ascontiguousarray(image.reshape(image.shape[:2]))
         corners, ids, _, _ = self._detector.detectBoard(grey)
-        if ids is None or len(ids) < LEAST_CORNERS:
+        if ids is None or len(ids) < _LEAST_CORNERS:
             return None
         numbers = np.asarray(ids, dtype=np.int64).ravel()
         places: Floats = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
@@ -97,17 +89,5 @@ class CharucoBoard:
             px_per_mm: Scale. Squares and marker modules are exact if their sides are whole
                 pixels.
         """
-        par = self.params
-        width = round(par.columns * par.square_mm * px_per_mm)
-        height = round(par.rows * par.square_mm * px_per_mm)
+        width, height = (round(1e3 * side_m * px_per_mm) for side_m in self.size_m)
         return np.asarray(self._board.generateImage((width, height)), dtype=np.uint8)
-
-
-def _grey(image: ImageArray) -> ImageArray | None:
-    """Return the image in grey, None if it is too small or not an image."""
-    if image.ndim not in (2, 3) or min(image.shape[:2]) < 16:
-        return None
-    if image.ndim == 2 or image.shape[2] == 1:
-        return np.ascontiguousarray(image.reshape(image.shape[:2]))
-    code = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}.get(image.shape[2])
-    return None if code is None else np.asarray(cv2.cvtColor(image, code), dtype=np.uint8)

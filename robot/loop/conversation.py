@@ -1,57 +1,28 @@
-"""State of a conversation, as a voice agent reports it, and its end."""
-
-from msgspec import Struct
+"""Conversation that a voice agent reports, and its end if reports are missing."""
 
 from gazerig.gaze.types import TurnState
+from gazerig.robot.loop.client_control import Lease
 from gazerig.robot.model.commands import Talk
-from gazerig.robot.model.lease import Lease
+from gazerig.robot.model.control_source import (
+    CHARACTERS_PER_S,
+    NO_CONVERSATION,
+    ConversationState,
+)
 
-CHARACTERS_PER_S = 15.0
-"""Rate of speech, for the end of a text without times: about 150 English words a minute."""
-LAST_WORD_S = 0.4
+_LAST_WORD_S = 0.4
 """Assumed duration of the last word."""
-GIVEN, TIMED, ESTIMATED = 0.9, 0.8, 0.3
+_GIVEN, _TIMED, _ESTIMATED = 0.9, 0.8, 0.3
 """Confidence of a planned end: given in seconds, from word times, from the length of a text."""
-OVERRUN_S, OVERRUN_SHARE = 5.0, 0.5
+_OVERRUN_S, _OVERRUN_SHARE = 5.0, 0.5
 """Speech that is not ended ends this time after its planned end, plus this share of its length."""
-LONGEST_S = {"thinking": 60.0, "speaking": 600.0}
+_LONGEST_S = {"thinking": 60.0, "speaking": 600.0}
 """Longest time in a state without a planned end and without a new report."""
-SHOWN_CHARACTERS = 80
+_SHOWN_CHARACTERS = 80
 """Length of the text that each tick contains; the command contains the whole."""
 
 
-class ConversationState(Struct, frozen=True):
-    """State of the conversation after a tick.
-
-    Attributes:
-        number: Number of the state since the start, 0 before the first; a plan that changes during
-            speech keeps it.
-        state: What the voice agent does; interrupted: it listens, after an interruption.
-        partner: Perception's number of the person, None if unknown.
-        since_s: Start of the state.
-        ends_s: Planned end of speech, None if unknown.
-        confidence: Confidence of the planned end, 0..1.
-        text: Beginning of the spoken text.
-        who: Name of the client, "" without one.
-        end_reason: Reason for an end that no client has requested, "" otherwise.
-    """
-
-    number: int = 0
-    state: TurnState = "idle"
-    partner: int | None = None
-    since_s: float = 0.0
-    ends_s: float | None = None
-    confidence: float = 0.0
-    text: str = ""
-    who: str = ""
-    end_reason: str = ""
-
-
-NO_CONVERSATION = ConversationState()
-
-
 class Conversation:
-    """The present state of conversation, its client, and the end if reports are missing.
+    """The present state of conversation and its client.
 
     Attributes:
         state: State at the present tick.
@@ -84,24 +55,17 @@ class Conversation:
         person = command.person if command.person is not None or not active else now.partner
         self._lease.start(command.who, command.stay, t_s)
         self._reported_s = t_s
+        repeated = not other and (state, person) == (now.state, now.partner)
+        number, since_s = (now.number, now.since_s) if repeated else (now.number + 1, t_s)
         if state == "idle":
             self.state = ConversationState(now.number + active, since_s=t_s)
         else:
-            repeated = not other and (state, person) == (now.state, now.partner)
             ends_s, confidence = _planned_end(command, t_s)
+            text = command.text[:_SHOWN_CHARACTERS]
             self.state = ConversationState(
-                now.number if repeated else now.number + 1,
-                state,
-                person,
-                now.since_s if repeated else t_s,
-                ends_s,
-                confidence,
-                command.text[:SHOWN_CHARACTERS],
-                command.who,
+                number, state, person, since_s, ends_s, confidence, text, command.who
             )
-        if not other:
-            return ""
-        return f"conversation: {command.who or 'a client'} takes over from {other}"
+        return f"conversation: {command.who or 'a client'} takes over from {other}" if other else ""
 
     def _comes_from_owner(self, command: Talk) -> bool:
         """Return whether a report is of the same client; one that stays may be of a new process."""
@@ -122,11 +86,10 @@ class Conversation:
         if self._lease.has_lapsed(t_s):
             return "not renewed"
         if now.ends_s is not None:
-            planned_s = now.ends_s - self._reported_s
-            late_s = OVERRUN_S + OVERRUN_SHARE * planned_s
+            late_s = _OVERRUN_S + _OVERRUN_SHARE * (now.ends_s - self._reported_s)
             if t_s - now.ends_s > late_s:
                 return f"{late_s:.0f} s after its planned end; report idle when the speech ends"
-        elif (longest_s := LONGEST_S.get(now.state)) and t_s - self._reported_s > longest_s:
+        elif (longest_s := _LONGEST_S.get(now.state)) and t_s - self._reported_s > longest_s:
             return f"no report for {longest_s:g} s; report the next state, or the same again"
         return ""
 
@@ -138,9 +101,9 @@ class Conversation:
 def _planned_end(command: Talk, t_s: float) -> tuple[float | None, float]:
     """Return the planned end of speech and its confidence; None and 0 if unknown."""
     if command.seconds is not None:
-        return t_s + command.seconds, GIVEN
+        return t_s + command.seconds, _GIVEN
     if command.words:
-        return t_s + max([start_s for _, start_s in command.words]) + LAST_WORD_S, TIMED
-    if command.text.strip():
-        return t_s + len(command.text.strip()) / CHARACTERS_PER_S, ESTIMATED
+        return t_s + max([start_s for _, start_s in command.words]) + _LAST_WORD_S, _TIMED
+    if text := command.text.strip():
+        return t_s + len(text) / CHARACTERS_PER_S, _ESTIMATED
     return None, 0.0
