@@ -45,18 +45,15 @@ def _find_radians(rig: "Rig") -> Iterator[str]:
 
 
 def _track_lines(rig: "Rig") -> Iterator[str]:
-    """Return how a rig plays each of its own tracks, and whether its angles look like radians."""
+    """Return how a rig plays each of its own tracks."""
     from gazerig.config.load import find_file
     from gazerig.config.tracks import load_track
     from gazerig.robot.model.track_fit import TrackRefused
-    from gazerig.robot.run.track_file import fit_to_rig, radians_hint, track_angles_deg
+    from gazerig.robot.run.track_file import fit_to_rig
 
     for file in rig.track_files:
         path = find_file("tracks", file)
-        track = load_track(path)
-        if hint := radians_hint(track_angles_deg(track)):
-            yield f"{file}: {hint}"
         try:
-            yield f"{file}: {fit_to_rig(rig, path.stem, track).text()}"
+            yield f"{file}: {fit_to_rig(rig, path.stem, load_track(path)).text()}"
         except TrackRefused as refused:
             yield f"{file}: {rig.name} cannot play it: {refused}"
