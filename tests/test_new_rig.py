@@ -9,7 +9,6 @@ from command_line import invoked, typed
 
 from gazerig.config.schema import load_rig
 from gazerig.config.shipped_files import SHIPPED
-from gazerig.robot.cli import new as command
 from gazerig.robot.cli.new import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
 
 TEMPLATES = {
@@ -24,7 +23,6 @@ TEMPLATES = {
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(command, "_plugged_in", lambda board: "")
 
 
 @pytest.mark.parametrize("name", TEMPLATES)

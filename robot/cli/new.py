@@ -134,9 +134,7 @@ def new(
         float | None,
         typer.Option(min=10, max=500, help=f"Distance between the eye centres: {_EYES_MM:g}."),
     ] = None,
-    port: Annotated[
-        str | None, typer.Option(help="Port of the board; default: the adaptor plugged in.")
-    ] = None,
+    port: Annotated[str, typer.Option(help="Port of the board; default: its usual one.")] = "",
     force: ForceOption = False,
 ) -> None:
     """Write a new rig's YAML from a few answers, check it, and print the next command."""
@@ -154,10 +152,7 @@ def new(
         if eyes_mm is None and sys.stdin.isatty():
             question = "What is the distance between the eyes, in mm?"
             eyes_mm = typer.prompt(question, f"{_EYES_MM:g}", value_proc=_read_length, err=True)
-        rig = NewRig(
-            file.stem, chosen, joints_of(wanted), seen, eyes_mm or _EYES_MM,
-            port or _plugged_in(chosen),
-        )  # fmt: skip
+        rig = NewRig(file.stem, chosen, joints_of(wanted), seen, eyes_mm or _EYES_MM, port)
         from gazerig.config.schema import load_rig
 
         write_file(file, rig_text(rig), force)
@@ -235,16 +230,6 @@ def next_steps(rig: NewRig, file: str) -> Iterable[str]:
     yield from (f"  {command:{wide}}  {what}" for command, what in steps)
     if rig.camera == "oak" and find_spec("depthai") is None:
         yield f"an OAK-D needs one more package: {install_command('oak')}"
-
-
-def _plugged_in(board: str) -> str:
-    """Return the port of the only USB serial adaptor if the board uses one, otherwise ""."""
-    if not _TABLES.boards[board].port.startswith("/dev/tty") or board == "none":
-        return ""
-    from gazerig.drivers.serial.list_ports import serial_ports
-
-    usb = [port for port in serial_ports() if port.usb]
-    return (usb[0].by_id or usb[0].device) if len(usb) == 1 else ""
 
 
 def rig_text(new: NewRig) -> str:

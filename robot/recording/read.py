@@ -78,10 +78,10 @@ class RunRecording:
                 case Chunk():
                     times_ns += (record.message_start_time, record.message_end_time)
                 case Metadata(name=fmt.RUN):
-                    with _damage_errors(self.path):
+                    with report_bad_contents(self.path):
                         info = read_text(record.metadata, RunInfo)
                 case Metadata(name=fmt.END):
-                    with _damage_errors(self.path):
+                    with report_bad_contents(self.path):
                         self.end = read_text(record.metadata, RunEnd)
                 case Footer():
                     self.whole = True
@@ -117,7 +117,7 @@ class RunRecording:
         percept: Percept | None = None
         before_s: float | None = None
         for data in self._tick_messages():
-            with _damage_errors(self.path):
+            with report_bad_contents(self.path):
                 exact = _exact.decode(data).exact
                 record = decode(exact, TickRecord) if exact else _ticks.decode(data)
                 if record.percept is not UNSET:
@@ -147,7 +147,7 @@ class RunRecording:
         Args:
             emit_chunks: Return chunks as they are, without their records.
         """
-        with open_mcap(self.path, BadRecording, _CURE) as file, _damage_errors(self.path):
+        with open_mcap(self.path, BadRecording, _CURE) as file, report_bad_contents(self.path):
             file.seek(-len(MAGIC), 2)
             closed = file.read() == MAGIC and file.tell() > len(MAGIC)
             file.seek(0)
@@ -182,7 +182,7 @@ class RunRecording:
 
 @contextmanager
 def report_bad_contents(path: Path) -> Iterator[None]:
-    """Convert errors caused by impossible contents of a recording to one line.
+    """Convert errors caused by damaged or impossible contents of a recording to one line.
 
     Use it around code that processes a recording: a well-formed file may contain impossible
     values.
@@ -195,17 +195,5 @@ def report_bad_contents(path: Path) -> Iterator[None]:
     except DriverError:
         raise
     except DAMAGE as error:
-        what = f"{type(error).__name__}: {' '.join(str(error).split())[:80]}"
-        raise BadRecording(f"{path} contains impossible values ({what}): record again") from error
-
-
-@contextmanager
-def _damage_errors(path: Path) -> Iterator[None]:
-    """Convert errors of a damaged file to one line."""
-    try:
-        yield
-    except BadRecording:
-        raise
-    except DAMAGE as error:
-        what = " ".join(str(error).split())[:80]
-        raise BadRecording(f"{path} is damaged ({what}): copy it again") from None
+        what = " ".join(str(error).split())[:80] or type(error).__name__
+        raise BadRecording(f"{path} is damaged ({what}): copy it again, or record again") from error

@@ -145,9 +145,8 @@ class FramePicker:
         if found.image is None:  # checked last, as reading the image may copy it
             return False
         # A late frame does not delay those that follow.
-        late_s = found.captured_s - self._due_s
-        began_s = self._due_s if late_s < self._every_s else found.captured_s
-        self._due_s = began_s + self._every_s
+        keeps_pace = found.captured_s - self._due_s < self._every_s
+        self._due_s = (self._due_s if keeps_pace else found.captured_s) + self._every_s
         return True
 
 
