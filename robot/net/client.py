@@ -10,6 +10,7 @@ with RobotClient.connect() as rig:
     rig.save("/home/me/my.yaml")
 """
 
+import contextlib
 import json
 import os
 import threading
@@ -131,7 +132,7 @@ class ControlHeartbeat:
         self._thread.join(timeout=2.0)
 
     def _beat(self) -> None:
-        try:
+        with contextlib.suppress(OSError, EOFError, MalformedMessage):  # closed by either side
             while not self._over.is_set():
                 self._wire.write(self._request, HEARTBEAT_S)
                 match self._wire.read(10.0, 10.0):
@@ -139,8 +140,6 @@ class ControlHeartbeat:
                         self._over.wait(_EVERY_S)
                     case _:  # another client is in control, or none
                         return
-        except (OSError, EOFError, MalformedMessage):
-            return  # closed by either side
 
 
 class RobotClient:
@@ -180,14 +179,15 @@ class RobotClient:
             return found[0]
         for other in found:
             other.close()
-        asked = "" if which is None else f" {_choice_text(which)}"
-        there = _names(connect_to_all())
+        kind = "of process" if str(which).isdecimal() else "named"
+        asked = "" if which is None else f" {kind} {which}"
+        running = _names_of_all()
         if not found:
             raise NoRobotError(
-                f"no rig{asked} is running: {there or 'start one with gazerig run ...'}"
+                f"no rig{asked} is running: {running or 'start one with gazerig run ...'}"
             )
         raise NoRobotError(
-            f"{len(found)} rigs{asked} are running: {there}; choose one with --rig NAME or --pid N"
+            f"{len(found)} rigs{asked} are running: {running}; choose one with --rig NAME or --pid N"
         )
 
     def __enter__(self) -> "RobotClient":
@@ -427,22 +427,19 @@ def connect_to_all(which: int | str | None = None, who: str = "") -> list[RobotC
         which: Process id or name of the rig; None: all.
         who: As in ``RobotClient.connect``.
     """
-    if isinstance(which, str) and not which.isdecimal():
-        return _select_by_name(connect_to_all(who=who), which)
-    pid = None if which is None else int(which)
     uid = os.getuid()
     place = socket_folder(os.environ, uid)
     if not is_private(place, uid):  # any user may have put a socket there
         return []
     found: list[RobotClient] = []
-    for path, number in find_sockets(place).items():
-        if pid is None or number == pid:
-            try:
-                found.append(
-                    RobotClient(_connect_wire(path), number, who, partial(_connect_wire, path))
-                )
-            except OSError:  # killed: the next rig that starts removes it
-                continue
+    for path, pid in find_sockets(place).items():
+        dial = partial(_connect_wire, path)
+        with contextlib.suppress(OSError):  # killed: the next rig that starts removes it
+            rig = RobotClient(dial(), pid, who, dial)
+            if which is None or _is_chosen(rig, str(which)):
+                found.append(rig)
+            else:
+                rig.close()
     return found
 
 
@@ -451,35 +448,25 @@ def _connect_wire(path: Path) -> Wire:
     return Wire(connect_to_socket(path, CONNECT_S), ANSWER_BYTES)
 
 
+def _is_chosen(rig: RobotClient, which: str) -> bool:
+    """Return whether a rig has this process id or name."""
+    if which.isdecimal():
+        return rig.pid == int(which)
+    try:
+        return rig.name == which
+    except DriverError:  # it is ending or hangs
+        return False
+
+
 def rig_name(rig: str) -> str:
     """Return the name of an unnamed rig: that of its file."""
     return Path(rig).stem
 
 
-def _choice_text(which: int | str) -> str:
-    """Return a chosen process or name as text."""
-    return f"of process {which}" if str(which).isdecimal() else f"named {which}"
-
-
-def _select_by_name(rigs: list[RobotClient], name: str) -> list[RobotClient]:
-    """Return the rigs of a name, and close the other connections."""
-    found = []
-    for rig in rigs:
-        try:
-            named = rig.name == name
-        except DriverError:  # it is ending or hangs
-            named = False
-        if named:
-            found.append(rig)
-        else:
-            rig.close()
-    return found
-
-
-def _names(rigs: list[RobotClient]) -> str:
-    """Return the names and processes of rigs as text, and close the connections."""
+def _names_of_all() -> str:
+    """Return the names and processes of all rigs that run as text."""
     names = []
-    for rig in rigs:
+    for rig in connect_to_all():
         with rig:
             try:
                 names.append(f"{rig.name} (process {rig.pid})")

@@ -22,7 +22,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from socket import socket
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import aiohttp
 import msgspec
@@ -66,10 +66,11 @@ from gazerig.robot.net.excess import (
     TokenBucket,
     find_stop,
 )
-from gazerig.robot.net.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
+from gazerig.robot.net.openapi import MOST_WAIT_S, WAIT_S, api_description
 from gazerig.robot.net.socket_io import REQUEST_BYTES, VERSION
 from gazerig.robot.net.topics import PanelContent, RigInfo, RunState, ShownPicture
 
+_T = TypeVar("_T")
 BASE = f"{API}v{VERSION}"
 MOST_CLIENTS = 32
 """Largest number of websockets; one more takes the place of the oldest of the greediest client."""
@@ -118,6 +119,18 @@ class MessageRefused(ValueError):
         self.status = status
 
 
+class _Wait(msgspec.Struct):
+    """Query of a message: longest wait for its outcome, s."""
+
+    wait_s: Annotated[float, msgspec.Meta(ge=0.0, le=MOST_WAIT_S)] = WAIT_S
+
+
+class _After(msgspec.Struct):
+    """Query of a state: number of the last known event."""
+
+    after: Annotated[int, msgspec.Meta(ge=0, le=_NEWEST)] = _NEWEST
+
+
 class HeadNews(NamedTuple):
     """What is new of the head; None and () for what is not.
 
@@ -155,32 +168,16 @@ def parse_message(data: str | bytes) -> dict[str, Any]:
     return found
 
 
-def parse_number(request: web.Request, name: str, least: float, most: float, usual: float) -> float:
-    """Parse a number of a query, ``usual`` without it.
+def parse_query(request: web.Request, kind: type[_T]) -> _T:
+    """Parse the values of a query.
 
     Raises:
-        MessageRefused: it is outside the bounds.
+        MessageRefused: one is of the wrong type, or outside its bounds.
     """
-    text = request.query.get(name)
     try:
-        value = usual if text is None else float(text)
-    except ValueError:
-        value = -1.0
-    if text is not None and not least <= value <= most:
-        raise MessageRefused(f"{name}={text:.20}: a number {least:g}..{most:g}")
-    return value
-
-
-def parse_flag(request: web.Request, name: str) -> bool:
-    """Parse a flag of a query, False without it.
-
-    Raises:
-        MessageRefused: it is neither true nor false.
-    """
-    text = request.query.get(name, "false")
-    if text not in ("true", "false"):
-        raise MessageRefused(f"{name}={text:.20}: true or false")
-    return text == "true"
+        return msgspec.convert(dict(request.query), kind, strict=False)
+    except msgspec.ValidationError as error:
+        raise MessageRefused(f"query: {error}") from None
 
 
 def add_client(message: dict[str, Any], visitor: Visitor, websocket: str = "") -> dict[str, Any]:
@@ -266,9 +263,11 @@ class PageDoor:
         return self._thread.is_alive()
 
     def wanted(self) -> Wishes:
-        """Return what any client wants now; may be called from any thread."""
+        """Return whether any client wants pictures, and the rig; for any thread."""
         wishes = [client.wishes for client in tuple(self._clients)]
-        return Wishes(*(max(column) for column in zip(Wishes(), *wishes, strict=True)))
+        return Wishes(
+            pictures=any(one.pictures for one in wishes), rig=any(one.rig for one in wishes)
+        )
 
     def close(self) -> None:
         """Close all connections."""
@@ -374,7 +373,7 @@ class PageDoor:
         try:
             match request.method, request.path.removeprefix(f"{BASE}/"):
                 case "GET", "state":
-                    after = int(parse_number(request, "after", 0, _NEWEST, _NEWEST))
+                    after = parse_query(request, _After).after
                     return _answer({"ok": await self._report(after)}, 200)
                 case "POST", "do":
                     return await self._post(request)
@@ -407,7 +406,7 @@ class PageDoor:
         return HeadReport(state, self._feed.events(after), self._feed.number)
 
     async def _post(self, request: web.Request) -> web.StreamResponse:
-        wait_s = parse_number(request, "wait_s", 0.0, MOST_WAIT_S, WAIT_S)
+        wait_s = parse_query(request, _Wait).wait_s
         data = b""
         async with asyncio.timeout(_READ_S):
             while len(data) <= REQUEST_BYTES and (more := await request.content.readany()):
@@ -476,12 +475,7 @@ class PageDoor:
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         _require_websocket(request)
-        wishes = Wishes(
-            parse_number(request, "rate_hz", 1.0, MOST_RATE_HZ, 0.0),
-            parse_flag(request, "events"),
-            parse_flag(request, "pictures"),
-            parse_flag(request, "rig"),
-        )
+        wishes = parse_query(request, Wishes)
         self._websockets += 1
         visitor = self._visitor(request)
         client = ClientSocket(wishes, visitor, f"websocket {self._websockets}")

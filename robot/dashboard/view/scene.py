@@ -4,7 +4,6 @@ import viser
 
 from gazerig.robot.dashboard.door.viser_server import browser_of
 from gazerig.robot.dashboard.feed.rig_feed import ShownHead, ShownWorld
-from gazerig.robot.dashboard.view.ghost import CommandedPoseView
 from gazerig.robot.dashboard.view.glb import add_lights
 from gazerig.robot.dashboard.view.head_view import HeadView
 from gazerig.robot.dashboard.view.people import PeopleView
@@ -25,7 +24,6 @@ class HeadScene:
         self._head = HeadView(server.scene)
         self._people = PeopleView(server.scene)
         self._world = WorldView(server.scene)
-        self._ghost = CommandedPoseView(server.scene)
         self._layers: tuple[Layer, ...] = ()
         self._drawn = False
 
@@ -49,4 +47,3 @@ class HeadScene:
             self._head.show(head, sight="sight" in layers)
             # A simulated world draws its own people.
             self._people.show(head.tick, people=world is None)
-            self._ghost.show(head if "ghost" in layers else None)
