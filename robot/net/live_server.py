@@ -8,14 +8,14 @@ found the same, and a missing file when it is missing for several checks.
 """
 
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
-from gazerig.errors import Error
 from gazerig.robot.loop.command_handler import (
+    REFUSALS,
     CommandHandler,
     ParamAccess,
     PathGuard,
@@ -119,16 +119,6 @@ class FileWatch:
             self.look()
 
 
-class FileTuning(ParamAccess, Protocol):
-    """Parameters of a running rig, and the files that define them."""
-
-    def files(self) -> Iterable[Path]:
-        """Return the files in use: the rig's file and its overlays."""
-
-    def reload(self, path: Path) -> Sequence[str]:
-        """Apply the contents of a file and return notes; on errors change nothing and raise."""
-
-
 class LiveServer:
     """Remote control and file watch of one running rig.
 
@@ -151,7 +141,7 @@ class LiveServer:
     def __init__(
         self,
         robot: Robot,
-        tuning: FileTuning | None,
+        tuning: ParamAccess | None,
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
@@ -170,7 +160,7 @@ class LiveServer:
             )  # fmt: skip
         else:
             handler = CommandHandler(
-                robot.command, tuning, (Error,), self._watch.saved, voice=voice, menus=robot.menus,
+                robot.command, tuning, self._watch.saved, voice=voice, menus=robot.menus,
                 tracks=robot.tracks,
             )  # fmt: skip
         self._server = RemoteServer(RequestHandler(handler, pulse, about, fault, changing), say)
@@ -199,7 +189,7 @@ class LiveServer:
         assert self._tuning is not None, "without parameters no file is watched"
         try:
             notes = self._tuning.reload(path)
-        except (OSError, ValueError, Error) as error:
+        except REFUSALS as error:
             self._say(f"{path} changed but has errors; the previous values stay:\n{error}")
             return
         if notes:

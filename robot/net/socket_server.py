@@ -17,7 +17,7 @@ from queue import SimpleQueue
 from typing import Any, NamedTuple
 
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.requests import ORDERS
+from gazerig.robot.model.commands import ORDERS
 from gazerig.robot.net import socket_io
 from gazerig.robot.net.excess import (
     CLOSED,
