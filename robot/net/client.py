@@ -340,18 +340,15 @@ class RobotClient:
         command = set_client(command, self.who)
         if isinstance(command, LookAt) and command.p_world_m is None and not self._talks:
             self._end_heartbeat()
-        reply = self._command(command)
+        reply, renews = self._command(command), False
         if isinstance(command, Talk):
             # After idle the heartbeat ends by itself, unless the client controls the gaze too.
-            self._talks = command.state != "idle" and not command.stay
-            if not self._talks or self._dial is None:
-                return reply
-        elif not isinstance(command, ControlCommand) or not reply.control_number:
-            return reply
-        elif (command.stay and not self._talks) or self._dial is None:
-            self._end_heartbeat()
-            return reply
-        if not self.in_control:
+            renews = self._talks = command.state != "idle" and not command.stay
+        elif isinstance(command, ControlCommand) and reply.control_number:
+            renews = self._talks or not command.stay
+            if not renews:
+                self._end_heartbeat()
+        if renews and self._dial is not None and not self.in_control:
             self._end_heartbeat()
             try:
                 self._heartbeat = ControlHeartbeat(self._dial, self.who)
