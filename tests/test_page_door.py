@@ -51,7 +51,7 @@ def test_the_page_comes_with_its_stop_button(near: Rig) -> None:
     assert headers["X-Frame-Options"] == "DENY"
     assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
     status, headers, text = near.get("/rig/stop.js")
-    assert status == 200 and "text/javascript" in headers["Content-Type"] and "STOP" in text
+    assert status == 200 and "javascript" in headers["Content-Type"] and "STOP" in text
 
 
 def test_the_view_is_viser_in_a_frame_of_this_page_alone(near: Rig) -> None:

@@ -39,7 +39,7 @@ from gazerig.robot.dashboard.door.client_socket import (
     Wishes,
     tag_of,
 )
-from gazerig.robot.dashboard.door.page_files import PageFiles
+from gazerig.robot.dashboard.door.page_files import add_page_files
 from gazerig.robot.dashboard.door.rig_link import BUSY, Answer, RigLink
 from gazerig.robot.dashboard.door.sockets import (
     TAKES_S,
@@ -107,6 +107,19 @@ _HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
+    # Allow scripts and connections of this address only. Panels contain their own styles, and the
+    # page itself creates the camera image and the icon of the tab.
+    "Content-Security-Policy": (
+        "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+        "media-src 'self' blob:; object-src 'none'; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'none'"
+    ),
+}
+_FRAMED_HEADERS = {
+    **_HEADERS,
+    # The page itself shows the view in a frame, and no other page may.
+    "X-Frame-Options": "SAMEORIGIN",
+    "Content-Security-Policy": "frame-ancestors 'self'",
 }
 _WHERE = (
     "open the address with the token that the rig's terminal shows; "
@@ -289,7 +302,8 @@ class PageDoor:
 
     async def _serve(self) -> None:
         app = web.Application(middlewares=[self._admission_middleware()])
-        PageFiles(_HEADERS).add_to(app.router)
+        app.on_response_prepare.append(add_headers)
+        add_page_files(app.router)
         app.router.add_route("*", API + "{path:.*}", self._handle)
         app.router.add_get(VIEW, self._relay_view)
         app.router.add_get(f"{VIEW}/{{path:.*}}", self._relay_view)
@@ -301,7 +315,7 @@ class PageDoor:
         assert runner.server is not None
         self._connections = Connections(runner.server)
         async with view_client(self._inside) as client:
-            self._view = ViewProxy(client, self._connections, _HEADERS)
+            self._view = ViewProxy(client, self._connections)
             listener = await self._loop.create_server(
                 self._connections.accept, sock=self._listener, backlog=BACKLOG
             )
@@ -352,7 +366,7 @@ class PageDoor:
                 if why_not is not None and is_program:
                     return _answer({"refused": why_not.removeprefix("refused: ")}, 403)
                 if why_not is not None:
-                    return web.Response(status=403, text=f"{why_not}\n", headers=_HEADERS)
+                    return web.Response(status=403, text=f"{why_not}\n")
                 if "token" in request.query and not is_program:
                     answer = self.admission.with_cookie(request, _HEADERS)
                     if self._name_cookie not in request.cookies:
@@ -453,23 +467,24 @@ class PageDoor:
 
     async def _ask(self, message: Mapping[str, Any], visitor: Visitor) -> Answer:
         """Answer a message, or send it to the rig, a stop before all others."""
+        tag = tag_of(message)
+        plain = {key: value for key, value in message.items() if key != "tag"}
         try:
             match message.get("do"):
                 case "stop":  # whatever else it says
                     stop = {key: message[key] for key in ("do", "why", "who")}
-                    answer = await self._rig.stop(stop) | tag_of(message)
+                    answer = await self._rig.stop(stop) | tag
                 case "state":
-                    asked = read_request(_without_tag(message))
+                    asked = read_request(plain)
                     assert isinstance(asked, State)
-                    return {"ok": await self._report(asked.after)} | tag_of(message)
+                    answer = {"ok": await self._report(asked.after)} | tag
                 case "show_view":
-                    view = msgspec.convert(_without_tag(message), ShowView)
-                    self._show_view(view, visitor.browser)
-                    return {"ok": {"notes": []}} | tag_of(message)
+                    self._show_view(msgspec.convert(plain, ShowView), visitor.browser)
+                    answer = {"ok": {"notes": []}} | tag
                 case _:
                     answer = await self._rig.ask(message)
         except ValueError as error:
-            return {"refused": str(error)} | tag_of(message)
+            answer = {"refused": str(error)} | tag
         match answer:
             case {"ok": {"reply": {"t_s": replied_s}}}:
                 self._replied_s = replied_s
@@ -639,11 +654,16 @@ class PageDoor:
             browser = self._visitor(request).browser
             return await self._view.relay(request, browser, self._over.wait())
         if request.path == VIEW:  # paths in the document are relative to it
-            return web.Response(status=302, headers={**_HEADERS, "Location": f"{VIEW}/"})
+            return web.Response(status=302, headers={"Location": f"{VIEW}/"})
         return await self._view.get(request)
 
     async def _not_found(self, request: web.Request) -> web.Response:
-        return web.Response(status=404, text="there is no page at this address\n", headers=_HEADERS)
+        return web.Response(status=404, text="there is no page at this address\n")
+
+
+async def add_headers(request: web.Request, response: web.StreamResponse) -> None:
+    """Add the headers of every answer."""
+    response.headers.update(_FRAMED_HEADERS if request.path.startswith(VIEW) else _HEADERS)
 
 
 def _require_websocket(request: web.Request) -> None:
@@ -656,16 +676,11 @@ def _answer(answer: Mapping[str, object], status: int) -> web.Response:
         body=msgspec.json.encode(answer),
         status=status,
         content_type="application/json",
-        headers=_HEADERS,
     )
 
 
 def _line(**message: object) -> str:
     return msgspec.json.encode(message).decode()
-
-
-def _without_tag(message: Mapping[str, object]) -> dict[str, object]:
-    return {key: value for key, value in message.items() if key != "tag"}
 
 
 def _unread_bytes(request: web.Request) -> int:
