@@ -5,10 +5,10 @@ servo on a Maestro: a quarter of a microsecond of pulse width). Only gazerig.rob
 converts steps to joint angles. Times are host monotonic seconds.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, nan
-from typing import Final, NamedTuple, Protocol, runtime_checkable
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -176,19 +176,6 @@ class ServoBus(Protocol):
         """Close the port."""
 
 
-@runtime_checkable
-class LimpableBus(Protocol):
-    """A bus that can switch the torque of single servos, a capability besides ``ServoBus``."""
-
-    def set_limp(self, servos: Collection[int]) -> None:
-        """Switch torque off on these servos, by index; all others that were limp get it again.
-
-        They hold their present position, without a jump; a servo without feedback its last one.
-        Nothing happens while no servo has torque. A servo that does not confirm keeps its torque,
-        as ``Feedback.torque`` shows; one that refuses its torque is set up again by later reads.
-        """
-
-
 class Clothing(NamedTuple):
     """Colours of the clothes below a head, as gazerig.drivers.vision.clothing finds them.
 
@@ -242,6 +229,8 @@ class Located(NamedTuple):
     thickness_m: for a moving thing, diameter of the largest disc within its patch, at its distance;
         from_side: it extends beyond the left or right edge of the image
     clothing: for a person, colours of the clothes, None if they are not visible
+    flat: for a face, whether the measured depth on both sides and above it is that of the face, as
+        for a picture or a screen
     """
 
     kind: str
@@ -269,6 +258,7 @@ class Located(NamedTuple):
     from_side: bool = False
     upper_m: tuple[float, float, float] | None = None
     clothing: Clothing | None = None
+    flat: bool = False
 
 
 class LocatedFrame(NamedTuple):

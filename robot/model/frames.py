@@ -10,11 +10,21 @@ from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import copysign, degrees, radians, sqrt
+from math import copysign, degrees, hypot, radians
 from typing import Annotated, Literal
 
 from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
-from gazerig.gaze.angles import add, angles_of, compose, rotate, rotation, scale, sub, transpose
+from gazerig.gaze.angles import (
+    add,
+    angles_of,
+    compose,
+    rotate,
+    rotation,
+    scale,
+    sub,
+    transpose,
+    yaw_pitch,
+)
 from gazerig.gaze.types import Angles2, Angles3, HeadGeometry, Mat3, Vec3
 from gazerig.params import Bounds
 
@@ -33,6 +43,7 @@ _Focal = Annotated[float, Bounds(10, 100_000)]
 _Centre = Annotated[float, Bounds(-10_000, 20_000)]
 _Bend = Annotated[float, Bounds(-100, 100)]
 _Millimetres = Annotated[float, Bounds(-2000, 2000)]
+_Degrees = Annotated[float, Bounds(-180, 180)]
 
 
 @dataclass(frozen=True)
@@ -65,6 +76,9 @@ class CameraParams:
         "degrees clockwise by which the camera's frames are turned upright; all other values here refer to upright frames"] = 0
     mirrored: Annotated[bool, "the camera delivers mirror images: left and right are exchanged before the rotation"] = False
     lens: Annotated[LensParams | None, "measured lens; without it, the field of view is used"] = None
+    ignore_deg: Annotated[tuple[tuple[_Degrees, _Degrees, _Degrees, _Degrees], ...],
+        "directions from the camera in which nothing is looked at, such as a television: least and largest yaw (to the "
+        "left), least and largest pitch (upwards), where 0, 0 is straight ahead of the neck base"] = ()
     # fmt: on
 
 
@@ -158,6 +172,15 @@ class CameraMount:
             (radians(params.yaw_deg), radians(params.pitch_deg), radians(params.roll_deg))
         )
         self._R = compose(turn, OPTICAL)
+        self._ignore_rad = [tuple(map(radians, window)) for window in params.ignore_deg]
+
+    def is_ignored(self, way: Vec3) -> bool:
+        """Return whether the rig ignores what is in a direction from the camera."""
+        yaw, pitch = yaw_pitch(way)
+        return any(
+            right <= yaw <= left and low <= pitch <= high
+            for right, left, low, high in self._ignore_rad
+        )
 
     def rotation(self, R_world_head: Mat3) -> Mat3:
         """Return R_world_camera for an orientation of the head."""
@@ -208,19 +231,14 @@ Quaternion = tuple[float, float, float, float]
 def quaternion(R: Mat3) -> Quaternion:
     """Return a rotation matrix as a unit quaternion with w >= 0."""
     (a, b, c), (d, e, f), (g, h, i) = R
-    w, x, y, z = (
-        0.5 * sqrt(max(0.0, 1.0 + trace)) for trace in (a + e + i, a - e - i, e - a - i, i - a - e)
+    # Each row is four times a component, times the quaternion; the largest is the most exact.
+    rows = (
+        (1.0 + a + e + i, h - f, c - g, d - b),
+        (h - f, 1.0 + a - e - i, b + d, c + g),
+        (c - g, b + d, 1.0 - a + e - i, f + h),
+        (d - b, c + g, f + h, 1.0 - a - e + i),
     )
-    # The largest is exact; the others follow from sums and differences with it.
-    largest = max(w, x, y, z)
-    if largest == w:
-        found = (w, (h - f) / (4 * w), (c - g) / (4 * w), (d - b) / (4 * w))
-    elif largest == x:
-        found = ((h - f) / (4 * x), x, (b + d) / (4 * x), (c + g) / (4 * x))
-    elif largest == y:
-        found = ((c - g) / (4 * y), (b + d) / (4 * y), y, (f + h) / (4 * y))
-    else:
-        found = ((d - b) / (4 * z), (c + g) / (4 * z), (f + h) / (4 * z), z)
-    sign = copysign(1.0, found[0])
-    w, x, y, z = (sign * value for value in found)
+    row = max(rows, key=lambda row: hypot(*row))
+    size = copysign(hypot(*row), row[0])
+    w, x, y, z = (value / size for value in row)
     return w, x, y, z

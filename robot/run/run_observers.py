@@ -11,21 +11,18 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gazerig.config.faults import ConfigError
 from gazerig.drivers.vision.model_files import detector_status
 from gazerig.robot.dashboard.door.token_file import hide_token
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.rig_feed import LiveRig
-from gazerig.robot.dashboard.feed.status_line import StatusLine
+from gazerig.robot.dashboard.feed.status_line import StatusLine, health_text
 from gazerig.robot.loop.loop import LoopCount
-from gazerig.robot.loop.loop_timing import LoopTiming, busy_text
-from gazerig.robot.loop.observers import Observers, failure_text
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_stream import TickStream
-from gazerig.robot.loop.tick_text import health_text
+from gazerig.robot.loop.tick_stream import Observers, TickStream, failure_text
+from gazerig.robot.loop.timing import LoopTiming, busy_text
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.moved_opponent import has_opponent
+from gazerig.robot.model.scene import has_opponent
 from gazerig.robot.net.client import rig_name
 from gazerig.robot.net.live_server import LiveServer, StopOnlyServer
 from gazerig.robot.net.topics import JointInfo, RigInfo, RunState
@@ -95,7 +92,6 @@ class RunObservers:
             self._server = LiveServer(
                 assembly.robot,
                 tuning,
-                (ConfigError,),
                 assembly.clock,
                 about,
                 say,
