@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import inf
+from math import hypot, inf
 from typing import Any
 
 import numpy as np
@@ -282,3 +282,12 @@ def test_the_planner_switched_off_leaves_the_behaviour_of_the_start() -> None:
     assert model.top_down.behaviour == "guard"
     model.top_down.retune(TopDownParams())
     assert model.top_down.behaviour == "wait" and not model.top_down.plans
+
+
+def test_the_line_to_the_chest_passes_below_fists_before_the_chin() -> None:
+    hands = [SeenHand(2, (-0.12, 0.12, -0.13), 0.0), SeenHand(3, (-0.12, -0.12, -0.13), 0.0)]
+    clear = {place.name: place.clear_m for place in hit_places(face(), hands, EYE)}
+    # At 0.88 m the line to a chest 1 m away and 0.3 m below is 0.264 m below the eyes.
+    off = 0.13 - 0.264
+    assert clear["chest"] == pytest.approx(hypot(0.12, off / hypot(1.0, 0.3)), abs=0.01)
+    assert clear["left side of the face"] < clear["chest"] < 0.28

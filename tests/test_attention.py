@@ -315,3 +315,12 @@ def test_a_lifeless_face_gets_a_small_share_and_is_not_remembered() -> None:
         bodies = structs.replace(seen.bodies, lifeless=seen.bodies.ids[1:])
         looks.append(model.choose(structs.replace(seen, bodies=bodies), looking(), k / 20).id)
     assert looks.count(1) > 540
+
+
+@pytest.mark.parametrize("count", [10, 30])
+def test_nothing_but_a_face_is_new_soon_after_somebody_has_come(count: int) -> None:
+    model = attention()
+    for k in range(count):
+        look(model, k / 10, FACE)
+    found = look(model, count / 10, FACE, body(2, "thing", (0.8, 0.3, 0.0))).saliences
+    assert sum(one.onset for one in found) == (count > 20)

@@ -10,7 +10,7 @@ from gaze_targets import DT
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from gazerig.gaze.lids.blink import LAWS, LidParams, blink_depth, blink_pause_s, closure
+from gazerig.gaze.lids.blink import LAWS, LidParams, blink_depth, closure
 from gazerig.gaze.lids.lids import Lids, Side
 from gazerig.params import declarations
 
@@ -40,14 +40,6 @@ def onsets(
 
 ROUGHLY_S = 0.02
 """Fine enough for times between blinks, which are no shorter than 0.6 s."""
-
-
-@pytest.mark.parametrize(("law", "cv"), [("people", 0.8), ("nakamoto", 0.6)])
-def test_laws_of_the_intervals_keep_the_mean_of_which_a_blink_is_part(law: str, cv: float) -> None:
-    rng = np.random.default_rng(0)
-    pauses = np.array([blink_pause_s(LAWS[law], 17.0, 0.4, rng) for _ in range(4000)])
-    assert pauses.mean() == pytest.approx(60.0 / 17.0 - 0.4, rel=0.05)
-    assert pauses.std() / pauses.mean() == pytest.approx(cv, abs=0.1) and pauses.min() >= 1.0
 
 
 def test_e51_blink_shape() -> None:

@@ -36,7 +36,7 @@ from gazerig.gaze.oculomotor.gaze_point import OculomotorParams, endpoint
 from gazerig.gaze.oculomotor.head import HeadParams, HeadShare
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.oculomotor.saccade_trajectory import RedirectedTrajectory, SaccadeTrajectory
-from gazerig.gaze.types import ORDERED, Angles3, Target, Vec3
+from gazerig.gaze.types import Angles3, Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState
 from gazerig.robot.run.gaze_models import rig_kinematics
@@ -68,24 +68,6 @@ def test_e15_head_start_rule(size: float, top_down: bool) -> None:
     head_onset = np.argmax(np.abs(trace.head) > 1e-9)
     expected = 0.0 if top_down else 0.020
     assert (head_onset - eye_onset) * DT == pytest.approx(expected, abs=DT + 1e-9)
-
-
-@pytest.mark.parametrize("distance_m", [0.22, 0.3, 0.4, 0.8])
-@pytest.mark.parametrize(("model", "kind"), [("stahl", "thing"), ("align", ORDERED)])
-def test_the_head_leaves_room_for_both_eyes_to_converge(
-    model: str, kind: str, distance_m: float
-) -> None:
-    """A head that stops short for one line of sight would hold an eye at its limit."""
-    head = HeadParams(
-        goal_model=model  # type: ignore[arg-type]
-    )
-    for yaw in (15.0, 18.0, 24.0, 27.0, 40.0, 60.0):
-        rig = Rig(eye_deg=25.0, geometry=DESK, head=head)
-        middle = rig.kinematics.forward(rig.joints).p_world_head_m
-        aside = add(middle, scale(direction((radians(yaw), 0.0)), distance_m))
-        there = structs.replace(still(0.0, salience=0.2)(0.2), p_world_m=aside, kind=kind)
-        last = rig.run(lambda t, there=there: there, 2.0).commands[-1]  # type: ignore[misc]
-        assert last.phase == "fixate" and last.limited == (), yaw
 
 
 def test_only_a_near_target_takes_range_of_the_eyes() -> None:
@@ -336,10 +318,6 @@ def mitake() -> GazeConfig:
     return load_rig("desk", profile="mitake").gaze
 
 
-def at_once() -> OculomotorParams:
-    return replace(mitake().oculomotor, eye_lag_ms=0.0)
-
-
 class NoSaccades:
     is_saccade_due = is_correction_due = False
 
@@ -509,24 +487,6 @@ def test_e58_a_lost_target_fades() -> None:
     assert after(0.3) == pytest.approx(9.6, abs=2.0)
     assert after(0.6) / after(0.3) == pytest.approx(np.exp(-1.0), rel=0.05)
     assert after(1.5) < 0.5
-
-
-def test_a_saccade_prescribes_the_angles_and_pursuit_goes_on_after_it() -> None:
-    rig = Rig(params=at_once(), pursuit=mitake().pursuit)
-    yaws, phases = [], []
-    for k in range(400):
-        t = k * DT
-        jump, seen_s = 8.0 if t >= 1.0 else 0.0, t - 0.07
-        aimed = aim(20.0 * seen_s + jump - 20.0, 20.0, t=seen_s)
-        command = rig.tick(structs.replace(aimed, shift=1 if t < 1.0 else 2), t, DT)
-        yaws.append(degrees(0.5 * (command.eye_left_rad[0] + command.eye_right_rad[0])))
-        phases.append(command.phase)
-    speeds = np.diff(yaws) / DT
-    landed = max(k for k in range(200, 240) if phases[k] == "saccade") + 2
-    assert speeds[195] == pytest.approx(20.0, abs=1.0)
-    assert speeds[landed : landed + 100].min() > -5.0
-    assert speeds[landed : landed + 100].max() < 35.0
-    assert speeds[-1] == pytest.approx(20.0, abs=1.0)
 
 
 # ---- The eyes of Nakamoto & Tsuruno 3.4, which the profile nakamoto runs.

@@ -7,7 +7,7 @@ columns, in memory, once for each process. ``tests/human/row_*.py`` measure on i
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from math import inf, nan
 from typing import Any, NamedTuple, cast
 
@@ -85,6 +85,11 @@ class MeasuredRun:
     angles: GazeAngles
     trace: GazeTrace
 
+    @property
+    def period_s(self) -> float:
+        """Return the time from tick to tick."""
+        return float(np.median(np.diff(self.t_s)))
+
     def truth_deg(self, name: str) -> np.ndarray:
         """Return the direction of something in the scene from the head, (n, 2)."""
         x, y, z = (self.truth[name] - self.head_m).T
@@ -93,12 +98,11 @@ class MeasuredRun:
     def later(self, begin_s: float) -> "MeasuredRun":
         """Return the run with the columns from a time on."""
         first = int(np.searchsorted(self.t_s, begin_s))
-        columns = {name: value[first:] for name, value in vars(self).items() if name in _COLUMNS}
+        arrays = [(k, v) for k, v in vars(self).items() if isinstance(v, np.ndarray)]
+        columns: dict[str, Any] = {name: value[first:] for name, value in arrays}
         truth = {name: place[first:] for name, place in self.truth.items()}
         return replace(self, truth=truth, **columns)
 
-
-_COLUMNS = {field.name for field in fields(MeasuredRun)} - {"truth", "angles", "trace"}
 
 Figures = dict[str, Any]
 """What a row measures, by name."""

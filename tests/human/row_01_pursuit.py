@@ -42,7 +42,7 @@ class Following(NamedTuple):
 def smooth(run: MeasuredRun) -> np.ndarray:
     """Return which ticks are neither in a saccade nor just before or after one, (n,)."""
     jumps = run.phase == "saccade"
-    rate_hz = 1.0 / float(np.median(np.diff(run.t_s)))
+    rate_hz = 1.0 / run.period_s
     before, after = (round(s * rate_hz) for s in _AROUND_S)
     near = np.convolve(jumps, np.ones(before + after + 1))[before : before + len(jumps)]
     return np.asarray(near < 0.5)

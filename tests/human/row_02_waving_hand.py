@@ -50,5 +50,5 @@ def _longest_s(seen: MeasuredRun, on: np.ndarray, start_s: float, end_s: float) 
     """Return the longest uninterrupted time on the hand."""
     there = on & (seen.t_s > start_s) & (seen.t_s < end_s)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], there.astype(int), [0]))))
-    lengths = (edges[1::2] - edges[::2]) * float(np.median(np.diff(seen.t_s)))
+    lengths = (edges[1::2] - edges[::2]) * seen.period_s
     return lengths.max(initial=0.0)

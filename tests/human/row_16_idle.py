@@ -82,7 +82,7 @@ def measure(runs: Runs) -> Figures:
 
 def _turns_s(one: MeasuredRun) -> list[float]:
     """Return the times of the head's turns from rest to rest above 10 deg."""
-    ticks = round(_OVER_S / float(np.median(np.diff(one.t_s))))
+    ticks = round(_OVER_S / one.period_s)
     moved = np.linalg.norm(one.head_deg[ticks:, :2] - one.head_deg[:-ticks, :2], axis=1)
     return [
         float(one.t_s[begin])

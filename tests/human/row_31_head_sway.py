@@ -44,7 +44,7 @@ def measure(runs: Runs) -> Figures:
 
 def _deviations(one: MeasuredRun) -> np.ndarray:
     """Return the standard deviations in windows of 10 s, (n, 3): few have a recentring."""
-    ticks = round(_WINDOW_S / float(np.median(np.diff(one.t_s))))
+    ticks = round(_WINDOW_S / one.period_s)
     starts = range(0, len(one.t_s) - ticks, ticks)
     return np.array([one.head_deg[k : k + ticks].std(axis=0) for k in starts])
 

@@ -99,7 +99,7 @@ def arrivals(one: MeasuredRun, scene: Arrivals) -> Iterator[tuple[bool, float]]:
     """Yield whether the person was there at the start, and the time that the head has taken."""
     head, face = one.head_deg[:, :2], one.truth_deg("face 0")
     seen = (np.abs(face - head) < _FIELD_DEG).all(axis=1)
-    kept = round(_KEPT_S / float(np.median(np.diff(one.t_s))))
+    kept = round(_KEPT_S / one.period_s)
     near = [begin for begin, end in spells(apart_deg(head, face) < _NEAR_DEG) if end - begin > kept]
     for visit in range(_VISITS):
         came_s = scene.came_s(visit)

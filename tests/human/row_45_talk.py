@@ -217,14 +217,14 @@ def _answers_to_another(scene: Talk, one: MeasuredRun) -> Iterator[tuple[str, bo
 
 def _head_speed(one: MeasuredRun, role: str) -> np.ndarray:
     """Return the head's speed in a role over a tenth of a second, all axes, deg/s."""
-    ticks = round(_SPEED_OVER_S / float(np.median(np.diff(one.t_s))))
+    ticks = round(_SPEED_OVER_S / one.period_s)
     moved = np.linalg.norm(one.head_deg[ticks:] - one.head_deg[:-ticks], axis=1)
     return np.asarray(moved[one.turn[ticks:] == role] / _SPEED_OVER_S)
 
 
 def _nods(one: MeasuredRun) -> int:
     """Return the number of short dips of the head while it listens; those of a second are one."""
-    rate_hz = 1.0 / float(np.median(np.diff(one.t_s)))
+    rate_hz = 1.0 / one.period_s
     dips, _ = find_peaks(-one.head_deg[:, 1], prominence=_NOD_DEG, width=(None, _NOD_S * rate_hz))
     heard = dips[one.turn[dips] == "listening"]
     return int((np.diff(heard, prepend=-rate_hz * 9.0) > _TOGETHER_S * rate_hz).sum())
