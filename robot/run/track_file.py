@@ -20,6 +20,7 @@ from gazerig.config.shipped_files import is_path
 from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
+from gazerig.gaze.track.motion_keys import GRID_S, fit_keys, resample, smooth
 from gazerig.gaze.track.track import (
     EYE_CHANNELS,
     HEAD_CHANNELS,
@@ -30,7 +31,6 @@ from gazerig.gaze.track.track import (
 )
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.kinematics import LIDS
-from gazerig.robot.model.motion_keys import GRID_S, fit_keys, resample, smooth
 from gazerig.robot.model.reply import TrackReply
 from gazerig.robot.model.track_fit import TrackFit, TrackRefused, channel_of_joint
 from gazerig.robot.model.types import GAZE_JOINTS
