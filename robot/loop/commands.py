@@ -11,7 +11,6 @@ from msgspec import structs
 from gazerig.gaze.angles import add, direction, rotate, scale
 from gazerig.gaze.attention.conversation import MODES
 from gazerig.gaze.attention.startle import FLINCH, Startle
-from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
 from gazerig.robot.loop.client_control import ClientControl
@@ -58,10 +57,7 @@ MAX_PER_TICK = 8
 takes longest."""
 _NEAR_END_RAD = radians(0.05)
 """A slider at the end of a joint's range is rounded to a tenth of a degree."""
-_LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
-    "wink left": lambda lids, t_s: lids.wink("left", t_s),
-    "wink right": lambda lids, t_s: lids.wink("right", t_s),
-}
+_LID_COMMANDS = ("wink left", "wink right")
 
 
 class CommandQueue:
@@ -169,7 +165,7 @@ class CommandExecutor:
         menus = {
             "behaviour": _put_first(top_down.chosen_behaviour, top_down.behaviours),
             "conversation": _put_first(robot.conversation_gaze.chosen_mode, MODES),
-            "lids": tuple(_LID_COMMANDS),
+            "lids": _LID_COMMANDS,
         }
         animation = robot.animation
         if animation.expressions:
@@ -313,7 +309,7 @@ class CommandExecutor:
         elif menu == "expression":
             robot.animation.express(choice)
         else:
-            _LID_COMMANDS[choice](robot.lids, t_s)
+            robot.lids.wink("left" if choice == "wink left" else "right", t_s)
 
     def _converse(self, t_s: float) -> None:
         """Let gaze and lids follow the state of conversation; when idle, the chosen mode."""

@@ -73,15 +73,10 @@ def unreachable_text(pair: CouplingParams, joints: Mapping[str, JointParams]) ->
     """
     for at in _corners(pair, joints):
         for name, angle in zip(pair.joints, pair.servo_rad(at), strict=True):
-            facts, steps = joints[name].model_facts, joints[name].steps(angle)
-            if not facts.lowest <= steps <= facts.highest:
-                low, high, at_ = (
-                    value / facts.unit_steps for value in (facts.lowest, facts.highest, steps)
-                )
+            if fault := joints[name].position_fault(joints[name].steps(angle)):
                 return (
                     f"cannot reach {pair.first} {degrees(at[0]):g}, {pair.second} "
-                    f"{degrees(at[1]):g} deg: the servo of {name} would be at {at_:.0f} "
-                    f"{facts.unit}, outside its {low:.0f}..{high:.0f}"
+                    f"{degrees(at[1]):g} deg: the servo of {name} would be at {fault}"
                 )
     return None
 
