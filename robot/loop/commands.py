@@ -235,12 +235,10 @@ class CommandExecutor:
         match command:
             case Ask(menu, choice):
                 self._choose(menu, choice, t_s)
-            case ControlCommand():
-                reply = self._jog(command, t_s) if isinstance(command, Jog) else None
-                if isinstance(command, Look):
-                    reply = self._look(command, t_s)
-                number = self.lead.state.number * self.lead.state.active
-                return structs.replace(reply or CommandReply(), control_number=number)
+            case Jog():
+                return self._jog(command, t_s)
+            case Look():
+                return self._look(command, t_s)
             case Play() | Speak():
                 return self._play(command, t_s)
             case EndTrack():
@@ -264,9 +262,9 @@ class CommandExecutor:
                 if not self.lead.renew(who, t_s) and not talks:
                     return CommandReply(f"the head is no longer controlled by {who or 'you'}")
             case Stop():
+                self.stop.halt(command, t_s)
                 self.lead.end(f"stopped: {command.why}")
                 robot.track_choices.drop_present(t_s)
-                self.stop.halt(command, t_s)
             case Resume() if self.stop.reason:
                 goals = self.stop.resume(command, t_s)
                 if isinstance(goals, CommandReply):
@@ -328,7 +326,8 @@ class CommandExecutor:
         target, robot = self.lead.chosen_target(None, t_s), self._robot
         if target is None:  # the gaze is free again
             return CommandReply()
-        return look_reply(target, robot.oculomotor, robot.kinematics, robot.guard.limits)
+        reply = look_reply(target, robot.oculomotor, robot.kinematics, robot.guard.limits)
+        return structs.replace(reply, control_number=self.lead.state.number)
 
     def _point(self, command: Look) -> Vec3 | None:
         """Return the point in the world to look at, None to free the gaze.
@@ -371,7 +370,9 @@ class CommandExecutor:
         self._change_control(lambda: self.lead.jog(command, self.commanded_rad, t_s))
         if command.angles_rad:
             robot.guard.start_gently()  # a slider may jump from end to end
-        return jog_reply(command, robot.body.names, robot.guard.limits)
+        number = self.lead.state.number * self.lead.state.active
+        reply = jog_reply(command, robot.body.names, robot.guard.limits)
+        return structs.replace(reply, control_number=number)
 
     def _change_control(self, change: Callable[[], None]) -> None:
         """Change the client in control; the models start slowly if they take over joints."""
