@@ -10,22 +10,23 @@ found the same, and a missing file when it is missing for several checks.
 import contextlib
 import threading
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
-from gazerig.robot.loop.command_handler import (
-    REFUSALS,
-    CommandHandler,
-    ParamAccess,
-    PathGuard,
-    Speaker,
-    accept_only_stops,
-)
 from gazerig.robot.loop.loop import Robot
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.reply import CommandTaker
-from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
+from gazerig.robot.net.request_handler import (
+    REFUSALS,
+    LoopMonitor,
+    ParamAccess,
+    PathGuard,
+    RequestHandler,
+    Speaker,
+    accept_only_stops,
+)
 from gazerig.robot.net.socket_server import RemoteServer
 
 EVERY_S = 0.5
@@ -163,17 +164,13 @@ class LiveServer:
         self._pulse = LoopMonitor(clock)
         self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
         self._watch = FileWatch(self._files, self._read_again)
-        handler = CommandHandler(
-            robot.command, tuning, self._watch.saved, voice=voice, menus=robot.menus,
-            tracks=robot.tracks,
+        handler = partial(
+            RequestHandler, robot.command, self._pulse, about, tuning, saved=self._watch.saved,
+            voice=voice, menus=robot.menus, tracks=robot.tracks, fault=fault, changing=changing,
         )  # fmt: skip
-        self._server = RemoteServer(
-            RequestHandler(handler, self._pulse, about, fault, changing), say
-        )
+        self._server = RemoteServer(handler(), say)
         # Apart from programs of this computer, so that neither uses up the other's time.
-        self._page_server = RemoteServer(
-            RequestHandler(handler, self._pulse, about, fault, changing, paths), say
-        )
+        self._page_server = RemoteServer(handler(paths=paths), say)
         self.serve, self.update = self._page_server.serve, self._pulse.update
 
     def open(self) -> None:
@@ -240,8 +237,8 @@ class StopOnlyServer:
         self._say = say
         pulse = LoopMonitor(clock)
         only = accept_only_stops(command, _CALIBRATED)
-        handler = CommandHandler(only, None, fixed=f"{_CALIBRATED}: its parameters are fixed")
-        self._server = RemoteServer(RequestHandler(handler, pulse, about), say)
+        fixed = f"{_CALIBRATED}: its parameters are fixed"
+        self._server = RemoteServer(RequestHandler(only, pulse, about, fixed=fixed), say)
         self.serve, self.update = self._server.serve, pulse.update
 
     def open(self) -> None:
