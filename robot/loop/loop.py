@@ -101,9 +101,8 @@ class Robot:
         pixels: PixelToWorld,
         messages: list[str] | None = None,
     ) -> None:
-        self.body, self.kinematics, self.camera, self.perception = (
-            body, kinematics, camera, perception,
-        )  # fmt: skip
+        self.body, self.kinematics = body, kinematics
+        self.camera, self.perception = camera, perception
         self.poses, self.attention, self.conversation_gaze = poses, attention, conversation
         self.oculomotor, self.lids, self.animation = oculomotor, lids, animation
         self.track_choices, self.guard, self.tune, self.pixels = tracks, guard, tune, pixels
