@@ -4,7 +4,7 @@ The joints are called first and second, the servos a and b. All angles are in ra
 servos are at their shafts, after sign, ratio and zero. The usual pair is a neck's pitch and roll.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from math import ceil, degrees, floor, radians
@@ -57,11 +57,6 @@ class CouplingParams:
         """Return the joint angles of servo angles, or the joint speeds of servo speeds."""
         a, b = servos
         return 0.5 * (a + b) / self.first_ratio, 0.5 * (a - b) / self.second_ratio
-
-
-def joint_partners(pairs: Collection[CouplingParams]) -> dict[str, str]:
-    """Return the partner of each coupled joint."""
-    return {a: b for pair in pairs for a, b in (pair.joints, pair.joints[::-1])}
 
 
 def unreachable_text(pair: CouplingParams, joints: Mapping[str, JointParams]) -> str | None:
