@@ -18,7 +18,7 @@ run: $(VENV)/.installed
 	@if [ -t 0 ]; then set -m; fi; $(BIN)/gazerig run --mock $$(if [ -d features/world ]; \
 	  then $(BIN)/python -m gazerig.features.world.run.first_world; \
 	  else echo "a visitor without a room: features/world is not there" >&2; \
-	  $(BIN)/python -m gazerig.robot.run.computer; fi) $(OPTIONS)
+	  $(BIN)/python -m gazerig.robot.cli.computer; fi) $(OPTIONS)
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -n auto --dist loadfile

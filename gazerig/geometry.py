@@ -12,7 +12,7 @@ from gazerig.robot.loop.reachability import look_reply, reached_joints
 from gazerig.robot.model.commands import LookAt, check_command
 from gazerig.robot.model.reply import JointReply
 from gazerig.robot.model.types import JointState
-from gazerig.robot.run.gaze_models import kinematics_and_oculomotor
+from gazerig.robot.run.models import GazeModels, random_generators, rig_kinematics
 from gazerig.robot.run.rig_limits import limits
 
 
@@ -77,7 +77,8 @@ def inverse(rig: Rig | str, point_m: tuple[float, float, float]) -> JointSolutio
     except ValueError as error:
         raise Refused(str(error)) from None
     found = _load(rig)
-    kinematics, oculomotor = kinematics_and_oculomotor(found, 0)
+    models = GazeModels(found, random_generators(0))
+    kinematics, oculomotor = models.kinematics, models.oculomotor
     target = Target(point_m, (0.0, 0.0, 0.0), 0.0, "point", -1, 1.0, True, None, 1, "asked for")
     ranges = limits(found.joints)
     reply = look_reply(target, oculomotor, kinematics, ranges)
@@ -103,7 +104,7 @@ def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
         Refused: the rig has no such joint; the message lists its joints.
         ConfigError: the rig is invalid.
     """
-    kinematics, _ = kinematics_and_oculomotor(_load(rig), 0)
+    kinematics = rig_kinematics(_load(rig))
     if strange := [name for name in joints_rad if name not in kinematics.names]:
         there = ", ".join(kinematics.names)
         raise Refused(f"this rig has no joint {strange[0]!r}; available: {there}")

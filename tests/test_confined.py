@@ -7,11 +7,11 @@ import pytest
 from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
-from gazerig.config.rig_files import AllowedFolder
+from gazerig.config.rig_files import AllowedFolder, RigLayers
 from gazerig.robot.loop.command_handler import CommandHandler
 from gazerig.robot.model.parameter import SavedFile
 from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
-from gazerig.robot.run.param_store import ParamStore
+from gazerig.robot.run.live import ParamStore
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     rig = home / "mine.yaml"
     rig.write_text(Path("config/rigs/desk.yaml").read_text())
     made = simulated(str(rig))
-    tuning = ParamStore(made.live_params, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
+    tuning = ParamStore(made.rig, lambda _: None, RigLayers(str(rig), None, None))
     handler = CommandHandler(made.robot.command, tuning, (ConfigError,))
     hear = RequestHandler(handler, LoopMonitor(made.clock), {}, paths=tuning.confined).answer
     before = sorted(os.listdir(tmp_path))

@@ -10,7 +10,7 @@ from gazerig.drivers.types import Located
 from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.types import Vec3
 from gazerig.robot.perception.hands import HAND, Hands, Known
-from gazerig.robot.run.scene_files import load_scene
+from gazerig.robot.run.surroundings import load_scene
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 
 EYE: Vec3 = (0.0, 0.0, 0.0)

@@ -85,8 +85,8 @@ def test_joints_of_slower_buses_begin_earlier() -> None:
 
 def test_a_running_head_measures_the_latency_of_its_servos() -> None:
     with gazerig.open("expressive", fast=True) as head:
-        assert head._composed is not None
-        robot = head._composed.assembly.robot
+        assert head._made is not None
+        robot = head._made.robot
         assert set(robot.joint_latencies_s()) == {0.015}  # the parameter
         head.step(4.0)
         found = robot.joint_latencies_s()

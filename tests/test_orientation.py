@@ -2,7 +2,6 @@
 
 import pickle
 from collections.abc import Iterator
-from dataclasses import replace
 from math import radians
 
 import cv2
@@ -11,16 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
+from gazerig.drivers.camera.orientation import FrameOrientation
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fits, project, rays
 from gazerig.robot.perception.frame_locator import FrameLocator
-from gazerig.robot.run.camera_factory import frame_orientation
 
 ALL = [FrameOrientation(r, m) for r in (0, 90, 180, 270) for m in (False, True)]
 NAMES = [f"{o.rotation}{' mirrored' if o.mirrored else ''}" for o in ALL]
@@ -115,11 +112,8 @@ def test_a_lens_of_another_shape_is_reported_once_and_the_gaze_goes_on() -> None
     assert len(look(1280, 720)) == 1  # another size that does not fit
 
 
-def test_the_rig_says_how_frames_are_turned() -> None:
-    rig = load_rig("desk")
-    assert frame_orientation(rig.camera) == AS_DELIVERED
-    turned = frame_orientation(replace(rig.camera, rotation=180, mirrored=True))
-    assert turned == FrameOrientation(180, True)
+def test_an_orientation_is_turned_and_sent_to_a_process() -> None:
+    turned = FrameOrientation(180, True)
     assert turned.turned_by(270) == FrameOrientation(90, True)
     assert pickle.loads(pickle.dumps(turned)) == turned  # it goes to the camera's process
 

@@ -23,7 +23,8 @@ from gazerig.drivers.errors import SetupError
 from gazerig.params import Declaration, declarations
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.run.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
+from gazerig.robot.run.buses import bus_ports
+from gazerig.robot.run.rig_limits import bus_names, joints_on, servo_configs
 
 DESK = shipped_path("rigs", "desk")
 

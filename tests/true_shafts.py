@@ -13,19 +13,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import gazerig.robot.run.assemble as assembling
-import gazerig.robot.run.run_bus as run_bus
+import gazerig.robot.run.buses as run_buses
+import gazerig.robot.run.run as run_module
 from gazerig.config.schema import Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.robot.loop.body import Body
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.types import JointAngles
-from gazerig.robot.run.assemble import Assembly, assemble
-from gazerig.robot.run.bus_wiring import rig_bus
+from gazerig.robot.run.buses import rig_bus
+from gazerig.robot.run.emulated import emulated_lines, servo_index
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_description import sag_compensation
 from gazerig.robot.run.rig_limits import limits, park_rad
-from gazerig.robot.run.run_bus import emulated_lines, servo_index
+from gazerig.robot.run.run import Run
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, build
@@ -37,7 +37,7 @@ SPEED_MS, ACCEL_MS = 5, 10
 PULSE_MS = 20
 GROUPS = {"eye": "eyes", "lid": "lids", "neck": "neck"}
 STOP_DEG = 4.0
-"""Emulated mechanical stops lie so far beyond a joint's range (robot/run/run_bus.py)."""
+"""Emulated mechanical stops lie so far beyond a joint's range (robot/run/emulated.py)."""
 
 
 def group_of(joint: str) -> str:
@@ -161,10 +161,10 @@ def hardest(angles: NDArray[np.float64], over_ms: int) -> NDArray[np.float64]:
 
 
 @contextmanager
-def looked_at(rig: Rig, choice: RunOptions) -> Iterator[tuple[Assembly, Shafts]]:
+def looked_at(rig: Rig, choice: RunOptions) -> Iterator[tuple[Run, Shafts]]:
     """Assemble a rig whose true shafts are looked at."""
     shafts = Shafts(rig)
-    was = assembling.SimulatedClock, run_bus.build
+    was = run_module.SimulatedClock, run_buses.build
 
     def built(line: object, now_s: Callable[[], float]) -> Device:
         device = build(line, now_s)  # type: ignore[arg-type]
@@ -173,11 +173,11 @@ def looked_at(rig: Rig, choice: RunOptions) -> Iterator[tuple[Assembly, Shafts]]
         return device
 
     lines = emulated_lines(rig)
-    assembling.SimulatedClock, run_bus.build = (lambda: shafts), built  # type: ignore
+    run_module.SimulatedClock, run_buses.build = (lambda: shafts), built  # type: ignore
     try:
-        made = assemble(rig, choice)
+        made = Run(rig, choice)
     finally:
-        assembling.SimulatedClock, run_bus.build = was  # type: ignore[misc]
+        run_module.SimulatedClock, run_buses.build = was  # type: ignore[misc]
     try:
         yield made, shafts
     finally:
@@ -206,12 +206,12 @@ def sometimes_late(seed: int, share: float, longest_slots: int) -> Late:
 
 
 def run(
-    made: Assembly,
+    made: Run,
     shafts: Shafts,
     judge: Judge,
     seconds: float,
     late: Late = on_time,
-    before_tick: Callable[[Assembly, float], None] = lambda made, t_s: None,
+    before_tick: Callable[[Run, float], None] = lambda made, t_s: None,
 ) -> int:
     """Start a robot and run it; returns the number of ticks."""
     made.robot.start(shafts)

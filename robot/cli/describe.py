@@ -34,8 +34,8 @@ def describe(
     with clear_errors(rig):
         from gazerig.config.schema import load_rig
         from gazerig.robot.description.files import FORMATS, description_files, file_name
+        from gazerig.robot.run.emulated import servo_drives
         from gazerig.robot.run.rig_description import description_of, mesh_faults
-        from gazerig.robot.run.servo_drives import servo_drives
 
         loaded = load_rig(rig, further=[mesh_faults])
         description = description_of(loaded).with_drives(servo_drives(loaded))

@@ -7,6 +7,7 @@ import msgspec
 import typer
 
 from gazerig.config.shipped_files import shipped_names
+from gazerig.drivers.errors import PluginError
 from gazerig.robot.cli.command_list import Examples
 
 
@@ -56,7 +57,10 @@ def complete_shipped(kind: str, home: Path | None = None) -> Callable[[str], lis
 
 
 def complete_world(incomplete: str) -> list[str]:
-    """Complete a world with physics, or other surroundings."""
-    from gazerig.robot.run.surroundings import surroundings_names
+    """Complete a world with physics; without that feature there is none."""
+    from gazerig.robot.run.surroundings import world
 
-    return [name for name in surroundings_names() if name.startswith(incomplete)]
+    try:
+        return [name for name in world().names() if name.startswith(incomplete)]
+    except PluginError:
+        return []

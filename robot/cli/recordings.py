@@ -23,7 +23,7 @@ from gazerig.robot.cli.terminal import (
 
 if TYPE_CHECKING:
     from gazerig.robot.loop.loop import Tick
-    from gazerig.robot.run.resimulate import Resimulation
+    from gazerig.robot.run.rerun import Rerun
 
 app = typer.Typer(add_completion=False)
 
@@ -44,11 +44,10 @@ def rerun(
         ),
     ] = None,
     character: Annotated[str | None, typer.Option(help="Another character.")] = None,
-    joints: Annotated[str | None, typer.Option(help="Recorded or emulated joints.")] = None,
 ) -> None:
     """Run a recording's input through the present models: same input, same bytes."""
     with clear_errors():
-        well = _rerun(file, rig, character, joints)
+        well = _rerun(file, rig, character)
     if not well:
         raise typer.Exit(FAULT)
 
@@ -93,13 +92,13 @@ def export(
 _EVENTS = ("saccade", "fixation", "pursuit", "blink")
 
 
-def _rerun(file: Path, rig: str | None, character: str | None, joints: str | None) -> bool:
+def _rerun(file: Path, rig: str | None, character: str | None) -> bool:
     """Run a recording again and print the result; return False if it differs unexpectedly.
 
-    Results must be identical only if joints are replayed and nothing else has changed.
+    Results must be identical only if nothing has changed.
     """
     from gazerig.robot.recording.read import RunRecording, report_bad_contents
-    from gazerig.robot.run import resimulate
+    from gazerig.robot.run.rerun import rerun as run_again
 
     recording = RunRecording(file)
     with report_bad_contents(file), _progress("running again", recording.duration_s) as read:
@@ -112,9 +111,7 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
             if count % 100 == 0:
                 read(tick.t_s - start_s)
 
-        result = resimulate.rerun(
-            recording, rig=rig, character=character, joints=joints, on_tick=on_tick
-        )
+        result = run_again(recording, rig, character, on_tick)
     for line in result.notes:
         say(line)
     say(agreement_text(result))
@@ -123,10 +120,10 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
         table.add_row(name, was, now, style=None if was == now else "bold")
     Console().print(table)
     changed = rig is not None or character is not None
-    return result.is_same or result.joints != "recorded" or changed
+    return result.is_same or changed
 
 
-def agreement_text(result: "Resimulation") -> str:
+def agreement_text(result: "Rerun") -> str:
     """Return how far a rerun agrees with the recorded run, as text."""
     text = f"{result.agreeing_ticks} of {result.ticks} ticks are bit-identical"
     if result.first_difference_s is not None:
@@ -137,7 +134,7 @@ def agreement_text(result: "Resimulation") -> str:
         text += (
             f"; the bytes on the bus are {'the same' if result.sent_bytes_same else 'different'}"
         )
-    return f"joints {result.joints}: {text}"
+    return text
 
 
 def compare_figures(

@@ -60,7 +60,7 @@ def weight_lines(rig: str) -> list[str]:
         ConfigError: the rig is not good.
     """
     from gazerig.config.schema import load_rig
-    from gazerig.robot.run.rig_weight import weight_findings
+    from gazerig.robot.run.rig_description import weight_findings
 
     return [f"{rig}: {finding}" for finding in weight_findings(load_rig(rig))]
 

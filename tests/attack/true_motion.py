@@ -20,9 +20,9 @@ from true_shafts import Judge, Late, group_of, looked_at, on_time, run, sometime
 
 from gazerig.config.schema import Rig
 from gazerig.robot.model.commands import LookAt
-from gazerig.robot.run.assemble import Assembly
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.scene_files import scene_names
+from gazerig.robot.run.run import Run
+from gazerig.robot.run.surroundings import scene_names
 
 RIGS = ("desk", "feetech", "maker", "pca9685", "mixed")
 LATES: dict[str, Callable[[], Late]] = {
@@ -34,11 +34,11 @@ LATES: dict[str, Callable[[], Late]] = {
 STILL_DEG_S = 0.5
 
 
-def all_around(seed: int) -> Callable[[Assembly, float], None]:
+def all_around(seed: int) -> Callable[[Run, float], None]:
     """Return what orders looks at random places all around, near and far."""
     rng, due_s = np.random.default_rng(seed), 0.5
 
-    def order(made: Assembly, t_s: float) -> None:
+    def order(made: Run, t_s: float) -> None:
         nonlocal due_s
         if t_s < due_s:
             return

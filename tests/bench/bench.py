@@ -93,8 +93,8 @@ def bench_tick() -> None:
     from ruckig import InputParameter, OutputParameter, Ruckig
 
     from gazerig.config.schema import load_rig
-    from gazerig.robot.run.assemble import assemble
     from gazerig.robot.run.options import RunOptions
+    from gazerig.robot.run.run import Run
 
     planner, given, found = Ruckig(9, 0.005), InputParameter(9), OutputParameter(9)
     given.max_velocity, given.max_acceleration = [6.0] * 9, [60.0] * 9
@@ -109,7 +109,7 @@ def bench_tick() -> None:
         found.pass_to_input(given)
 
     def tick(bus: str) -> float:
-        made = assemble(load_rig("desk"), RunOptions(True, True, 0, "visitor", bus=bus))
+        made = Run(load_rig("desk"), RunOptions(True, True, 0, "visitor", bus=bus))
         return timed(lambda: play(made, 10.0)) / 2000
 
     peer = "ruckig, a step of nine axes"
@@ -171,8 +171,8 @@ def bench_camera() -> None:
     from gazerig.drivers.vision.face.params import FaceDetectorParams
     from gazerig.drivers.vision.motion.params import MotionParams
     from gazerig.robot.perception.motion_source import MotionSource
-    from gazerig.robot.run.assemble import assemble
     from gazerig.robot.run.options import RunOptions
+    from gazerig.robot.run.run import Run
 
     cv2.setNumThreads(1)
     picture = background(640, 480).copy()
@@ -200,7 +200,7 @@ def bench_camera() -> None:
     }  # fmt: skip
     figures = in_turns({name: partial(timed, work, 20) for name, work in works.items()})
     show(figures, "us of processor a picture, 640x480", peer)
-    made = assemble(load_rig("desk"), RunOptions(True, True, 0, "visitor", bus="ideal"))
+    made = Run(load_rig("desk"), RunOptions(True, True, 0, "visitor", bus="ideal"))
     spent: dict[str, list[float]] = {"camera": [], "see": [], "choose": []}
 
     def follow(name: str, owner: Any, verb: str) -> None:

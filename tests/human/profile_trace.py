@@ -15,7 +15,7 @@ from fakes.scenes import EmptyScene
 
 from gazerig.config.parameters import apply_changes, value_of
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.run import run_rig
+from gazerig.robot.run import surroundings
 from gazerig.robot.run.options import RunOptions
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
@@ -90,18 +90,18 @@ def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> 
     """Return what runs in a profile, and what it looks at."""
     calls, kinds = Profile(subcalls=False, builtins=False), set[str]()
     scene = EverythingOnce()
-    shipped = run_rig.load_scene
+    shipped = surroundings.load_scene
     options = RunOptions(
         True, True, 0, scene.name, profile=profile, scanpath=scanpath, seconds=seconds, bus="ideal"
     )
     rig = apply_changes(load_rig("desk", profile=profile), {"loop.rate_hz": 50.0})
-    run_rig.load_scene = cast(Any, lambda name, seed: scene)
+    surroundings.load_scene = cast(Any, lambda name, seed: scene)
     calls.enable()
     try:
         simulate(rig, options, watch=lambda tick: kinds.add(tick.target.kind))
     finally:
         calls.disable()
-        run_rig.load_scene = shipped
+        surroundings.load_scene = shipped
     named: Counter[str] = Counter()
     for code, times, *_ in calls.getstats():
         if isinstance(code, CodeType) and "gaze" in Path(code.co_filename).parts:

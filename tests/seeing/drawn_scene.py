@@ -18,7 +18,7 @@ from gazerig.gaze.types import Angles2, Angles3, Mat3, Percept, Vec3
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.run.drawn_motion import SyntheticMotionDetector
+from gazerig.robot.run.cameras import SyntheticMotion
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.cameras.frame_times import FrameParams
@@ -98,7 +98,7 @@ def frames(scene: Scene, start_s: float, end_s: float) -> Iterator[Frame]:
     field = rig.camera.horizontal_field_deg
     drawn = FrameParams(latency_ms=0.0, horizontal_field_deg=field)
     locate = FrameLocator(None, radians(field))
-    motion = SyntheticMotionDetector(rig.motion)
+    motion = SyntheticMotion(rig.motion)
     camera = PixelCamera(drawn, DrawnScene(later), mount, still, faces, rng, motion, locate)
     perception = Perception(mount, field)
     poses = PoseHistory(_Standing())  # type: ignore[arg-type]

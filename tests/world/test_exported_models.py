@@ -13,8 +13,8 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.description.urdf import urdf
 from gazerig.robot.model.coupling import CouplingParams
+from gazerig.robot.run.emulated import servo_drives
 from gazerig.robot.run.rig_description import description_of
-from gazerig.robot.run.servo_drives import servo_drives
 
 pytestmark = pytest.mark.usefixtures("mujoco")
 

@@ -14,7 +14,7 @@ from gazerig.config.schema import load_rig
 from gazerig.features.world.run.run_world import rig_in_world
 from gazerig.features.world.serve import SentWorld
 from gazerig.features.world.world_spec import WorldSpec
-from gazerig.robot.run.run_bus import JOINT_PLAY_DEG, emulated_lines
+from gazerig.robot.run.emulated import JOINT_PLAY_DEG, emulated_lines
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.pty.server import Server, ServerSettings
 

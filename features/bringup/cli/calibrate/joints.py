@@ -50,7 +50,7 @@ from gazerig.robot.loop.interrupts import Interrupts
 from gazerig.robot.loop.power_down import PowerDown
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling import joint_partners
-from gazerig.robot.run.bus_wiring import release_plan
+from gazerig.robot.run.buses import release_plan
 
 
 def calibrate_joints(
