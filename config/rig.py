@@ -33,14 +33,14 @@ from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.gaze.track.level import LevelParams
 from gazerig.params import Bounds, Choices, Unit, Unlisted
 from gazerig.robot.description.mesh_params import MeshParams
+from gazerig.robot.model.clock import LoopParams
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import GeometryParams
-from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.types import order_joints
+from gazerig.robot.model.weight import MassParams
 
 
 @dataclass(frozen=True)

@@ -17,18 +17,18 @@ from gazerig.config.load import (
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
 from gazerig.config.validation import suggestion_text
-from gazerig.drivers.bus.servo_models import BUS_KINDS, SERVOS
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.hobby_board.board import HobbyBoardParams
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import PARTS
 from gazerig.params import declarations
-from gazerig.robot.model.coupling import joint_partners, unreachable_text
+from gazerig.robot.model.coupling import unreachable_text
 from gazerig.robot.model.guard_params import forbidden_pairs
 from gazerig.robot.model.kinematics import LIDS, NECK
-from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
+from gazerig.robot.model.weight import MassParams
 
 NO_CHARACTER = "none"
 """In place of a character's name: none, whatever the rig's file says."""
@@ -179,24 +179,6 @@ def _servos(rig: Rig) -> Faults:
             )
 
 
-def _limp_joints(rig: Rig) -> Faults:
-    """Find joints that must not or cannot be limp while the others have torque."""
-    held = {
-        *GAZE_JOINTS,
-        *joint_partners(rig.couplings.values()),
-        *(one[0] for pair in rig.guard.collisions for one in (pair.first, pair.second)),
-    }
-    for name, joint in rig.joints.items():
-        kind = rig.buses.get(joint.bus, rig.bus).kind
-        if joint.limp_when_idle_s is not None and (name in held or kind not in BUS_KINDS):
-            yield (
-                f"joints.{name}.limp_when_idle_s",
-                "remove it: only a further joint can be limp (not the neck, which would drop, nor "
-                "another one that gaze moves), outside couplings and guard.collisions, on a bus of "
-                f"kind {', '.join(BUS_KINDS)}",
-            )
-
-
 def _angles(rig: Rig) -> Faults:
     """Find poses and moves that a joint cannot do; a move has a time."""
     poses = [(f"park_deg.{name}", name, [angle], inf) for name, angle in rig.park_deg.items()]
@@ -279,7 +261,6 @@ RULES = (
     _joint_names,
     _owners,
     _servos,
-    _limp_joints,
     _angles,
     _mechanism,
     _names,

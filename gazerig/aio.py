@@ -11,10 +11,8 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from gazerig.head import Head, Order
 from gazerig.remote_head import RemoteHead
 from gazerig.remote_head import connect as connect_now
-from gazerig.robot.loop.gaze_events import EventKind
-from gazerig.robot.loop.head_state import HeadEvent, HeadState
-from gazerig.robot.model.outcome import Outcome
-from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.loop.head_state import EventKind, HeadEvent, HeadState
+from gazerig.robot.model.reply import CommandReply, Outcome
 
 _POLL_S = 0.02
 _P = ParamSpec("_P")

@@ -2,7 +2,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import threading
 import time
@@ -19,7 +18,6 @@ from feedback_rows import rows
 from gazerig.config.rig import BusConfig, Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.types import LimpableBus
 from gazerig.robot.run.buses import bus_ports, guarded_rig_bus, rig_bus
 from gazerig.robot.run.emulated import emulated_lines
 from gazerig.robot.run.rig_limits import servo_configs
@@ -45,10 +43,7 @@ def slow(kind: str) -> Rig:
 
 
 def drive(kind: str, guarded: bool, path: str) -> None:
-    """Drive all joints slowly to their ends, 100 ticks a second, and print events.
-
-    After SIGUSR1 the first servo is limp.
-    """
+    """Drive all joints slowly to their ends, 100 ticks a second, and print events."""
     rig = slow(kind)
     paths = bus_ports(rig, path)
     bus = (
@@ -58,9 +53,6 @@ def drive(kind: str, guarded: bool, path: str) -> None:
     )
     bus.open()
     bus.enable_torque()
-    assert isinstance(bus, LimpableBus)
-    relax: list[int] = []
-    signal.signal(signal.SIGUSR1, lambda number, frame: relax.append(0))
     goals: list[Any] = [setup.max_steps for setup in servo_configs(rig)]
     said = False
     ticks = 0
@@ -74,9 +66,6 @@ def drive(kind: str, guarded: bool, path: str) -> None:
                 for r, goal in zip(readings, goals, strict=True)
             ]
             print("rearmed", flush=True)
-        if relax:
-            bus.set_limp(relax)
-            relax.clear()
         bus.write(goals)
         ticks += 1
         if not said and ticks == 30:

@@ -18,7 +18,7 @@ from present import present
 from shown_page import free_port, wait_for
 
 from gazerig.robot.loop.loop import Tick
-from gazerig.robot.loop.observers import Observers
+from gazerig.robot.loop.tick_stream import Observers
 from gazerig.robot.model.commands import Renew
 from gazerig.robot.run.observers import RunObservers
 from gazerig.robot.run.options import RunOptions

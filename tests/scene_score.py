@@ -19,7 +19,7 @@ from statistics import median
 from typing import Literal, NamedTuple
 
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.model.scene_events import BoxingEvent, ExpectedResponse
+from gazerig.robot.model.scene import BoxingEvent, ExpectedResponse
 
 
 class _EventOutcome(NamedTuple):

@@ -15,10 +15,9 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
 from gazerig.gaze.types import PART_NAMES, Floats
 from gazerig.robot.loop.head_state import head_state
-from gazerig.robot.loop.interrupts import Interrupts
+from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import head_activity, tick_control_source
-from gazerig.robot.model.client_control import ARRIVED_RAD
+from gazerig.robot.loop.tick_text import tick_control_source
 from gazerig.robot.model.commands import (
     AnyCommand,
     Ask,
@@ -37,9 +36,10 @@ from gazerig.robot.model.commands import (
     Talk,
     Tune,
     check_command,
+    read_request,
 )
 from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlSource, control_sentence
-from gazerig.robot.model.requests import read_request
+from gazerig.robot.model.reply import ARRIVED_RAD
 from gazerig.robot.run.session import prepare_shutdown
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -191,7 +191,7 @@ def test_a_jog_beyond_the_end_is_refused_with_the_joints_range(running: Running)
     with pytest.raises(ValueError, match=r"neck_yaw 180.0 deg is outside its range, -70..70 deg"):
         running.order(Jog((("neck_yaw", pi),)))
     running.order(Jog((("neck_yaw", radians(70.04)),)))  # a slider's rounding
-    assert running.go(0.1)[0].controlled_by == "a client: jog neck_yaw 70.0"
+    assert running.go(0.1)[0].controlled_by == "a client: neck_yaw at 70.0 deg"
 
 
 def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
@@ -280,13 +280,13 @@ def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: 
 def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None:
     running.order(Jog((("neck_yaw", 0.3),), who="a show (process 7)"))
     ticks = running.go(1.5)
-    assert ticks[0].controlled_by == "a show (process 7): jog neck_yaw 17.2"
+    assert ticks[0].controlled_by == "a show (process 7): neck_yaw at 17.2 deg"
     led = [tick for tick in ticks if tick.controlled_by]
     assert led[-1].t_s - led[0].t_s == pytest.approx(1.0, abs=0.011)
     words = [event for tick in ticks for event in tick.events]
-    assert "controlled by a show (process 7): jog neck_yaw 17.2" in words
+    assert "controlled by a show (process 7): neck_yaw at 17.2 deg" in words
     assert (
-        "a show (process 7): jog neck_yaw 17.2: not renewed, so the gaze models are in control again"
+        "a show (process 7): neck_yaw at 17.2 deg: not renewed, so the gaze models are in control again"
         in words
     )
     assert fastest_rad_s(ticks)[YAW] <= GENTLE_RAD_S * 1.01
@@ -468,7 +468,7 @@ def test_a_point_and_a_pointer_are_led_by_who_chose_them(
         running.order(LookAt((1.0, 0.2, 0.3), who="ann", pointer=pointer))
         tick = running.go(0.2)[-1]
     assert tick_control_source(tick).kind == kind
-    assert head_activity(tick).headline == said
+    assert head_state(tick).headline == said
 
 
 def test_stopped_says_that_and_nothing_else(running: Running) -> None:
@@ -490,7 +490,7 @@ def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) ->
     ticks: list[Tick] = []
     assert made.robot.park(made.park_rad, made.clock, made.loop, watch=ticks.append)
     assert {tick_control_source(tick).kind for tick in ticks} == {"parking"} and len(ticks) > 5
-    assert head_activity(ticks[-1]).headline == control_sentence(ControlSource("parking"), 0.0)
+    assert head_state(ticks[-1]).headline == control_sentence(ControlSource("parking"), 0.0)
     yaw = [
         tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
     ]

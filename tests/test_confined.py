@@ -74,7 +74,7 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     rig.write_text(Path("config/rigs/desk.yaml").read_text())
     made = simulated(str(rig))
     tuning = ParamStore(made.rig, lambda _: None, RigLayers(str(rig), None, None))
-    handler = CommandHandler(made.robot.command, tuning, (ConfigError,))
+    handler = CommandHandler(made.robot.command, tuning)
     hear = RequestHandler(handler, LoopMonitor(made.clock), {}, paths=tuning.confined).answer
     before = sorted(os.listdir(tmp_path))
     for asked in (

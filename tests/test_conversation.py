@@ -23,7 +23,7 @@ from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
 from gazerig.robot.loop.head_state import HeadState, head_state
 from gazerig.robot.model.commands import LookAt, Renew, Speak, Talk, TalkOrder
-from gazerig.robot.model.conversation import ConversationState
+from gazerig.robot.model.control_source import ConversationState
 from gazerig.robot.model.reply import CommandReply
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")

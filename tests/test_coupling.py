@@ -16,10 +16,10 @@ from gazerig.config.load import shipped_path
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Feedback
-from gazerig.robot.loop.coupled_servos import CoupledServos
+from gazerig.robot.loop.body import CoupledServos
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.coupling import CouplingParams
-from gazerig.robot.model.mass_params import HeadMassParams, MassParams
+from gazerig.robot.model.weight import HeadMassParams, MassParams
 from gazerig.robot.run.rig_limits import servo_configs
 from gazerig.robot.run.run import Run
 

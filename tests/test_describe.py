@@ -29,7 +29,7 @@ from gazerig.robot.description.own_meshes import read_mesh
 from gazerig.robot.description.urdf import Urdf, urdf
 from gazerig.robot.loop.body import Body
 from gazerig.robot.model.coupling import CouplingParams
-from gazerig.robot.model.mass_params import CounterweightParams, HeadMassParams, MassParams
+from gazerig.robot.model.weight import CounterweightParams, HeadMassParams, MassParams
 from gazerig.robot.run.buses import rig_bus
 from gazerig.robot.run.rig_description import (
     description_of,

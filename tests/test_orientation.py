@@ -16,7 +16,7 @@ from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.robot.model.frames import LensParams
-from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fits, project, rays
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fault, project, rays
 from gazerig.robot.perception.frame_locator import FrameLocator
 
 ALL = [FrameOrientation(r, m) for r in (0, 90, 180, 270) for m in (False, True)]
@@ -168,4 +168,4 @@ def test_a_measured_lens_serves_every_picture_of_its_shape() -> None:
     assert intrinsics_of_lens(BENT_LENS, view, 1280, 800) == BENT.scaled(2.0, 2.0)
     assert intrinsics_of_lens(BENT_LENS, view, 640, 480) == intrinsics_of_view(view, 640, 480)
     assert intrinsics_of_lens(None, view, 640, 400) == intrinsics_of_view(view, 640, 400)
-    assert not lens_fits(BENT_LENS, 0, 0)
+    assert lens_fault(BENT_LENS, 0, 0)

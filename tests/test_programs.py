@@ -32,8 +32,7 @@ from websockets.typing import Origin
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.dashboard.door import page_door
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
-from gazerig.robot.model.commands import Jog
-from gazerig.robot.model.requests import REQUESTS
+from gazerig.robot.model.commands import REQUESTS, Jog
 from gazerig.robot.net.client import RobotClient
 from gazerig.robot.net.openapi import api_description
 

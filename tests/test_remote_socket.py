@@ -20,12 +20,11 @@ import pytest
 from branch import Branch
 from fakes.runs import simulated
 
-from gazerig.config.load import ConfigError
 from gazerig.config.rig_files import RigLayers
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.loop import client_control, stop
 from gazerig.robot.loop.command_handler import CommandHandler
 from gazerig.robot.loop.loop import Robot, Tick
-from gazerig.robot.model import commands, lease
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import LookAt, Value
 from gazerig.robot.net import client
@@ -104,8 +103,8 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture(scope="module")
 def beat() -> Iterator[Beat]:
     with pytest.MonkeyPatch.context() as patch, Beat() as running_robot:
-        patch.setattr(commands, "MIN_HOLD_S", 0.0)
-        patch.setattr(commands, "MIN_RESUME_GAP_S", 0.0)
+        patch.setattr(stop, "MIN_HOLD_S", 0.0)
+        patch.setattr(stop, "MIN_RESUME_GAP_S", 0.0)
         yield running_robot
 
 
@@ -118,7 +117,7 @@ def errors() -> list[str]:
 def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
     tuning = ParamStore(beat.made.rig, beat.robot.command, RigLayers("desk", None, None))
     about = {"rig": "desk", "pid": os.getpid()}
-    handler = CommandHandler(beat.robot.command, tuning, (ConfigError,), menus=beat.robot.menus)
+    handler = CommandHandler(beat.robot.command, tuning, menus=beat.robot.menus)
     requests = RequestHandler(handler, beat.pulse, about)
     server = RemoteServer(requests, errors.append)
     server.open()
@@ -348,7 +347,7 @@ def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
 def test_a_program_leads_while_it_lives_and_is_named(
     rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lease, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
+    monkeypatch.setattr(client_control, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
     monkeypatch.setattr(client, "_EVERY_S", 0.05)
     with RobotClient.connect(who="a show") as show:
         reply = show.send(LookAt((-1.0, 0.0, 0.3)))

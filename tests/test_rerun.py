@@ -3,7 +3,6 @@
 import os
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 from math import inf, nextafter
 from pathlib import Path
 
@@ -137,8 +136,6 @@ def test_a_show_is_done_again_to_the_same_bytes(tmp_path: Path) -> None:
         (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
     paths = tuple(str(tmp_path / f"{name}.yaml") for name in files)
     rig = replace(load_rig("expressive"), track_files=paths)
-    jaw = replace(rig.joints["jaw"], limp_when_idle_s=0.25)
-    rig = replace(rig, joints={**rig.joints, "jaw": jaw})
 
     def ask(number: int, made: Run) -> None:
         if (command := COMMANDS.get(number)) is not None:
@@ -150,8 +147,6 @@ def test_a_show_is_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     assert {one.cue for them in states for one in them} == {"", "here"}
     assert {one.name for one in states[-1] if one.is_playing} == set()
     assert "switched off" in states[-1][-1].end_reason
-    limp = [bool(tick.guard_result.limp) for tick in ticks]
-    assert sum(a != b for a, b in pairwise(limp)) >= 2  # the jaw, between its motions
     for name in files:
         (tmp_path / f"{name}.yaml").unlink()
     again = rerun(RunRecording(tmp_path / "run.mcap"))

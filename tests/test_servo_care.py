@@ -248,28 +248,6 @@ def test_one_that_was_silent_gets_no_goals_until_it_holds_its_place_again(sts):
     assert sts.chain.positions_steps()[1] == pytest.approx(2600, abs=8)
 
 
-def test_one_that_does_not_confirm_that_it_is_limp_keeps_its_goals(xl):
-    xl.bus.enable_torque()
-    real = xl.chain[2].write
-    xl.chain[2].write = lambda address, data: 0
-    xl.bus.set_limp({1})
-    xl.chain[2].write = real
-    for _ in range(200):
-        xl.tick([2500] * 3)
-    assert xl.places() == pytest.approx([2500] * 3, abs=12)
-
-
-def test_a_limp_servo_that_restarts_stays_limp(sts):
-    sts.run(0.2, [2000] * 4)
-    sts.bus.set_limp({1})
-    sts.command("brown-out 2")
-    readings = sts.run(2.0, [2100] * 4)
-    assert [r.torque for r in readings] == [True, False, True, True]
-    assert [servo.torque for servo in sts.chain.servos] == [True, False, True, True]
-    sts.bus.set_limp(())
-    assert all(servo.torque for servo in sts.chain.servos)
-
-
 def test_eeprom_that_differs_is_corrected_under_way_without_torque(xl):
     xl.bus.enable_torque()
     xl.tick([2000] * 3)

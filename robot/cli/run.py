@@ -23,7 +23,7 @@ from gazerig.robot.cli.terminal import (
     status,
 )
 from gazerig.robot.dashboard.door.token_file import hide_token
-from gazerig.robot.loop.joint_faults import JointFault, joints_text
+from gazerig.robot.loop.joint_faults import fault_text
 from gazerig.robot.run.options import RunOptions, level_text, parse_camera
 
 if TYPE_CHECKING:
@@ -149,9 +149,9 @@ def report_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> boo
         for reason, count in reasons.items():
             key = reason, count["times"], round(count["seconds"], 1)
             alike.setdefault(key, []).append(joint)
-    held = [str(JointFault(joints_text(joints), *key)) for key, joints in alike.items()]
+    held = [fault_text(joints, *key) for key, joints in alike.items()]
     if held:
-        from gazerig.robot.loop.loop_timing import BUSY_SHARE  # with NumPy
+        from gazerig.robot.loop.timing import BUSY_SHARE
 
         late, ticks = figures.get("overruns", 0), figures.get("ticks", 0)
         share = late / (late + ticks) if late else 0.0

@@ -33,7 +33,7 @@ from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError, extra_hint
 from gazerig.drivers.process.visible_text import VisibleStream, visible
 from gazerig.drivers.process.work_queue import WorkQueue
-from gazerig.robot.loop.interrupts import ENDING, Interrupts
+from gazerig.robot.loop.power_down import ENDING, Interrupts
 
 _OF_REPORTS = ("jinja2", "scipy")
 """Packages of the extra ``report`` that commands import as soon as they start."""

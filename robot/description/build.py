@@ -46,8 +46,8 @@ from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import OPTICAL, CameraParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, LOWER_NECK, NECK, GeometryParams, LidEnds
-from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.types import further_joints
+from gazerig.robot.model.weight import MassParams
 
 
 def joint_torques_nm(

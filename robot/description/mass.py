@@ -12,7 +12,7 @@ from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.description.links import ORIGIN, Description, Inertia, Link, Visual
 from gazerig.robot.description.parts import MIDDLE, HeadMeasures
-from gazerig.robot.model.mass_params import MassParams
+from gazerig.robot.model.weight import MassParams
 
 HEAD_KG, _REFERENCE_M = 0.6, 0.0619
 """Mass of a whole head (skull, servos, eyes, lids) with this distance between the eyes."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from gazerig.params import Bounds
-from gazerig.robot.model.mass_params import PositionMm
+from gazerig.robot.model.weight import PositionMm
 
 _Degrees = Annotated[float, Bounds(-180, 180)]
 

@@ -1,60 +1,58 @@
 """Requests to a running rig: the same for all clients, handled in one place.
 
 The live page, other programs, the command line and Python all send the classes of
-``gazerig.robot.model.commands`` and ``gazerig.robot.model.requests``.
+``gazerig.robot.model.commands`` and ``gazerig.robot.model.commands``.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from gazerig.drivers.errors import DriverError
+from gazerig.errors import Error
 from gazerig.robot.loop.track_choices import TrackInfo
-from gazerig.robot.model.commands import Command, Request, Resume, Say, Speak, Stop, Value, as_value
-from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
-from gazerig.robot.model.reply import CommandTaker, Ticket
-from gazerig.robot.model.requests import (
+from gazerig.robot.model.commands import (
     Character,
     Characters,
+    Command,
     Get,
     Parameters,
     ReadMenus,
+    Request,
+    Resume,
     Revert,
     Save,
+    Say,
     SayPiece,
     Set,
+    Speak,
+    Stop,
     Tracks,
     Unsaved,
+    Value,
+    as_value,
 )
+from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
+from gazerig.robot.model.reply import CommandTaker, Ticket
 
+REFUSALS = (ValueError, OSError, Error)
+"""Exceptions that refuse a request; the message is for the user."""
 FIXED = "these parameters cannot be changed while the rig runs"
 
 
 class ParamAccess(Protocol):
-    """The parameters of a running rig, such as ``gazerig.robot.run.param_store.ParamStore``."""
+    """The parameters of a running rig, such as ``gazerig.robot.run.live.ParamStore``."""
 
     @property
     def version(self) -> int:
         """Return the number of changes."""
 
-    @property
-    def path(self) -> Path:
-        """Return the rig's file."""
-
-    @property
-    def character_name(self) -> str:
-        """Return the present character."""
-
     def parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters."""
-
-    def values(self) -> Mapping[str, Value]:
-        """Return all present values."""
 
     def get(self, prefix: str) -> Mapping[str, Value]:
         """Return the present values whose keys start with ``prefix``."""
 
-    def set(self, changes: Mapping[str, Value]) -> Iterable[str]:
+    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
         """Apply values from the next tick on; return notes for the user."""
 
     def unsaved(self) -> Sequence[ParamChange]:
@@ -63,14 +61,20 @@ class ParamAccess(Protocol):
     def save(self, path: Path | None = None) -> SavedFile:
         """Write the present values to a file."""
 
-    def revert(self) -> object:
-        """Restore the values of the file."""
+    def revert(self) -> tuple[str, ...]:
+        """Restore the values of the file; return notes for the user."""
 
     def characters(self) -> Sequence[str]:
         """Return the available characters."""
 
-    def apply_character(self, name: str) -> object:
-        """Apply another character to the rig."""
+    def apply_character(self, name: str) -> tuple[str, ...]:
+        """Apply another character to the rig; return notes for the user."""
+
+    def files(self) -> tuple[Path, ...]:
+        """Return the files in use: the rig's file and its overlays."""
+
+    def reload(self, path: Path) -> tuple[str, ...]:
+        """Apply the contents of a file; on errors change nothing and raise with all of them."""
 
 
 class PathGuard(Protocol):
@@ -116,8 +120,6 @@ class CommandHandler:
     Args:
         command: Queues a command for the next tick.
         params: The parameters, None if they cannot be read or changed.
-        refusals: Exceptions of ``params`` for a value that breaks a rule, besides ValueError;
-            the attribute contains all exceptions of ``handle``.
         saved: Called with each written file.
         fixed: Reason why parameters cannot be changed.
         voice: Says sounds and texts; None if the head has no voice.
@@ -129,7 +131,6 @@ class CommandHandler:
         self,
         command: CommandTaker,
         params: ParamAccess | None,
-        refusals: tuple[type[Exception], ...] = (),
         saved: Callable[[Path], None] | None = None,
         fixed: str = FIXED,
         voice: Speaker | None = None,
@@ -139,9 +140,6 @@ class CommandHandler:
         self._command, self.params, self._voice = command, params, voice
         self._menus, self._tracks = menus, tracks
         self._saved, self._fixed = saved, fixed
-        self.refusals: tuple[type[Exception], ...] = (
-            ValueError, DriverError, OSError, *refusals,
-        )  # fmt: skip
 
     def handle(self, request: Request, paths: PathGuard | None = None) -> object:
         """Handle a request.
@@ -155,22 +153,20 @@ class CommandHandler:
             saved file; or the ticket for the reply to a command, None without one.
 
         Raises:
-            Exception: One of ``refusals``, with every broken rule.
+            Exception: One of ``REFUSALS``, with every broken rule.
         """
         match request:
             case ReadMenus():
                 return self._menus()
             case Tracks():
                 return self._tracks()
-            case SayPiece():
-                return self._say_piece(request)
-            case Say():
-                return self._command(self._require_voice().prepare(request, paths is not None))
+            case SayPiece() | Say():
+                return self._say(request, paths is not None)
             case Command():
                 return self._command(request)
-        if self.params is None:
-            if isinstance(request, Get | Parameters | Unsaved | Characters):
+            case Get() | Parameters() | Unsaved() | Characters() if self.params is None:
                 return {} if isinstance(request, Get) else ()
+        if self.params is None:
             raise ValueError(self._fixed)
         return self._handle_params(request, self.params, paths)
 
@@ -189,44 +185,33 @@ class CommandHandler:
             case Set(changes):
                 if paths is not None:
                     paths.check_changes(changes)
-                return _notes(params.set({key: as_value(one) for key, one in changes.items()}))
+                return params.set({key: as_value(one) for key, one in changes.items()})
             case Save(path):
-                return self._save(params, path, paths)
+                if path and paths is not None:
+                    path = paths.check_file(path)
+                file = Path(path).expanduser() if path else None
+                if file is not None and not file.is_absolute():
+                    raise ValueError(f"{path}: give the absolute path; the rig has its own folder")
+                saved = params.save(file)
+                if self._saved is not None:
+                    self._saved(saved.path)
+                return saved
             case Revert():
-                return _notes(params.revert())
+                return params.revert()
             case Character(name):
                 if paths is not None and name not in params.characters():
                     name = paths.check_file(name, "characters")
-                return _notes(params.apply_character(name))
+                return params.apply_character(name)
         raise ValueError(f"{type(request).__name__} is not available here")
 
-    def _say_piece(self, piece: SayPiece) -> float:
-        """Say a piece of a stream; return the length that has not been heard, s."""
-        voice = self._require_voice()
-        ahead_s = voice.feed(piece.pcm, piece.rate_hz, piece.channels, piece.volume)
-        if piece.last:
+    def _say(self, request: Say | SayPiece, confined: bool) -> object:
+        """Say a file or a text; of a stream, return the length that has not been heard, s."""
+        voice = self._voice
+        if voice is None:
+            raise ValueError("this head has no voice")
+        if isinstance(request, Say):
+            return self._command(voice.prepare(request, confined))
+        ahead_s = voice.feed(request.pcm, request.rate_hz, request.channels, request.volume)
+        if request.last:
             voice.finish()
         return ahead_s
-
-    def _require_voice(self) -> Speaker:
-        if self._voice is None:
-            raise ValueError("this head has no voice")
-        return self._voice
-
-    def _save(self, params: ParamAccess, path: str | None, paths: PathGuard | None) -> SavedFile:
-        if path and paths is not None:
-            path = paths.check_file(path)
-        file = Path(path).expanduser() if path else None
-        if file is not None and not file.is_absolute():
-            raise ValueError(f"{path}: give the absolute path; the rig has its own folder")
-        saved = params.save(file)
-        if self._saved is not None:
-            self._saved(saved.path)
-        return saved
-
-
-def _notes(notes: object) -> tuple[str, ...]:
-    """Return the notes for the user in the result of a change."""
-    if isinstance(notes, str) or not isinstance(notes, Iterable):
-        return ()
-    return tuple(map(str, notes))

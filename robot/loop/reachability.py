@@ -48,7 +48,7 @@ def look_reply(
     pose = kinematics.forward(JointState(done, at_rest, at_rest, ()))
     error = gaze_error(target.p_world_m, pose, not kinematics.one_pan)
     # A head that stops short because the eyes do the rest is not limited.
-    head = reach.facing_rad if error.whole > _OFF_POINT_RAD else reach.head_rad
+    head = reach.facing_rad if error > _OFF_POINT_RAD else reach.head_rad
     further_rad = kinematics.further_rad(reach.base_rad)
     asked = kinematics.inverse(_command(head, *reach.required_eyes_rad), further_rad)
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
@@ -68,7 +68,7 @@ def look_reply(
         for name, angle in zip(NECK, head, strict=True)
         if name not in kinematics.names and abs(angle) > _SAME_RAD
     ]
-    return CommandReply("", target.p_world_m, met, tuple(joints), error.whole)
+    return CommandReply("", target.p_world_m, met, tuple(joints), error)
 
 
 def jog_reply(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> CommandReply:

@@ -1,4 +1,6 @@
-"""Stream of ticks to other processes, encoded in batches, once for all receivers.
+"""Observers of every tick, and the stream of ticks to other processes.
+
+The stream is encoded in batches, once for all receivers.
 
 If each tick is encoded at its end, neither code nor encoder are in the processor's cache; a
 batch several times per second takes a third of that time. MessagePack keeps every number bit for
@@ -16,7 +18,6 @@ from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
 
 from gazerig.gaze.types import Percept
-from gazerig.robot.loop.observers import failure_text
 from gazerig.robot.loop.tick import BodyRecord, Tick, TickRecord
 
 T = TypeVar("T")
@@ -24,6 +25,38 @@ LIVE_S = 0.0399  # slightly below 40 ms, so that rounding does not make it 45
 """Time between two batches of a run in real time."""
 SIMULATED_S = 0.2
 """Time between two batches in simulated time, without viewers."""
+
+
+class Observers:
+    """The functions called with every tick; a function that raises is removed.
+
+    Args:
+        report: Receives one line about each removed function.
+    """
+
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
+        self._observers: tuple[tuple[str, Callable[[Tick], object]], ...] = ()
+
+    def add(self, name: str, update: Callable[[Tick], object]) -> None:
+        """Add a function under a name for messages."""
+        self._observers = (*self._observers, (name, update))
+
+    def update(self, tick: Tick) -> None:
+        """Update all observers with a tick; called by the loop."""
+        for observer in self._observers:
+            try:
+                observer[1](tick)
+            except Exception as error:
+                self._observers = tuple([one for one in self._observers if one is not observer])
+                self._report(failure_text(observer[0], error))
+
+
+def failure_text(name: str, error: Exception) -> str:
+    """Return a message that the run continues without a failed observer."""
+    what = " ".join(str(error).split())
+    why = f"{type(error).__name__}: {what}" if what else type(error).__name__
+    return f"{name} failed ({why}); the rig continues without it"
 
 
 class TickBatch(NamedTuple):
@@ -97,11 +130,9 @@ def encode(value: object) -> bytes:
 
     Raises:
         TypeError: A part of it has a type that msgspec does not support.
+        UnicodeEncodeError: A text, such as a file name, cannot be written as UTF-8.
     """
-    try:
-        return _encoder.encode(value)
-    except UnicodeEncodeError:  # a file or device name that is not text
-        return _encoder.encode(_to_utf8(msgspec.to_builtins(value, enc_hook=to_plain)))
+    return _encoder.encode(value)
 
 
 def decode(data: bytes, kind: type[T]) -> T:
@@ -128,17 +159,6 @@ def to_plain(value: Any) -> Any:
 def to_array(kind: Any, value: Any) -> Any:
     """Return a list as a NumPy array, for msgspec's decoders."""
     return np.array(value, float)
-
-
-def _to_utf8(value: Any) -> Any:
-    """Replace texts that cannot be written as UTF-8."""
-    if isinstance(value, str):
-        return value.encode(errors="replace").decode()
-    if isinstance(value, tuple | list):
-        return [_to_utf8(item) for item in value]
-    if isinstance(value, dict):
-        return {_to_utf8(key): _to_utf8(item) for key, item in value.items()}
-    return value
 
 
 _NOT_FINITE = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]")

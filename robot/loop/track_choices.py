@@ -15,7 +15,6 @@ from gazerig.gaze.track.track import BLEND_IN_S, BLEND_OUT_S, KEEP, Track
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.track.track_player import TrackPlayer, Voice
 from gazerig.gaze.types import ORDERED, Percept, Target, Vec3
-from gazerig.robot.loop.joint_latency import JointLatency
 from gazerig.robot.model.commands import EndTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import FINISHED, SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
@@ -104,9 +103,8 @@ class TrackChoices:
         joints: Joints of the rig, in the order of all sequences of joints.
         lid_spans_rad: Range of each lid from shut to open, by joint.
         tables: Expressions and levels of the rig.
-        latency_s: Latency of joints that has not been measured yet.
+        latency_s: Latency of the joints.
         sound_s: Returns the duration of a track's sound.
-        latency: Measures the latencies of the joints; None: as of joints on one bus.
         files: Files of tracks, None for a rig without them.
     """
 
@@ -119,10 +117,8 @@ class TrackChoices:
         tables: AnimationTables = NO_TABLES,
         latency_s: float = 0.0,
         sound_s: Callable[[str], float] = lambda path: 0.0,
-        latency: JointLatency | None = None,
         files: TrackFiles | None = None,
     ) -> None:
-        self.latency = latency or JointLatency(("",) * len(joints))
         self._tracks: dict[str, Track | str] = dict(tracks)
         self._player, self._joints, self._tables = player, joints, tables
         self._sound_s, self._files = sound_s, files
@@ -274,8 +270,8 @@ class TrackChoices:
         return structs.replace(command, yaml=found.yaml) if found.yaml else command
 
     def latencies_s(self) -> tuple[float, ...]:
-        """Return the latencies of all joints, measured or assumed. Thread-safe."""
-        return self.latency.estimates_s(self._latency_s)
+        """Return the latencies of all joints. Thread-safe."""
+        return (self._latency_s,) * len(self._joints)
 
     # --- playing
 

@@ -102,12 +102,8 @@ def pair_setups(
     """
     both = joints[pair.first], joints[pair.second]
     ratios = pair.rates[0]
-    speed, accel = (
-        sum(ratio * radians(most) for ratio, most in zip(ratios, limits, strict=True))
-        for limits in zip(
-            *((one.max_speed_deg_s, one.max_accel_deg_s2) for one in both), strict=True
-        )
-    )
+    speed = sum(k * radians(one.max_speed_deg_s) for k, one in zip(ratios, both, strict=True))
+    accel = sum(k * radians(one.max_accel_deg_s2) for k, one in zip(ratios, both, strict=True))
     rest = pair.servo_rad((park_rad.get(pair.first, 0.0), park_rad.get(pair.second, 0.0)))
     shafts = zip(*(pair.servo_rad(at) for at in _corners(pair, joints)), strict=True)
     found = {}

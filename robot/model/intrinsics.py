@@ -45,17 +45,12 @@ def intrinsics_of_lens(
         height_px: Height of the images.
         own: Intrinsics reported by the camera, used if no measured lens fits.
     """
-    if lens is None or not lens_fits(lens, width_px, height_px):
+    if lens is None or lens_fault(lens, width_px, height_px):
         if own is not None:
             return own
         return intrinsics_of_view(view_rad, width_px, height_px)
     measured = Intrinsics(*lens.focal_px, *lens.centre_px, lens.distortion)
     return measured.scaled(width_px / lens.size_px[0], height_px / lens.size_px[1])
-
-
-def lens_fits(lens: LensParams, width_px: int, height_px: int) -> bool:
-    """Return whether images of a size show the field for which the lens was measured."""
-    return not lens_fault(lens, width_px, height_px)
 
 
 def lens_fault(lens: LensParams, width_px: int, height_px: int) -> str:

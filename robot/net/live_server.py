@@ -11,11 +11,11 @@ import contextlib
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Protocol
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.robot.loop.command_handler import (
+    REFUSALS,
     CommandHandler,
     ParamAccess,
     PathGuard,
@@ -127,23 +127,12 @@ class FileWatch:
             self.look()
 
 
-class FileTuning(ParamAccess, Protocol):
-    """Parameters of a running rig, and the files that define them."""
-
-    def files(self) -> Iterable[Path]:
-        """Return the files in use: the rig's file and its overlays."""
-
-    def reload(self, path: Path) -> object:
-        """Apply the contents of a file; on errors change nothing and raise with all of them."""
-
-
 class LiveServer:
     """Remote control and file watch of one running rig.
 
     Args:
         robot: Executes commands.
         tuning: Parameters and their files.
-        refusals: Exceptions that ``tuning`` raises if a value breaks a rule.
         clock: Clock of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         say: Prints a line on the terminal.
@@ -160,8 +149,7 @@ class LiveServer:
     def __init__(
         self,
         robot: Robot,
-        tuning: FileTuning,
-        refusals: tuple[type[Exception], ...],
+        tuning: ParamAccess,
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
@@ -171,13 +159,12 @@ class LiveServer:
         voice: Speaker | None = None,
     ) -> None:
         self._tuning = tuning
-        self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
         self._say = say
         self._pulse = LoopMonitor(clock)
         self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
         self._watch = FileWatch(self._files, self._read_again)
         handler = CommandHandler(
-            robot.command, tuning, refusals, self._watch.saved, voice=voice, menus=robot.menus,
+            robot.command, tuning, self._watch.saved, voice=voice, menus=robot.menus,
             tracks=robot.tracks,
         )  # fmt: skip
         self._server = RemoteServer(
@@ -208,8 +195,8 @@ class LiveServer:
         version, files = self._in_use
         now = self._tuning.version
         if now != version:
-            with contextlib.suppress(*self._refusals):
-                files = tuple(self._tuning.files())
+            with contextlib.suppress(*REFUSALS):
+                files = self._tuning.files()
             self._in_use = now, files
         return files
 
@@ -217,12 +204,11 @@ class LiveServer:
         """Apply an edited file, or report all of its errors."""
         try:
             notes = self._tuning.reload(path)
-        except self._refusals as error:
+        except REFUSALS as error:
             self._say(f"{path} changed but has errors; the previous values stay:\n{error}")
             return
-        lines = [str(note) for note in notes] if isinstance(notes, tuple | list) else []
-        if lines:
-            self._say("\n".join([f"{path} was edited: its values are applied", *lines]))
+        if notes:
+            self._say("\n".join([f"{path} was edited: its values are applied", *notes]))
         else:
             self._say(f"{path} was written again without changes")
 

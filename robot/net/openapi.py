@@ -8,11 +8,9 @@ import msgspec
 
 from gazerig.robot.loop.head_state import HeadReport, HeadState
 from gazerig.robot.loop.track_choices import TrackInfo
-from gazerig.robot.model.commands import Request, verb
-from gazerig.robot.model.outcome import Outcome
+from gazerig.robot.model.commands import REQUESTS, Request, ShowView, verb
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.model.requests import REQUESTS, ShowView
+from gazerig.robot.model.reply import CommandReply, Outcome
 from gazerig.robot.net.socket_io import VERSION
 from gazerig.robot.net.topics import PanelContent, Picture, RigInfo, RunState
 

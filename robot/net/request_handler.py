@@ -9,23 +9,26 @@ from collections.abc import Callable, Mapping
 
 from msgspec import structs
 
-from gazerig.robot.loop.command_handler import CommandHandler, PathGuard
+from gazerig.robot.loop.command_handler import REFUSALS, CommandHandler, PathGuard
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.head_state import HeadReport, head_state
-from gazerig.robot.loop.tick_feed import TickFeed
 from gazerig.robot.loop.tick_text import camera_conditions
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import ClientCommand, Command, Request, set_client
-from gazerig.robot.model.reply import Ticket
-from gazerig.robot.model.requests import (
+from gazerig.robot.model.commands import (
     Character,
+    ClientCommand,
+    Command,
     Fault,
     Hello,
     ReadStatus,
+    Request,
     Revert,
     Set,
     State,
     read_request,
+    set_client,
 )
+from gazerig.robot.model.reply import Ticket
 from gazerig.robot.net.socket_io import VERSION
 
 _TAKEN_UP_S = 1.0
@@ -136,7 +139,7 @@ class RequestHandler:
                 who = f"{request.who} ({peer})" if request.who else peer
                 request = set_client(request, who)
             return {**self._execute(request), **tag}
-        except self._handler.refusals as error:
+        except REFUSALS as error:
             return {"refused": str(error), **tag}
 
     def _execute(self, request: Request) -> dict[str, object]:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.requests import ORDERS, REQUESTS
+from gazerig.robot.model.commands import ORDERS, REQUESTS
 from gazerig.robot.net import socket_io as remote_socket
 from gazerig.robot.net.excess import (
     CLOSED,

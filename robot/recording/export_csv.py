@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from gazerig.drivers.files.file_output import output_file, refuse_existing, write_file
-from gazerig.robot.loop.feedback_basis import ESTIMATED
+from gazerig.robot.loop.tick_text import ESTIMATED
 from gazerig.robot.recording.gaze_angles import MOVEMENTS, GazeAngles, LabelledInterval, Labels
 
 _GAZE = (

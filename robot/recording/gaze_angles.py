@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from gazerig.gaze.angles import add, angle_between, sub, yaw_pitch
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3, body_name
-from gazerig.robot.loop.feedback_basis import Basis, basis_of, estimated_joints
 from gazerig.robot.loop.tick import Tick
+from gazerig.robot.loop.tick_text import Basis, basis_of, estimated_joints
 from gazerig.robot.model.commands import Jog, Stop
 
 Ints = NDArray[np.int64]

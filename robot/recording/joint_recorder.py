@@ -30,16 +30,6 @@ class ForwardingBody(Body):
         """Return the ranges and speeds in the servos' configuration."""
         return self._body.configured_limits()
 
-    def relax_idle(
-        self, desired_rad: JointAngles, joints: JointState, t_s: float, held: bool
-    ) -> frozenset[int]:
-        """Switch the torque of idle joints."""
-        return self._body.relax_idle(desired_rad, joints, t_s, held)
-
-    def wake(self) -> None:
-        """Switch the torque of idle joints on."""
-        self._body.wake()
-
     def write(self, command_rad: JointAngles) -> None:
         """Send one goal to every servo."""
         self._body.write(command_rad)

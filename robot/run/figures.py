@@ -9,8 +9,8 @@ import numpy as np
 from gazerig.gaze.angles import add, angle_between, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Vec3
-from gazerig.robot.loop.feedback_basis import estimated_joints
 from gazerig.robot.loop.tick import Tick
+from gazerig.robot.loop.tick_text import estimated_joints
 
 _FIXATION_RAD_S = radians(40.0)
 """Largest speed of a fixation; 30 is usual, and a servo step in 20 ms is already 4.4 deg/s."""

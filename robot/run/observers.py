@@ -10,7 +10,6 @@ from collections.abc import Callable
 from math import dist, isfinite
 from typing import Any
 
-from gazerig.config.faults import ConfigError
 from gazerig.drivers.vision.model_files import detector_status
 from gazerig.gaze.types import Vec3
 from gazerig.robot.dashboard.door.token_file import hide_token
@@ -18,14 +17,13 @@ from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.rig_feed import LiveRig
 from gazerig.robot.dashboard.feed.status_line import StatusLine
-from gazerig.robot.loop.loop_timing import LoopTiming, busy_text
-from gazerig.robot.loop.observers import Observers, failure_text
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_stream import TickStream
+from gazerig.robot.loop.tick_stream import Observers, TickStream, failure_text
 from gazerig.robot.loop.tick_text import health_text
+from gazerig.robot.loop.timing import LoopTiming, busy_text
 from gazerig.robot.model.commands import Talk
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.moved_opponent import has_opponent
+from gazerig.robot.model.scene import has_opponent
 from gazerig.robot.net.client import rig_name
 from gazerig.robot.net.live_server import LiveServer
 from gazerig.robot.net.topics import JointInfo, RigInfo, RunState
@@ -87,7 +85,6 @@ class RunObservers:
         return LiveServer(
             run.robot,
             run.params,
-            (ConfigError,),
             run.clock,
             {"rig": options.rig, "name": options.name or rig_name(options.rig), "pid": os.getpid()},
             self._say,

@@ -20,8 +20,8 @@ from gazerig.config.save_text import track_files
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.loop.body import Body
-from gazerig.robot.loop.interrupts import Interrupts
 from gazerig.robot.loop.loop import Tick
+from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import MeasuredJoints
 from gazerig.robot.recording.playback_devices import NoCamera, PlaybackBody, PlaybackPerception
 from gazerig.robot.recording.read import BadRecording, RunRecording

@@ -19,9 +19,8 @@ from gazerig.robot.description.statics import (
     moving_bodies,
 )
 from gazerig.robot.loop.sag import SagCompensation
-from gazerig.robot.model.assumed_servo import AMBIENT_C, STALL_RISE_C
-from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.types import JointAngles, order_joints
+from gazerig.robot.model.weight import AMBIENT_C, STALL_RISE_C, MassParams
 from gazerig.robot.run.rig_limits import lid_ends, park_rad
 
 

@@ -24,14 +24,12 @@ from gazerig.gaze.track.track import MAX_DURATION_S
 from gazerig.robot.dashboard.feed.rig_feed import ShownRig
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.chooser import Chooser, RuleChooser, TargetChooser
-from gazerig.robot.loop.joint_latency import JointLatency
 from gazerig.robot.loop.loop import Robot
 from gazerig.robot.loop.track_choices import TrackChoices
-from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
+from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClock
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.frames import CameraParams, fixed_mount
-from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.moved_opponent import BoxingScene, TickClockOpponent
+from gazerig.robot.model.scene import BoxingScene
 from gazerig.robot.model.track_fit import TrackRefused
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
@@ -201,8 +199,7 @@ class Run:
                 self._messages,
             )
             if isinstance(self.scene, BoxingScene) and self.scene.opponent and self.room:
-                opponent = TickClockOpponent(self.scene.opponent, self.room.start_s)
-                self.robot.set_opponent(opponent)
+                self.robot.set_opponent(self.scene.opponent, self.room.start_s)
             # What people use while it runs
             self.browser: BrowserCamera | None = None
             if options.mock and not options.fast:
@@ -327,7 +324,6 @@ def _tracks(rig: Rig, models: GazeModels, rig_file: str) -> TrackChoices:
         animation_tables(rig),
         rig.gaze.oculomotor.eye_lag_ms / 1e3,
         _sound_s,
-        JointLatency([rig.joints[name].bus for name in rig.names]),
         TrackFolder(rig_file),
     )
 

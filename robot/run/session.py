@@ -8,13 +8,12 @@ import contextlib
 from collections.abc import Callable, Iterator
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.loop.event_text import group_events, is_register_change
-from gazerig.robot.loop.interrupts import Interrupts
+from gazerig.robot.loop.events import group_events, is_register_change
 from gazerig.robot.loop.joint_faults import JointFaults
 from gazerig.robot.loop.loop import LoopCount, Tick, TickLoop
-from gazerig.robot.loop.observers import Observers
-from gazerig.robot.loop.power_down import Again, PowerDown
-from gazerig.robot.loop.real_time import SWITCH_INTERVAL, frozen_objects
+from gazerig.robot.loop.power_down import Again, Interrupts, PowerDown
+from gazerig.robot.loop.tick_stream import Observers
+from gazerig.robot.loop.timing import SWITCH_INTERVAL, frozen_objects
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.run.figures import Summary
 from gazerig.robot.run.observers import RunObservers

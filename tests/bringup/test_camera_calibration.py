@@ -12,6 +12,7 @@ import pytest
 from desk import GAZE_JOINTS, LIDS
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
+from gazerig.drivers.vision.charuco_board import CharucoBoard, DetectedBoard
 from gazerig.features.bringup.calibration.board_page import PAPERS_MM, write_page
 from gazerig.features.bringup.calibration.board_views import ViewCollector, board_view
 from gazerig.features.bringup.calibration.camera_procedure import neck_angles, neck_steps
@@ -22,7 +23,6 @@ from gazerig.features.bringup.calibration.lens_calibration import (
     calibrate_lens,
 )
 from gazerig.gaze.types import Angles3
-from gazerig.robot.model.charuco_board import CharucoBoard, DetectedBoard
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.intrinsics import project

@@ -27,8 +27,8 @@ from gazerig.features.bringup.telemetry import (
     smart_servo_reader,
 )
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.mass_params import HeadMassParams, MassParams
 from gazerig.robot.model.track_fit import TrackFit
+from gazerig.robot.model.weight import HeadMassParams, MassParams
 from gazerig.robot.run.rig_limits import bus_names, joints_on, lid_spans, limits
 from gazerig.robot.run.track_file import TOLERANCE_DEG, track_text, write_track
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine

@@ -7,8 +7,8 @@ from typing import Any
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.chooser import TargetChooser
-from gazerig.robot.loop.interrupts import Interrupts
 from gazerig.robot.loop.loop import LoopCount, run
+from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.run.options import RunOptions

@@ -18,7 +18,7 @@ from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.description.links import IDENTITY, ORIGIN
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.scene_view import PinholeView
+from gazerig.robot.model.scene import PinholeView
 from gazerig.sim_mock.scenes.script import PersonScript, SceneScript
 
 pytestmark = pytest.mark.usefixtures("renders")

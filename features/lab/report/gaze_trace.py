@@ -31,8 +31,8 @@ from gazerig.gaze.angles import (
 from gazerig.gaze.attention.conversation import face_extent_deg
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.loop.feedback_basis import Basis, basis_of, estimated_joints
 from gazerig.robot.loop.tick import Tick, cyclopean_direction
+from gazerig.robot.loop.tick_text import Basis, basis_of, estimated_joints
 from gazerig.robot.model.commands import Ask
 from gazerig.robot.model.types import GAZE_JOINTS, order_joints
 

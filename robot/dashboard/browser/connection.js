@@ -1,4 +1,4 @@
-// Connection to the rig: the websocket of every program, /api/v1/socket, as in docs/api.md.
+// Connection to the rig: the websocket of every program, /api/v1/socket, as in docs/connect-your-program.md.
 //
 // One connection per tab. It reconnects by itself; the newest state is in `now`, and modules
 // subscribe to the kinds of messages that they need.

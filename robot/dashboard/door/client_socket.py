@@ -8,10 +8,8 @@ from typing import Any, NamedTuple
 import msgspec
 
 from gazerig.robot.dashboard.door.rig_link import BUSY
-from gazerig.robot.model.commands import COMMANDS, REPEATED, ControlCommand
-from gazerig.robot.model.outcome import Progress, command_outcome
-from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.model.requests import ORDERS
+from gazerig.robot.model.commands import COMMANDS, ORDERS, REPEATED, ControlCommand
+from gazerig.robot.model.reply import CommandReply, Progress, command_outcome
 from gazerig.robot.net.excess import STOPPED
 from gazerig.robot.net.topics import ShownPicture
 

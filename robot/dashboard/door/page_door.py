@@ -50,13 +50,20 @@ from gazerig.robot.dashboard.door.sockets import (
 )
 from gazerig.robot.dashboard.door.viser_server import VIEW, ViewProxy, view_client
 from gazerig.robot.dashboard.door.waveforms import waveform
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.head_state import HeadEvent, HeadReport, head_state
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_feed import TickFeed
-from gazerig.robot.model.commands import HEARTBEAT_S, ClientCommand, Resume, Stop
-from gazerig.robot.model.outcome import command_outcome
-from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.model.requests import ORDERS, ShowView, State, read_request
+from gazerig.robot.model.commands import (
+    HEARTBEAT_S,
+    ORDERS,
+    ClientCommand,
+    Resume,
+    ShowView,
+    State,
+    Stop,
+    read_request,
+)
+from gazerig.robot.model.reply import CommandReply, command_outcome
 from gazerig.robot.net.excess import (
     CLOSED,
     REST_S,

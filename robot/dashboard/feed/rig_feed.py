@@ -21,14 +21,14 @@ from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES
 from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
 from gazerig.robot.description.build import RigShape
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.tick import Tick, TickRecord
-from gazerig.robot.loop.tick_feed import TickFeed
 from gazerig.robot.loop.tick_stream import decode, encode
 from gazerig.robot.loop.tick_text import perception_text
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.scene_view import PinholeView, SceneView
+from gazerig.robot.model.scene import PinholeView, SceneView
 from gazerig.robot.net.topics import RigInfo, RunState, ShownPicture
 
 TICKS, RIG, STATE, DETECTED = b"t", b"g", b"a", b"d"

@@ -4,14 +4,14 @@ from collections.abc import Callable
 from math import inf
 
 from gazerig.drivers.types import BusHealth
-from gazerig.robot.loop.loop_timing import busy_text
+from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.loop.tick_text import (
     camera_conditions,
     guard_text,
-    head_activity,
     health_text,
 )
+from gazerig.robot.loop.timing import busy_text
 from gazerig.robot.model.types import LoopFigures
 
 _LINE_S = 0.2
@@ -50,7 +50,7 @@ class StatusLine:
             parts = [
                 self._busy,
                 self._rate,
-                head_activity(tick).headline,
+                head_state(tick).headline,
                 guard_text(tick.guard_result),
                 health_text(self._health()),
                 *[f"camera: {text.partition(':')[0]}" for text in camera_conditions(tick)],

@@ -12,8 +12,8 @@ from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose, set_r
 from gazerig.robot.description.mesh import Colour
 from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.description.people import SHIRTS, head, part_of, torso
+from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import head_activity
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import quaternion
 
@@ -157,7 +157,7 @@ class PeopleView:
                 self._bodies[body.id] = _BodyView(self._scene, body)
             self._bodies[body.id].show(body)
         set_pose(self._target, target_m)
-        self._label.text = head_activity(tick).target
+        self._label.text = head_state(tick).gaze.target
 
 
 def seen_bodies(percept: Percept) -> tuple[SeenBody, ...]:

@@ -10,7 +10,7 @@ from gazerig.robot.dashboard.view.head_view import HeadView
 from gazerig.robot.dashboard.view.people import PeopleView
 from gazerig.robot.dashboard.view.viewpoints import Viewpoints
 from gazerig.robot.dashboard.view.world_view import WorldView
-from gazerig.robot.model.requests import Layer, ShowView
+from gazerig.robot.model.commands import Layer, ShowView
 
 
 class HeadScene:

@@ -36,10 +36,10 @@ from gazerig.features.bringup.cli.rig_writer import (
 from gazerig.gaze.attention.idle import REST_M
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
-from gazerig.robot.loop.event_text import group_events
-from gazerig.robot.loop.interrupts import Interrupts
+from gazerig.robot.loop.events import group_events
 from gazerig.robot.loop.loop import LoopCount, Tick
 from gazerig.robot.loop.loop import run as run_loop
+from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.net.live_server import StopOnlyServer
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.run import Run

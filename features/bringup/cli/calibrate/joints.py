@@ -46,8 +46,7 @@ from gazerig.features.bringup.cli.rig_writer import (
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
 from gazerig.robot.guardian.guardian import Guardian
-from gazerig.robot.loop.interrupts import Interrupts
-from gazerig.robot.loop.power_down import PowerDown
+from gazerig.robot.loop.power_down import Interrupts, PowerDown
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling import joint_partners
 from gazerig.robot.run.buses import release_plan
