@@ -12,19 +12,12 @@ import numpy as np
 
 from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
-from gazerig.drivers.dynamixel.control_table import GAINS, PWM_FULL, DynamixelModel
-from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
-from gazerig.drivers.dynamixel.family import STEEPEST_PWM
-from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
-from gazerig.drivers.feetech.memory_table import REGISTERS, SCS_MODELS
 from gazerig.drivers.plugins import EmulatedJoint
-from gazerig.drivers.servo_bus.family import ServoModel
 from gazerig.gaze.angles import rotate
-from gazerig.robot.description.links import Description, ServoDrive
+from gazerig.robot.description.links import Description
 from gazerig.robot.description.mass import in_parent_frame
 from gazerig.robot.description.statics import moving_bodies
 from gazerig.robot.model.coupling import pair_setups
-from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.weight import weight_nm
 from gazerig.robot.run.rig_description import description_of
 from gazerig.robot.run.rig_limits import bus_names, joints_on
@@ -36,18 +29,10 @@ from gazerig.sim_mock.devices import (
     Pca9685Line,
     plugin_line,
 )
-from gazerig.sim_mock.dynamixel.servo import POSITION, control_loop
-from gazerig.sim_mock.feetech.servo import D_SHARE, P_SHARE
-from gazerig.sim_mock.hobby_motor import HOBBY_PHYSICS, hobby_motor
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.smart_servo.physics import (
-    MS_S,
-    STEPS_PER_RAD,
-    Loop,
-    Motor,
     Physics,
     ServoSpec,
-    mechanics_of,
 )
 
 JOINT_PLAY_DEG = 0.25
@@ -83,7 +68,7 @@ def emulated_lines(rig: Rig) -> dict[str, Emulated]:
             servos = tuple(_smart_servo(rig, name, weights[name]) for name in joints)
             lines[bus] = CHAINS[config.kind](servos, config.section.baud)
         elif config.kind in BOARDS:
-            lines[bus] = BOARDS[config.kind](config, tuple(hobby_spec(rig, n) for n in joints))
+            lines[bus] = BOARDS[config.kind](config, tuple(_hobby_spec(rig, n) for n in joints))
         else:
             others = tuple(
                 EmulatedJoint(one.id, one.model, start_step(rig, name), *_stops(rig, name))
@@ -148,7 +133,7 @@ def _smart_servo(rig: Rig, name: str, weight: "Weight") -> ServoSpec:
     return ServoSpec(joint.id, joint.model, start, physics=physics)
 
 
-def hobby_spec(rig: Rig, name: str) -> HobbySpec:
+def _hobby_spec(rig: Rig, name: str) -> HobbySpec:
     """Return the hobby servo of one joint; the board allows the whole range of such servos."""
     joint, (low, high) = rig.joints[name], _stops(rig, name)
     facts, spec = joint.model_facts, HobbySpec(joint.id)
@@ -212,83 +197,3 @@ def _inertias(description: Description, joints: Collection[str]) -> Mapping[str,
                 break
             at = links[at.parent]
     return found
-
-
-# --- the servos as drives of their joints, for simulators
-
-
-def servo_drives(rig: Rig) -> dict[str, ServoDrive]:
-    """Return the drive of each joint whose servo's data are known, not those of a package."""
-    found = {name: _shaft_drive(rig, name) for name in rig.joints}
-    shafts = {name: drive for name, drive in found.items() if drive is not None}
-    turns = {name: {name: _turns(rig.joints[name])} for name in shafts}
-    for pair in rig.couplings.values():
-        if shafts.keys() >= {*pair.joints}:
-            for j, name in enumerate(pair.joints):
-                rates = zip(pair.joints, pair.rates, strict=True)
-                turns[name] = {one: _turns(rig.joints[one]) * rate[j] for one, rate in rates}
-    drives = {}
-    for name, own in turns.items():
-        parts = [np.multiply(shafts[n], _at_joint(turn)) for n, turn in own.items()]
-        drives[name] = ServoDrive(*np.sum(parts, axis=0).tolist())
-    return drives
-
-
-def _at_joint(turn: float) -> tuple[float, ...]:
-    """Return the factors from a shaft to a joint for one turn of which the shaft makes ``turn``."""
-    square = turn * turn
-    return square, abs(turn), square, square, square, abs(turn)
-
-
-def _shaft_drive(rig: Rig, name: str) -> ServoDrive | None:
-    """Return the drive of a servo at its own shaft."""
-    joint = rig.joints[name]
-    if joint.model in _SMART:
-        model = _SMART[joint.model]
-        motor, physics = Motor(model.stall_torque_nm, model.no_load_rpm), Physics()
-        loop = smart_loop(joint)
-    elif rig.bus_named(joint.bus).kind in BOARDS:
-        motor, loop = hobby_motor(hobby_spec(rig, name), joint.model_facts.steps_per_turn)
-        physics = HOBBY_PHYSICS
-    else:
-        return None
-    stall_nm, built = motor.stall_torque_nm, mechanics_of(motor, physics)
-    top_rad_s = motor.no_load_rpm * pi / 30.0
-    return ServoDrive(
-        armature_kg_m2=physics.rotor_s * stall_nm / top_rad_s,
-        friction_nm=physics.coulomb_share * stall_nm,
-        damping_nm_s=stall_nm
-        * (physics.viscous_share / top_rad_s + built.rate * STEPS_PER_RAD * MS_S),
-        kp_nm_rad=stall_nm * loop.p * STEPS_PER_RAD,
-        kv_nm_s=stall_nm * loop.d * STEPS_PER_RAD * MS_S,
-        force_nm=stall_nm * loop.u_max,
-    )
-
-
-_SMART: Mapping[str, ServoModel] = {**DYNAMIXEL, **FEETECH, **SCS_MODELS}
-
-
-def smart_loop(joint: JointParams) -> Loop:
-    """Return the controller of a joint's smart servo as a run configures it."""
-    model, strength = _SMART[joint.model], joint.torque_limit or 1.0
-    if not isinstance(model, DynamixelModel):
-        p, _, d = joint.gains or (REGISTERS[f"position_{one}_gain"].initial or 0 for one in "pid")
-        return Loop(p=P_SHARE * p, d=D_SHARE * d, u_max=strength)
-    registers = dict(zip(GAINS, model.gains, strict=True))
-    if joint.gains is not None:
-        names = ("position_p_gain", "position_i_gain", "position_d_gain")
-        registers |= dict(zip(names, joint.gains, strict=True))
-    limit = round(strength * PWM_FULL)
-    registers |= {"operating_mode": POSITION, "pwm_limit": limit, "goal_pwm": limit}
-    registers["pwm_slope"] = STEEPEST_PWM
-    return control_loop(lambda name: registers.get(name, 0), model)
-
-
-_NEAR_ZERO_RAD = radians(10.0)
-
-
-def _turns(joint: JointParams) -> float:
-    """Return the signed turns of a servo for one turn of its part of the linkage, near angle 0."""
-    linkage = joint.make_linkage()
-    steps = linkage.steps(_NEAR_ZERO_RAD) - linkage.steps(-_NEAR_ZERO_RAD)
-    return pi * steps / (joint.model_facts.steps_per_turn * _NEAR_ZERO_RAD)
