@@ -162,12 +162,6 @@ class RunOptions:
         named = None if self.summary is None or self.summary == "-" else Path(self.summary)
         return tuple(path for path in (self.record, named) if path is not None)
 
-    @property
-    def initial_choices(self) -> tuple[tuple[str, str], ...]:
-        """Return the initial choices of the robot's menus, as (menu, choice)."""
-        choices = (("behaviour", self.behaviour), ("conversation", self.conversation))
-        return tuple((menu, choice) for menu, choice in choices if choice is not None)
-
     def check_and_complete(self, blind: bool = False) -> "RunOptions":
         """Return the options with the default scene if none was given.
 

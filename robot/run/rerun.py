@@ -173,19 +173,21 @@ def _rerun(
 
 
 def _difference(was: Tick, now: Tick) -> str:
-    """Return the first decision of a tick of which a bit differs, as text; "" if none does."""
+    """Return the names of the decisions of a tick of which a bit differs, "" if none does."""
+    pairs = zip(_decisions(was).items(), _decisions(now).values(), strict=True)
+    return ", ".join(name for (name, then), again in pairs if then != again)
+
+
+def _decisions(tick: Tick) -> dict[str, str]:
+    """Return the decisions of a tick, as text that is equal only if every bit is equal."""
     # The wording of the reason may change; its content is in the saliences.
-    if repr(structs.replace(was.target, why="")) != repr(structs.replace(now.target, why="")):
-        return f"target: {now.target.why}, was {was.target.why}"
-    for name, then, again in (
-        ("gaze", repr(was.gaze), repr(now.gaze)),
-        ("desired angles", repr(was.desired_rad), repr(now.desired_rad)),
-        ("command", repr(was.guard_result.command_rad), repr(now.guard_result.command_rad)),
-        ("level", was.guard_result.level, now.guard_result.level),
-    ):
-        if then != again:
-            return f"{name}: {again}, was {then}"
-    return ""
+    return {
+        "target": repr(structs.replace(tick.target, why="")),
+        "gaze": repr(tick.gaze),
+        "desired angles": repr(tick.desired_rad),
+        "commanded angles": repr(tick.guard_result.command_rad),
+        "level": tick.guard_result.level,
+    }
 
 
 def _recorded_rig(recording: RunRecording, character: str | None, folder: Path) -> Rig:

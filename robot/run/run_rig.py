@@ -2,29 +2,24 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import TypeVar
 
+from gazerig.config.parameters import apply_changes
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import params_text, tracks_text
 from gazerig.config.schema import load_rig, load_rules, load_walk
-from gazerig.drivers.errors import SetupError
-from gazerig.gaze.oculomotor.saccade import SaccadeParams
-from gazerig.gaze.scanpath.scanpath import ScanpathParams
-from gazerig.params import choices_of
+from gazerig.robot.model.commands import Value
 from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_description import mesh_faults
 from gazerig.robot.run.surroundings import scene_of
-
-P = TypeVar("P", ScanpathParams, SaccadeParams)
 
 
 def run_rig(options: RunOptions) -> Rig:
     """Return the rig of a run; its meshes are checked too.
 
     Raises:
-        gazerig.config.load.ConfigError: rig, character, profile or rule set are invalid.
-        SetupError: an option names an unknown model.
+        gazerig.config.load.ConfigError: rig, character, profile, rule set or an option are invalid.
+        SetupError: the scene or world is unknown.
     """
     names = (options.rig, options.character, options.profile)
     return with_options(load_rig(*names, further=[mesh_faults]), options)
@@ -37,37 +32,26 @@ def with_options(rig: Rig, options: RunOptions) -> Rig:
     if the rig has the rules for it; otherwise the run is refused later.
 
     Raises:
-        gazerig.config.load.ConfigError: the rule set is invalid.
-        SetupError: an option names an unknown model.
+        gazerig.config.load.ConfigError: the rule set, or the value of an option, is invalid.
+        SetupError: the scene or world is unknown.
     """
-    gaze = rig.gaze
     if options.rules is not None:
-        gaze = replace(gaze, top_down=load_rules(options.rules))
-    if options.scanpath is not None:
-        scanpath = _with_choice(gaze.scanpath, "model", options.scanpath, "--scanpath")
-        gaze = replace(gaze, scanpath=scanpath)
-    if options.saccade is not None:
-        saccade = _with_choice(gaze.saccade, "profile", options.saccade, "--saccade")
-        gaze = replace(gaze, saccade=saccade)
+        gaze = replace(rig.gaze, top_down=load_rules(options.rules))
+        rig = replace(rig, gaze=gaze)
     rate_hz, level = options.rate, options.level
     if rate_hz is None and level is not None and level.rate_hz is not None:
         rate_hz = min(level.rate_hz, rig.loop.rate_hz)
-    if rate_hz is not None:
-        rig = replace(rig, loop=replace(rig.loop, rate_hz=rate_hz))
+    changes: dict[str, Value] = {
+        "gaze.scanpath.model": options.scanpath,
+        "gaze.saccade.profile": options.saccade,
+        "loop.rate_hz": rate_hz,
+    }
     scene = scene_of(options)
-    if scene is not None and scene.behaviours and {*scene.behaviours} <= {*gaze.top_down.rules}:
-        gaze = replace(gaze, top_down=replace(gaze.top_down, planner=True))
-        if options.world is not None:
-            rig = replace(rig, motion=replace(rig.motion, gloves=True))
-    return replace(rig, gaze=gaze)
-
-
-def _with_choice(params: P, key: str, value: str, option: str) -> P:
-    """Replace one key that has choices by an option of the command line."""
-    choices = choices_of(type(params), key)
-    if value not in choices:
-        raise SetupError(f"{option} {value}: unknown; available: {', '.join(choices)}")
-    return replace(params, **{key: value})  # type: ignore[arg-type]
+    if scene is not None and scene.behaviours and {*scene.behaviours} <= {*rig.gaze.top_down.rules}:
+        changes["gaze.top_down.planner"] = True
+        changes["motion.gloves"] = True if options.world is not None else None
+    wanted = {key: value for key, value in changes.items() if value is not None}
+    return apply_changes(rig, wanted) if wanted else rig
 
 
 def run_info(rig: Rig, options: RunOptions) -> RunInfo:

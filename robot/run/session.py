@@ -184,8 +184,10 @@ def _choose(run: Run) -> None:
         SetupError: there is no such choice.
     """
     try:
-        for menu, choice in run.options.initial_choices:
-            run.robot.ask(menu, choice)
+        for menu in ("behaviour", "conversation"):
+            choice = getattr(run.options, menu)
+            if choice is not None:
+                run.robot.ask(menu, choice)
     except ValueError as error:
         raise SetupError(str(error)) from error
 
