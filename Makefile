@@ -14,6 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # In a room with physics if it can be rendered. OPTIONS="--rate 200" overrides what was measured for this
 # computer. In a terminal Ctrl-C goes to the program alone (set -m): it parks, and make ends without an error.
 run: $(VENV)/.installed
+	@echo "measuring this computer for a second" >&2
 	@if [ -t 0 ]; then set -m; fi; $(BIN)/gazerig run --mock $$(if [ -d features/world ]; \
 	  then $(BIN)/python -m gazerig.features.world.run.first_world; \
 	  else $(BIN)/python -m gazerig.robot.cli.computer; fi) $(OPTIONS)
@@ -44,13 +45,15 @@ package: $(VENV)/.installed-dev # wheel and sdist in dist/, each installed and r
 clean:
 	rm -rf $(VENV) build dist site *.egg-info
 
-# $(call install,WHAT) makes the environment and installs WHAT; the installer shows its progress and errors.
+# $(call install,WHAT) makes the environment and installs WHAT; the installer shows progress and errors. A line every
+# five seconds has the number of packages, as pip unpacks them without a word.
+PACKAGES = $$(find $(VENV)/lib/*/site-packages -maxdepth 1 -name '*.dist-info' 2>/dev/null | wc -l)
 install = { $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 	  || { echo "$(PYTHON) is older than 3.11: give another, make PYTHON=python3.11 ..." >&2; exit 2; }; } \
-	&& { { command -v uv >/dev/null && { test -x $(BIN)/python || uv venv -q --python $(PYTHON) $(VENV); } \
-	       && uv pip install --python $(BIN)/python -e '$(1)'; } \
-	  || { { test -x $(BIN)/pip || $(PYTHON) -m venv --clear $(VENV); } \
-	       && $(BIN)/python -m pip install -e '$(1)'; }; }
+	&& ( while sleep 5; do echo "  $(PACKAGES) packages installed"; done & beat=$$!; trap "kill $$beat" EXIT; \
+	  { command -v uv >/dev/null && { test -x $(BIN)/python || uv venv -q --python $(PYTHON) $(VENV); } \
+	    && uv pip install --python $(BIN)/python -e '$(1)'; } \
+	  || { { test -x $(BIN)/pip || $(PYTHON) -m venv --clear $(VENV); } && $(BIN)/python -m pip install -e '$(1)'; } )
 
 $(VENV)/.installed: pyproject.toml
 	@echo "installing gazerig and what it needs into $(VENV): a minute or two, the first time only"

@@ -284,7 +284,7 @@ def line_of(end: socket.socket) -> dict[str, Any]:
         (b'{"do": "get", "prefix": NaN}\n', "not a line of JSON"),
         (b"\xff\xfe\n", "not a line of JSON"),
         (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
-        (b'{"do": "dance"}\n', "unknown request; available: hello, status, "),
+        (b'{"do": "dance"}\n', "no request 'dance'; available: hello, status, "),
         (b'{"do": "save", "path": "my.yaml"}\n', "absolute path"),
         (b'{"do": "tune", "changes": [["a", 1]]}\n', "requests set and say"),
     ],
@@ -377,10 +377,10 @@ def test_nobody_passes_himself_off_as_another(rig: RobotClient, folder: Path) ->
 def test_programs_of_other_users_are_hung_up_on(
     rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stranger = remote_socket.Peer(1, os.getuid() + 1)
     rig.get(RATE)  # let in
+    own = os.getuid()
     with monkeypatch.context() as patch:
-        patch.setattr(remote_socket, "identify_peer", lambda end: stranger)
+        patch.setattr(os, "getuid", lambda: own + 1)
         with raw(folder) as end:
             assert hung_up(end)
     assert rig.get(RATE) == {RATE: 200.0}

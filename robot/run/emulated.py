@@ -64,7 +64,7 @@ def emulated_lines(rig: Rig) -> dict[str, Emulated]:
     for bus in bus_names(rig):
         config, joints = rig.bus_named(bus), joints_on(rig, bus)
         if config.kind in CHAINS:
-            weights = joint_weights(description_of(rig, looks=False), rig.joints)
+            weights = joint_weights(description_of(rig), rig.joints)
             servos = tuple(_smart_servo(rig, name, weights[name]) for name in joints)
             lines[bus] = CHAINS[config.kind](servos, config.section.baud)
         elif config.kind in BOARDS:

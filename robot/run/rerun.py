@@ -23,7 +23,7 @@ from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.loop import Tick
 from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import MeasuredJoints
-from gazerig.robot.recording.playback_devices import NoCamera, PlaybackBody, PlaybackPerception
+from gazerig.robot.recording.body_playback import NoCamera, PlaybackBody, PlaybackPerception
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.run.figures import Summary
 from gazerig.robot.run.options import RunOptions

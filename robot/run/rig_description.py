@@ -1,17 +1,13 @@
-"""Description of a rig from its YAML, with the user's own meshes, and the weight on its neck."""
+"""Description of a rig from its YAML, and the weight on its neck."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
 from itertools import product
 from math import degrees, radians
 from typing import Literal, NamedTuple
 
 from gazerig.config.rig import Rig
-from gazerig.config.schema import unknown_text
-from gazerig.drivers.errors import SetupError
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import Description
-from gazerig.robot.description.own_meshes import own_visual
 from gazerig.robot.description.statics import (
     NECK_JOINTS,
     STRONG_SHARE,
@@ -24,26 +20,14 @@ from gazerig.robot.model.weight import AMBIENT_C, STALL_RISE_C, MassParams
 from gazerig.robot.run.rig_limits import lid_ends, park_rad
 
 
-def description_of(rig: Rig, *, looks: bool = True) -> Description:
-    """Return the links, joints, shapes and looks of a rig.
-
-    Args:
-        rig: the rig.
-        looks: Whether to read the meshes of its own.
-
-    Raises:
-        SetupError: one of its meshes cannot be used.
-    """
-    return describe(shape_of(rig if looks else replace(rig, meshes={})))
+def description_of(rig: Rig) -> Description:
+    """Return the links, joints, shapes and looks of a rig."""
+    return describe(shape_of(rig))
 
 
 def shape_of(rig: Rig) -> RigShape:
-    """Return the shape from which a rig's description is built.
-
-    Raises:
-        SetupError: a mesh of its own cannot be used.
-    """
-    shape = RigShape(
+    """Return the shape from which a rig's description is built."""
+    return RigShape(
         rig.name,
         rig.geometry,
         rig.joints,
@@ -53,23 +37,6 @@ def shape_of(rig: Rig) -> RigShape:
         rig.mass,
         (rig.webcam.width_px, rig.webcam.height_px),
     )
-    for key, fault in mesh_faults(rig):
-        raise SetupError(f"{key}: {fault}")
-    looks = ((name, own_visual(name, params)) for name, params in rig.meshes.items())
-    return shape._replace(meshes=tuple(looks))
-
-
-def mesh_faults(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find meshes of a rig that cannot be shown: their key in its file, and the fault."""
-    links = [link.name for link in description_of(rig, looks=False).links] if rig.meshes else []
-    for name, params in rig.meshes.items():
-        if name not in links:
-            yield f"meshes.{name}", unknown_text("link", name, links)
-            continue
-        try:
-            own_visual(name, params)
-        except SetupError as error:
-            yield f"meshes.{name}.file", str(error)
 
 
 # --- the weight on its servos
@@ -84,7 +51,7 @@ def statics_of(rig: Rig, *, of_neck: bool = False) -> Statics:
     """
     joints = {n: joint for n, joint in rig.joints.items() if not of_neck or n in NECK_JOINTS}
     pairs = [pair for pair in rig.couplings.values() if {*pair.joints} <= {*joints}]
-    return Statics(moving_bodies(description_of(rig, looks=False), joints), joints, pairs)
+    return Statics(moving_bodies(description_of(rig), joints), joints, pairs)
 
 
 def sag_compensation(rig: Rig) -> SagCompensation | None:

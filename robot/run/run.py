@@ -6,7 +6,6 @@
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import cached_property, partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gazerig.config.faults import ConfigError
@@ -17,10 +16,8 @@ from gazerig.config.shipped_files import shipped_names
 from gazerig.config.tracks import tracks_of
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.sound.sound_file import check_sound
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.gaze.scanpath.scanpath import row_sums_note
-from gazerig.gaze.track.track import MAX_DURATION_S
 from gazerig.robot.dashboard.feed.rig_feed import ShownRig
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.chooser import Chooser, RuleChooser, TargetChooser
@@ -30,7 +27,6 @@ from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClo
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.frames import CameraParams, fixed_mount
 from gazerig.robot.model.scene import BoxingScene
-from gazerig.robot.model.track_fit import TrackRefused
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
@@ -57,8 +53,8 @@ from gazerig.robot.run.rig_description import (
     shape_of,
 )
 from gazerig.robot.run.rig_limits import (
-    animation_tables,
     face_parts_m,
+    face_tables,
     lid_spans,
     limits,
     park_rad,
@@ -211,7 +207,6 @@ class Run:
                 lambda: self.rig,
                 self.clock,
                 rig_folder(options.rig),
-                self.robot.joint_latencies_s,
                 options.fast,
                 self.robot.report,
             )
@@ -321,23 +316,10 @@ def _tracks(rig: Rig, models: GazeModels, rig_file: str) -> TrackChoices:
         models.animation.tracks,
         rig.names,
         lid_spans(rig),
-        animation_tables(rig),
+        face_tables(rig),
         rig.gaze.oculomotor.eye_lag_ms / 1e3,
-        _sound_s,
-        TrackFolder(rig_file),
+        TrackFolder(rig_file).changes,
     )
-
-
-def _sound_s(path: str) -> float:
-    """Return the duration of a track's sound, s.
-
-    Raises:
-        TrackRefused: it cannot be played.
-    """
-    try:
-        return check_sound(Path(path), MAX_DURATION_S).duration_s
-    except SetupError as error:
-        raise TrackRefused(str(error)) from None
 
 
 def _recorder(rig: Rig, options: RunOptions) -> "Recorder":
@@ -345,7 +327,7 @@ def _recorder(rig: Rig, options: RunOptions) -> "Recorder":
     from gazerig.robot.recording.recorder import Recorder  # imports file formats
 
     assert options.record is not None
-    shown = urdf(description_of(rig, looks=False), looks=False).xml
+    shown = urdf(description_of(rig), looks=False).xml
     return Recorder(options.record, run_info(rig, options), options.force, options.fast, shown)
 
 

@@ -10,19 +10,18 @@ from gazerig.config.schema import load_rig, load_rules, load_walk
 from gazerig.robot.model.commands import Value
 from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.rig_description import mesh_faults
 from gazerig.robot.run.surroundings import scene_of
 
 
 def run_rig(options: RunOptions) -> Rig:
-    """Return the rig of a run; its meshes are checked too.
+    """Return the rig of a run.
 
     Raises:
         gazerig.config.load.ConfigError: rig, character, profile, rule set or an option are invalid.
         SetupError: the scene or world is unknown.
     """
     names = (options.rig, options.character, options.profile)
-    return with_options(load_rig(*names, further=[mesh_faults]), options)
+    return with_options(load_rig(*names), options)
 
 
 def with_options(rig: Rig, options: RunOptions) -> Rig:

@@ -18,7 +18,7 @@ def exported(rig: Rig) -> Any:
     """Return the MJCF that ``gazerig describe`` writes, compiled."""
     import mujoco
 
-    description = description_of(rig, looks=False)
+    description = description_of(rig)
     return mujoco.MjModel.from_xml_string(mjcf(description, looks=False).xml)
 
 
@@ -26,7 +26,7 @@ def exported(rig: Rig) -> Any:
 def test_masses_of_a_urdf_are_those_of_the_mjcf_and_possible(mujoco: Any, name: str) -> None:
     """As MuJoCo's importer reads them."""
     rig = load_rig(name)
-    text = urdf(description_of(rig, looks=False), looks=False)
+    text = urdf(description_of(rig), looks=False)
     read, model = mujoco.MjModel.from_xml_string(text.xml, text.assets), exported(rig)
     for i in range(1, model.nbody):
         body = model.body(i)
