@@ -27,7 +27,6 @@ from gazerig.robot.model.commands import (
     HEARTBEAT_S,
     SLOW,
     Character,
-    Characters,
     Command,
     ControlCommand,
     Fault,
@@ -299,10 +298,6 @@ class RobotClient:
     def revert(self) -> tuple[str, ...]:
         """Apply the values of the rig's file again."""
         return self._change(Revert())
-
-    def characters(self) -> tuple[str, ...]:
-        """Return the names of the characters that can be applied to the rig."""
-        return self.ask(Characters(), tuple[str, ...])
 
     def apply_character(self, name: str) -> tuple[str, ...]:
         """Apply another character to the rig."""
