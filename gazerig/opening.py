@@ -9,7 +9,7 @@ from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.local_head import LocalHead, RunningHead, SimulatedHead
 from gazerig.robot.loop.chooser import Chooser
-from gazerig.robot.recording.playback_devices import NoCamera
+from gazerig.robot.recording.body_playback import NoCamera
 from gazerig.robot.run.assemble import Substitutes
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.program_parts import ProgramParts
