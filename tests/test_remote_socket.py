@@ -519,13 +519,13 @@ def test_a_stop_does_not_wait_for_another_thread_of_its_program(
     answer, asked, over = RequestHandler.answer, threading.Event(), threading.Event()
 
     def slow(self: RequestHandler, request: Any, peer: str = "") -> dict[str, object]:
-        if request["do"] == "characters":
+        if request["do"] == "get":
             asked.set()
             over.wait(20.0)
         return answer(self, request, peer)
 
     monkeypatch.setattr(RequestHandler, "answer", slow)
-    other = threading.Thread(target=rig.characters)
+    other = threading.Thread(target=rig.get)
     other.start()
     assert asked.wait(20.0)
     rig.stop("meanwhile")
