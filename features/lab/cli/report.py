@@ -7,7 +7,7 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.robot.cli.options import DEFAULT_RIG, RigCommand, run_option
+from gazerig.robot.cli.options import DEFAULT_RIG, run_option
 from gazerig.robot.cli.progress import Steps, progress_bar
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, record_signals, say
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False)
 
 
-@app.command(cls=RigCommand)
+@app.command()
 def report(
     file: Annotated[
         Path | None,

@@ -9,7 +9,7 @@ import typer
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.robot.cli.ctl import read_value
-from gazerig.robot.cli.options import RigCommand, run_option
+from gazerig.robot.cli.options import run_option
 from gazerig.robot.cli.progress import progress_bar
 from gazerig.robot.cli.terminal import (
     FAULT,
@@ -25,7 +25,7 @@ from gazerig.robot.run.options import DEFAULT_SCENE, RunOptions
 app = typer.Typer(add_completion=False)
 
 
-@app.command(cls=RigCommand)
+@app.command()
 def sweep(
     rig: RigArgument = "desk",
     setting: Annotated[
