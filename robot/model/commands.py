@@ -494,7 +494,7 @@ class Fault(Request, frozen=True):
     text: str
 
 
-Layer = Literal["ghost", "sight"]
+Layer = Literal["sight"]
 Viewpoint = Literal["face", "both", "over its shoulder", "from above"]
 
 
@@ -502,8 +502,7 @@ class ShowView(Request, frozen=True):
     """Choose what the page's view of the head shows; the page does it, not the rig.
 
     Attributes:
-        layers: Layers for all browsers, None for no change: ghost of the desired pose, lines of
-            sight.
+        layers: Layers for all browsers, None for no change: lines of sight.
         look_from: Viewpoint of this browser, None for no change.
     """
 
