@@ -57,7 +57,6 @@ def sweep(
     bus: Annotated[str | None, run_option("bus")] = None,
     profile: Annotated[str | None, run_option("profile")] = None,
     character: Annotated[str | None, run_option("character")] = None,
-    conversation: Annotated[str | None, run_option("conversation")] = None,
     force: ForceOption = False,
 ) -> None:
     """Vary parameters over many simulated runs; write a table of all runs as CSV.
@@ -73,7 +72,7 @@ def sweep(
 
         run_options = RunOptions(
             mock=True, fast=True, scene=scene, seconds=seconds, bus=bus, rig=rig, profile=profile,
-            character=character, conversation=conversation,
+            character=character,
         ).check_and_complete()  # fmt: skip
         points = grid(setting or (), read_value)
         if points == [{}]:
