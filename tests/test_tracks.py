@@ -271,14 +271,13 @@ def interrupted(track: str, rig_name: str, moments: int) -> tuple[Floats, Sequen
     """
     rig, random = load_rig(rig_name), np.random.default_rng(len(track))
     player = TrackPlayer(len(further_joints(rig.joints)))
-    choices = TrackChoices(shipped_tracks(), player, rig.names, lid_spans(rig))
+    choices = TrackChoices(shipped_tracks(), player, TrackFit(rig.names, lid_spans(rig)))
     bounds, others = limits(rig.joints), (*choices.names, track, track, "")
-    at_rest = tuple([0.0] * len(rig.names))
     offsets, t, began = [PoseOffset.from_flat(player.rest.tolist())] * 3, 0.0, 0
     for _ in range(moments):
         name = track if not player.voices else others[int(random.integers(len(others)))]
         speed = float(random.uniform(0.5, 2.0))
-        reply = choices.play(Play(name, speed), t, at_rest, bounds)
+        reply = choices.play(Play(name, speed), t, bounds)
         began += bool(name) and not reply.refused
         for _ in range(int(random.integers(1, round(0.25 / DT_S)))):
             t += DT_S
@@ -319,8 +318,7 @@ class Show(NamedTuple):
     bounds: Sequence[JointLimit]
 
     def play(self, name: str, t_s: float, **how: object) -> int:
-        rest = (0.0,) * len(rig().names)
-        reply = self.choices.play(Play(name, **how), t_s, rest, self.bounds)  # type: ignore[arg-type]
+        reply = self.choices.play(Play(name, **how), t_s, self.bounds)  # type: ignore[arg-type]
         assert reply.track is not None, reply
         return reply.track.number
 
@@ -336,7 +334,7 @@ class Show(NamedTuple):
 
 def show(**tracks: Track) -> Show:
     player = TrackPlayer(len(further_joints(rig().joints)))
-    choices = TrackChoices(tracks, player, rig().names, lid_spans(rig()))
+    choices = TrackChoices(tracks, player, TrackFit(rig().names, lid_spans(rig())))
     return Show(player, choices, limits(rig().joints))
 
 

@@ -8,9 +8,8 @@ of spoken phonemes, or else where the loudness has a short deep dip. The level t
 
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,15 +30,6 @@ _LEAST_OPEN_S = 0.05
 _P_CLOSED_S = 0.055
 _CLOSED_SHARE = {"b": 0.5, "m": 0.65}
 _LONGEST_S = 1200.0
-
-
-@dataclass(frozen=True)
-class MouthParams:
-    """Motion while the head speaks."""
-
-    # fmt: off
-    level: Annotated[str, "level of the rig's table that opens the mouth; a rig without it plays only the sound"] = "mouth"
-    # fmt: on
 
 
 class Closure(NamedTuple):

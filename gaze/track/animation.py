@@ -21,6 +21,8 @@ from gazerig.params import Bounds
 
 HOLD_S = 0.5
 """A level that was not set for this time returns to 0, as its program may have ended."""
+MOUTH = "mouth"
+"""The level that opens the mouth of a rig that has one."""
 NEUTRAL = "neutral"
 """The initial expression; without an entry in the rig's table all its offsets are 0."""
 _LIDS = slice(5, 9)
@@ -52,11 +54,10 @@ class FaceRange(NamedTuple):
 
 
 class FaceTables(NamedTuple):
-    """Expressions of a rig, neutral first, and its levels; mouth: level that opens it, or ""."""
+    """Expressions of a rig, neutral first, and its levels."""
 
     expressions: Mapping[str, FaceRange]
     levels: Mapping[str, FaceRange]
-    mouth: str = ""
 
 
 NO_TABLES = FaceTables({}, {})
@@ -165,18 +166,17 @@ class Animation:
 
     def _speak(self, t_s: float) -> None:
         """Let the mouth follow a speech that knows its openings; it shuts at the end of any."""
-        mouth, speech = self._tables.mouth, self.tracks.speech
-        if mouth and speech is not None and speech.motion.mouth is not None:
+        speech = self.tracks.speech
+        if MOUTH not in self._tables.levels:
+            return
+        if speech is not None and speech.motion.mouth is not None:
             at_s = speech.position_s(t_s) + speech.lead_s
-            self.set_level(mouth, float(np.interp(at_s, *speech.motion.mouth)), t_s)
-        elif mouth and speech is None and self._speaks:
-            self.set_level(mouth, 0.0, t_s)
+            self.set_level(MOUTH, float(np.interp(at_s, *speech.motion.mouth)), t_s)
+        elif speech is None and self._speaks:
+            self.set_level(MOUTH, 0.0, t_s)
         self._speaks = speech is not None
 
     @property
     def loudness(self) -> float | None:
         """Return the loudness 0..1 of a speech by its mouth, 1 without one; None: no speech."""
-        if self.tracks.speech is None:
-            return None
-        mouth = self._tables.mouth
-        return self._shares[mouth] if mouth else 1.0
+        return self._shares.get(MOUTH, 1.0) if self.tracks.speech is not None else None

@@ -51,6 +51,7 @@ class TrackMotion:
     Attributes:
         channels: Channels that it moves or owns.
         mouth: Times and openings of the mouth of a speech, None without one.
+        lead_s: Time by which the openings must be ahead of the sound.
         rate: Mean speed of the position; ``speed`` if nothing behind the first key is slower.
         slowed_by: Factor by which it takes longer.
         slowest: Index of the joint that needs this, or -1.
@@ -65,6 +66,7 @@ class TrackMotion:
         self.track, self.owned, self.sound_s, self.speed = track, owned, sound_s, speed
         self.channels = owned | {row.channel for row in rows}
         self.mouth: tuple[Floats, Floats] | None = None
+        self.lead_s = 0.0
         self.cues = sorted((time_s, name) for name, time_s in track.cues.items())
         self._rows, self._count, self._strain = rows, count, strain
         self._positions = np.unique(np.concatenate(([0.0], *(row.times_s for row in rows))))

@@ -126,6 +126,7 @@ class TrackFit:
             motion.channels = frozenset(np.flatnonzero(self._ranges[level].gain).tolist())
             if mouth:
                 motion.mouth = (*np.array(mouth).T,)
+                motion.lead_s = 0.5 * self._ranges[level].smoothing_s
         return motion
 
     def rows(self, track: Track) -> tuple[list[ChannelKeys], tuple[str, ...]]:
@@ -195,18 +196,6 @@ class TrackFit:
                 values = clipped
             found.append(row._replace(values=values))
         return found, tuple(smaller.items())
-
-    def channel_means(self, values: Sequence[float]) -> Floats:
-        """Return the mean over the joints of each channel; 0 for a channel without a joint."""
-        found: Floats = np.zeros(len(self.channels))
-        for i, channel in enumerate(self.channels):
-            of = [
-                v
-                for j, v in zip(self.joints, values, strict=True)
-                if channel_of_joint(j) == channel
-            ]
-            found[i] = sum(of) / max(1, len(of))
-        return found
 
     def _strain(self, owned: frozenset[int], limits: Sequence[JointLimit]) -> Strain:
         """Return the factors by which motion must take longer to keep the limits.

@@ -30,6 +30,7 @@ from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClo
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.scene import BoxingScene
+from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.model.types import JointAngles, further_joints
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
@@ -301,9 +302,7 @@ def _build_components(
         tracks=TrackChoices(
             tracks_of(rig.track_files),
             animation.tracks,
-            rig.names,
-            lid_spans(rig),
-            face_tables(rig),
+            TrackFit(rig.names, lid_spans(rig), face_tables(rig)),
             rig.gaze.oculomotor.eye_lag_ms / 1e3,
             TrackFolder(rig_file).changes,
         ),

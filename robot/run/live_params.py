@@ -37,7 +37,6 @@ from gazerig.robot.perception.perception import Perception
 from gazerig.robot.run.rig_limits import (
     eye_limits,
     head_limits,
-    lid_spans,
     limits,
 )
 from gazerig.robot.run.rig_weight import rest_park_pose
@@ -186,7 +185,7 @@ class LiveParams:
             parts.oculomotor.retune(now.oculomotor, eye_limits(new))
         if now.head != was.head or bounds:
             parts.head.retune(now.head, *head_limits(new))
-        parts.tracks.retune(lid_spans(new), now.oculomotor.eye_lag_ms / 1e3)
+        parts.tracks.latency_s = now.oculomotor.eye_lag_ms / 1e3
 
     def _apply_to_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
         """Apply limits of joints and guard.

@@ -26,6 +26,7 @@ from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
 from gazerig.drivers.sound.sound_file import check_sound, read_samples, write_wav
 from gazerig.drivers.sound.speech import speak
 from gazerig.gaze.mouth.mouth import Mouth, phoneme_closures
+from gazerig.gaze.track.animation import MOUTH
 from gazerig.gaze.track.track import FINISHED
 from gazerig.gaze.track.track_player import SPEECH
 from gazerig.gaze.types import Floats
@@ -231,10 +232,7 @@ class RunVoice:
             if not 0.0 <= volume <= 1.0:
                 raise SoundError(f"the volume is {volume:g}: give 0..1")
             if not volume and not self._level:
-                raise SoundError(
-                    f"this head has no level {self._rig().gaze.mouth.level!r} that a sound without "
-                    "volume could move"
-                )
+                raise SoundError("this head has no level mouth, which a sound without volume moves")
             self._open_loudspeaker(self._rig().sound.device if volume else SILENT_DEVICE)
         now_s = self._clock.now_s()
         with self._lock:
@@ -387,8 +385,7 @@ class RunVoice:
     @property
     def _level(self) -> str:
         """Return the level that opens the mouth, "" for a rig without it."""
-        level = self._rig().gaze.mouth.level
-        return level if level in self._rig().levels else ""
+        return MOUTH if MOUTH in self._rig().levels else ""
 
     def _try(self, command: Command) -> None:
         """Queue a command; a refusal is not important, as the next one follows."""
