@@ -200,11 +200,11 @@ class TrackPlayer:
         self.moves, self.owned.layers = bool(self.voices), {}
         offset: Floats = np.zeros(len(self.rest))
         for voice in self.voices:
-            weight, owned = voice.weight(t_s), voice.motion.owned
-            for i, value in voice.motion.values_at(voice.time_s(t_s)).items():
-                if i in owned:
-                    layer = float(self.rest[i]) + value, weight
-                    self.owned.layers.setdefault(i, []).append(layer)
-                else:
-                    offset[i] += weight * value
+            weight, motion = voice.weight(t_s), voice.motion
+            values = motion.sample_at(np.array([voice.time_s(t_s)]))[0, 0]
+            for i in motion.owned:
+                layer = float(self.rest[i] + values[i]), weight
+                self.owned.layers.setdefault(i, []).append(layer)
+                values[i] = 0.0
+            offset += weight * values
         return offset
