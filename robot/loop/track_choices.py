@@ -125,7 +125,8 @@ class TrackChoices:
         """
         if isinstance(command, Speak):
             track = Track(SPEECH, sound=command.sound, volume=command.volume)
-            motion = self._fit.speech(track, command.level, command.mouth, command.duration_s)
+            duration_s, level, mouth = command.duration_s, command.level, command.mouth
+            motion = self._fit.speech(track, level, mouth, duration_s, limits)
             return motion, TrackReply(SPEECH, motion.duration_s)
         name, how = command.track, (command.speed, command.sound_s, tuple(limits))
         if command.definition is not None:

@@ -110,7 +110,12 @@ class TrackFit:
         return motion, reply
 
     def speech(
-        self, track: Track, level: str, mouth: Sequence[tuple[float, float]], duration_s: float
+        self,
+        track: Track,
+        level: str,
+        mouth: Sequence[tuple[float, float]],
+        duration_s: float,
+        limits: Sequence[JointLimit],
     ) -> TrackMotion:
         """Return the motion of a speech: none but that of a level, whose channels it takes.
 
@@ -119,8 +124,9 @@ class TrackFit:
             level: Level that opens the mouth, "" without one.
             mouth: Times and openings; () if they arrive during the speech.
             duration_s: Its duration, s.
+            limits: Limits of the joints.
         """
-        strain = self._strain(frozenset(), ())
+        strain = self._strain(frozenset(), limits)
         motion = TrackMotion(track, (), len(self.channels), frozenset(), strain, 1.0, duration_s)
         if level in self._ranges:
             motion.channels = frozenset(np.flatnonzero(self._ranges[level].gain).tolist())
