@@ -1,4 +1,4 @@
-"""Functions of the gaze models that run in a profile, compared with docs/profiles.md."""
+"""Functions of the gaze models that run in a profile, compared with docs/gaze.md."""
 
 import re
 from collections import Counter
@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, cast
 import pytest
 from fakes.scenes import EmptyScene
 
-from gazerig.config.parameters import apply_changes, value_of
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.parameters import apply_changes
+from gazerig.config.schema import load_rig
 from gazerig.robot.run import run_rig
 from gazerig.robot.run.options import RunOptions
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
@@ -22,7 +22,7 @@ from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 pytest.importorskip("gazerig.features.lab")  # its measures
 from gazerig.features.lab.simulated_run import simulate  # noqa: E402
 
-PAGE = Path(__file__).parents[2] / "docs" / "profiles.md"
+PAGE = Path(__file__).parents[2] / "docs" / "gaze.md"
 PROFILES = ("robot", "mitake", "nakamoto")
 SECONDS = 20.0
 _ROW = re.compile(
@@ -54,25 +54,23 @@ class EverythingOnce(EmptyScene):
 
 
 class Claim(NamedTuple):
-    """A row of the page: paper and item, function or key, and what it is in each profile.
-
-    Keys are told of the papers' profiles, functions of all three.
-    """
+    """A row of the page: paper and item, function, and whether it runs in each profile."""
 
     paper: str
     what: str
     name: str
     cells: tuple[str, ...]
 
-    @property
-    def is_key(self) -> bool:
-        """Return whether the row has a parameter's value."""
-        return self.name.startswith(("gaze.", "ranges."))
+
+def rows() -> list[str]:
+    """Return the lines of the page's section about profiles."""
+    text = PAGE.read_text(encoding="utf-8")
+    return text.partition("\n## Profiles\n")[2].partition("\n## ")[0].splitlines()
 
 
 def claims() -> Iterator[Claim]:
     """Yield the rows of the page's tables."""
-    for line in PAGE.read_text(encoding="utf-8").splitlines():
+    for line in rows():
         if found := _ROW.match(line):
             cells = tuple(cell.strip() for cell in found["cells"].split("|"))
             yield Claim(found["paper"], found["what"], found["name"], cells)
@@ -113,20 +111,6 @@ def as_told(claim: Claim) -> list[str]:
     """Return the profiles of which a row of the page is not true."""
     return [
         profile
-        for profile, cell in zip(PROFILES[-len(claim.cells) :], claim.cells, strict=True)
-        if cell != (_value(claim.name, profile) if claim.is_key else _runs(claim.name, profile))
+        for profile, cell in zip(PROFILES, claim.cells, strict=True)
+        if cell != ("runs" if ran(profile).calls[claim.name] else "-")
     ]
-
-
-def _runs(name: str, profile: str) -> str:
-    return "runs" if ran(profile).calls[name] else "-"
-
-
-def _value(key: str, profile: str) -> str:
-    value = value_of(_rig(profile), key)
-    return f"{value:g}" if isinstance(value, float) else str(value).lower()
-
-
-@cache
-def _rig(profile: str) -> Rig:
-    return load_rig("desk", profile=profile)

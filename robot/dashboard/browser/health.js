@@ -75,7 +75,7 @@ function row(name, joint, unanswered, limits) {
     title,
     cell(`${Math.round(degrees(joint.measured_rad)) + 0}°`),
     cell(isKnown(heat) ? heat.toFixed(0) : "-", heat >= hot_c ? "over" : heat >= warm_c ? "near" : ""),
-    cell(isKnown(load) ? `${load < 0 ? "-" : "+"}${Math.abs(100 * load).toFixed(0)} %` : "-",
+    cell(isKnown(load) ? `${Math.round(100 * load) + 0} %` : "-",
       Math.abs(load) >= HARD_LOAD ? "over" : Math.abs(load) > heavy_load ? "near" : ""),
     cell(isKnown(volts) ? volts.toFixed(1) : "-",
       isKnown(volts) && (volts < low_v || volts > (high_v ?? Infinity)) ? "near" : ""),

@@ -46,6 +46,7 @@ from gazerig.robot.dashboard.door.sockets import (
     TakePicture,
     WebcamSocket,
     close_socket,
+    send_uncompressed,
     until_one_ends,
 )
 from gazerig.robot.dashboard.door.viser_server import VIEW, ViewProxy, view_client
@@ -327,6 +328,7 @@ class PageDoor:
         for topic, text in zip(news.topics, texts, strict=True):
             self._lasting[type(topic), getattr(topic, "title", "")] = text
         silent = [_line(silent=news.silent_s)] if news.silent_s else []
+        picture = _line(picture=news.picture.picture) if news.picture is not None else ""
         for client in self._clients:
             wishes = client.wishes
             for text in (
@@ -336,7 +338,7 @@ class PageDoor:
             ):
                 client.queue_text(text)
             if news.picture is not None and wishes.pictures:
-                client.add_picture(news.picture)
+                client.add_picture(picture, news.picture.jpeg)
 
     # --- admission ---------------------------------------------------------------------
 
@@ -393,7 +395,7 @@ class PageDoor:
                         raise MessageRefused("no track of this name has a sound", 404)
                     return _answer({"ok": wave}, 200)
                 case "GET", "openapi.json":
-                    return _answer(api_description(BASE), 200)
+                    return _answer(api_description(), 200)
             raise MessageRefused(
                 f"{request.method} {request.path:.60} is not here: version {VERSION} is at {BASE}/",
                 404,
@@ -526,9 +528,8 @@ class PageDoor:
                     await socket.pong(ping)
             while message := client.outgoing():
                 async with asyncio.timeout(TAKES_S):
-                    if isinstance(message, ShownPicture):
-                        await socket.send_str(_line(picture=message.picture))
-                        await socket.send_bytes(message.jpeg)
+                    if isinstance(message, bytes):
+                        await send_uncompressed(socket, message)
                     else:
                         await socket.send_str(message)
 

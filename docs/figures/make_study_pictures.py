@@ -1,6 +1,7 @@
-"""Photograph a study's questions: python docs/study/make_study_pictures.py (with Chromium)."""
+"""Photograph a study's questions: python docs/figures/make_study_pictures.py (with Chromium)."""
 
 import sys
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -8,13 +9,17 @@ from tempfile import TemporaryDirectory
 TESTS = Path(__file__).parents[2] / "tests"
 sys.path[:0] = [str(TESTS), str(TESTS / "study")]
 
-from browser import browsing  # noqa: E402
+from browser import Browser, browsing  # noqa: E402
 from PIL import Image  # noqa: E402
 from shown_page import free_port, wait_for  # noqa: E402
 from study_helpers import Program  # noqa: E402
 
 OUT = Path(__file__).parent
 GAP_PX = 20
+
+
+def _shown(tab: Browser) -> bool | None:
+    return "Your impression" in tab.words() or None
 
 
 def main() -> None:
@@ -36,7 +41,7 @@ def main() -> None:
         for size in ((1000, 560), (390, 560)):
             with browsing(size) as tab:
                 tab.go(f"{one.url}/?token={one.token}")
-                wait_for(lambda tab=tab: "Your impression" in tab.words() or None, "the page")
+                wait_for(partial(_shown, tab), "the page")
                 tab.run("document.querySelectorAll('input')[3].click()")
                 pictures.append(Image.open(BytesIO(tab.photograph())).convert("RGB"))
         one.process.terminate()

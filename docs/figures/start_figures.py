@@ -19,7 +19,7 @@ from gazerig.config.schema import load_rig  # noqa: E402
 from gazerig.robot.cli.new_rig import MECHANISMS  # noqa: E402
 from gazerig.robot.description.parts import EYE_RADIUS  # noqa: E402
 
-HERE = Path(__file__).parent / "figures"
+HERE = Path(__file__).parent
 INK, SOFT, EYE, SKIN = "#2c3136", "#9aa3a9", "#1c6ea4", "#f3e3d3"
 SERVO, POWER, GROUND, DATA = "#d9660a", "#b3261e", "#2c3136", "#1c6ea4"
 EYE_AT = {"left": 1.0, "right": -1.0}

@@ -1,9 +1,9 @@
-"""Draw docs/figures/stop.svg, the path of a STOP: python docs/make_stop_picture.py."""
+"""Draw docs/figures/stop.svg, the path of a STOP: python docs/figures/make_stop_picture.py."""
 
 from html import escape
 from pathlib import Path
 
-PICTURE = Path(__file__).parent / "figures" / "stop.svg"
+PICTURE = Path(__file__).parent / "stop.svg"
 WIDTH, HEIGHT = 946, 590
 BOX_WIDTH, BOX_HEIGHT = 196, 46
 COLUMNS = (12, 254, 496, 738)

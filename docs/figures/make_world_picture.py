@@ -1,4 +1,4 @@
-"""Draw world-people.webp, a moment of four worlds: python docs/world/make_world_picture.py."""
+"""Draw world-people.webp, a moment of four worlds: python docs/figures/make_world_picture.py."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Draw the figures of docs/ from the program itself: make figures.
+"""Draw the figures of docs/ from the program itself: python docs/figures/make_figures.py.
 
 Every curve is what the models give at this moment; human data are marked as such, with
 their sources.
@@ -33,14 +33,14 @@ from gazerig.robot.run.assemble import assemble
 from gazerig.robot.run.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.run.options import RunOptions  # noqa: E402
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
+sys.path.append(str(Path(__file__).parents[2] / "tests"))
 from true_gaze import (  # noqa: E402
     gaze_angles,
     gaze_error_rad,
     true_part,
 )
 
-HERE = Path(__file__).parent / "figures"
+HERE = Path(__file__).parent
 INK, HUMAN = "#1f5fa8", "#c0722e"
 TICK_S = 0.005
 STEP_AT_S = 2.0

@@ -1,4 +1,4 @@
-"""Draw the figures that take the lab: traces beside a person's: make figures."""
+"""Draw gaze beside that of people, with the lab: python docs/figures/make_lab_figures.py."""
 
 from pathlib import Path
 
@@ -15,14 +15,14 @@ HERE = Path(__file__).parent
 def traces() -> None:
     """Twenty seconds of a person by published numbers, of the default and of both papers."""
     figure = trace_figure.figure_of(trace_figure.all_traces())
-    figure.savefig(HERE.parent / "figures" / "traces.png", dpi=110, bbox_inches="tight")
+    figure.savefig(HERE / "traces.png", dpi=110, bbox_inches="tight")
     plt.close(figure)
 
 
 def people() -> None:
     """Twenty seconds before a face, a walker and three people, and in a talk."""
     figure = people_figure.figure_of(people_figure.all_traces())
-    figure.savefig(HERE.parent / "figures" / "people.png", dpi=110, bbox_inches="tight")
+    figure.savefig(HERE / "people.png", dpi=110, bbox_inches="tight")
     plt.close(figure)
 
 

@@ -1,29 +1,26 @@
-"""Write docs/parameters.md from the declarations; ``make docs`` does."""
+"""The list of all parameters of a rig, a page of the documentation site."""
 
 from collections.abc import Iterator
 from dataclasses import MISSING, fields, is_dataclass
-from pathlib import Path
 from typing import Any
 
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import format_value
 from gazerig.params import Declaration, declarations
 
-PAPER = Path(__file__).parent / "parameters.md"
 _HEAD = """# Every parameter of a rig
 
-Written by `make docs` from the declarations in the code, the same that the loader,
-the page and `gazerig ctl set` read. A star stands for a name that you choose: a joint's, a rule's, a bus's.
-A default is the program's own; the shipped rigs and profiles set their values over it, and a dash
-means that a rig file must give one. [tuning.md](tuning.md) describes how to change them while the head moves
-and how to add one.
+From the declarations in the code, which the loader, the page and `gazerig ctl set` read. A star
+stands for a name that you choose: a joint's, a rule's, a bus's. A default is the program's own; the
+shipped rigs and profiles set their values over it, and a dash means that a rig file must give one.
+[tuning.md](tuning.md) describes how to change them while the head moves and how to add one.
 """
 
 
 _TABLE = "|key|default|unit, range|meaning|\n|---|---|---|---|\n"
 
 
-def text() -> str:
+def parameters_page() -> str:
     """Return the whole page: one table for each top-level section of a rig file."""
     parts = [_HEAD]
     last = None
@@ -80,8 +77,3 @@ def _limits(shape: Declaration) -> str:
 
 def _cell(words: str) -> str:
     return words.replace("|", "\\|").replace("*", "\\*").replace("[", "\\[")
-
-
-if __name__ == "__main__":
-    PAPER.write_text(text(), encoding="utf-8")
-    print(f"written: {PAPER}")

@@ -1,4 +1,4 @@
-"""Film the page of a rig in a living room: MUJOCO_GL=egl python docs/make_page_film.py.
+"""Film the page of a rig in a living room: MUJOCO_GL=egl python docs/figures/make_page_film.py.
 
 The rig's time is simulated and goes on slowly, so that a browser without a graphics card has
 the time to draw it; each picture stands in the film for as long as it was true.
@@ -11,7 +11,7 @@ import time
 from io import BytesIO
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 
 from browser import SLOW_DRAWING, Browser, browsing  # noqa: E402
 from PIL import Image  # noqa: E402
@@ -23,7 +23,7 @@ from gazerig.robot.run.assemble import assemble  # noqa: E402
 from gazerig.robot.run.options import RunOptions  # noqa: E402
 from gazerig.robot.run.run_observers import RunObservers  # noqa: E402
 
-OUT = Path(__file__).parent / "page.webp"
+OUT = Path(__file__).parents[1] / "page.webp"
 MOST_BYTES = 1_500_000
 WINDOW_PX, SHOWN_PX = (1280, 800), (960, 600)
 SECONDS, SHORTEST_S = 7.0, 0.08

@@ -1,4 +1,4 @@
-"""Draw docs/figures/describe.png: MUJOCO_GL=egl python docs/make_describe_picture.py."""
+"""Draw docs/figures/describe.png: MUJOCO_GL=egl python docs/figures/make_describe_picture.py."""
 
 from math import radians
 from pathlib import Path
@@ -11,7 +11,7 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.description.files import description_files
 from gazerig.robot.run.rig_description import description_of
 
-PICTURE = Path(__file__).parent / "figures" / "describe.png"
+PICTURE = Path(__file__).parent / "describe.png"
 _SIZE = (520, 640)
 _POSES = {
     "desk": {"left_upper_lid": 16.9, "right_upper_lid": 16.9, "neck_yaw": -8.0},
