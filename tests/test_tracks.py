@@ -16,7 +16,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track, shipped_tracks
 from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.track.minimum_jerk_curve import evaluate, key_states
-from gazerig.gaze.track.pose_offset import PoseOffset
+from gazerig.gaze.track.pose_offset import OwnedPose, PoseOffset
 from gazerig.gaze.track.track import LIMIT_SHARE, KeyFrame, Track
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.track.track_player import TrackPlayer
@@ -419,8 +419,8 @@ def test_an_owned_jaw_goes_from_the_present_angle_to_the_track_and_back() -> Non
     for k in range(2200):
         t = k * 0.005
         it.player.step(t)
-        (index,) = it.player.owned.layers or (index,)
-        angles.append(it.player.owned.mix(index, radians(5.0)))
+        (index,) = it.player.owned or (index,)
+        angles.append(OwnedPose(it.player.owned).mix(index, radians(5.0)))
     at = np.degrees(angles)
     assert at[0] == pytest.approx(5.0) and at[-1] == pytest.approx(5.0)
     assert at[400] == pytest.approx(2.0, abs=0.01)  # of the track alone

@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
-from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.gaze.track.pose_offset import NO_OFFSET, OwnedPose, PoseOffset
 from gazerig.gaze.track.track import POSE_CHANNELS
 from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.gaze.types import Floats
@@ -156,12 +156,12 @@ class Animation:
             self._at_rest = all([blend.is_at_rest for blend in self._blends.values()])
         flat = self._face + moved
         flat[_LIDS] = self._face[_LIDS] * (1.0 + moved[_LIDS])
-        if not tracks.owned.layers:
-            self._sum = PoseOffset.from_flat(flat.tolist())
-            return self._sum
-        first = len(POSE_CHANNELS)
-        flat[first:] = [tracks.owned.mix(first + i, a) for i, a in enumerate(flat[first:].tolist())]
-        self._sum = PoseOffset.from_flat(flat.tolist())._replace(owned=tracks.owned)
+        values: list[float] = flat.tolist()
+        self._sum = PoseOffset.from_flat(values)
+        if tracks.owned:
+            owned, first = OwnedPose(tracks.owned), len(POSE_CHANNELS)
+            joints = [owned.mix(first + i, value) for i, value in enumerate(values[first:])]
+            self._sum = self._sum._replace(joints_rad=tuple(joints), owned=owned)
         return self._sum
 
     def _speak(self, t_s: float) -> None:

@@ -128,21 +128,21 @@ class TrackMotion:
         later_s = max(0.0, position_s - float(self._positions[-1]))
         return float(np.interp(position_s, self._positions, self._times)) + later_s / self.speed
 
-    def blend_s(self, time_s: float, base: Floats, least_s: float, rising: bool) -> float:
-        """Return the shortest time in which it can grow from or fade to a base within limits.
+    def blend_s(self, time_s: float, least_s: float, rising: bool) -> float:
+        """Return the shortest time in which it can grow from rest or fade to it within limits.
 
         Args:
             time_s: Time since its start at which the blend begins.
-            base: (channels,) Values at its other end.
             least_s: Shortest time.
-            rising: Whether it grows from the base.
+            rising: Whether it grows.
         """
         for blend_s in [1.25**i * least_s for i in range(16)]:
             times = np.linspace(0.0, blend_s, 81)
             s = times / blend_s
             weight = s**3 * (10.0 + s * (6.0 * s - 15.0))
-            value = self.sample_at(time_s + times)[0] - base
-            value *= (weight if rising else 1.0 - weight)[:, None]
+            value = (
+                self.sample_at(time_s + times)[0] * (weight if rising else 1.0 - weight)[:, None]
+            )
             speed = np.gradient(value, times, axis=0)
             acceleration = np.gradient(speed, times, axis=0)
             if self._strain(speed, acceleration).max() <= _BLEND_STRAIN:

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 
 from gazerig.gaze.minimum_jerk import min_jerk
-from gazerig.gaze.track.pose_offset import OwnedPose
 from gazerig.gaze.track.track import FINISHED, HEAD_CHANNELS, POSE_CHANNELS, rest_value
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.types import Floats
@@ -78,7 +77,7 @@ class Voice:
             self._next_cue = passed
         if self._time_s < motion.duration_s + self.lead_s:
             return False
-        if self.rounds == 1 or not motion.duration_s:
+        if self.rounds == 1:
             return True
         self.rounds = max(0, self.rounds - 1)
         self._time_s -= motion.duration_s
@@ -88,7 +87,7 @@ class Voice:
     def correct(self, t_s: float, position_s: float) -> None:
         """Follow another clock: its position at a time, approached slowly."""
         self._late_s = (position_s - self.position_s(t_s)) / self.motion.speed
-        if self.rounds != 1 and self.motion.duration_s:  # the clock may be in another round
+        if self.rounds != 1:  # the clock may be in another round
             self._late_s -= self.motion.duration_s * round(self._late_s / self.motion.duration_s)
 
     def leave(self, reason: str, t_s: float, exit_s: float, until_s: float | None = None) -> None:
@@ -117,20 +116,19 @@ class TrackPlayer:
 
     Attributes:
         voices: Tracks that move the head, the newest last; also those that are ending.
-        owned: Angles that tracks give instead of gaze.
+        owned: Value and share of each channel that tracks give instead of gaze.
         moves: Whether ``step`` may return another offset than last time.
     """
 
     def __init__(self, joints: int) -> None:
         names = (*POSE_CHANNELS, *[""] * joints)
         self.rest: Floats = np.array([rest_value(name) for name in names])
-        self.owned = OwnedPose()
         self.reset()
 
     def reset(self) -> None:
         """Rest immediately, for a head whose joints are hand-guided or switched off."""
         self.voices: list[Voice] = []
-        self.owned.layers = {}
+        self.owned: dict[int, tuple[float, float]] = {}
         self.moves = True
 
     @property
@@ -146,7 +144,7 @@ class TrackPlayer:
     @property
     def replaces_gaze(self) -> bool:
         """Return whether a track gives the head's angles."""
-        return any([channel < len(HEAD_CHANNELS) for channel in self.owned.layers])
+        return any([channel < len(HEAD_CHANNELS) for channel in self.owned])
 
     def play(self, voice: Voice) -> None:
         """Begin a track at its time."""
@@ -179,10 +177,7 @@ class TrackPlayer:
         for voice in voices:
             exit_s, motion = 0.0, voice.motion
             if motion.moves and t_s >= voice.begins_s:
-                base = np.zeros(len(self.rest))
-                for i in motion.owned:
-                    base[i] = self.owned.gaze.get(i, self.rest[i]) - self.rest[i]
-                exit_s = motion.blend_s(voice.time_s(t_s), base, BLEND_OUT_S, rising=False)
+                exit_s = motion.blend_s(voice.time_s(t_s), BLEND_OUT_S, rising=False)
             voice.leave(reason, t_s, exit_s, until_s)
             longest_s = max(longest_s, voice.gone_s - t_s)
         self.moves = True
@@ -197,14 +192,16 @@ class TrackPlayer:
                 else:
                     voice.leave(FINISHED, t_s, 0.0)
         self.voices = [voice for voice in self.voices if t_s < voice.gone_s]
-        self.moves, self.owned.layers = bool(self.voices), {}
+        self.moves, self.owned = bool(self.voices), {}
         offset: Floats = np.zeros(len(self.rest))
         for voice in self.voices:
             weight, motion = voice.weight(t_s), voice.motion
             values = motion.sample_at(np.array([voice.time_s(t_s)]))[0, 0]
-            for i in motion.owned:
-                layer = float(self.rest[i] + values[i]), weight
-                self.owned.layers.setdefault(i, []).append(layer)
+            for i in motion.owned:  # the newest above the others
+                value, share = self.owned.get(i, (0.0, 0.0))
+                both = weight + share * (1.0 - weight)
+                mixed = weight * (self.rest[i] + values[i]) + share * (1.0 - weight) * value
+                self.owned[i] = float(mixed / both if both else 0.0), both
                 values[i] = 0.0
             offset += weight * values
         return offset

@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
-import numpy as np
 from msgspec import Struct, structs
 
 from gazerig.drivers.errors import SetupError
@@ -228,8 +227,7 @@ class TrackChoices:
         begins_s = max([t_s, *fading])
         entry_s = 0.0
         if motion.owned or from_s > 0.0:
-            rest = np.zeros(len(player.rest))
-            entry_s = motion.blend_s(motion.time_at(from_s), rest, BLEND_IN_S, rising=True)
+            entry_s = motion.blend_s(motion.time_at(from_s), BLEND_IN_S, rising=True)
         player.end(staying, ended, t_s, begins_s + entry_s)
         lead_s = motion.lead_s + (self.latency_s if motion.sound_s else 0.0)
         rounds = 1
