@@ -21,7 +21,7 @@ _LAST = "\uffff"
 _CLOCK_GAIN, _CLOCK_SMOOTH_S = 1.0, 0.25
 
 
-class Voice:
+class PlayingTrack:
     """One track that plays.
 
     Args:
@@ -127,17 +127,17 @@ class TrackPlayer:
 
     def reset(self) -> None:
         """Rest immediately, for a head whose joints are hand-guided or switched off."""
-        self.voices: list[Voice] = []
+        self.voices: list[PlayingTrack] = []
         self.owned: dict[int, tuple[float, float]] = {}
         self.moves = True
 
     @property
-    def playing(self) -> list[Voice]:
+    def playing(self) -> list[PlayingTrack]:
         """Return the tracks that play, the newest last."""
         return [voice for voice in self.voices if not voice.end_reason]
 
     @property
-    def speech(self) -> Voice | None:
+    def speech(self) -> PlayingTrack | None:
         """Return the speech that plays."""
         return next((voice for voice in self.playing if voice.name == SPEECH), None)
 
@@ -146,12 +146,12 @@ class TrackPlayer:
         """Return whether a track gives the head's angles."""
         return any([channel < len(HEAD_CHANNELS) for channel in self.owned])
 
-    def play(self, voice: Voice) -> None:
+    def play(self, voice: PlayingTrack) -> None:
         """Begin a track at its time."""
         self.voices.append(voice)
         self.moves = True
 
-    def overlapping(self, motion: TrackMotion, name: str) -> list[Voice]:
+    def overlapping(self, motion: TrackMotion, name: str) -> list[PlayingTrack]:
         """Return the tracks that another one replaces: those of its channels, or of its name."""
         return [
             voice
@@ -160,7 +160,7 @@ class TrackPlayer:
         ]
 
     def end(
-        self, voices: Iterable[Voice], reason: str, t_s: float, until_s: float | None = None
+        self, voices: Iterable[PlayingTrack], reason: str, t_s: float, until_s: float | None = None
     ) -> float:
         """End tracks: they fade to gaze within the limits of the joints.
 

@@ -11,7 +11,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.sound.sound_file import check_sound
 from gazerig.gaze.track.track import MAX_DURATION_S, Track
 from gazerig.gaze.track.track_motion import TrackMotion
-from gazerig.gaze.track.track_player import BLEND_IN_S, SPEECH, TrackPlayer, Voice
+from gazerig.gaze.track.track_player import BLEND_IN_S, SPEECH, TrackPlayer, PlayingTrack
 from gazerig.params import unknown_text
 from gazerig.robot.model.commands import EndTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import SHOWN_S, TrackState
@@ -72,7 +72,7 @@ class TrackChoices:
         self._player, self._fit = player, fit
         self._changes, self._changed = changes, set[str]()
         self._fitted = lru_cache(_MOST_KEPT)(self._fit_track)
-        self._started: list[tuple[Voice, TrackState]] = []
+        self._started: list[tuple[PlayingTrack, TrackState]] = []
         self._number = 0
 
     # --- the available ones
@@ -234,7 +234,7 @@ class TrackChoices:
         rounds = 1
         if isinstance(command, Play):
             rounds = 0 if command.loop or track.loop else max(1, command.times)
-        voice = Voice(name, motion, begins_s, from_s, rounds, lead_s, entry_s)
+        voice = PlayingTrack(name, motion, begins_s, from_s, rounds, lead_s, entry_s)
         player.play(voice)
         self._number += 1
         duration_s = begins_s - t_s + lead_s + motion.duration_s * max(1, rounds)
