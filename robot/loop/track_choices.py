@@ -11,7 +11,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.sound.sound_file import check_sound
 from gazerig.gaze.track.track import MAX_DURATION_S, Track
 from gazerig.gaze.track.track_motion import TrackMotion
-from gazerig.gaze.track.track_player import BLEND_IN_S, SPEECH, TrackPlayer, PlayingTrack
+from gazerig.gaze.track.track_player import BLEND_IN_S, SPEECH, PlayingTrack, TrackPlayer
 from gazerig.params import unknown_text
 from gazerig.robot.model.commands import EndTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import SHOWN_S, TrackState
