@@ -14,12 +14,14 @@ from fakes.waiting import wait_for
 from test_sound import needs_espeak
 
 import gazerig
+from gazerig.drivers.sound.espeak import SpokenText
 from gazerig.drivers.sound.sound_file import write_wav
 from gazerig.errors import Refused
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Say
 from gazerig.robot.model.control_source import TrackState
+from gazerig.robot.run import voice
 
 RATE = 16000
 SHIPPED = Path(__file__).parents[1] / "config" / "rigs" / "expressive.yaml"
@@ -100,6 +102,24 @@ def test_the_jaw_follows_the_speech_and_is_shut_at_its_end(folder: Path, what: s
         if what != "text":
             shut = sum(1 for a, b, c in zip(jaw, jaw[1:], jaw[2:], strict=False) if a > b <= c)
             assert 4 <= shut <= 7  # once in each of six syllables
+
+
+def test_the_lips_close_on_the_phonemes_of_a_text(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    t_s = np.arange(2 * RATE) / RATE
+    pcm = (12000 * np.sin(2 * np.pi * 1000 * t_s)).astype("<i2").tobytes()
+    phonemes = [("m", 0.3), ("a", 0.4), ("b", 0.8), ("a", 0.9), ("p", 1.4), ("a", 1.42)]
+    monkeypatch.setattr(voice, "speak", lambda text, name: SpokenText(pcm, RATE, phonemes))
+    ticks = Ticks()
+    with opened(folder, ticks, fast=True) as head:
+        head.step(2.0)  # it begins gently
+        assert head.say("mabapa").wait(10.0) == "arrived"
+    times, jaw = np.array([(one.position_s, angle) for one, angle in ticks.speech()]).T
+    silent_s = 0.05
+    for middle_s in (0.332, 0.825, 1.372):
+        assert np.interp(middle_s + silent_s - 0.015, times, jaw) < 0.1 * JAW_DEG
+        assert np.interp(middle_s + silent_s - 0.12, times, jaw) > 0.8 * JAW_DEG
 
 
 @pytest.mark.parametrize(

@@ -123,8 +123,7 @@ def face_tables(rig: Rig) -> FaceTables:
         )
         for name, level in rig.levels.items()
     }
-    mouth = rig.gaze.mouth.level
-    return FaceTables(expressions, levels, mouth if mouth in levels else "")
+    return FaceTables(expressions, levels)
 
 
 def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:

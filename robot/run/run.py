@@ -27,6 +27,7 @@ from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClo
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.frames import CameraParams, fixed_mount
 from gazerig.robot.model.scene import BoxingScene
+from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
@@ -273,7 +274,7 @@ class Run:
         except ConfigError as error:
             return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         self.rig = new
-        self.tracks.retune(lid_spans(new), new.gaze.oculomotor.eye_lag_ms / 1e3)
+        self.tracks.latency_s = new.gaze.oculomotor.eye_lag_ms / 1e3
         gentle_deg_s = new.guard.soft_start_speed_deg_s
         set_up = new.joints != old.joints or gentle_deg_s != old.guard.soft_start_speed_deg_s
         if set_up:
@@ -314,9 +315,7 @@ def _tracks(rig: Rig, models: GazeModels, rig_file: str) -> TrackChoices:
     return TrackChoices(
         tracks_of(rig.track_files),
         models.animation.tracks,
-        rig.names,
-        lid_spans(rig),
-        face_tables(rig),
+        TrackFit(rig.names, lid_spans(rig), face_tables(rig)),
         rig.gaze.oculomotor.eye_lag_ms / 1e3,
         TrackFolder(rig_file).changes,
     )
