@@ -155,10 +155,9 @@ class LiveServer:
         pulse = LoopMonitor(clock)
         self._watch = FileWatch(tuning.files if tuning is not None else tuple, self._read_again)
         if tuning is None:
-            handler = partial(
-                RequestHandler, accept_only_stops(robot.command, _CALIBRATED), pulse, about,
-                fixed=f"{_CALIBRATED}: its parameters are fixed", fault=fault, changing=changing,
-            )  # fmt: skip
+            only = accept_only_stops(robot.command, _CALIBRATED)
+            fixed = f"{_CALIBRATED}: its parameters are fixed"
+            handler = partial(RequestHandler, only, pulse, about, fixed=fixed)
         else:
             handler = partial(
                 RequestHandler, robot.command, pulse, about, tuning, saved=self._watch.saved,
