@@ -20,6 +20,7 @@ import pytest
 from branch import Branch
 from fakes.runs import simulated
 
+from gazerig.config.rig_files import RigLayers
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.loop import client_control, stop
 from gazerig.robot.loop.loop import Robot, Tick
@@ -37,7 +38,7 @@ from gazerig.robot.net.client import (
 )
 from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
 from gazerig.robot.net.socket_server import RemoteServer
-from gazerig.robot.run.param_store import ParamStore
+from gazerig.robot.run.live import ParamStore
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -113,12 +114,7 @@ def errors() -> list[str]:
 
 @pytest.fixture
 def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
-    tuning = ParamStore(
-        beat.made.live_params,
-        beat.robot.command,
-        "desk",
-        elsewhere=lambda work, *words: work(*words),
-    )
+    tuning = ParamStore(beat.made.rig, beat.robot.command, RigLayers("desk", None, None))
     about = {"rig": "desk", "pid": os.getpid()}
     robot = beat.robot
     requests = RequestHandler(robot.command, beat.pulse, about, tuning, menus=robot.menus)

@@ -16,7 +16,7 @@ from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.params import choices_of
 from gazerig.robot.cli.options import RigCommand
 from gazerig.robot.cli.terminal import clear_errors, complete_rig
-from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.emulated import emulated_lines
 from gazerig.sim_mock.device_spec import EXAMPLE, line_of
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.line import BusSettings

@@ -68,7 +68,7 @@ def sweep(
         # Models are slow to import; `--help` does not need them.
         from gazerig.features.lab.sweep.points import check_points, grid
         from gazerig.features.lab.sweep.runs import FAILED, open_executor, run_all, table_text
-        from gazerig.robot.run.assemble import assemble
+        from gazerig.robot.run.run import Run
         from gazerig.robot.run.run_rig import run_rig
 
         run_options = RunOptions(
@@ -82,7 +82,7 @@ def sweep(
         table = out or Path(f"sweep-{Path(rig).stem}-{Path(scene or '').stem}.csv")
         refuse_existing(table, force=force)
         own = run_rig(run_options)
-        assemble(own, run_options).close()
+        Run(own, run_options).close()
         check_points(own, points)
         runs = [(point, seed + number) for point in points for number in range(seeds)]
         with (
