@@ -41,7 +41,7 @@ class Rig:
         made.options = RunOptions(page=f"127.0.0.1:{free_port()}")
         self.tuning = made.params
         self.audience = RunObservers(made, self.said.append, self.said.append)
-        self.observers = Observers(self.said.append)
+        self.observers = Observers[Tick](self.said.append)
         self.audience.attach(self.observers)
         self.newest: Tick | None = None
         self.pace_s = PACE_S

@@ -101,8 +101,8 @@ class RunObservers:
         # Who keeps a token does not want it in a log.
         tell = say if options.token_file is None else lambda line: say(hide_token(line))
         publisher = Publisher(page, self._live_rig, self._run_state, tell, browse)
-        self._stream.add_sink("the page", publisher.take)
-        self._parking.add_sink("the page", publisher.take)
+        self._stream.sinks.add("the page", publisher.take)
+        self._parking.sinks.add("the page", publisher.take)
         return page, publisher
 
     def _live_rig(self) -> LiveRig:
@@ -138,7 +138,7 @@ class RunObservers:
             self._run.scene_start_s(),
         )
 
-    def attach(self, observers: Observers) -> None:
+    def attach(self, observers: Observers[Tick]) -> None:
         """Add all of them as observers of the ticks; any that fails is dropped."""
         if self._run.recorder is not None:
             observers.add("the recording", self._run.recorder.record)

@@ -124,8 +124,8 @@ class Session:
         with contextlib.suppress(Exception):  # a failed message must not end the run
             self._write(line)
 
-    def _observers(self, people: RunObservers, faults: JointFaults) -> Observers:
-        observers = Observers(self._say)
+    def _observers(self, people: RunObservers, faults: JointFaults) -> Observers[Tick]:
+        observers = Observers[Tick](self._say)
         if self._summary is not None:
             observers.add("the summary", self._summary.update)
         observers.add("the watch for faults", faults.update)
