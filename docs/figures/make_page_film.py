@@ -18,7 +18,7 @@ from PIL import Image  # noqa: E402
 from shown_page import free_port, wait_for  # noqa: E402
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.robot.loop.tick import Tick
+from gazerig.robot.loop.tick import Tick  # noqa: E402
 from gazerig.robot.loop.tick_stream import Observers  # noqa: E402
 from gazerig.robot.run.observers import RunObservers  # noqa
 from gazerig.robot.run.options import RunOptions  # noqa: E402
