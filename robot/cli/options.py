@@ -72,6 +72,13 @@ def run_option(name: str, is_shown: bool = True) -> Any:
     )
 
 
+MockOption = Annotated[bool, run_option("mock")]
+PortOption = Annotated[str | None, run_option("port")]
+CameraOption = Annotated[str | None, run_option("camera")]
+OakOption = Annotated[bool, run_option("oak")]
+NoBrowserOption = Annotated[bool, run_option("no_browser")]
+
+
 def add_run_options(command: F) -> F:
     """Declare the rig and the fields of ``RunOptions`` as arguments of a command."""
     kind = Parameter.KEYWORD_ONLY

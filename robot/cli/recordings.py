@@ -8,7 +8,6 @@ import typer
 from rich.table import Table
 
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.robot.cli.options import RigCommand
 from gazerig.robot.cli.progress import Console, progress_bar
 from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, complete_rig, say
 
@@ -24,7 +23,7 @@ Recording = Annotated[
 _EVENTS = ("saccade", "fixation", "pursuit", "blink")
 
 
-@app.command(cls=RigCommand)
+@app.command()
 def rerun(
     file: Recording,
     rig: Annotated[

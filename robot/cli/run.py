@@ -13,7 +13,7 @@ from typing import Any
 import typer
 
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.cli.options import RigCommand, add_run_options
+from gazerig.robot.cli.options import add_run_options
 from gazerig.robot.cli.terminal import (
     FAULT,
     clear_errors,
@@ -30,7 +30,7 @@ app = typer.Typer()
 DEFAULT_PAGE = "127.0.0.1:8080"
 
 
-@app.command(cls=RigCommand)
+@app.command()
 @add_run_options
 def run(**given: Any) -> None:
     """Run the head: gazerig run --mock, then open the page at the printed address."""
