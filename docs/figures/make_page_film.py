@@ -18,7 +18,8 @@ from PIL import Image  # noqa: E402
 from shown_page import free_port, wait_for  # noqa: E402
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.robot.loop.observers import Observers  # noqa: E402
+from gazerig.robot.loop.tick import Tick  # noqa: E402
+from gazerig.robot.loop.tick_stream import Observers  # noqa: E402
 from gazerig.robot.run.observers import RunObservers  # noqa
 from gazerig.robot.run.options import RunOptions  # noqa: E402
 from gazerig.robot.run.run import Run  # noqa
@@ -56,7 +57,7 @@ class Film:
         made = Run(load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, world="living-room"))
         say = self._said.append
         made.options = RunOptions(page=f"127.0.0.1:{free_port()}")
-        people, observers = RunObservers(made, say, say), Observers(say)
+        people, observers = RunObservers(made, say, say), Observers[Tick](say)
         people.attach(observers)
         made.robot.start(made.clock)
         people.open()
