@@ -53,6 +53,8 @@ class PeopleDetector:
             image: The frame.
             captured_s: Time of its capture, seconds, which schedules searches.
         """
+        if image.size == 0:
+            return ()
         # Overlapping squares as high as the frame cover it.
         height, width = image.shape[:2]
         count = max(1, ceil((width - height) / (_STEP * height)) + 1)
