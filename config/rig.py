@@ -23,24 +23,23 @@ from gazerig.gaze.attention.conversation import AversionParams, ConversationPara
 from gazerig.gaze.attention.idle import IdleParams
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.lids.blink import LidParams
-from gazerig.gaze.mouth.mouth_keys import MouthParams
+from gazerig.gaze.mouth.mouth import MouthParams
 from gazerig.gaze.oculomotor.drift import DriftLaw
 from gazerig.gaze.oculomotor.gaze_point import OculomotorParams
 from gazerig.gaze.oculomotor.head import HeadParams
 from gazerig.gaze.oculomotor.pursuit import PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
-from gazerig.gaze.track.level import LevelParams
+from gazerig.gaze.track.animation import LevelParams
 from gazerig.params import Bounds, Choices, Unit, Unlisted
-from gazerig.robot.description.mesh_params import MeshParams
+from gazerig.robot.model.clock import LoopParams
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import GeometryParams
-from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.types import order_joints
+from gazerig.robot.model.weight import MassParams
 
 
 @dataclass(frozen=True)
@@ -152,8 +151,6 @@ class Rig(PluginSections):
     lid_joints: Annotated[LidJoints, "lid angles of a rig with lids"] = LidJoints()
     couplings: Annotated[Mapping[str, CouplingParams],
         "pairs of joints that two servos move together, each pair under any name"] = field(default_factory=dict)
-    meshes: Annotated[Mapping[str, MeshParams],
-        "mesh files that replace the generated shapes, by the name of the link"] = field(default_factory=dict)
     mass: Annotated[MassParams, "masses and their balance"] = MassParams()
     park_deg: Annotated[Mapping[str, _Degrees],
         "pose to which the joints move before torque is switched off; omitted joints go to 0"] = field(default_factory=dict)

@@ -1,6 +1,6 @@
 """Rigs, rule sets and face walks by name or path, and rules between the sections of a rig."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from math import inf, sqrt
 from pathlib import Path
@@ -16,19 +16,18 @@ from gazerig.config.load import (
 )
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
-from gazerig.config.validation import suggestion_text
-from gazerig.drivers.bus.servo_models import BUS_KINDS, SERVOS
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.hobby_board.board import HobbyBoardParams
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import PARTS
-from gazerig.params import declarations
-from gazerig.robot.model.coupling import joint_partners, unreachable_text
+from gazerig.params import declarations, unknown_text
+from gazerig.robot.model.coupling import unreachable_text
 from gazerig.robot.model.guard_params import forbidden_pairs
 from gazerig.robot.model.kinematics import LIDS, NECK
-from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
+from gazerig.robot.model.weight import MassParams
 
 NO_CHARACTER = "none"
 """In place of a character's name: none, whatever the rig's file says."""
@@ -107,12 +106,6 @@ Faults = Iterable[tuple[str, str]]
 """Dotted key and broken rule of each fault."""
 
 
-def unknown_text(kind: str, name: str, names: Collection[str]) -> str:
-    """Return that nothing of a kind has a name, with a similar name and all names."""
-    near = suggestion_text(name.lower(), names) or ";"
-    return f"no {kind} {name!r}{near} available: {', '.join(names) or 'none'}"
-
-
 def _joint_names(rig: Rig) -> Faults:
     absent = [name for name in GAZE_JOINTS if name not in rig.joints]
     for name in rig.joints:
@@ -176,24 +169,6 @@ def _servos(rig: Rig) -> Faults:
                 key,
                 f"a {joint.model} cannot be on one bus with a {first}: their byte orders differ; "
                 "give each series its own port under buses",
-            )
-
-
-def _limp_joints(rig: Rig) -> Faults:
-    """Find joints that must not or cannot be limp while the others have torque."""
-    held = {
-        *GAZE_JOINTS,
-        *joint_partners(rig.couplings.values()),
-        *(one[0] for pair in rig.guard.collisions for one in (pair.first, pair.second)),
-    }
-    for name, joint in rig.joints.items():
-        kind = rig.buses.get(joint.bus, rig.bus).kind
-        if joint.limp_when_idle_s is not None and (name in held or kind not in BUS_KINDS):
-            yield (
-                f"joints.{name}.limp_when_idle_s",
-                "remove it: only a further joint can be limp (not the neck, which would drop, nor "
-                "another one that gaze moves), outside couplings and guard.collisions, on a bus of "
-                f"kind {', '.join(BUS_KINDS)}",
             )
 
 
@@ -279,7 +254,6 @@ RULES = (
     _joint_names,
     _owners,
     _servos,
-    _limp_joints,
     _angles,
     _mechanism,
     _names,

@@ -2,23 +2,16 @@
 
 import asyncio
 import os
-import sys
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
-from ipaddress import IPv4Address, IPv6Address, ip_address
-from math import inf
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlsplit
 
-from gazerig.doors.door import Address, DoorLink, is_loopback
+from gazerig.doors.door import Address, is_loopback
 
 MOST = 8
 """Connections of a door at once."""
-IDLE_S = 10.0
-"""A connection is idle after this time without a message from it, and before its first one."""
-_TABLES = ("/proc/net/tcp", "/proc/net/tcp6")
-"""Linux: the ends of all connections on this computer, with their users."""
+_CONNECTIONS = Path("/proc/net")
+"""Folder of Linux's tables of connections, with their ports and users."""
 
 
 def page_refusal(bind: str, port: int, headers: Mapping[str, str]) -> str:
@@ -47,61 +40,39 @@ def page_refusal(bind: str, port: int, headers: Mapping[str, str]) -> str:
 def user_refusal(bind: str, transport: asyncio.WriteTransport) -> str:
     """Return why a connection is refused as that of another user, "" if it is not.
 
-    Nothing is refused on a door that listens to the network, nor without /proc. Root may connect:
-    it can do all that the user of the door can.
+    Nothing is refused on a door that listens to the network. Root may connect: it can do all that
+    the user of the door can.
 
     Args:
         bind: Where the door listens, HOST:PORT.
         transport: The connection.
     """
-    rows: list[str] = []
-    tables = 0
-    for table in _TABLES if is_loopback(Address.parse(bind).host) else ():
-        with suppress(OSError):
-            rows += Path(table).read_text("ascii").splitlines()[1:]
-            tables += 1
-    if not tables:
+    if not is_loopback(Address.parse(bind).host):
         return ""
     peer, own = (transport.get_extra_info(name) for name in ("peername", "sockname"))
-    uid = socket_user(rows, peer, own) if peer and own else None
-    if uid in (os.getuid(), 0):
-        return ""
-    if uid is None:
+    users = connection_users(_CONNECTIONS, peer[1], own[1]) if peer and own else set()
+    if not users:
         return "a connection was refused: it had closed before its user was known"
-    return f"a program of user {uid} was refused; run it as the door's user, {os.getuid()}"
+    if others := users - {os.getuid(), 0}:
+        return (
+            f"a program of user {min(others)} was refused; run it as the door's user, {os.getuid()}"
+        )
+    return ""
 
 
-def socket_user(rows: Iterable[str], peer: tuple[Any, ...], own: tuple[Any, ...]) -> int | None:
-    """Return the user of the peer's end of a connection, None if that is closed.
+def connection_users(tables: Path, port: int, door_port: int) -> set[int]:
+    """Return the users who have a connection from one port to another, at any address.
+
+    What a process has closed is listed until it has been sent, as root's and without inode.
 
     Args:
-        rows: Rows of Linux's tables of connections.
-        peer: Address and port of that end.
-        own: Address and port of the other end.
+        tables: Folder with the tables tcp and tcp6.
+        port: The port from which the connection comes.
+        door_port: The port to which it goes.
     """
-    theirs, ours = _as_listed(peer), _as_listed(own)
-    for row in rows:
-        _, local, remote, _, _, _, _, uid, _, inode, *_ = row.split()
-        # What a process has closed is listed until it has been sent, as root's and without inode.
-        if local in theirs and remote in ours and inode != "0":
-            return int(uid)
-    return None
-
-
-def _as_listed(end: tuple[Any, ...]) -> set[str]:
-    """Return the forms in which the tables list an address: IPv4 may be that of an IPv6 socket."""
-    address = ip_address(end[0].partition("%")[0])
-    found: list[IPv4Address | IPv6Address] = [address]
-    if isinstance(address, IPv6Address) and address.ipv4_mapped is not None:
-        found = [address.ipv4_mapped]
-    if isinstance(found[0], IPv4Address):
-        found.append(IPv6Address(f"::ffff:{found[0]}"))
-    return {f"{_as_hex(one.packed)}:{end[1]:04X}" for one in found}
-
-
-def _as_hex(packed: bytes) -> str:
-    words = [packed[at : at + 4] for at in range(0, len(packed), 4)]
-    return "".join(f"{int.from_bytes(word, sys.byteorder):08X}" for word in words)
+    ends = f"{port:04X}", f"{door_port:04X}"
+    rows = [line.split() for path in tables.glob("tcp*") for line in path.read_text().splitlines()]
+    return {int(row[7]) for row in rows if (row[1][-4:], row[2][-4:]) == ends and row[9] != "0"}
 
 
 def _hostname(host: str) -> str:
@@ -109,39 +80,3 @@ def _hostname(host: str) -> str:
         return urlsplit(f"//{host}").hostname or ""
     except ValueError:
         return ""
-
-
-class Neighbours:
-    """The connections of a door: beyond ``MOST``, the newest takes the place of the idlest.
-
-    Args:
-        link: The head.
-    """
-
-    def __init__(self, link: DoorLink) -> None:
-        self._link = link
-        self._heard_s: dict[asyncio.WriteTransport, float] = {}
-
-    def admit(self, transport: asyncio.WriteTransport) -> bool:
-        """Add a connection; return whether there is a place for it."""
-        if len(self._heard_s) >= MOST:
-            idlest = min(self._heard_s, key=self._heard_s.__getitem__)
-            if self._link.now_s() - self._heard_s[idlest] < IDLE_S:
-                self._link.report(
-                    f"more than {MOST} connections at once, none of them idle: the newest is refused"
-                )
-                return False
-            self._link.report(f"more than {MOST} connections at once: the idlest is closed")
-            self.leave(idlest)
-            idlest.abort()
-        self._heard_s[transport] = -inf
-        return True
-
-    def hear(self, transport: asyncio.WriteTransport) -> None:
-        """Note a message of a connection."""
-        if transport in self._heard_s:
-            self._heard_s[transport] = self._link.now_s()
-
-    def leave(self, transport: asyncio.WriteTransport) -> None:
-        """Remove a connection."""
-        self._heard_s.pop(transport, None)

@@ -116,28 +116,17 @@ class DoorLink:
 
     async def run(self) -> None:
         """Pass orders on for ever."""
-        wait_s, reported = FIRST_WAIT_S, False
-        while True:
-            try:
-                head = await asyncio.to_thread(self.connect)
-            except gazerig.Error as error:
-                if not reported:
-                    self.report(f"waiting for a head: {error}")
-                await asyncio.sleep(wait_s)
-                wait_s = min(2.0 * wait_s, LONGEST_WAIT_S)
-                continue
-            wait_s, reported = FIRST_WAIT_S, False
-            if self._last is not None and self._last.state != "idle":
-                self.send((self._last,))
-            try:
-                await self._pass_on(head)
-            except gazerig.HeadEnded as error:
-                self.report_again()
-                self.report(f"waiting for the head, which has ended: {error}")
-                reported = True
-            finally:
-                await asyncio.to_thread(head.__exit__, None, None, None)
-            await asyncio.sleep(wait_s)
+        await self.keep(self._follow_head, "a head", errors=(gazerig.Error,))
+
+    async def _follow_head(self) -> None:
+        """Connect to the head, and pass orders on until it ends."""
+        head = await asyncio.to_thread(self.connect)
+        if self._last is not None and self._last.state != "idle":
+            self.send((self._last,))
+        try:
+            await self._pass_on(head)
+        finally:
+            await asyncio.to_thread(head.__exit__, None, None, None)
 
     async def _pass_on(self, head: Any) -> None:
         """Pass orders on until the head ends."""
@@ -162,7 +151,7 @@ class DoorLink:
 
         Args:
             attempt: Connects, follows the neighbour, and returns when it disconnects.
-            neighbour: Name of the awaited program, for reports.
+            neighbour: Name and address of the awaited program, for reports.
             remedy: What to do if it does not come.
             errors: Errors of a lost connection.
         """
@@ -179,7 +168,7 @@ class DoorLink:
                 wait_s = FIRST_WAIT_S
                 self.report_again()
             hint = f"; {remedy}" if remedy else ""
-            self.report(f"waiting for {neighbour} at {self.address}: {reason}{hint}")
+            self.report(f"waiting for {neighbour}: {reason}{hint}")
             await asyncio.sleep(wait_s)
             wait_s = min(2.0 * wait_s, LONGEST_WAIT_S)
 

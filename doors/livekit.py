@@ -7,10 +7,9 @@ fields, so they fit several versions; the package ``livekit`` is only needed to 
 """
 
 import asyncio
-import json
 import logging
 import os
-from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from typing import Any
 
 import gazerig
@@ -19,7 +18,6 @@ from gazerig.doors.spoken_sound import MouthSound
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
 
 ATTRIBUTE = "lk.agent.state"
-TRANSCRIPTION = "lk.transcription"
 RATE_HZ = 16_000
 """Rate of the samples that move the mouth."""
 _AUDIO = 1
@@ -31,14 +29,13 @@ class LiveKit:
     """States of an agent and its user as orders."""
 
     def __init__(self) -> None:
-        self.talk = TurnTaking("listening", reports_silence=True, streams_text=True)
+        self.talk = TurnTaking("listening", reports_silence=True)
 
     def take(self, message: Mapping[str, Any], now_s: float) -> Orders:
         """Return the orders for changed states.
 
         Args:
-            message: ``lk.agent.state``; "user": the state of ``user_state_changed``; or "text": a
-                part of the agent's transcription, most of which arrives while it is spoken.
+            message: ``lk.agent.state``, or "user": the state of ``user_state_changed``.
             now_s: Present time, s.
 
         Raises:
@@ -50,8 +47,6 @@ class LiveKit:
                 return talk.partner_speaks()
             case {"user": _}:
                 return talk.resume(now_s)
-            case {"text": str(text)}:
-                return talk.add_text(text, now_s)
         match message.get(ATTRIBUTE):
             case "thinking":
                 return talk.end_speech() + talk.partner_pauses()
@@ -92,16 +87,6 @@ def follow(session: Any, head: int | str | None = None, link: DoorLink | None = 
     return used
 
 
-def plain_text(part: str) -> str:
-    """Return the text of a part of a transcription, which may be JSON with the times of words."""
-    if not part.startswith("{"):
-        return part
-    try:
-        return "".join(str(json.loads(line)["text"]) for line in part.splitlines())
-    except (ValueError, KeyError, TypeError):
-        return part
-
-
 async def follow_room(
     link: DoorLink, room: Any, token: str, options: Any = None,
     listen: Callable[[Any], AsyncIterator[bytes]] | None = None,
@@ -117,7 +102,7 @@ async def follow_room(
             the mouth does not move.
     """
     mouth = MouthSound(link)
-    states, closed, reading = LiveKit(), asyncio.Event(), set[asyncio.Task[None]]()
+    states, closed, moving = LiveKit(), asyncio.Event(), set[asyncio.Task[None]]()
 
     def take(message: Mapping[str, str]) -> None:
         try:
@@ -137,26 +122,12 @@ async def follow_room(
     def join(participant: Any) -> None:
         change(participant.attributes, participant)
 
-    def begin(work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.ensure_future(work)
-        reading.add(task)
-        task.add_done_callback(reading.discard)
-
     async def move_mouth(sounds: AsyncIterator[bytes]) -> None:
         async for pcm in sounds:
             if states.talk.state == "speaking":
                 mouth.add(pcm, RATE_HZ)
             else:
                 mouth.shut()
-
-    def transcribe(stream: Any, identity: str) -> None:
-        participant = room.remote_participants.get(identity)
-        if participant is not None and ATTRIBUTE in participant.attributes:
-            begin(read(stream))
-
-    async def read(stream: Any) -> None:
-        async for part in stream:
-            take({"text": plain_text(part)})
 
     def leave(participant: Any) -> None:
         if ATTRIBUTE in participant.attributes:
@@ -166,10 +137,12 @@ async def follow_room(
     room.on("participant_connected", join)
     room.on("track_published", lambda publication, participant: change({}, participant))
     if listen is not None:
-        room.on("track_subscribed", lambda track, *of: begin(move_mouth(listen(track))))
+        room.on(
+            "track_subscribed",
+            lambda track, *of: moving.add(asyncio.ensure_future(move_mouth(listen(track)))),
+        )
     room.on("participant_disconnected", leave)
     room.on("disconnected", lambda *reason: closed.set())
-    room.register_text_stream_handler(TRANSCRIPTION, transcribe)
     try:
         await room.connect(link.address, token, *([options] if options is not None else []))
         link.report(f"connected to {link.address}")
@@ -179,7 +152,7 @@ async def follow_room(
     finally:
         link.send(states.talk.end())
         mouth.shut()
-        for task in reading:
+        for task in moving:
             task.cancel()
         await room.disconnect()
 
@@ -209,7 +182,7 @@ async def serve(link: DoorLink) -> None:
     options = rtc.RoomOptions(auto_subscribe=False)
     await link.keep(
         lambda: follow_room(link, rtc.Room(), token, options, listen),
-        "a LiveKit room with an agent",
+        f"a LiveKit room with an agent at {link.address}",
         f"a token lasts for hours only: check {_TOKEN}",
         (OSError, TimeoutError, rtc.ConnectError),
     )

@@ -10,7 +10,7 @@ import asyncio
 import base64
 import contextlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from aiohttp import ClientSession, ClientWebSocketResponse, WSMsgType, web
@@ -108,7 +108,7 @@ class OpenAIRealtime:
 async def serve(link: DoorLink) -> None:
     """Relay sessions between programs and the server."""
 
-    async def relay(request: web.Request, hear: Callable[[], None]) -> web.WebSocketResponse:
+    async def relay(request: web.Request) -> web.WebSocketResponse:
         kept = {
             name: value for name, value in request.headers.items()
             if name.lower().startswith(_PASSED_ON)
@@ -126,7 +126,7 @@ async def serve(link: DoorLink) -> None:
                 chosen = (server.protocol,) if server.protocol else ()
                 program = web.WebSocketResponse(protocols=chosen, max_msg_size=_MAX_BYTES)
                 await program.prepare(request)
-                await _relay(link, program, server, hear)
+                await _relay(link, program, server)
                 return program
         except ERRORS as error:
             link.report(f"{link.address} refuses a session ({error}); check the program's key")
@@ -136,22 +136,19 @@ async def serve(link: DoorLink) -> None:
 
 
 async def _relay(
-    link: DoorLink, program: web.WebSocketResponse, server: ClientWebSocketResponse,
-    hear: Callable[[], None],
-) -> None:  # fmt: skip
-    """Relay a session until one side ends it; note each message of either."""
+    link: DoorLink, program: web.WebSocketResponse, server: ClientWebSocketResponse
+) -> None:
+    """Relay a session until one side ends it."""
     events = OpenAIRealtime()
     intake, mouth = Intake(link, events), MouthSound(link)
 
     async def upwards() -> None:
         async for message in program:
-            hear()
             await _pass(server, message.type, message.data)
         await server.close(code=program.close_code or 1000)
 
     async def downwards() -> None:
         async for message in server:
-            hear()
             await _pass(program, message.type, message.data)
             if message.type == WSMsgType.TEXT:
                 with contextlib.suppress(ValueError, RecursionError):

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 from aiohttp import ClientError, ClientSession, ClientWebSocketResponse, WSMsgType, web
 
-from gazerig.doors.admission import Neighbours, page_refusal, user_refusal
+from gazerig.doors.admission import MOST, page_refusal, user_refusal
 from gazerig.doors.door import Address, DoorLink
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
 
@@ -41,13 +41,10 @@ class Intake:
     Args:
         link: The head.
         translator: What the messages mean.
-        hear: Notes each message.
     """
 
-    def __init__(
-        self, link: DoorLink, translator: Translator, hear: Callable[[], None] = lambda: None
-    ) -> None:
-        self._link, self._translator, self._hear = link, translator, hear
+    def __init__(self, link: DoorLink, translator: Translator) -> None:
+        self._link, self._translator = link, translator
         self._second_s, self._count = link.now_s(), 0
 
     async def read(self, socket: ClientWebSocketResponse | web.WebSocketResponse) -> None:
@@ -55,7 +52,6 @@ class Intake:
         try:
             async for message in socket:
                 if message.type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                    self._hear()
                     await self.take(message.data)
         finally:
             self.end()
@@ -123,7 +119,7 @@ async def follow_socket(
         import gazerig
 
         raise gazerig.Error(f"{link.address!r} is not ws://HOST:PORT or wss://HOST/PATH")
-    await link.keep(follow, neighbour, remedy, ERRORS)
+    await link.keep(follow, f"{neighbour} at {link.address}", remedy, ERRORS)
 
 
 async def receive_sockets(link: DoorLink, make: Callable[[], Translator], neighbour: str) -> None:
@@ -135,10 +131,10 @@ async def receive_sockets(link: DoorLink, make: Callable[[], Translator], neighb
         neighbour: What the door waits for.
     """
 
-    async def handle(request: web.Request, hear: Callable[[], None]) -> web.WebSocketResponse:
+    async def handle(request: web.Request) -> web.WebSocketResponse:
         socket = web.WebSocketResponse(heartbeat=_HEARTBEAT_S, max_msg_size=MAX_BYTES)
         await socket.prepare(request)
-        await Intake(link, make(), hear).read(socket)
+        await Intake(link, make()).read(socket)
         return socket
 
     await listen(link, handle, neighbour)
@@ -146,7 +142,7 @@ async def receive_sockets(link: DoorLink, make: Callable[[], Translator], neighb
 
 async def listen(
     link: DoorLink,
-    handle: Callable[[web.Request, Callable[[], None]], Awaitable[web.WebSocketResponse]],
+    handle: Callable[[web.Request], Awaitable[web.WebSocketResponse]],
     neighbour: str,
 ) -> None:
     """Accept WebSockets at the link's bind address, for ever.
@@ -155,13 +151,13 @@ async def listen(
 
     Args:
         link: The head.
-        handle: Serves a request, and notes each message by its second argument.
+        handle: Serves a request.
         neighbour: What the door waits for.
 
     Raises:
         OSError: the port is not free.
     """
-    neighbours = Neighbours(link)
+    connections: set[asyncio.Transport] = set()
 
     async def admit(request: web.Request) -> web.StreamResponse:
         transport = request.transport
@@ -174,12 +170,14 @@ async def listen(
             raise web.HTTPForbidden(text=refused)
         if not web.WebSocketResponse().can_prepare(request):
             raise web.HTTPUpgradeRequired
-        if not neighbours.admit(transport):
+        if len(connections) >= MOST:
+            link.report(f"more than {MOST} connections at once: the newest is refused")
             raise web.HTTPServiceUnavailable
+        connections.add(transport)
         try:
-            return await handle(request, lambda: neighbours.hear(transport))
+            return await handle(request)
         finally:
-            neighbours.leave(transport)
+            connections.discard(transport)
 
     app = web.Application()
     app.router.add_get("/{path:.*}", admit)

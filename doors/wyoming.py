@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import Any
 
 import gazerig
-from gazerig.doors.admission import Neighbours, user_refusal
+from gazerig.doors.admission import MOST, user_refusal
 from gazerig.doors.door import Address, Door, DoorLink
 from gazerig.doors.spoken_sound import WIDTH, SpokenSound
 from gazerig.doors.turn_taking import Orders, TurnTaking, field
@@ -62,13 +62,16 @@ class Wyoming:
         return ()
 
 
-class _LimitedReader(asyncio.StreamReader):
-    """A stream that refuses to read a huge event."""
+def _limit_events(reader: asyncio.StreamReader) -> None:
+    """Let a stream refuse to read a huge event."""
+    read = reader.readexactly
 
-    async def readexactly(self, n: int) -> bytes:
+    async def read_limited(n: int) -> bytes:
         if not isinstance(n, int) or n > _MAX_BYTES:
             raise ValueError(f"an event of {n} bytes; the limit is {_MAX_BYTES}")
-        return await super().readexactly(n)
+        return await read(n)
+
+    reader.readexactly = read_limited  # type: ignore[method-assign]
 
 
 class Satellite:
@@ -80,20 +83,20 @@ class Satellite:
 
     def __init__(self, link: DoorLink) -> None:
         self._link, self._events = link, Wyoming()
-        self._neighbours = Neighbours(link)
         self._sounds: list[asyncio.Queue[Any]] = []
         self._said = set[SpokenSound]()
         self._opening: asyncio.Future[str] | None = None
 
     async def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Read one connection to its end."""
-        if refused := user_refusal(self._link.bind, writer.transport):
+        refused = user_refusal(self._link.bind, writer.transport)
+        if not refused and len(self._sounds) >= MOST:
+            refused = f"more than {MOST} connections at once: the newest is refused"
+        if refused:
             self._link.report(refused)
             await _refuse(writer, refused)
             return
-        if not self._neighbours.admit(writer.transport):
-            await _refuse(writer, "too many connections")
-            return
+        _limit_events(reader)
         sounds: asyncio.Queue[Any] = asyncio.Queue(_MAX_CHUNKS)
         if self._opening is None:  # so that the first sound does not wait for the loudspeaker
             silence = SpokenSound(16_000, 1)
@@ -116,7 +119,6 @@ class Satellite:
         finally:
             player.cancel()
             await asyncio.gather(player, return_exceptions=True)
-            self._neighbours.leave(writer.transport)
             self._sounds.remove(sounds)
             if not self._sounds:
                 self._link.send(self._events.talk.end())
@@ -143,7 +145,6 @@ class Satellite:
                 if not reader.at_eof():
                     raise ValueError("not a line of JSON, or too long")
                 return
-            self._neighbours.hear(writer.transport)
             if event.type == "describe":
                 await async_write_event(_info(), writer)
                 continue
@@ -260,30 +261,13 @@ async def serve(link: DoorLink) -> None:
         import wyoming  # noqa: F401
     except ImportError as error:
         raise gazerig.Error(f"{error}: pip install 'gazerig[doors]'") from None
-    satellite, open_tasks = Satellite(link), set[asyncio.Task[None]]()
-
-    def begin() -> asyncio.StreamReaderProtocol:
-        async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            task = asyncio.current_task()
-            assert task is not None
-            open_tasks.add(task)
-            try:
-                await satellite.accept(reader, writer)
-            finally:
-                open_tasks.discard(task)
-
-        return asyncio.StreamReaderProtocol(_LimitedReader(limit=_MAX_LINE), accept)
-
     host, port = Address.parse(link.bind)
-    server = await asyncio.get_running_loop().create_server(begin, host, port)
+    server = await asyncio.start_server(Satellite(link).accept, host, port, limit=_MAX_LINE)
     link.report(f"waiting for a Wyoming satellite on tcp://{link.bind} (--snd-uri, --event-uri)")
     try:
         await asyncio.Event().wait()
     finally:
         server.close()
-        for task in open_tasks:
-            task.cancel()
-        await asyncio.gather(*open_tasks, return_exceptions=True)
 
 
 DOOR = Door(

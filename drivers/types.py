@@ -5,10 +5,10 @@ servo on a Maestro: a quarter of a microsecond of pulse width). Only gazerig.rob
 converts steps to joint angles. Times are host monotonic seconds.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, nan
-from typing import Final, NamedTuple, Protocol, runtime_checkable
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,19 +174,6 @@ class ServoBus(Protocol):
 
     def close(self) -> None:
         """Close the port."""
-
-
-@runtime_checkable
-class LimpableBus(Protocol):
-    """A bus that can switch the torque of single servos, a capability besides ``ServoBus``."""
-
-    def set_limp(self, servos: Collection[int]) -> None:
-        """Switch torque off on these servos, by index; all others that were limp get it again.
-
-        They hold their present position, without a jump; a servo without feedback its last one.
-        Nothing happens while no servo has torque. A servo that does not confirm keeps its torque,
-        as ``Feedback.torque`` shows; one that refuses its torque is set up again by later reads.
-        """
 
 
 class Clothing(NamedTuple):

@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from gazerig.robot.loop.head_state import HeadState as HeadState
     from gazerig.robot.loop.head_state import JointReading as JointReading
     from gazerig.robot.loop.head_state import Person as Person
-    from gazerig.robot.model.conversation import CHARACTERS_PER_S as CHARACTERS_PER_S
-    from gazerig.robot.model.outcome import Outcome as Outcome
+    from gazerig.robot.model.control_source import CHARACTERS_PER_S as CHARACTERS_PER_S
+    from gazerig.robot.model.reply import Outcome as Outcome
 
     __version__: str
 
 _HOME = {
-    "CHARACTERS_PER_S": "gazerig.robot.model.conversation",
+    "CHARACTERS_PER_S": "gazerig.robot.loop.conversation",
     "ConfigError": "gazerig.config.faults",
     "Error": "gazerig.errors",
     "GazeReading": "gazerig.robot.loop.head_state",
@@ -51,7 +51,7 @@ _HOME = {
     "JointSolution": "gazerig.geometry",
     "NotFound": "gazerig.errors",
     "Order": "gazerig.head",
-    "Outcome": "gazerig.robot.model.outcome",
+    "Outcome": "gazerig.robot.model.reply",
     "Person": "gazerig.robot.loop.head_state",
     "Refused": "gazerig.errors",
     "SetupError": "gazerig.drivers.errors",

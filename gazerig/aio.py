@@ -11,10 +11,8 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from gazerig.head import Head, Order
 from gazerig.remote_head import RemoteHead
 from gazerig.remote_head import connect as connect_now
-from gazerig.robot.loop.gaze_events import EventKind
-from gazerig.robot.loop.head_state import HeadEvent, HeadState
-from gazerig.robot.model.outcome import Outcome
-from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.loop.head_state import EventKind, HeadEvent, HeadState
+from gazerig.robot.model.reply import CommandReply, Outcome
 
 _POLL_S = 0.02
 _P = ParamSpec("_P")
@@ -53,19 +51,8 @@ class AsyncOrder:
         return outcome
 
 
-def _order(
-    method: Callable[Concatenate[Head, _P], Order],
-) -> "Callable[Concatenate[AsyncHead, _P], AsyncOrder]":
-    def send(head: "AsyncHead", /, *args: _P.args, **named: _P.kwargs) -> AsyncOrder:
-        work = asyncio.to_thread(method, head._connected, *args, **named)
-        return AsyncOrder(asyncio.ensure_future(work))
-
-    send.__doc__ = method.__doc__
-    return send
-
-
 def _call(
-    method: Callable[Concatenate[RemoteHead, _P], _T],
+    method: Callable[Concatenate[Any, _P], _T],
 ) -> "Callable[Concatenate[AsyncHead, _P], asyncio.Task[_T]]":
     def call(head: "AsyncHead", /, *args: _P.args, **named: _P.kwargs) -> "asyncio.Task[_T]":
         work = asyncio.to_thread(method, head._connected, *args, **named)
@@ -73,6 +60,18 @@ def _call(
 
     call.__doc__ = method.__doc__
     return call
+
+
+def _order(
+    method: Callable[Concatenate[Head, _P], Order],
+) -> "Callable[Concatenate[AsyncHead, _P], AsyncOrder]":
+    call = _call(method)
+
+    def send(head: "AsyncHead", /, *args: _P.args, **named: _P.kwargs) -> AsyncOrder:
+        return AsyncOrder(call(head, *args, **named))
+
+    send.__doc__ = method.__doc__
+    return send
 
 
 class AsyncHead:

@@ -10,8 +10,8 @@ from typing import Literal, Self
 
 from gazerig.drivers.sound.params import KINDS
 from gazerig.errors import HeadEnded, Refused
-from gazerig.robot.loop.gaze_events import EventKind
 from gazerig.robot.loop.head_state import (
+    EventKind,
     GazeReading,
     HeadEvent,
     HeadState,
@@ -42,8 +42,7 @@ from gazerig.robot.model.commands import (
     Talk,
     Value,
 )
-from gazerig.robot.model.outcome import Outcome, Progress, command_outcome
-from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.model.reply import CommandReply, Outcome, Progress, command_outcome
 
 STREAM_AHEAD_S = 1.0
 """Length of a stream that is sent before it is heard."""

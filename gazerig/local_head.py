@@ -6,23 +6,24 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.process.work_queue import WorkQueue
 from gazerig.errors import Error, HeadEnded, Refused
 from gazerig.head import Head, Order
 from gazerig.program_signals import SIGNALS, interrupt, is_left_waiting_for
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.head_state import HeadEvent, HeadState, head_state
-from gazerig.robot.loop.interrupts import Interrupts
-from gazerig.robot.loop.line_queue import LineQueue
 from gazerig.robot.loop.loop import TickLoop
+from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_feed import TickFeed
 from gazerig.robot.model.commands import Command, Say, Value, set_client
-from gazerig.robot.model.outcome import Progress
+from gazerig.robot.model.reply import Progress
 from gazerig.robot.run import session
 from gazerig.robot.run.assemble import Substitutes
 from gazerig.robot.run.options import RunOptions
@@ -31,6 +32,8 @@ from gazerig.robot.run.voice import RunVoice
 
 _LOG = logging.getLogger("gazerig")
 _ENDED = "the program"
+_LINES_S = 1.0
+"""Time to deliver the last lines to a program."""
 
 
 class LocalHead(Head):
@@ -229,17 +232,21 @@ class RunningHead(LocalHead):
     def _run(self, composed: session.ComposedRun) -> None:
         """Run from torque on to torque off; the target of the loop's thread."""
         ended = "fault: unexpected error"
+        lines = WorkQueue("the program's say")  # which may block
         try:
-            name = "the logger gazerig" if self._say == _LOG.info else "say of the program"
-            with LineQueue(self._say, name) as said:
-                figures = session.run(
-                    composed, self._interrupts, said.line, watch=self._update, summarised=False
-                )
+            figures = session.run(
+                composed,
+                self._interrupts,
+                lambda line: lines.add(partial(self._say, line)),
+                watch=self._update,
+                summarised=False,
+            )
             ended = str(figures["stopped_by"])
         except BaseException as error:
             self._failure = error
             ended = f"fault: {error}"
         finally:
+            lines.wait_idle(_LINES_S)
             self._ended = ended
             self._finished.set()
             # Otherwise a worker that does not look at the head would keep the program from ending.

@@ -10,7 +10,7 @@ from concurrent.futures import thread as pool_threads
 from types import FrameType
 from typing import Protocol
 
-from gazerig.robot.loop.interrupts import SAME_REQUEST_S
+from gazerig.robot.loop.power_down import SAME_REQUEST_S
 from gazerig.robot.model.clock import RealClock
 
 _ENDING = (signal.SIGTERM, signal.SIGHUP)

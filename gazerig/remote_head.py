@@ -9,7 +9,7 @@ from gazerig.errors import HeadEnded
 from gazerig.head import Head, Order
 from gazerig.robot.loop.head_state import HeadEvent, HeadState
 from gazerig.robot.model.commands import Command, Value, as_value
-from gazerig.robot.model.outcome import Progress
+from gazerig.robot.model.reply import Progress
 from gazerig.robot.net.client import RequestRejected, RobotClient
 
 
@@ -79,7 +79,7 @@ class RemoteHead(Head):
 
     def _progress(self) -> Progress:
         state = self.state
-        return Progress(state.client_control, state.tracks, state.controlled_by)
+        return Progress(state.client_control, state.tracks)
 
     def _events(self, after: int) -> tuple[HeadEvent, ...]:
         return self._client.state(after)[1]

@@ -10,10 +10,6 @@ import pytest
 from gazerig.drivers.plugins import COMMAND, SHIPPED
 
 _PARTS = [part for parts in SHIPPED.values() for part in parts.values()]
-SHIPPED_FEATURES = sorted(
-    {part.split(".")[2] for part in _PARTS if part.startswith("gazerig.features.")}
-)
-"""The features that the package ships, those included that were deleted."""
 
 
 @cache

@@ -2,7 +2,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import threading
 import time
@@ -19,7 +18,6 @@ from feedback_rows import rows
 from gazerig.config.rig import BusConfig, Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.types import LimpableBus
 from gazerig.robot.run.bus_wiring import bus_ports, guarded_rig_bus, rig_bus, servo_configs
 from gazerig.robot.run.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
@@ -44,10 +42,7 @@ def slow(kind: str) -> Rig:
 
 
 def drive(kind: str, guarded: bool, path: str) -> None:
-    """Drive all joints slowly to their ends, 100 ticks a second, and print events.
-
-    After SIGUSR1 the first servo is limp.
-    """
+    """Drive all joints slowly to their ends, 100 ticks a second, and print events."""
     rig = slow(kind)
     paths = bus_ports(rig, path)
     bus = (
@@ -57,9 +52,6 @@ def drive(kind: str, guarded: bool, path: str) -> None:
     )
     bus.open()
     bus.enable_torque()
-    assert isinstance(bus, LimpableBus)
-    relax: list[int] = []
-    signal.signal(signal.SIGUSR1, lambda number, frame: relax.append(0))
     goals: list[Any] = [setup.max_steps for setup in servo_configs(rig)]
     said = False
     ticks = 0
@@ -73,9 +65,6 @@ def drive(kind: str, guarded: bool, path: str) -> None:
                 for r, goal in zip(readings, goals, strict=True)
             ]
             print("rearmed", flush=True)
-        if relax:
-            bus.set_limp(relax)
-            relax.clear()
         bus.write(goals)
         ticks += 1
         if not said and ticks == 30:

@@ -16,8 +16,8 @@ from websockets.sync.connection import Connection
 
 from gazerig.robot.dashboard.door.page_door import PageDoor
 from gazerig.robot.dashboard.door.viser_server import open_server
-from gazerig.robot.loop.tick_feed import TickFeed
-from gazerig.robot.model.requests import ShowView
+from gazerig.robot.loop.events import TickFeed
+from gazerig.robot.model.commands import ShowView
 
 PATIENCE_S = 20.0
 TOKEN = "what-only-the-terminal-shows"

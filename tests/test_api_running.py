@@ -18,8 +18,8 @@ from branch import Branch, script
 from slow_rigs import at_rate
 
 import gazerig
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.loop import Robot, Tick
-from gazerig.robot.loop.tick_feed import TickFeed
 
 LET_GO = "(not )?parked, torque off"
 """On a starved machine the time for parking may be over before."""

@@ -1,6 +1,6 @@
 """Events of a bus drawn together."""
 
-from gazerig.robot.loop.event_text import group_events
+from gazerig.robot.loop.events import group_events
 
 
 def test_the_same_done_to_several_servos_is_one_line() -> None:

@@ -16,8 +16,6 @@ from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
 from gazerig.gaze.types import PART_NAMES, Floats
 from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import head_activity, tick_control_source
-from gazerig.robot.model.client_control import ARRIVED_RAD
 from gazerig.robot.model.commands import (
     AnyCommand,
     Ask,
@@ -36,9 +34,10 @@ from gazerig.robot.model.commands import (
     Talk,
     Tune,
     check_command,
+    read_request,
 )
 from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlSource, control_sentence
-from gazerig.robot.model.requests import read_request
+from gazerig.robot.model.reply import ARRIVED_RAD
 from gazerig.robot.run.session import shut_down
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -188,7 +187,7 @@ def test_a_jog_beyond_the_end_is_refused_with_the_joints_range(running: Running)
     with pytest.raises(ValueError, match=r"neck_yaw 180.0 deg is outside its range, -70..70 deg"):
         running.order(Jog((("neck_yaw", pi),)))
     running.order(Jog((("neck_yaw", radians(70.04)),)))  # a slider's rounding
-    assert running.go(0.1)[0].controlled_by == "a client: jog neck_yaw 70.0"
+    assert running.go(0.1)[0].controlled_by == "a client: neck_yaw at 70.0 deg"
 
 
 def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
@@ -277,13 +276,13 @@ def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: 
 def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None:
     running.order(Jog((("neck_yaw", 0.3),), who="a show (process 7)"))
     ticks = running.go(1.5)
-    assert ticks[0].controlled_by == "a show (process 7): jog neck_yaw 17.2"
+    assert ticks[0].controlled_by == "a show (process 7): neck_yaw at 17.2 deg"
     led = [tick for tick in ticks if tick.controlled_by]
     assert led[-1].t_s - led[0].t_s == pytest.approx(1.0, abs=0.011)
     words = [event for tick in ticks for event in tick.events]
-    assert "controlled by a show (process 7): jog neck_yaw 17.2" in words
+    assert "controlled by a show (process 7): neck_yaw at 17.2 deg" in words
     assert (
-        "a show (process 7): jog neck_yaw 17.2: not renewed, so the gaze models are in control again"
+        "a show (process 7): neck_yaw at 17.2 deg: not renewed, so the gaze models are in control again"
         in words
     )
     assert fastest_rad_s(ticks)[YAW] <= GENTLE_RAD_S * 1.01
@@ -361,7 +360,7 @@ def test_a_person_is_followed_with_the_scanpath_on_the_face(running: Running) ->
 
 
 def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(running: Running) -> None:
-    assert running.do(LookAtPerson(99))[0].refused.startswith("person 99 is not visible; visible: ")
+    assert running.do(LookAtPerson(99))[0].refused.startswith("no visible person '99'; available: ")
     percept = running.go(0.006)[-1].percept
     assert percept is not None
     running.do(LookAtPerson(percept.faces[0].id, stay=True))
@@ -425,10 +424,7 @@ def test_leads_are_counted_and_their_ends_have_reasons(running: Running) -> None
 
 def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:
     tick = running.go(0.1)[-1]
-    assert (
-        tick_control_source(tick) == ControlSource()
-        and not tick_control_source(tick).overrides_gaze
-    )
+    assert tick.control_source == ControlSource() and not tick.control_source.overrides_gaze
     state = head_state(tick)
     assert state.headline.startswith("looks at person 1") and state.gaze.kind == "face"
     assert state.gaze.part in PART_NAMES.values() and state.saliences[0].id == 1
@@ -441,7 +437,7 @@ def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running:
     for _ in range(6):
         running.order(Jog((("neck_yaw", 0.3),), who="ann"))
         tick = running.go(0.5)[-1]
-    leads = tick_control_source(tick)
+    leads = tick.control_source
     assert (leads.kind, leads.who, leads.since_s) == ("joint", "ann", first.t_s)
     assert leads.joints == ("neck_yaw", "neck_pitch")
     state = head_state(tick)
@@ -464,8 +460,8 @@ def test_a_point_and_a_pointer_are_led_by_who_chose_them(
     for _ in range(10):
         running.order(LookAt((1.0, 0.2, 0.3), who="ann", pointer=pointer))
         tick = running.go(0.2)[-1]
-    assert tick_control_source(tick).kind == kind
-    assert head_activity(tick).headline == said
+    assert tick.control_source.kind == kind
+    assert head_state(tick).headline == said
 
 
 def test_stopped_says_that_and_nothing_else(running: Running) -> None:
@@ -477,7 +473,7 @@ def test_stopped_says_that_and_nothing_else(running: Running) -> None:
     assert state.headline == state.gaze.reason == "stopped: STOP was pressed; the torque is off"
     running.go(2.0)
     running.order(Resume(who="ann"))
-    assert tick_control_source(running.go(0.1)[-1]) == ControlSource()
+    assert running.go(0.1)[-1].control_source == ControlSource()
 
 
 def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) -> None:
@@ -486,8 +482,8 @@ def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) ->
     made = running.made
     ticks: list[Tick] = []
     assert made.robot.park(made.park_rad, made.clock, made.loop, watch=ticks.append)
-    assert {tick_control_source(tick).kind for tick in ticks} == {"parking"} and len(ticks) > 5
-    assert head_activity(ticks[-1]).headline == control_sentence(ControlSource("parking"), 0.0)
+    assert {tick.control_source.kind for tick in ticks} == {"parking"} and len(ticks) > 5
+    assert head_state(ticks[-1]).headline == control_sentence(ControlSource("parking"), 0.0)
     yaw = [
         tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
     ]

@@ -16,10 +16,10 @@ from gazerig.config.load import shipped_path
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Feedback
-from gazerig.robot.loop.coupled_servos import CoupledServos
+from gazerig.robot.loop.body import CoupledServos
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.coupling import CouplingParams
-from gazerig.robot.model.mass_params import HeadMassParams, MassParams
+from gazerig.robot.model.weight import HeadMassParams, MassParams
 from gazerig.robot.run.assemble import Assembly
 from gazerig.robot.run.bus_wiring import servo_configs
 
@@ -68,7 +68,7 @@ def test_servos_get_the_limits_that_the_whole_range_needs() -> None:
     ("coupling", "said"),
     [
         (replace(COUPLING, first_ratio=5.0),
-         "the servo of neck_pitch would be at -284 steps, outside its 0..4095"),
+         "the servo of neck_pitch would be at -284, outside the servo's 0..4095 steps"),
         (replace(COUPLING, first="nek_pitch"), "no joint 'nek_pitch'; did you mean 'neck_pitch'? available: left"),
     ],
 )  # fmt: skip

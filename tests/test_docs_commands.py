@@ -5,6 +5,7 @@ import importlib
 import inspect
 import re
 import shlex
+import tomllib
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,9 +15,11 @@ import numpy as np
 import pytest
 from command_line import options, parse, typed
 from features_there import needs_all_features
+from outside_package import install, on_path
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, spans
 
 import gazerig
+from gazerig.drivers.plugins import find
 from gazerig.robot.net.client import RobotClient
 
 pytestmark = needs_all_features  # the documents describe every command
@@ -79,7 +82,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "myrig.yaml").write_bytes((ROOT / "config/rigs/desk.yaml").read_bytes())
     for language in ("yaml", "xml"):
         for block in blocks(language):
-            if block.paper.name == "worlds.md":
+            if block.text.startswith(("room:", "<mujoco>")):
                 (tmp_path / f"myworld.{language}").write_text(block.text)
     film = cv2.VideoWriter("film.avi", cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (64, 48))
     for _ in range(5):
@@ -207,3 +210,19 @@ def test_python_that_needs_no_rig_runs(capfd: pytest.CaptureFixture[str]) -> Non
     [code] = [b.text for b in blocks("python") if "with PtyBuses" in b.text]
     exec(compile(code, "emulator.md", "exec"), names)
     assert names["paths"]["neck"]
+
+
+def test_parts_of_a_package_are_found_by_their_registration(tmp_path: Path) -> None:
+    code, registered = (
+        "\n".join(
+            block.text
+            for block in blocks(language)
+            if block.paper.name == "extend.md" and not re.search("lx16a|BusSuite", block.text)
+        )
+        for language in ("python", "toml")
+    )
+    parts = tomllib.loads(registered)["project"]["entry-points"]
+    install(tmp_path, "my-package", parts, {"my_package": code})
+    with on_path(tmp_path):
+        for group, named in parts.items():
+            assert all(find(group, name).load() for name in named)

@@ -1,14 +1,12 @@
-"""Links of README and docs have targets; those to a deleted feature are left out."""
+"""Links of README and docs have targets."""
 
 import re
 from pathlib import Path
 
-from features_there import SHIPPED_FEATURES
 from papers import PAPERS, ROOT, prose
 
 GENERATED = ROOT / "docs/parameters.md"
 """Page that is written when the documentation is built."""
-GONE = [name for name in SHIPPED_FEATURES if not (ROOT / "features" / name).exists()]
 
 
 def slugs(paper: Path) -> set[str]:
@@ -26,7 +24,5 @@ def test_links_lead_somewhere() -> None:
             file = (paper.parent / target).resolve() if target else paper
             if file == GENERATED:
                 continue
-            if not file.exists() and any(one in file.relative_to(ROOT).parts[:2] for one in GONE):
-                continue  # to a feature that was deleted
             assert file.exists(), f"{paper.name}: {link}"
             assert not anchor or anchor in slugs(file), f"{paper.name}: {link}"

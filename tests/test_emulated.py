@@ -4,7 +4,7 @@ import pickle
 from dataclasses import replace
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.model.mass_params import HeadMassParams, MassParams
+from gazerig.robot.model.weight import HeadMassParams, MassParams
 from gazerig.robot.run.run_bus import emulated_lines
 
 

@@ -6,8 +6,7 @@ import pytest
 from commanded_robot import running_desk
 
 import gazerig
-from gazerig.robot.loop.gaze_events import EventKind
-from gazerig.robot.loop.tick_feed import TickFeed
+from gazerig.robot.loop.events import EventKind, TickFeed
 from gazerig.robot.model.commands import Play
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")

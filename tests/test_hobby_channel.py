@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.drivers.hobby_board.bus import Channel
+from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.types import ServoConfig
 
 SETUP = ServoConfig(3, "hobby", 4400, 7600, 12_000.0)

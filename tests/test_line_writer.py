@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from gazerig.robot.cli.terminal import LineWriter
-from gazerig.robot.loop.interrupts import Interrupts
+from gazerig.robot.loop.power_down import Interrupts
 
 
 def _wait_until(true: Callable[[], bool]) -> bool:

@@ -9,7 +9,6 @@ import pytest
 from fakes.runs import simulated
 from slow_rigs import at_rate
 
-from gazerig.config.load import ConfigError
 from gazerig.robot.model.commands import Command, Tune
 from gazerig.robot.net.client import connect_to_all
 from gazerig.robot.net.live_server import LiveServer
@@ -34,9 +33,7 @@ class Rig:
         )
         self.said: list[str] = []
         about = {"rig": "desk", "pid": 1}
-        self.live = LiveServer(
-            made.robot, self.tuning, (ConfigError,), made.clock, about, self.said.append
-        )
+        self.live = LiveServer(made.robot, self.tuning, made.clock, about, self.said.append)
 
     def _apply(self, order: Command) -> None:
         assert isinstance(order, Tune)

@@ -19,12 +19,11 @@ from gazerig.drivers.types import DetectedFace, Detections, Located, MovingBlob
 from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import PARTS
 from gazerig.robot.loop.loop import PARK_S, Tick
-from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
+from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClock
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -239,7 +238,7 @@ def test_it_parks_in_time_on_a_host_that_is_late(name: str, host: str) -> None:
     rig = load_rig(name)
     made = simulated(rig)
     robot, period_s = made.robot, 1.0 / made.loop.rate_hz
-    limits = robot._guard.limits
+    limits = robot.guard.limits
     robot.start(made.clock)
     go(made, 0.5)
     sent: list[tuple[float, tuple[float, ...]]] = []

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gazerig.robot.loop.loop_timing import LoopTiming, busy_text
+from gazerig.robot.loop.timing import LoopTiming, busy_text
 from gazerig.robot.model.types import LoopFigures
 
 

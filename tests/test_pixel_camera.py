@@ -20,7 +20,7 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.scene_view import PinholeView
+from gazerig.robot.model.scene import PinholeView
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.run.scene_files import load_scene, scene_names
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene

@@ -52,7 +52,7 @@ def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[Com
             for angle, one in zip(desired, spans, strict=True)
         )
     pose = kinematics.forward(joints_at(q, 0.0))
-    return reply, degrees(gaze_error(point, pose, not kinematics.one_pan).whole)
+    return reply, degrees(gaze_error(point, pose, not kinematics.one_pan))
 
 
 @settings(max_examples=30, deadline=None)

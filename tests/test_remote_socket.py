@@ -20,11 +20,9 @@ import pytest
 from branch import Branch
 from fakes.runs import simulated
 
-from gazerig.config.load import ConfigError
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.loop.command_handler import CommandHandler
+from gazerig.robot.loop import client_control, stop
 from gazerig.robot.loop.loop import Robot, Tick
-from gazerig.robot.model import commands, lease
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import LookAt, Value
 from gazerig.robot.net import client
@@ -103,8 +101,8 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture(scope="module")
 def beat() -> Iterator[Beat]:
     with pytest.MonkeyPatch.context() as patch, Beat() as running_robot:
-        patch.setattr(commands, "MIN_HOLD_S", 0.0)
-        patch.setattr(commands, "MIN_RESUME_GAP_S", 0.0)
+        patch.setattr(stop, "MIN_HOLD_S", 0.0)
+        patch.setattr(stop, "MIN_RESUME_GAP_S", 0.0)
         yield running_robot
 
 
@@ -122,8 +120,8 @@ def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
         elsewhere=lambda work, *words: work(*words),
     )
     about = {"rig": "desk", "pid": os.getpid()}
-    handler = CommandHandler(beat.robot.command, tuning, (ConfigError,), menus=beat.robot.menus)
-    requests = RequestHandler(handler, beat.pulse, about)
+    robot = beat.robot
+    requests = RequestHandler(robot.command, beat.pulse, about, tuning, menus=robot.menus)
     server = RemoteServer(requests, errors.append)
     server.open()
     with RobotClient.connect() as connected:
@@ -146,8 +144,7 @@ def open_server() -> RemoteServer:
 
 
 def beatless() -> RequestHandler:
-    handler = CommandHandler(lambda command: None, None)
-    return RequestHandler(handler, LoopMonitor(RealClock()), {"rig": "other"})
+    return RequestHandler(lambda command: None, LoopMonitor(RealClock()), {"rig": "other"})
 
 
 def test_close_removes_it_and_hangs_up(folder: Path) -> None:
@@ -289,7 +286,7 @@ def line_of(end: socket.socket) -> dict[str, Any]:
         (b'{"do": "get", "prefix": NaN}\n', "not a line of JSON"),
         (b"\xff\xfe\n", "not a line of JSON"),
         (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
-        (b'{"do": "dance"}\n', "unknown request; available: hello, status, "),
+        (b'{"do": "dance"}\n', "no request 'dance'; available: hello, status, "),
         (b'{"do": "save", "path": "my.yaml"}\n', "absolute path"),
         (b'{"do": "tune", "changes": [["a", 1]]}\n', "requests set and say"),
     ],
@@ -352,7 +349,7 @@ def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
 def test_a_program_leads_while_it_lives_and_is_named(
     rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lease, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
+    monkeypatch.setattr(client_control, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
     monkeypatch.setattr(client, "_EVERY_S", 0.05)
     with RobotClient.connect(who="a show") as show:
         reply = show.send(LookAt((-1.0, 0.0, 0.3)))
@@ -382,10 +379,10 @@ def test_nobody_passes_himself_off_as_another(rig: RobotClient, folder: Path) ->
 def test_programs_of_other_users_are_hung_up_on(
     rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stranger = remote_socket.Peer(1, os.getuid() + 1)
     rig.get(RATE)  # let in
+    own = os.getuid()
     with monkeypatch.context() as patch:
-        patch.setattr(remote_socket, "identify_peer", lambda end: stranger)
+        patch.setattr(os, "getuid", lambda: own + 1)
         with raw(folder) as end:
             assert hung_up(end)
     assert rig.get(RATE) == {RATE: 200.0}

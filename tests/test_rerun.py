@@ -3,7 +3,6 @@
 import os
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 from math import inf, nextafter
 from pathlib import Path
 
@@ -34,7 +33,7 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.run_info import RunEnd
-from gazerig.robot.recording.run_writer import RunWriter
+from gazerig.robot.recording.writer import RunWriter
 from gazerig.robot.run.assemble import Assembly
 from gazerig.robot.run.resimulate import rerun
 
@@ -113,10 +112,10 @@ description: a show
 owns: [neck, eyes]
 cues: {here: 0.8}
 frames:
-  - {time_s: 0.4, look_at: [1.0, 0.3, 0.2], levels: {mouth: 0.7}}
-  - {time_s: 0.8, head_yaw_deg: 8, eyes_yaw_deg: 3, express: surprised, strength: 0.5}
-  - {time_s: 1.4, head_yaw_deg: -6, look_at: person}
-  - {time_s: 2.0, head_yaw_deg: 0, eyes_yaw_deg: 0, look_at: null}
+  - {time_s: 0.4, levels: {mouth: 0.7}}
+  - {time_s: 0.8, head_yaw_deg: 8, eyes_yaw_deg: 3, joints_deg: {right_brow: 3}}
+  - {time_s: 1.4, head_yaw_deg: -6}
+  - {time_s: 2.0, head_yaw_deg: 0, eyes_yaw_deg: 0}
 """
 COMMANDS: dict[int, Command] = {
     100: Play("a_show", loop=True, from_s="here"), 260: Play("wink_brow"),
@@ -135,8 +134,6 @@ def test_a_show_is_done_again_to_the_same_bytes(tmp_path: Path) -> None:
         (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
     paths = tuple(str(tmp_path / f"{name}.yaml") for name in files)
     rig = replace(load_rig("expressive"), track_files=paths)
-    jaw = replace(rig.joints["jaw"], limp_when_idle_s=0.25)
-    rig = replace(rig, joints={**rig.joints, "jaw": jaw})
 
     def ask(number: int, made: Assembly) -> None:
         if (command := COMMANDS.get(number)) is not None:
@@ -148,8 +145,6 @@ def test_a_show_is_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     assert {one.cue for them in states for one in them} == {"", "here"}
     assert {one.name for one in states[-1] if one.is_playing} == set()
     assert "switched off" in states[-1][-1].end_reason
-    limp = [bool(tick.guard_result.limp) for tick in ticks]
-    assert sum(a != b for a, b in pairwise(limp)) >= 2  # the jaw, between its motions
     for name in files:
         (tmp_path / f"{name}.yaml").unlink()
     for joints in ("emulated", "recorded"):

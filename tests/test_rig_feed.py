@@ -14,12 +14,11 @@ from shown_page import wait_for
 from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.rig_feed import LiveRig, RigFeed
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.head_state import HeadEvent, head_state
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_feed import TickFeed
 from gazerig.robot.loop.tick_stream import TickStream
-from gazerig.robot.model.control_source import TrackState
-from gazerig.robot.model.conversation import ConversationState
+from gazerig.robot.model.control_source import ConversationState, TrackState
 from gazerig.robot.net.topics import RunState
 from gazerig.robot.run.assemble import Assembly
 
@@ -51,7 +50,7 @@ class Page:
             self.page, lambda: self._rig(made), lambda: self.state, self.said.append
         )
         self.stream = TickStream(self.said.append, 0.0399)
-        self.stream.add_sink("the page", self.publisher.take)
+        self.stream.sinks.add("the page", self.publisher.take)
         self.live = RigFeed()
 
     def _rig(self, made: Assembly) -> LiveRig:

@@ -1,4 +1,4 @@
-"""docs/raspberry-pi.md is true: the profile small, the service, and the list of wheels."""
+"""docs/small-computers.md is true: the profile small and the service."""
 
 import configparser
 import re
@@ -13,7 +13,7 @@ from gazerig.config.load import shipped_names
 from gazerig.config.schema import load_rig
 from gazerig.robot.loop.loop import PARK_S
 
-PAPER = (ROOT / "docs/raspberry-pi.md").read_text(encoding="utf-8")
+PAPER = (ROOT / "docs/small-computers.md").read_text(encoding="utf-8")
 UNIT = ROOT / "docs/gazerig.service"
 
 
@@ -40,7 +40,7 @@ def unit() -> configparser.ConfigParser:
 
 def test_the_service_parks_before_anything_is_killed() -> None:
     service = unit()["Service"]
-    assert service["KillSignal"] == "SIGTERM"  # as gazerig.robot.loop.interrupts heeds it
+    assert service["KillSignal"] == "SIGTERM"  # as gazerig.robot.loop.power_down heeds it
     # With any other the guardian would be killed before it has switched the servos off.
     assert service["KillMode"] == "control-group"
     assert float(service["TimeoutStopSec"]) >= 2 * PARK_S + 10

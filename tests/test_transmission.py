@@ -7,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig
-from gazerig.robot.model.joint import JointParams, MeasuredLinkage
+from gazerig.robot.model.joint import JointParams, Linkage
 
 ROD = [[-30.0, 1900.0], [-10.0, 1640.0], [0.0, 1500.0], [15.0, 1350.0], [30.0, 1100.0]]
 
 
 @st.composite
-def curves(draw: st.DrawFn) -> MeasuredLinkage:
+def curves(draw: st.DrawFn) -> Linkage:
     n = draw(st.integers(2, 8))
     gaps = draw(st.lists(st.floats(0.02, 0.5), min_size=n, max_size=n))
     climbs = draw(st.lists(st.floats(5.0, 400.0), min_size=n, max_size=n))
@@ -22,17 +22,17 @@ def curves(draw: st.DrawFn) -> MeasuredLinkage:
     for gap, climb in zip(gaps[1:], climbs[1:], strict=True):
         angles.append(angles[-1] + gap)
         places.append(places[-1] + way * climb)
-    return MeasuredLinkage(angles, places)
+    return Linkage(angles, places)
 
 
 @given(curves(), st.floats(-2.0, 2.0))
-def test_there_and_back_is_where_one_was(curve: MeasuredLinkage, angle_rad: float) -> None:
+def test_there_and_back_is_where_one_was(curve: Linkage, angle_rad: float) -> None:
     assert curve.angle_rad(curve.steps(angle_rad)) == pytest.approx(angle_rad, abs=1e-9)
 
 
 @given(curves(), st.floats(-2.0, 2.0), st.floats(1e-4, 0.2))
 def test_a_larger_angle_is_farther_on_the_same_way(
-    curve: MeasuredLinkage, angle_rad: float, more: float
+    curve: Linkage, angle_rad: float, more: float
 ) -> None:
     climb = curve.steps(angle_rad + more) - curve.steps(angle_rad)
     assert (climb > 0.0) == curve.rising
@@ -40,7 +40,7 @@ def test_a_larger_angle_is_farther_on_the_same_way(
 
 
 @given(curves(), st.floats(-2.0, 2.0))
-def test_the_rate_is_the_slope_of_the_angle(curve: MeasuredLinkage, angle_rad: float) -> None:
+def test_the_rate_is_the_slope_of_the_angle(curve: Linkage, angle_rad: float) -> None:
     steps = curve.steps(angle_rad)
     rate = curve.rate_rad(steps)
     tiny = 1e-5 / abs(rate) * 1e-3
@@ -51,7 +51,7 @@ def test_the_rate_is_the_slope_of_the_angle(curve: MeasuredLinkage, angle_rad: f
 
 
 def test_measured_places_are_met_and_lines_lie_between() -> None:
-    curve = MeasuredLinkage([radians(a) for a, _ in ROD], [4.0 * us for _, us in ROD])
+    curve = Linkage([radians(a) for a, _ in ROD], [4.0 * us for _, us in ROD])
     for angle, us in ROD:
         assert curve.steps(radians(angle)) == pytest.approx(4.0 * us)
     assert curve.steps(radians(7.5)) == pytest.approx(4.0 * 1425.0)
@@ -72,7 +72,7 @@ def test_places_that_cannot_be_are_refused(
     angles: list[float], steps: list[float], words: str
 ) -> None:
     with pytest.raises(ValueError, match=words):
-        MeasuredLinkage(angles, steps)
+        Linkage(angles, steps)
 
 
 def hobby(**other: object) -> JointParams:

@@ -13,9 +13,8 @@ from features_there import skip_without
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, SetupError
 from gazerig.robot.cli.run import report_faults
-from gazerig.robot.loop.interrupts import SAME_REQUEST_S, Interrupts
 from gazerig.robot.loop.loop import Robot
-from gazerig.robot.loop.power_down import PowerDown
+from gazerig.robot.loop.power_down import SAME_REQUEST_S, Interrupts, PowerDown
 from gazerig.robot.run import session
 from gazerig.robot.run.assemble import Assembly
 from gazerig.robot.run.options import RunOptions

@@ -1,7 +1,7 @@
 """Several servo buses as one: joints of one rig on several ports, of several kinds."""
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from itertools import chain
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from typing import NamedTuple
 from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.plugins import describe_error
-from gazerig.drivers.types import BusHealth, Feedback, LimpableBus, ServoBus, ServoConfig
+from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
 
 
 class BusShare(NamedTuple):
@@ -79,12 +79,6 @@ class MultiBus:
                 self.disable_torque()
             raise
         return tuple([goals[i] for i in self._order])
-
-    def set_limp(self, servos: Collection[int]) -> None:
-        """Switch torque off on these servos; all others that were limp get it again."""
-        for _, bus, indices in self._shares:
-            if isinstance(bus, LimpableBus):
-                bus.set_limp([k for k, place in enumerate(indices) if place in servos])
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo; goals are clipped to the limits."""

@@ -27,8 +27,6 @@ _QUARTERS = {
     180: ((-1, 0), (0, -1)),
     270: ((0, 1), (-1, 0)),
 }
-# A mirror exchanges the person's right and left.
-_OTHER_SIDE = [1, 0, 2, 4, 3]
 
 
 @dataclass(frozen=True)

@@ -39,8 +39,6 @@ BAUD_RATES = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4
 """Bit/s by the value of Baud Rate (8); the last one only on the X430."""
 
 RETURN_DELAY_UNIT_S = 2e-6
-SHADOW_OFF = 253
-"""Smallest value of Secondary ID (12) that disables it."""
 
 EEPROM_END = 64
 """Addresses below keep their values without power and are locked while torque is on."""

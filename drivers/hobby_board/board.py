@@ -19,7 +19,7 @@ from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, TIMING, BusPort, BusTiming, open_port
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.hobby_board.bus import Channel
+    from gazerig.drivers.hobby_board.channel import Channel
     from gazerig.drivers.types import ServoConfig
 
 TRIES = 3
@@ -74,8 +74,8 @@ class Board(ABC):
         the board itself ramps pulses
     """
 
-    remedy: ClassVar[str]
-    longest_ramp_s: ClassVar[float] = inf
+    remedy: str
+    longest_ramp_s: float = inf
 
     def __init__(self, port: BusPort, params: HobbyBoardParams, timing: BusTiming = TIMING) -> None:
         self.port, self.params, self.timing = port, params, timing

@@ -8,16 +8,16 @@ After an error or a restart a board outputs no pulses, and has perhaps lost its 
 channels are then enabled again, one after another; if that happens again soon, all stay without.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from math import inf
 
-from gazerig.drivers.bus.goal_limits import clip_goals, entry_speed_steps_s
+from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.port_bus import PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
-from gazerig.drivers.bus.servo_models import HOBBY_STEPS_PER_TURN, US_STEPS
 from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import CHECK_SUPPLY, TRIES, Board, are_alike
+from gazerig.drivers.hobby_board.channel import FINE_STEPS, Channel
 from gazerig.drivers.serial.port import open_port, wait_until
 from gazerig.drivers.types import Feedback, ServoConfig
 
@@ -28,107 +28,6 @@ WITHIN_S = 10.0
 
 MOST_TRIES = 300
 """Failed attempts to enable channels again after which all stay without pulses."""
-
-BEHIND_S = 0.1
-"""Longest delay of the board behind the last goals: its period is 20 ms, and lines are slow."""
-
-FINE_STEPS = 24
-"""Tolerance of an expected pulse at rest, half a degree: the grain of a PCA9685 is 20 steps."""
-
-
-class Channel:
-    """A servo without feedback, assumed to be at its pulse. Steps are quarter microseconds.
-
-    pulse_steps, mean_steps_s: present pulse, and the mean speed of its last advance
-    speed_steps_s: armed limit of its speed
-    on: whether it outputs pulses, as far as known
-    held, due: whether it follows goals, or is to be held again
-    entering: whether it moves slowly into its limits
-
-    Args:
-        setup: The servo.
-        longest_ramp_s: Longest time for which the driver's ramp advances while nothing is sent,
-            seconds; inf: the board itself ramps its pulses.
-    """
-
-    def __init__(self, setup: ServoConfig, longest_ramp_s: float = inf) -> None:
-        self._longest_ramp_s = longest_ramp_s
-        self.id, self.label = setup.id, setup.label("channel")
-        self.on = self.held = self.due = self.entering = False
-        self.pulse_steps = self.mean_steps_s = 0.0
-        self.speed_steps_s = setup.max_speed_steps_s
-        self._is_position_known, self._at_s = False, -inf
-        self.set_target(setup)
-
-    def set_target(self, setup: ServoConfig) -> None:
-        """Apply a changed setup of the same servo."""
-        self.setup = setup
-        if not self._is_position_known:
-            middle = (setup.min_steps + setup.max_steps) // 2
-            self.goal_steps = self._clip(middle if setup.rest_steps is None else setup.rest_steps)
-            self.pulse_steps = self.goal_steps
-
-    def _clip(self, steps: int) -> int:
-        return min(max(steps, self.setup.min_steps), self.setup.max_steps)
-
-    @property
-    def top_speed_steps_s(self) -> float:
-        """Return the present speed limit of its pulses, low while it enters its limits."""
-        if self.entering:
-            return entry_speed_steps_s(self.setup, HOBBY_STEPS_PER_TURN)
-        return self.setup.max_speed_steps_s
-
-    def adopt_pulse(self, pulse_steps: int) -> None:
-        """Adopt the pulse of a channel that is not held; 0: none."""
-        self.on = pulse_steps > 0
-        if self.on:
-            self._is_position_known = True
-            self.goal_steps = self.pulse_steps = pulse_steps
-
-    def start(self, pulse_steps: int, now_s: float) -> int:
-        """Hold at the present pulse, or at the last position if there is none; return the goal."""
-        self.goal_steps = self._clip(pulse_steps or round(self.pulse_steps))
-        self.entering = pulse_steps not in (0, self.goal_steps)
-        # A first pulse is not ramped, as there is no pulse to ramp from.
-        self.pulse_steps = pulse_steps or self.goal_steps
-        self.on, self._at_s = True, now_s
-        return self.goal_steps
-
-    def record_hold(self) -> None:
-        """Record that it has pulses and follows goals."""
-        self.on = self.held = self._is_position_known = True
-        self.due = False
-
-    def record_release(self, due: bool = False) -> None:
-        """Record that it follows no goals any more; its pulses may continue."""
-        self.held, self.due, self.entering = False, due, False
-
-    def record_stop(self) -> None:
-        """Record that it outputs no pulses: its servo has no torque, and is assumed not to move."""
-        self.record_release()
-        self.on, self.mean_steps_s = False, 0.0
-
-    def advance(self, now_s: float) -> None:
-        """Advance the estimate to ``now_s``."""
-        spent_s = now_s - self._at_s
-        if self.on and 0.0 < spent_s < inf:
-            most = self.speed_steps_s * min(spent_s, self._longest_ramp_s)
-            way = min(max(self.goal_steps - self.pulse_steps, -most), most)
-            self.pulse_steps += way
-            self.mean_steps_s = way / spent_s
-        self._at_s = now_s
-
-    def is_expected(self, pulse_steps: int) -> bool:
-        """Return whether a pulse can be the commanded one."""
-        if self._longest_ramp_s < inf:
-            return pulse_steps > 0  # the next goals correct it
-        room = FINE_STEPS + BEHIND_S * self.speed_steps_s
-        return pulse_steps > 0 and abs(pulse_steps - self.pulse_steps) <= room
-
-    def difference_text(self, pulse_steps: int) -> str:
-        """Return how a pulse differs from the commanded one."""
-        us, goal_us = pulse_steps / US_STEPS, self.goal_steps / US_STEPS
-        return f"is sent to {goal_us:g} us and gets {us:g} us" if us else "has no pulses"
 
 
 class HobbyBoardBus(PortBus):
@@ -246,24 +145,6 @@ class HobbyBoardBus(PortBus):
             return ""
         channel.on = pulses[0] > 0
         return channel.difference_text(pulses[0])
-
-    def set_limp(self, servos: Collection[int]) -> None:
-        """Stop the pulses of these servos, by index; all others that were limp get them again.
-
-        A joint that was moved by hand returns to its last pulse at the servo's own speed, as its
-        position is not known. A channel that does not stop, is held.
-        """
-        if not self._engaged or self._is_down or self._fault:
-            return
-        wanted = [self._channels[i] for i in servos]
-        limp = [one for one in self._channels if not (one.held or one.due or one in wanted)]
-        try:
-            if off := [channel for channel in wanted if channel.held or channel.due]:
-                self._switch_off(off)
-            for channel in limp:
-                channel.due = bool(self._hold(channel))
-        except BusLost as lost:
-            self._record_loss(lost)
 
     # --- every tick
 

@@ -13,8 +13,8 @@ from smbus2 import SMBus, i2c_msg
 
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.i2c.transfers import NO_ACKNOWLEDGE, OK, READ_STATUS, START, STOP
+from gazerig.drivers.serial.host_port import HostPort
 from gazerig.drivers.serial.list_ports import open_failure_text
-from gazerig.drivers.serial.port import HostPort
 
 I2C_RETRIES, I2C_TIMEOUT = 0x0701, 0x0702
 """Requests of the kernel's i2c-dev."""
@@ -57,8 +57,7 @@ class I2cPort(HostPort):
 
     def write(self, data: bytes) -> None:
         """Execute transfers; bytes that they read are kept for ``read_until``."""
-        if self._on_traffic:
-            self._on_traffic()
+        self._on_traffic()
         if self._bus is None:
             raise self._lost("it is closed")
         at, status = 0, OK
@@ -80,8 +79,7 @@ class I2cPort(HostPort):
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return up to ``length`` available bytes; if there are none, wait until the deadline."""
-        if self._on_traffic:
-            self._on_traffic()
+        self._on_traffic()
         # Transfers have ended when ``write`` returns: no more bytes can arrive.
         if not self._waiting and (left_s := deadline_s - self.now_s()) > 0.0:
             time.sleep(left_s)

@@ -16,7 +16,7 @@ from gazerig.drivers.serial.port import BusPort, open_port
 from gazerig.params import Choices
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.hobby_board.bus import Channel
+    from gazerig.drivers.hobby_board.channel import Channel
     from gazerig.drivers.types import ServoConfig
 
 SET_TARGET, SET_SPEED, SET_ACCELERATION = 0x84, 0x87, 0x89

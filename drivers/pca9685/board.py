@@ -16,7 +16,7 @@ from gazerig.drivers.serial.port import BusPort, open_port, wait_until
 from gazerig.params import Bounds
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.hobby_board.bus import Channel
+    from gazerig.drivers.hobby_board.channel import Channel
     from gazerig.drivers.types import ServoConfig
 
 MODE1, MODE2, LED0, ALL_LED, PRESCALE = 0x00, 0x01, 0x06, 0xFA, 0xFE

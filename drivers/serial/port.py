@@ -12,7 +12,8 @@ from typing import NamedTuple, Protocol
 
 from serial import Serial, SerialException
 
-from gazerig.drivers.errors import BusLost, PortError
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.serial.host_port import HostPort
 from gazerig.drivers.serial.list_ports import BY_ID, is_i2c, open_failure_text, persistent_name
 
 BITS_PER_BYTE = 10
@@ -72,33 +73,6 @@ class BusPort(Protocol):
         """Discard bytes until none arrives for ``quiet_s``; return their number."""
 
 
-class HostPort:
-    """A port of this computer.
-
-    Args:
-        port_name: Its path.
-        exclusive: Whether to open it for this program alone; otherwise it is shared with the
-            program that has it open.
-        on_traffic: Called whenever bytes are sent or waited for; None if not needed.
-
-    now_s: returns host monotonic seconds
-    """
-
-    now_s = staticmethod(time.monotonic)
-
-    def __init__(
-        self,
-        port_name: str,
-        exclusive: bool = True,
-        on_traffic: Callable[[], None] | None = None,
-    ) -> None:
-        self.port_name = port_name
-        self._exclusive, self._on_traffic = exclusive, on_traffic
-
-    def _lost(self, reason: object) -> BusLost:
-        return BusLost(f"{self.port_name} is gone ({reason}): check USB cable and servo power")
-
-
 class BlockingPort(HostPort):
     """A real serial port; implements ``BusPort``.
 
@@ -114,8 +88,7 @@ class BlockingPort(HostPort):
 
     def write(self, data: bytes) -> None:
         """Send bytes; wait at most 50 ms for space in the adapter's buffer."""
-        if self._on_traffic:
-            self._on_traffic()
+        self._on_traffic()
         deadline_s = 0.0
         while data:
             try:
@@ -135,8 +108,7 @@ class BlockingPort(HostPort):
         The last wait is rounded up to the milliseconds of poll(), which also finds the bytes that
         arrived while this process did not run.
         """
-        if self._on_traffic:
-            self._on_traffic()
+        self._on_traffic()
         got = b""
         while len(got) < length:
             left_s = deadline_s - time.monotonic()

@@ -1,6 +1,6 @@
 """Smart servos of one family on one serial bus: one read and one write per tick."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 
 from gazerig.drivers.bus.goal_limits import clip_goals
@@ -230,18 +230,6 @@ class SmartServoBus(PortBus):
         self._release_due = False
         return goals
 
-    def set_limp(self, servos: Collection[int]) -> None:
-        """Switch torque off on these servos, by index; all others that were limp get it again.
-
-        They hold their present position. One that refuses is set up again by later reads.
-        """
-        if not self._supervisor.engaged or self._is_down:
-            return
-        try:
-            self._supervisor.set_limp({self._ids[i] for i in servos})
-        except BusLost as lost:
-            self._record_loss(lost)
-
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo in one packet; goals are clipped to the limits.
 
@@ -256,7 +244,7 @@ class SmartServoBus(PortBus):
         if not supervisor.engaged or self._is_down or line.starved:
             return
         builder, speeds = self._goals, supervisor.speeds
-        if supervisor.limp or supervisor.held or self._poll_list.silent_since_s:
+        if supervisor.held or self._poll_list.silent_since_s:
             kept = [k for k, servo_id in enumerate(self._ids) if not self._is_withheld(servo_id)]
             if not kept:
                 return
@@ -268,9 +256,8 @@ class SmartServoBus(PortBus):
             self._record_loss(lost)
 
     def _is_withheld(self, servo_id: int) -> bool:
-        """Return whether a servo gets no goals: it is limp or held, or may have restarted."""
-        supervisor = self._supervisor
-        if servo_id in supervisor.limp or servo_id in supervisor.held:
+        """Return whether a servo gets no goals: it is held or may have restarted."""
+        if servo_id in self._supervisor.held:
             return True
         return self._now_s - self._poll_list.silent_since_s.get(servo_id, inf) >= RESTART_S
 

@@ -1,6 +1,6 @@
 """A family of smart servos as data: registers, models, units, and the module of its packets.
 
-The bus (gazerig.drivers.servo_bus) does not depend on any particular family; docs/servo-families.md
+The bus (gazerig.drivers.servo_bus) does not depend on any particular family; docs/extend.md
 explains how to add one.
 """
 
@@ -153,7 +153,7 @@ class AnswerFrame(NamedTuple):
 
 @dataclass(frozen=True)
 class Family:
-    """A family of smart servos; docs/servo-families.md compares those that exist.
+    """A family of smart servos; docs/extend.md explains how to add one.
 
     A span is the first and the last of registers that are read together.
     """

@@ -4,7 +4,7 @@ The checksum of an answer misses some damage, so a position that no joint can ha
 last one is rejected (``gazerig.drivers.bus.plausibility``).
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from operator import mul
 from typing import Any
 
@@ -128,10 +128,9 @@ class FeedbackColumns:
         if columns:
             self.now = self.now._replace(**columns)
 
-    def expect_torque(self, on: bool, limp: Collection[int] = ()) -> None:
-        """Record that torque has been switched for all servos but the limp ones."""
-        torque = tuple([on and slot not in limp for slot in range(len(self.now.torque))])
-        self.now = self.now._replace(torque=torque)
+    def expect_torque(self, on: bool) -> None:
+        """Record that torque has been switched for all servos."""
+        self.now = self.now._replace(torque=(on,) * len(self.now.torque))
 
     def _set_climate(self, slot: int, voltage: int, temperature: int) -> None:
         self._tenth_volts = ()

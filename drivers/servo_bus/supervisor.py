@@ -1,4 +1,4 @@
-"""Care for the servos between the exchanges: faults, restarts, tripped watchdogs, limp joints.
+"""Care for the servos between the exchanges: faults, restarts, tripped watchdogs.
 
 An answer that is not that of a healthy servo only marks the servo. After the read the supervisor
 asks each marked servo what is wrong with it. A fault is named, and asked about until it is gone. A
@@ -57,7 +57,6 @@ class Supervisor:
         log: Records events.
 
     engaged: whether torque is on
-    limp: servos whose torque is off on purpose
     held: servos that get no goals until they are set up, as some firmware switches torque on with a
         goal
     faults: present fault of a servo, by id
@@ -77,7 +76,6 @@ class Supervisor:
         self._ids = tuple(setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self.engaged = False
-        self.limp: frozenset[int] = frozenset()
         self.held: set[int] = set()
         self.faults: dict[int, str] = {}
         self.due_s = self._pause_until_s = -inf
@@ -123,28 +121,11 @@ class Supervisor:
 
     def stop_supervision(self) -> None:
         """Stop supervision, as the servos have no torque."""
-        self.engaged, self.limp = False, frozenset()
+        self.engaged = False
         self.held.clear()
         self._rearmed.clear()
         self._line.starving_s, self._line.starved, self._line.tries = inf, False, TRIES
         self._feedback.expect_torque(False)
-
-    def set_limp(self, wanted: Collection[int]) -> None:
-        """Switch torque off on these servos; all others that were limp get it again.
-
-        A servo that does not confirm keeps its torque. One that refuses it is set up by later
-        reads.
-        """
-        off, on = tuple(set(wanted) - self.limp), tuple(self.limp.difference(wanted))
-        if not off and not on:
-            return
-        limp = self.limp.difference(on)
-        if off:
-            released = switch_off(self._line, off)
-            limp |= set(off).difference(released.holding_ids, released.unconfirmed_ids)
-        self.limp = limp
-        self._enable_again(on)
-        self._feedback.expect_torque(True, [self._slot[servo_id] for servo_id in limp])
 
     def _enable_again(self, ids: tuple[int, ...]) -> bool:
         """Give some servos torque again at their present positions; return whether they have it."""
@@ -183,7 +164,7 @@ class Supervisor:
         """Check registers of one servo, by name, that are read at intervals."""
         if values.get(self._family.error_register):
             self.mark(servo_id, is_held=False)
-        if not self.engaged or servo_id in self.limp:
+        if not self.engaged:
             return
         expected = self._expected[servo_id]
         if any(expected.get(name, value) != value for name, value in values.items()):
@@ -274,7 +255,7 @@ class Supervisor:
             ServoFault: it refuses its torque.
         """
         line, family, setup, ids = self._line, self._family, self._setups[servo_id], (servo_id,)
-        arms, slot = self.engaged and servo_id not in self.limp, self._slot[servo_id]
+        arms, slot = self.engaged, self._slot[servo_id]
         line.write_all(ids, "status_return_level", [family.answer_level])
         found = dict[str, int]()
         for name in ("torque_enable", "model_number", family.error_register):

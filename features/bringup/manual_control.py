@@ -23,7 +23,7 @@ from typing import NamedTuple
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.robot.loop.body import Body
-from gazerig.robot.loop.command_choices import refuse_out_of_range
+from gazerig.robot.loop.commands import refuse_out_of_range
 from gazerig.robot.loop.power_down import Again
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Jog

@@ -18,7 +18,7 @@ from gazerig.features.world.gl_context import open_context
 from gazerig.gaze.angles import add, compose, rotate
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.description.links import IDENTITY, ORIGIN
-from gazerig.robot.model.scene_view import PinholeView
+from gazerig.robot.model.scene import PinholeView
 
 _NEAREST_M, _FARTHEST_M = 0.02, 60.0
 _FONT = 100  # the smallest: no text is drawn

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from gazerig.robot.model.joint import LinearLinkage, Linkage
+from gazerig.robot.model.joint import Linkage
 
 
 class Transmission(NamedTuple):
@@ -17,15 +17,15 @@ class Transmission(NamedTuple):
     ratios: tuple[float, ...] = (1.0,)
 
     @property
-    def line(self) -> LinearLinkage | None:
-        """Return the line of a linear transmission to one joint, otherwise None."""
+    def line(self) -> tuple[float, float] | None:
+        """Return zero and slope of a linear transmission to one joint, otherwise None."""
         return self.linkage.line if len(self.ratios) == 1 else None
 
     def at(self, joints_rad: Sequence[float]) -> tuple[float, tuple[float, ...]]:
         """Return the servo's position in steps, and the steps per radian of each joint."""
         angle = sum(ratio * rad for ratio, rad in zip(self.ratios, joints_rad, strict=True))
         steps, line = self.linkage.steps(angle), self.linkage.line
-        slope = 1.0 / self.linkage.rate_rad(steps) if line is None else line.slope
+        slope = 1.0 / self.linkage.rate_rad(steps) if line is None else line[1]
         return steps, tuple(slope * ratio for ratio in self.ratios)
 
 

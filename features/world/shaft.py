@@ -81,8 +81,8 @@ class ShaftAxis:
         self._friction_nm = 0.0
         _, self._slopes = servo.transmission.at(self._angles(data.qpos))
         line = servo.transmission.line
-        self.slope = None if line is None else self._unit * line.slope
-        self.zero = 0.0 if line is None else self._unit * line.zero
+        self.slope = None if line is None else self._unit * line[1]
+        self.zero = 0.0 if line is None else self._unit * line[0]
         self.qpos, self.dof = self._qpos[0], self._dof[0]
 
     def _angles(self, qpos: Sequence[float]) -> list[float]:

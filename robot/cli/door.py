@@ -24,7 +24,7 @@ def door(
         str | None, typer.Argument(help="Name of the door.", autocompletion=complete_door)
     ] = None,
     address: Annotated[
-        str, typer.Argument(metavar="ADDRESS", help="Address of the neighbour; see docs/doors.md.")
+        str, typer.Argument(metavar="ADDRESS", help="Address of the neighbour; see docs/talk.md.")
     ] = "",
     bind: Annotated[
         str,

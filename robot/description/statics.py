@@ -15,11 +15,10 @@ from gazerig.robot.description.links import (
     ORIGIN,
     Description,
 )
-from gazerig.robot.model.assumed_servo import GEAR_FRICTION
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
-from gazerig.robot.model.weight import MovingBody, weight_nm
+from gazerig.robot.model.weight import GEAR_FRICTION, MovingBody, weight_nm
 
 NECK_JOINTS = (*LOWER_NECK, *NECK)
 """Joints that carry the head."""

@@ -3,13 +3,13 @@
 import os
 import select
 import subprocess
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from math import inf
 
 from gazerig.drivers.bus.goal_limits import far_outside_steps
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
 from gazerig.drivers.process import child_process
-from gazerig.drivers.types import BusHealth, Feedback, LimpableBus, ServoBus, ServoConfig
+from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
 from gazerig.robot.guardian.heartbeat import (
     IDLE,
     MAX_PLANS,
@@ -307,14 +307,6 @@ class GuardedBus:
         goals = self._bus.enable_torque()
         self._holding, self._lost_hold = True, False
         return goals
-
-    def set_limp(self, servos: Collection[int]) -> None:
-        """Switch torque off on these servos; all others that were limp get it again."""
-        self._beat()
-        if self._lost_hold or self._guardian.is_released(self._plan):
-            return
-        if isinstance(self._bus, LimpableBus):
-            self._bus.set_limp(servos)
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo; send nothing after the guardian has released them.

@@ -2,26 +2,22 @@
 
 import contextlib
 from collections.abc import Callable, Collection, Mapping, Sequence
-from math import isfinite, radians
-from operator import add, mul, sub
+from math import isfinite
+from typing import Any
 
 from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
 from gazerig.drivers.errors import BusLost, DriverError, ServoMissing, SetupError
-from gazerig.drivers.types import Feedback, LimpableBus, ServoBus, ServoConfig
-from gazerig.robot.loop.coupled_servos import CoupledServos
-from gazerig.robot.loop.limp_joints import LimpJoints
+from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
 from gazerig.robot.loop.sag import SagCompensation
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling import CouplingParams, pair_setups
-from gazerig.robot.model.joint import JointLimit, JointParams, LinearLinkage
+from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.types import JointAngles, JointState, order_joints
 from gazerig.robot.safety.start_range import find_far_outside
 
 _FIRST_S = 0.5
 """Longest time until every servo has reported its position before torque is switched on."""
 _AGAIN_S = 0.02
-_INSIDE_RAD = radians(1.0)
-"""Distance from its range at which friction may stop a joint that has moved inside."""
 
 
 def servo_setups(
@@ -74,20 +70,14 @@ class Body:
     ) -> None:
         self.bus = bus
         self._sag, self._read_s = sag, 0.0
-        self._recover, self._recovering = recover, set[int]()
+        self._recover = recover
         self.names = order_joints(joints)
         self._pairs = tuple(pairs)
-        self._coupled = CoupledServos(pairs, self.names) if pairs else None
+        self._coupled = CoupledServos(pairs, self.names)
         self._park_rad = dict(park_rad or {})
         self._torque_off = False
         self._joints = self._set_up = tuple(joints[name] for name in self.names)
-        self._limp = LimpJoints([joint.limp_when_idle_s for joint in self._joints])
-        linkages = [joint.make_linkage() for joint in self._joints]
-        # All joints are computed as if every linkage were straight; the other joints are then
-        # corrected.
-        lines = [linkage.line or LinearLinkage(0.0, 0.0, 0.0) for linkage in linkages]
-        self._zeros, self._slopes, self._rates = zip(*lines, strict=True)
-        self._bent = [(i, one) for i, one in enumerate(linkages) if one.line is None]
+        self._linkages = [joint.make_linkage() for joint in self._joints]
         # Before the first answer: the centre, infinitely old.
         self._nothing = Feedback.create_missing(len(self.names))
         self._last = self._nothing._replace(
@@ -164,53 +154,15 @@ class Body:
         if feedback.missing:
             feedback = feedback.fill_missing(self._last)
         self._last = feedback
-        if self._coupled is not None:
-            feedback = self._coupled.share_feedback(feedback, self._torque_off)
+        feedback = self._coupled.share_feedback(feedback, self._torque_off)
         steps, speeds, load, at_s, celsius, volts, torque, fault, measured, rearmed, gone = feedback
-        rates = tuple(map(mul, speeds, self._rates))
-        if self._bent or self._coupled is not None:
-            angles = self.angles(steps)
-            right = list(rates)
-            for i, linkage in self._bent:
-                right[i] = speeds[i] * linkage.rate_rad(steps[i])
-            rates = tuple(right if self._coupled is None else self._coupled.joints(right))
-        else:
-            angles = tuple(map(mul, map(sub, steps, self._zeros), self._rates))
-        if self._recovering:
-            self._report_recovered(angles)
+        rows = zip(self._linkages, speeds, steps, strict=True)
+        shaft_rates = [speed * linkage.rate_rad(at) for linkage, speed, at in rows]
+        angles, rates = self.angles(steps), tuple(self._coupled.joints(shaft_rates))
         missing = tuple([self.names[i] for i in gone]) if gone else ()
         return JointState(
             angles, rates, at_s, missing, torque, fault, load, celsius, volts, rearmed, measured
         )
-
-    def relax_idle(
-        self, desired_rad: JointAngles, joints: JointState, t_s: float, held: bool
-    ) -> frozenset[int]:
-        """Switch the torque of joints off that are idle, and on again before they move.
-
-        Args:
-            desired_rad: Desired angles of this tick.
-            joints: Measured joints.
-            t_s: Present time.
-            held: Whether a client holds the joints, which are not idle then.
-
-        Returns:
-            The numbers of the joints that have no torque in this reading on purpose.
-        """
-        before = self._limp.limp
-        if self._limp.step(desired_rad, joints.torque, t_s, held):
-            self._set_limp()
-        return before
-
-    def wake(self) -> None:
-        """Switch the torque of idle joints on, at their present angles."""
-        if self._limp.limp:
-            self._limp.reset()
-            self._set_limp()
-
-    def _set_limp(self) -> None:
-        if isinstance(self.bus, LimpableBus):
-            self.bus.set_limp(self._limp.limp)
 
     def write(self, command_rad: JointAngles) -> None:
         """Send one goal to every servo.
@@ -228,25 +180,13 @@ class Body:
         """Return the servo positions of joint angles."""
         if len(angles_rad) != len(self.names):
             raise ValueError(f"{len(angles_rad)} angles for {len(self.names)} joints")
-        angles: Sequence[float] = angles_rad
-        if self._coupled is not None:
-            angles = self._coupled.shafts(angles_rad)
-        steps = [*map(round, map(add, self._zeros, map(mul, self._slopes, angles)))]
-        for i, linkage in self._bent:
-            steps[i] = round(linkage.steps(angles[i]))
-        return steps
+        rows = zip(self._linkages, self._coupled.shafts(angles_rad), strict=True)
+        return [round(linkage.steps(angle)) for linkage, angle in rows]
 
     def angles(self, steps: Sequence[float]) -> JointAngles:
         """Return the joint angles of servo positions."""
-        shafts = self._shafts(steps)
-        return tuple(shafts if self._coupled is None else self._coupled.joints(shafts))
-
-    def _shafts(self, steps: Sequence[float]) -> list[float]:
-        """Return the angles of servo positions; for coupled servos those of their shafts."""
-        angles = [*map(mul, map(sub, steps, self._zeros), self._rates)]
-        for i, linkage in self._bent:
-            angles[i] = linkage.angle_rad(steps[i])
-        return angles
+        rows = zip(self._linkages, steps, strict=True)
+        return tuple(self._coupled.joints([linkage.angle_rad(at) for linkage, at in rows]))
 
     def disable_torque(self) -> None:
         """Switch the torque off immediately; the bus stays open and reading continues.
@@ -255,7 +195,6 @@ class Body:
             BusLost: The port is lost; the torque is switched off when it reconnects.
         """
         self._torque_off = True
-        self._limp.reset()
         self.bus.disable_torque()
 
     def enable_torque(self) -> JointAngles:
@@ -291,7 +230,6 @@ class Body:
             for joints in (self._joints, self._set_up)
         )
         far = {name: text for name, text in far.items() if name in before}
-        self._recovering.clear()
         if not far:
             return
         where = [f"{name} {text}" for name, text in far.items()]
@@ -300,18 +238,8 @@ class Body:
                 f"{'; '.join(where)} Torque stays off: gazerig doctor examines it, gazerig run "
                 "--recover moves it slowly into its range"
             )
-        self._recovering = {self.names.index(name) for name in far}
         for text in where:
             self._recover(f"{text} It moves slowly into its range")
-
-    def _report_recovered(self, angles: JointAngles) -> None:
-        """Report the joints that have arrived in their ranges."""
-        for i in tuple(self._recovering):
-            limit = self._joints[i].limit()
-            if limit.low_rad - _INSIDE_RAD <= angles[i] <= limit.high_rad + _INSIDE_RAD:
-                self._recovering.discard(i)
-                if self._recover is not None:
-                    self._recover(f"{self.names[i]} is in its range again")
 
     def stop(self) -> tuple[str, ...]:
         """Switch the torque off and close the bus; return the bus's messages about it.
@@ -333,8 +261,70 @@ class Body:
             self.bus.disable_torque()
         except DriverError:
             raise
-        except Exception:  # not a fault of the bus, such as no memory: try once more
+        except BaseException as error:  # not a fault of the bus, such as no memory: try once more
             self.bus.disable_torque()
-        except BaseException:
-            self.bus.disable_torque()
-            raise
+            if not isinstance(error, Exception):
+                raise
+
+
+class CoupledServos:
+    """The pairs of servos of one body that together move two joints.
+
+    Args:
+        pairs: The pairs with the names of their joints.
+        names: Names of all joints in their order.
+    """
+
+    def __init__(self, pairs: Collection[CouplingParams], names: Sequence[str]) -> None:
+        # The positions of both joints in every sequence, and their coupling.
+        self._pairs = [(names.index(one.first), names.index(one.second), one) for one in pairs]
+        self._last: dict[int, Feedback] = {}
+
+    def joints(self, shafts_rad: Sequence[float]) -> list[float]:
+        """Return the joint angles of servo angles, or the joint speeds of servo speeds."""
+        angles = list(shafts_rad)
+        for i, j, coupling in self._pairs:
+            angles[i], angles[j] = coupling.joint_rad((shafts_rad[i], shafts_rad[j]))
+        return angles
+
+    def shafts(self, joints_rad: Sequence[float]) -> list[float]:
+        """Return the servo angles of joint angles."""
+        angles = list(joints_rad)
+        for i, j, coupling in self._pairs:
+            angles[i], angles[j] = coupling.servo_rad((joints_rad[i], joints_rad[j]))
+        return angles
+
+    def share_feedback(self, feedback: Feedback, released: bool) -> Feedback:
+        """Return feedback in which both servos of a pair share the values for both joints.
+
+        If one servo did not answer, both joints are stale, at their last common position. The
+        higher load, a fault, and torque that was switched on again apply to both. The torque is on
+        if both servos have it; after a release (``released``), if one has it.
+        """
+        if not self._pairs:
+            return feedback
+        column: dict[str, list[Any]] = {
+            name: list(values) for name, values in feedback._asdict().items()
+        }
+        for i, j, _ in self._pairs:
+            both = [i, j]
+            if {*both}.isdisjoint(feedback.missing):
+                self._last[i] = feedback
+            else:
+                column["missing"] = sorted({*column["missing"], *both})
+            last = self._last.get(i, feedback)
+            for k in both:
+                column["position_steps"][k] = last.position_steps[k]
+                column["velocity_steps_s"][k] = last.velocity_steps_s[k]
+                if fault := feedback.fault[i + j - k]:
+                    column["fault"][k] = feedback.fault[k] or f"{fault} (of its coupled servo)"
+            on = [feedback.torque[k] for k in both]
+            shared = {
+                "at_s": min(last.at_s[i], last.at_s[j]),
+                "load": max((feedback.load[k] for k in both), key=abs),
+                "torque": any(on) if released else all(on),
+                "rearmed": any(feedback.rearmed[k] for k in both),
+            }
+            for name, value in shared.items():
+                column[name][i] = column[name][j] = value
+        return Feedback(**{name: tuple(values) for name, values in column.items()})

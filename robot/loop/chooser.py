@@ -68,9 +68,8 @@ class RuleChooser:
         self._rule, self._own, self._label = rule, own, label
         self.top_down = own.top_down
         self._chosen: Target | None = None
-        self._identity: tuple[str, int] | None = None
+        self._identity: tuple[str, int, int] | None = None
         self._shift = 0
-        self._own_shift = 0
 
     @property
     def reacts(self) -> bool:
@@ -92,15 +91,14 @@ class RuleChooser:
             PluginError: The rule returned something else.
         """
         own, before = self._own.choose(percept, state, t_s), self._chosen
-        chosen = self._to_target(self._rule.choose(percept, state, t_s), t_s)
-        if chosen is not None and before is not None and chosen.id < 0:
-            self._shift += dist(chosen.p_world_m, before.p_world_m) > _JUMP_M
-        self._chosen = chosen
+        chosen = self._chosen = self._to_target(self._rule.choose(percept, state, t_s), t_s)
         target = chosen or own
-        identity = (target.kind, target.id)
-        if identity != self._identity or own.shift != self._own_shift and target is own:
-            self._shift += 1
-        self._identity, self._own_shift = identity, own.shift
+        identity = (target.kind, target.id, own.shift if chosen is None else 0)
+        jumped = False
+        if chosen is not None and before is not None and chosen.id < 0:
+            jumped = dist(chosen.p_world_m, before.p_world_m) > _JUMP_M
+        self._shift += jumped or identity != self._identity
+        self._identity = identity
         return replace(target, shift=self._shift)
 
     def _to_target(self, answer: Any, t_s: float) -> Target | None:
@@ -113,11 +111,11 @@ class RuleChooser:
             return None
         point = answer.p_world_m if isinstance(answer, Target) else answer
         try:
-            x, y, z = map(float, point)
+            x, y, z = map(float, () if isinstance(point, str) else point)
             valid = all(abs(v) <= FARTHEST_M for v in (x, y, z))  # also rejects NaN
         except (TypeError, ValueError):
             valid = False
-        if not valid or isinstance(point, str):
+        if not valid:
             raise PluginError(
                 f"{self._label} returned {type(answer).__name__} {str(answer)[:60]!r}, wanted a "
                 f"target, a point x, y, z within {FARTHEST_M:g} m, or None"

@@ -4,25 +4,41 @@ World frame: at the neck base, x ahead, y left, z up. Angles in rad, yaw + left,
 roll + right ear down; lengths in m; times in s of the rig's own clock.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import degrees
-from typing import Any
+from typing import Literal
 
 from msgspec import Struct
 
-from gazerig.gaze.angles import add, unit, yaw_pitch
-from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Salience, Vec3
-from gazerig.robot.loop.gaze_events import EventKind
-from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import head_activity, target_name, tick_control_source
+from gazerig.gaze.angles import yaw_pitch
+from gazerig.gaze.types import (
+    ORDERED,
+    PART_NAMES,
+    PARTS,
+    Angles2,
+    Angles3,
+    Face,
+    Salience,
+    Target,
+    Vec3,
+)
+from gazerig.robot.loop.tick import Tick, cyclopean_direction, target_name
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
+    NO_CONVERSATION,
     ControlSource,
     ControlState,
+    ConversationState,
     TrackState,
+    control_sentence,
 )
-from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
+from gazerig.robot.model.kinematics import gaze_error
+
+EventKind = Literal[
+    "message", "saccade_start", "saccade_landing", "blink", "target", "person_arrived",
+    "person_left", "track_finished", "cue",
+]  # fmt: skip
+"""message: of the bus, the camera or a program's request; all others are found in the ticks."""
 
 
 class JointReading(Struct, frozen=True):
@@ -36,8 +52,7 @@ class JointReading(Struct, frozen=True):
         velocity_rad_s: Measured speed.
         estimated: Whether the servo has no feedback: ``measured_rad`` is then its goal, moved at
             its known speed.
-        limited: Reason why ``commanded_rad`` differs from ``desired_rad``, "" if it does not;
-            "limp" if the joint has no torque because it is idle.
+        limited: Reason why ``commanded_rad`` differs from ``desired_rad``, "" if it does not.
         torque: Whether the torque is on, None if unknown.
         fault: Latched hardware errors, "" for none.
         load: Share of the stall torque, signed, -1..1, None if unknown.
@@ -153,9 +168,7 @@ class HeadEvent(Struct, frozen=True):
         number: Number of the event, from 1.
         t_s: The rig's own time.
         text: Description in one line.
-        kind: "message" (of the bus, the camera or a program's request), "saccade_start",
-            "saccade_landing", "blink", "target", "person_arrived", "person_left", "track_finished"
-            or "cue".
+        kind: Kind of event.
         subject: Number of the person, name of the target, of the track or of the cue, "" for none.
     """
 
@@ -217,12 +230,13 @@ class HeadReport(Struct, frozen=True):
 
 def head_state(tick: Tick) -> HeadState:
     """Return the state of a head in a tick."""
-    percept, leads = tick.percept, tick_control_source(tick)
-    chooses = not leads.overrides_gaze
+    percept, source = tick.percept, tick.control_source
+    chooses = not source.overrides_gaze
+    gaze, headline = _gaze(tick, source)
     return HeadState(
         tick.t_s,
         _joints(tick),
-        _gaze(tick),
+        gaze,
         tuple(_person(face, percept.age_s(tick.t_s)) for face in percept.faces)
         if percept is not None
         else (),
@@ -233,8 +247,8 @@ def head_state(tick: Tick) -> HeadState:
         tick.client_control,
         tick.tracks,
         percept.captured_s if percept is not None else None,
-        leads,
-        head_activity(tick).headline,
+        source,
+        headline,
         tick.conversation,
         tick.target.saliences if chooses else (),
         tick.target.plan if chooses else "",
@@ -243,56 +257,95 @@ def head_state(tick: Tick) -> HeadState:
 
 def _joints(tick: Tick) -> dict[str, JointReading]:
     guard, state = tick.guard_result, tick.joints
-    count = len(guard.joints)
+    unknown = (None,) * len(guard.joints)
     columns = zip(
         guard.joints,
         guard.desired_rad or tick.desired_rad,
         guard.command_rad,
         state.position_rad,
         state.velocity_rad_s,
-        [not measured for measured in state.measured] or [False] * count,
-        guard.why or [""] * count,
-        _values_or_none(state.torque, count),
-        state.fault or [""] * count,
-        _values_or_none(state.load, count),
-        _values_or_none(state.temperature_c, count),
-        _values_or_none(state.voltage_v, count),
-        [tick.t_s - at_s for at_s in state.measured_s] or [0.0] * count,
+        [measured is False for measured in state.measured or unknown],
+        [why or "" for why in guard.why or unknown],
+        state.torque or unknown,
+        [fault or "" for fault in state.fault or unknown],
+        state.load or unknown,
+        state.temperature_c or unknown,
+        state.voltage_v or unknown,
+        [tick.t_s - at_s for at_s in state.measured_s] or [0.0] * len(unknown),
         strict=True,
     )
     return {row[0]: JointReading(*row) for row in columns}
 
 
-def _values_or_none(values: Sequence[Any], count: int) -> Sequence[Any]:
-    return values or [None] * count
-
-
-def _gaze(tick: Tick) -> GazeReading:
-    pose, gaze, does = tick.pose, tick.gaze, head_activity(tick)
-    leads, part = tick_control_source(tick), tick.target.part
-    chooses = not leads.overrides_gaze
-    # A client's target is a gaze target; held joints have none.
-    target = (
-        target_name(tick.target)
-        if tick.client_control.kind != "joint" and tick.controlled_by
-        else does.target
-    )
-    sight = add(line_of_sight(pose, left=True), line_of_sight(pose, left=False))
-    return GazeReading(
-        target,
-        does.reason,
+def _gaze(tick: Tick, source: ControlSource) -> tuple[GazeReading, str]:
+    """Return the gaze and the head's activity; while a client is in control, only that."""
+    pose, gaze, target, guard = tick.pose, tick.gaze, tick.target, tick.guard_result
+    name, reason, phase, kind = target_name(target), target.why, str(gaze.phase), target.kind
+    part = PART_NAMES[target.part] if target.part is not None else None
+    headline = _looks_text(target)
+    sentence = control_sentence(source, tick.t_s)
+    if source.kind == "track":
+        headline = f"{sentence}, and {headline}"
+    elif source.overrides_gaze:
+        headline = reason = sentence
+        kind, part = source.kind, None
+        if source.kind in ("person", "pointer"):
+            headline = reason = sentence + _distance_text(tick)
+        elif source.kind == "joint":
+            name, phase = f"{' and '.join(source.joints)} held", "held"
+        else:
+            name = phase = source.kind
+    if guard.level == "torque_off" and source.kind not in ("stopped", "parking"):
+        headline = reason = f"the torque is off: {' and '.join(guard.critical_reasons[:1])}"
+    reading = GazeReading(
+        name,
+        reason,
         gaze.gaze_point_world_m,
-        yaw_pitch(unit(sight)),
+        yaw_pitch(cyclopean_direction(tick)),
         pose.p_world_head_m,
         pose.head_rad,
         pose.eye_left_rad,
         pose.eye_right_rad,
         (pose.lid_left, pose.lid_right),
-        gaze.phase if does.phase == "blink" else does.phase,
+        phase,
         gaze.blink,
-        tick.target.kind if chooses else leads.kind,
-        PART_NAMES[part] if chooses and part is not None else None,
+        kind,
+        part,
     )
+    return reading, headline
+
+
+def _looks_text(target: Target) -> str:
+    """Return the gaze's activity as the predicate of a sentence about the head."""
+    match target.kind:
+        case "rest":
+            return "looks ahead: nobody is visible"
+        case "glance":
+            return "looks around: nobody is visible"
+        case "search":
+            return "looks for a person who has left"
+        case "away":
+            return "looks away for a moment"
+        case "face":
+            part = f" ({PART_NAMES[target.part]})" if target.part is not None else ""
+            return f"looks at person {target.id}{part}"
+        case "thing":
+            return "looks at a moving object"
+        case kind:
+            return "looks at its point" if kind == ORDERED else f"looks at a {kind}"
+
+
+def _distance_text(tick: Tick) -> str:
+    """Return the gaze's distance from the chosen point, "" if it reaches the point."""
+    limited = tick.gaze.limited
+    if tick.target.kind != ORDERED or not limited:
+        return ""
+    error = degrees(gaze_error(tick.target.p_world_m, tick.pose))
+    ends = (
+        f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
+        for one in limited
+    )
+    return f"; {error:.0f} deg off: {', '.join(ends)}"
 
 
 def _person(face: Face, age_s: float) -> Person:

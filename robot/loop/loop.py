@@ -19,40 +19,27 @@ from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.chooser import TargetChooser
-from gazerig.robot.loop.command_choices import (
-    Menus,
-    refuse_impossible,
-    refuse_out_of_range,
-)
-from gazerig.robot.loop.command_executor import CommandExecutor
-from gazerig.robot.loop.command_queue import CommandQueue
-from gazerig.robot.loop.look_point import LastObservation, LookPoints
-from gazerig.robot.loop.real_time import freeze_objects
-from gazerig.robot.loop.stop_control import StopControl
+from gazerig.robot.loop.commands import CommandExecutor, CommandQueue, refuse_out_of_range
 from gazerig.robot.loop.tick import Tick as Tick
 from gazerig.robot.loop.tick import stopped_result
+from gazerig.robot.loop.timing import freeze_objects
 from gazerig.robot.loop.track_choices import TrackChoices, TrackInfo
-from gazerig.robot.model.client_control import ClientControl
-from gazerig.robot.model.clock import Clock, RealClock
+from gazerig.robot.model.clock import Clock, LoopParams, RealClock
 from gazerig.robot.model.commands import (
-    NO_TRACK,
     AnyCommand,
     Ask,
     Command,
     Jog,
     MoveOpponent,
     Play,
-    Speak,
     Tune,
     check_command,
 )
-from gazerig.robot.model.conversation import Conversation
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.moved_opponent import TickClockOpponent
 from gazerig.robot.model.reply import Ticket
-from gazerig.robot.model.types import JointAngles
+from gazerig.robot.model.scene import MovableOpponent
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.safety.guard import Guard
@@ -90,7 +77,9 @@ class Robot:
         pixels: Converts pixels of a camera frame to points in the world.
         messages: Lines for the events of the next tick; other components add theirs.
 
-    closing_events: the camera's messages as it was closed
+    Attributes:
+        newest: The newest tick, None before the first.
+        closing_events: The camera's messages as it was closed.
     """
 
     def __init__(
@@ -112,36 +101,23 @@ class Robot:
         pixels: PixelToWorld,
         messages: list[str] | None = None,
     ) -> None:
-        self.body = body
-        self.camera = camera
-        self.perception = perception
-        self.attention: TargetChooser = attention
-        self._kinematics = kinematics
-        self._poses = poses
+        self.body, self.kinematics = body, kinematics
+        self.camera, self.perception = camera, perception
+        self.poses, self.attention, self.conversation_gaze = poses, attention, conversation
+        self.oculomotor, self.lids, self.animation = oculomotor, lids, animation
+        self.track_choices, self.guard, self.tune, self.pixels = tracks, guard, tune, pixels
+        self.messages = messages if messages is not None else []
+        self.newest: Tick | None = None
+        self.closing_events: tuple[str, ...] = ()
         self._scanpath = scanpath
-        self._conversation_gaze = conversation
-        self._oculomotor = oculomotor
-        self._menus = Menus(conversation, lids, animation.expressions, tracks)
-        self._animation = animation
-        self._tracks = tracks
-        self._guard = guard
         self._gaze_m: Vec3 | None = None
         self._commands = CommandQueue()
-        self._lead = ClientControl()
-        self._conversation = Conversation()
-        self._messages: list[str] = messages if messages is not None else []
-        self.closing_events: tuple[str, ...] = ()
-        self._stop = StopControl(self._messages)
-        self._looks = LookPoints(pixels)
-        self._executor = CommandExecutor(
-            body, self._lead, self._stop, self._menus, attention, oculomotor, animation, tracks,
-            kinematics, guard, tune, self._messages, self._looks, self._conversation,
-        )  # fmt: skip
+        self._executor = CommandExecutor(self)
 
     @property
     def stopped(self) -> str:
         """Return the reason for a stop, "" while the robot moves."""
-        return self._stop.stop_reason
+        return self._executor.stop.reason
 
     def command(self, command: Command) -> Ticket:
         """Queue a command for the next tick. Thread-safe.
@@ -155,11 +131,11 @@ class Robot:
         """
         command = check_command(command)
         if isinstance(command, Jog):
-            refuse_out_of_range(command, self.body.names, self._guard.limits)
+            refuse_out_of_range(command, self.body.names, self.guard.limits)
         if isinstance(command, MoveOpponent) and self._executor.opponent is None:
             raise ValueError("no opponent to move: the run is in no world with a boxer")
-        if isinstance(command, Play):  # only a recording has the text of a track
-            command = structs.replace(command, yaml="")
+        if isinstance(command, Play):  # only a recording defines a track
+            command = structs.replace(command, definition=None)
         return self.replay_command(command)
 
     def replay_command(self, command: Command) -> Ticket:
@@ -169,23 +145,24 @@ class Robot:
             ValueError: As ``command``.
         """
         command = check_command(command)
-        refuse_impossible(
-            command, self.menus, self.body.names, self._animation, self._tracks, self._guard.limits
-        )
+        self._executor.refuse_impossible(command)
         return self._commands.add(command)
 
-    def set_opponent(self, opponent: TickClockOpponent) -> None:
-        """Let commands move a boxer of the emulated world."""
-        self._executor.opponent = opponent
+    def set_opponent(self, opponent: MovableOpponent, start_s: Callable[[], float | None]) -> None:
+        """Let commands move a boxer of the emulated world.
+
+        Args:
+            opponent: The boxer.
+            start_s: Returns the start of its scene, None before.
+        """
+        self._executor.opponent = opponent, start_s
 
     def report(self, line: str) -> None:
         """Add a line to the events of the next tick; only for the loop's thread."""
-        self._messages.append(line)
+        self.messages.append(line)
 
     def ask(self, menu: str, choice: str) -> None:
-        """Choose a behaviour, a mode of conversation or a wink from the next tick on.
-
-        Thread-safe.
+        """Choose from a menu from the next tick on. Thread-safe.
 
         Raises:
             ValueError: There is no such menu or choice; the message lists the available ones.
@@ -193,16 +170,12 @@ class Robot:
         self.command(Ask(menu, choice))
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return the choices of ``ask``: menu -> choices, the present one first."""
-        return self._menus.choices(self.attention.top_down)
+        """Return the choices of ``Ask``: menu -> choices, the present one first."""
+        return self._executor.menus()
 
     def tracks(self) -> tuple[TrackInfo, ...]:
         """Return all tracks with their fit to this rig."""
-        return self._tracks.all_tracks(self._guard.limits)
-
-    def joint_latencies_s(self) -> tuple[float, ...]:
-        """Return the time of every joint from a command to its motion. Thread-safe."""
-        return self._tracks.latencies_s()
+        return self.track_choices.all_tracks(self.guard.limits)
 
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
         """Open camera and bus, switch the torque on and start from the present angles.
@@ -241,21 +214,21 @@ class Robot:
 
     def _initialize(self, t_s: float, goals: JointAngles) -> None:
         """Initialize every component with the present angles of the joints."""
-        self._guard.reset(t_s, goals)
+        self.guard.reset(t_s, goals)
         joints = self.body.read(t_s)
-        pose = self._kinematics.forward(joints)
-        self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
-        self._looks.newest = LastObservation(pose)
+        pose = self.kinematics.forward(joints)
+        self.poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
+        self.newest = None
         self.attention.reset(t_s)
-        self._conversation_gaze.reset(t_s)
+        self.conversation_gaze.reset(t_s)
         self._scanpath.reset(t_s)
         self._gaze_m = None
-        self._oculomotor.reset(t_s, pose)
-        self._animation.reset(t_s)
+        self.oculomotor.reset(t_s, pose)
+        self.animation.reset(t_s)
         self._executor.reset()
         self._executor.commanded_rad = goals
 
-    def tick(self, t_s: float, dt_s: float, watch: Callable[[Tick], None] | None = None) -> Tick:
+    def tick(self, t_s: float, dt_s: float, watch: Callable[[Tick], object] | None = None) -> Tick:
         """Read, perceive, choose, plan, guard, write; then reply to the commands.
 
         Args:
@@ -280,59 +253,57 @@ class Robot:
             self._commands.give_replies(t_s)
 
     def _tick(self, t_s: float, dt_s: float) -> Tick:
+        executor = self._executor
         commands = self._execute_commands(t_s)
+        lead, stop, conversation = executor.lead, executor.stop, executor.conversation
         joints = self.body.read(t_s)
-        pose = self._kinematics.forward(joints)
-        self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
-        if self._executor.models_took_over():
-            self._oculomotor.reset(t_s, pose)
+        pose = self.kinematics.forward(joints)
+        self.poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
+        if executor.models_took_over():
+            self.oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)
-        percept = self.perception.see(detections, self._poses)
-        if self._conversation.active:
-            self._executor.follow_turn(self._conversation_gaze, t_s)
+        percept = self.perception.see(detections, self.poses)
+        executor.follow_turn(t_s)
         chosen = self.attention.choose(percept, pose, t_s)
-        chosen = self._executor.direct_by_track(chosen, percept, pose, t_s)
-        target = self._lead.target(chosen, percept, t_s)
+        executor.react_by_track(chosen, percept, pose, t_s)
+        target = lead.target(chosen, percept, t_s)
         rests_s = self._scanpath.rests_until_s
-        target = self._conversation_gaze.look(
-            target, pose.p_world_head_m, t_s, self._lead.active, rests_s, percept
+        target = self.conversation_gaze.look(
+            target, pose.p_world_head_m, t_s, lead.state.active, rests_s, percept
         )
         # What appears delays the saccades under way (Reingold & Stampe 2002), so the gaze stays.
-        settled = self._oculomotor.has_arrived and not self.attention.reacts
+        settled = self.oculomotor.has_arrived and not self.attention.reacts
         target = self._scanpath.wander(
             target, percept, t_s, settled, pose.p_world_head_m, self._gaze_m
         )
-        offset = self._animation.step(t_s)
-        loudness = self._animation.loudness
-        if loudness is None and self._conversation.state.state == "speaking":
+        offset = self.animation.step(t_s)
+        loudness = self.animation.loudness
+        if loudness is None and conversation.state.state == "speaking":
             loudness = 1.0
-        self._oculomotor.speak(loudness)
-        gaze = self._oculomotor.step(target, pose, t_s, dt_s, offset)
+        self.oculomotor.speak(loudness)
+        gaze = self.oculomotor.step(target, pose, t_s, dt_s, offset)
         self._gaze_m = gaze.gaze_point_world_m
-        desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)
-        if stopped := self._stop.stop_reason:
-            self._stop.keep_released(self.body, joints, t_s)
-            self._tracks.latency.interrupt()
-            guard_result = stopped_result(joints, desired, stopped, self.body.names)
+        desired = lead.pose_rad or self.kinematics.inverse(gaze, offset.joints_rad)
+        if stop.reason:
+            stop.keep_released(joints, t_s)
+            guard_result = stopped_result(joints, desired, stop.reason, self.body.names)
         else:
-            held = bool(self._lead.pose_rad)
-            self._guard.limp = self.body.relax_idle(desired, joints, t_s, held)
-            guard_result = self._guard.check(desired, joints, self._frame_age_s(percept, t_s), t_s)
-            self._messages += self._guard.take_reports()
+            guard_result = self.guard.check(desired, joints, self._frame_age_s(percept, t_s), t_s)
+            self.messages += self.guard.take_reports()
             self.body.write(guard_result.command_rad)
-            self._tracks.latency.add(t_s, guard_result.command_rad, joints)
-        self._executor.commanded_rad = guard_result.command_rad
-        converges = not self._kinematics.one_pan
-        lead = self._lead.measure(target, pose, joints.position_rad, converges, t_s)
-        events = (*self._messages, *self.body.bus.events(), *self.camera.events())
-        self._messages.clear()
-        tick = Tick(
-            t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
-            stopped, self._lead.controlled_by, lead, self._tracks.states(t_s), False,
-            self._conversation.state,
+        executor.commanded_rad = guard_result.command_rad
+        executor.remember_people(percept)
+        converges = not self.kinematics.one_pan
+        events = (*self.messages, *self.body.bus.events(), *self.camera.events())
+        self.messages.clear()
+        self.newest = Tick(
+            t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events,
+            commands, stop.reason,
+            lead.measure(target, pose, joints.position_rad, converges, t_s),
+            self.track_choices.states(t_s),
+            conversation=conversation.state,
         )  # fmt: skip
-        self._looks.see(tick)
-        return tick
+        return self.newest
 
     def park(
         self,
@@ -353,10 +324,15 @@ class Robot:
             again: Returns whether to skip the rest; called at every step.
             watch: Called at every step with the last tick and the changes since.
         """
-        self._guard.start_gently()
-        self.body.wake()
-        newest = self._looks.newest
+        self.guard.start_gently()
+        newest = self.newest
         rate_hz, start_s, slot = params.rate_hz, clock.now_s(), 0
+
+        def show(joints: JointState, result: GuardResult) -> None:
+            if watch is not None and newest is not None:
+                pose, events = self.kinematics.forward(joints), self.body.bus.events()
+                watch(newest.parking_tick(t_s, joints, pose, result, events, self.stopped))
+
         end_s = start_s + PARK_S + 0.5 / rate_hz
         last = int(PARK_S * rate_hz)
         while (slot := max(slot, int((clock.now_s() - start_s) * rate_hz + 1e-6)) + 1) <= last:
@@ -366,18 +342,17 @@ class Robot:
             if t_s > end_s or (again is not None and again()):
                 return False
             if stops := self._commands.take_stops():
-                for stop in stops:
-                    self._commands.reply(stop, self._executor.execute(stop.command, t_s))
-                if watch is not None and isinstance(newest, Tick):
-                    watch(newest.stopped_tick(t_s, self._stop.stop_reason, self.body.bus.events()))
+                for command, ticket in stops:
+                    self._commands.reply(ticket, self._executor.execute(command, t_s))
+                if newest is not None:
+                    joints = newest.joints
+                    show(joints, stopped_result(joints, pose_rad, self.stopped, self.body.names))
                 self._commands.give_replies(t_s)
                 return False
             joints = self.body.read(t_s)
-            guard_result = self._guard.check(pose_rad, joints, 0.0, t_s)
-            self.body.write(guard_result.command_rad)
-            if watch is not None and isinstance(newest, Tick):
-                pose, events = self._kinematics.forward(joints), self.body.bus.events()
-                watch(newest.parking_tick(t_s, joints, pose, pose_rad, guard_result, events))
+            result = self.guard.check(pose_rad, joints, 0.0, t_s)
+            self.body.write(result.command_rad)
+            show(joints, result)
             errors = zip(pose_rad, joints.position_rad, strict=True)
             if max(abs(desired - now) for desired, now in errors) < radians(2.0):
                 return True
@@ -402,23 +377,19 @@ class Robot:
     def _execute_commands(self, t_s: float) -> tuple[AnyCommand, ...]:
         """Execute and return the queued commands, and end a control that was not renewed."""
         taken: list[Any] = []
-        for waiting in self._commands.take() if self._commands else ():
-            command = self._looks.resolve_pixel(waiting.command)
-            if isinstance(command, Ask) and command.menu == "track":
-                command = Play("" if command.choice == NO_TRACK else command.choice)
-            if isinstance(command, Play | Speak):
-                command = self._tracks.complete(command, self._guard.limits)
+        for queued, ticket in self._commands.take():
+            command = self._executor.complete(queued)
             taken.append(command)
-            self._commands.reply(waiting, self._executor.execute(command, t_s))
+            self._commands.reply(ticket, self._executor.execute(command, t_s))
         self._executor.end_expired(t_s)
         return tuple(taken)
 
     def _frame_age_s(self, percept: Percept | None, t_s: float) -> float:
         """Return the age of the frame that the gaze depends on.
 
-        A target chosen by a client, and a neck or a point of a track, do not depend on the camera.
+        A target chosen by a client, and the neck of a track, do not depend on the camera.
         """
-        if not self._lead.needs_camera or self._animation.tracks.replaces_gaze:
+        if not self._executor.lead.needs_camera or self.animation.tracks.replaces_gaze:
             return 0.0
         return t_s - percept.captured_s if percept is not None else inf
 
@@ -442,7 +413,7 @@ class TickLoop:
         clock: Clock,
         params: LoopParams,
         stop: Callable[[float], str | None],
-        watch: Callable[[Tick], None],
+        watch: Callable[[Tick], object],
     ) -> None:
         self._robot, self._clock, self._stop, self._watch = robot, clock, stop, watch
         self._period_s = 1.0 / params.rate_hz
@@ -482,7 +453,7 @@ def run(
     clock: Clock,
     params: LoopParams,
     stop: Callable[[float], str | None],
-    watch: Callable[[Tick], None],
+    watch: Callable[[Tick], object],
 ) -> LoopCount:
     """Tick until ``stop(seconds)`` returns a reason or a driver fails; see ``TickLoop``."""
     loop = TickLoop(robot, clock, params, stop, watch)

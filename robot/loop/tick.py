@@ -1,19 +1,21 @@
 """Inputs and decisions of one tick, and its record."""
 
 from msgspec import UNSET, Struct, UnsetType
-from msgspec.structs import replace
 
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, unit
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target, Vec3
+from gazerig.gaze.types import PART_NAMES, GazeCommand, GazeState, Percept, Target, Vec3, body_name
 from gazerig.robot.model.commands import AnyCommand
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
+    NO_CONVERSATION,
+    ControlSource,
     ControlState,
+    ConversationState,
     TrackState,
+    control_source,
 )
-from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 
@@ -24,7 +26,6 @@ class Tick(Struct, frozen=True, gc=False, omit_defaults=True):
         events: Texts of events on the bus and of the camera.
         commands: Commands executed at the beginning of this tick.
         stopped: Reason for a stop, "" while the robot moves.
-        controlled_by: Client that controls gaze or joints, and its command; "" without one.
         client_control: State of the newest client's control, with arrival at its target.
         tracks: Tracks that play, and the last ones that have ended, in the order of their numbers.
         conversation: State of the conversation.
@@ -44,36 +45,59 @@ class Tick(Struct, frozen=True, gc=False, omit_defaults=True):
     events: tuple[str, ...] = ()
     commands: tuple[AnyCommand, ...] = ()
     stopped: str = ""
-    controlled_by: str = ""
     client_control: ControlState = NO_CLIENT_CONTROL
     tracks: tuple[TrackState, ...] = ()
     parking: bool = False
     conversation: ConversationState = NO_CONVERSATION
+
+    @property
+    def controlled_by(self) -> str:
+        """Return the client that controls gaze or joints, and its command; "" without one."""
+        return self.client_control.client
+
+    @property
+    def control_source(self) -> ControlSource:
+        """Return the source of control of the head."""
+        return control_source(self.stopped, self.parking, self.client_control, self.tracks)
+
+    @property
+    def camera_conditions(self) -> tuple[str, ...]:
+        """Return the conditions that impair the camera, each with its remedy."""
+        return self.detections.conditions if self.detections is not None else ()
+
+    @property
+    def estimated_joints(self) -> tuple[str, ...]:
+        """Return the joints whose servos have no feedback.
+
+        A hobby servo takes a goal and reports no position. Its position is estimated as its goal,
+        moved at its known speed: no sensor detects sticking, slipping or oscillation.
+        """
+        rows = zip(self.guard_result.joints, self.joints.measured, strict=False)
+        return tuple([name for name, measured in rows if not measured])
 
     def parking_tick(
         self,
         t_s: float,
         joints: JointState,
         pose: GazeState,
-        desired_rad: JointAngles,
         guard_result: GuardResult,
         events: tuple[str, ...],
+        stopped: str = "",
     ) -> "Tick":
-        """Return a later tick of parking, with this tick's percept and without a client."""
+        """Return a later tick of parking, with this tick's percept and without a client.
+
+        Args:
+            t_s: Its time.
+            joints: Measured joints.
+            pose: Measured poses of head and eyes.
+            guard_result: Result of the guard.
+            events: Texts of events on the bus.
+            stopped: Reason for which a client has stopped the parking head, "" while it moves.
+        """
         return Tick(
             t_s, joints, pose, self.detections, self.percept, self.target, self.gaze,
-            desired_rad, guard_result, events, parking=True,
+            guard_result.desired_rad, guard_result, events, stopped=stopped, parking=not stopped,
         )  # fmt: skip
-
-    def stopped_tick(self, t_s: float, stopped: str, events: tuple[str, ...]) -> "Tick":
-        """Return a later tick in which a client has stopped the parking head."""
-        guard_result = stopped_result(
-            self.joints, self.desired_rad, stopped, self.guard_result.joints
-        )
-        parking = self.parking_tick(
-            t_s, self.joints, self.pose, self.desired_rad, guard_result, events
-        )
-        return replace(parking, stopped=stopped, parking=False)
 
 
 class TorqueEnabled(Struct, frozen=True, gc=False, tag=True):
@@ -131,3 +155,10 @@ def stopped_result(
 def cyclopean_direction(tick: Tick) -> Vec3:
     """Return the unit mean of both measured lines of sight, in the world."""
     return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
+
+
+def target_name(target: Target) -> str:
+    """Return a target's name for users, e.g. "face 3: left eye"."""
+    kind = "motion" if target.kind == "thing" else target.kind
+    name = body_name(kind, target.id)
+    return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"

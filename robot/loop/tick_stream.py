@@ -1,4 +1,6 @@
-"""Stream of ticks to other processes, encoded in batches, once for all receivers.
+"""Observers of every tick, and the stream of ticks to other processes.
+
+The stream is encoded in batches, once for all receivers.
 
 If each tick is encoded at its end, neither code nor encoder are in the processor's cache; a
 batch several times per second takes a third of that time. MessagePack keeps every number bit for
@@ -8,7 +10,7 @@ bit.
 import re
 from collections.abc import Callable
 from math import inf
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -16,7 +18,6 @@ from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
 
 from gazerig.gaze.types import Percept
-from gazerig.robot.loop.observers import failure_text
 from gazerig.robot.loop.tick import BodyRecord, Tick, TickRecord
 
 T = TypeVar("T")
@@ -24,6 +25,44 @@ LIVE_S = 0.0399  # slightly below 40 ms, so that rounding does not make it 45
 """Time between two batches of a run in real time."""
 SIMULATED_S = 0.2
 """Time between two batches in simulated time, without viewers."""
+
+
+class Observers(Generic[T]):
+    """Functions that are called with every value; a function that raises is removed.
+
+    Args:
+        report: Receives one line about each removed function.
+    """
+
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
+        self._observers: dict[str, Callable[[T], object]] = {}
+
+    def __bool__(self) -> bool:
+        """Return whether there is any."""
+        return bool(self._observers)
+
+    def add(self, name: str, update: Callable[[T], object]) -> None:
+        """Add a function under a name for messages."""
+        self._observers = {**self._observers, name: update}
+
+    def update(self, value: T) -> list[object]:
+        """Call all functions with a value, such as a tick; return their results."""
+        results = []
+        for name, update in tuple(self._observers.items()):
+            try:
+                results.append(update(value))
+            except Exception as error:
+                del self._observers[name]
+                self._report(failure_text(name, error))
+        return results
+
+
+def failure_text(name: str, error: Exception) -> str:
+    """Return a message that the run continues without a failed observer."""
+    what = " ".join(str(error).split())
+    why = f"{type(error).__name__}: {what}" if what else type(error).__name__
+    return f"{name} failed ({why}); the rig continues without it"
 
 
 class TickBatch(NamedTuple):
@@ -41,7 +80,10 @@ class TickBatch(NamedTuple):
 
 
 class TickStream:
-    """A stream of ticks to sinks in batches; used only in the loop's thread.
+    """A stream of ticks in batches; used only in the loop's thread.
+
+    Attributes:
+        sinks: Receive each batch; one returns False if it loses a batch.
 
     Args:
         report: Receives one line about each sink that fails and is removed.
@@ -49,16 +91,12 @@ class TickStream:
     """
 
     def __init__(self, report: Callable[[str], None], every_s: float = LIVE_S) -> None:
-        self._report, self._every_s = report, every_s
-        self._sinks: tuple[tuple[str, Callable[[TickBatch], bool]], ...] = ()
+        self._every_s = every_s
+        self.sinks = Observers[TickBatch](report)
         self._records: list[TickRecord] = []
         self._newest: Tick | None = None
         self._due_s = -inf
         self._percept: Percept | None | UnsetType = UNSET
-
-    def add_sink(self, name: str, take: Callable[[TickBatch], bool]) -> None:
-        """Add a sink, which returns False if it loses a batch."""
-        self._sinks = (*self._sinks, (name, take))
 
     def update(self, tick: Tick) -> None:
         """Add a tick of a run that is not recorded."""
@@ -80,16 +118,10 @@ class TickStream:
         if newest is None or not records:
             return
         self._records = []
-        if not self._sinks:
-            return
-        batch = TickBatch(encode(records), len(records), newest)
-        for sink in self._sinks:
-            try:
-                if not sink[1](batch):
-                    self._percept = UNSET  # it may have lost the present percept
-            except Exception as error:
-                self._sinks = tuple([one for one in self._sinks if one is not sink])
-                self._report(failure_text(sink[0], error))
+        if self.sinks and False in self.sinks.update(
+            TickBatch(encode(records), len(records), newest)
+        ):
+            self._percept = UNSET  # a sink may have lost the present percept
 
 
 def encode(value: object) -> bytes:
@@ -97,11 +129,9 @@ def encode(value: object) -> bytes:
 
     Raises:
         TypeError: A part of it has a type that msgspec does not support.
+        UnicodeEncodeError: A text, such as a file name, cannot be written as UTF-8.
     """
-    try:
-        return _encoder.encode(value)
-    except UnicodeEncodeError:  # a file or device name that is not text
-        return _encoder.encode(_to_utf8(msgspec.to_builtins(value, enc_hook=to_plain)))
+    return _encoder.encode(value)
 
 
 def decode(data: bytes, kind: type[T]) -> T:
@@ -128,17 +158,6 @@ def to_plain(value: Any) -> Any:
 def to_array(kind: Any, value: Any) -> Any:
     """Return a list as a NumPy array, for msgspec's decoders."""
     return np.array(value, float)
-
-
-def _to_utf8(value: Any) -> Any:
-    """Replace texts that cannot be written as UTF-8."""
-    if isinstance(value, str):
-        return value.encode(errors="replace").decode()
-    if isinstance(value, tuple | list):
-        return [_to_utf8(item) for item in value]
-    if isinstance(value, dict):
-        return {_to_utf8(key): _to_utf8(item) for key, item in value.items()}
-    return value
 
 
 _NOT_FINITE = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]")

@@ -1,7 +1,17 @@
-"""Clocks: a real one, which waits, and a simulated one, whose time is set."""
+"""The loop's rate, and clocks: a real one, which waits, and a simulated one, whose time is set."""
 
 import time
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Annotated, Protocol
+
+from gazerig.params import Bounds
+
+
+@dataclass(frozen=True)
+class LoopParams:
+    """The control rate."""
+
+    rate_hz: Annotated[float, Bounds(20, 1000), "control rate"] = 200.0
 
 
 class Clock(Protocol):

@@ -2,9 +2,6 @@
 
 A command is plain data: Python, the sockets, HTTP and recordings use these classes as they are. It
 is executed at the next tick. A recording of a run contains it, so that the run can be repeated.
-
-The latch of a stop stores the client that stopped, the shortest duration, and the clients that may
-resume. Its times are those of the ticks, so a repeated run is stopped and resumed as recorded.
 """
 
 import re
@@ -15,7 +12,8 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 import msgspec
 from msgspec import Meta, Struct, structs
 
-from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED, Track
+from gazerig.params import unknown_text
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """Value of a key in a rig's YAML."""
@@ -51,7 +49,6 @@ _Position = Annotated[float, Meta(ge=0.0, le=MAX_DURATION_S)]
 _Number = Annotated[int, Meta(ge=0, le=2**53)]
 """Number of a person or a track: every client and recording can hold it."""
 _SpeechTime = Annotated[float, Meta(ge=0.0, le=MAX_SPEECH_S)]
-_Lead = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], ...]
 _ControlTime = Annotated[float, Meta(gt=0.0, le=86_400.0)]
 _TalkTime = Annotated[float, Meta(ge=0.0, le=600.0)]
 
@@ -204,10 +201,8 @@ class Play(ClientCommand, frozen=True):
         times: Number of repetitions, 0 for the track's own.
         from_s: Position in the track, in s or as the name of a cue, at which it begins.
         loop: Repeat it until it is ended, as a track with ``loop: true`` does.
-        lead_s: Latencies of all joints, by which the motion of a track with sound is early; set on
-            execution for the recording.
         sound_s: Duration of its sound, set on execution.
-        yaml: The track, set on execution if its file is newer than the run.
+        definition: The track, set on execution if its file is newer than the run.
     """
 
     track: _Name
@@ -215,9 +210,8 @@ class Play(ClientCommand, frozen=True):
     times: Annotated[int, Meta(ge=0, le=MAX_COUNT)] = 0
     from_s: _Position | _Name = 0.0
     loop: bool = False
-    lead_s: _Lead | None = None
     sound_s: _Position = 0.0
-    yaml: str = ""
+    definition: Track | None = None
 
 
 class EndTrack(ClientCommand, frozen=True):
@@ -292,15 +286,13 @@ class Speak(ClientCommand, frozen=True):
         level: Level of the rig's table that opens the mouth, "" without one.
         mouth: (time in s, opening 0..1) pairs; the mouth shuts at the end.
         volume: Factor 0..1.
-        lead_s: As in Play.
     """
 
     sound: str
     duration_s: Annotated[float, Meta(gt=0.0, le=MAX_SPEECH_S)]
     level: str = ""
-    mouth: Annotated[tuple[tuple[_SpeechTime, _Share], ...], Meta(max_length=40_000)] = ()
+    mouth: Annotated[tuple[tuple[_SpeechTime, _Share], ...], Meta(max_length=61_000)] = ()
     volume: _Share = 1.0
-    lead_s: _Lead | None = None
 
 
 class MoveOpponent(Command, frozen=True, tag="opponent"):
@@ -331,7 +323,7 @@ class Resume(ClientCommand, frozen=True):
     """Switch the torque on again after a stop, at the present angles, and continue slowly.
 
     Only the client that stopped may resume, or one with ``confirmed``; the rules are in
-    ``gazerig.robot.model.commands``.
+    ``gazerig.robot.loop.stop``.
 
     Attributes:
         confirmed: A person has confirmed that no hand is in the mechanism.
@@ -417,59 +409,145 @@ def as_value(value: Any) -> Value:
     return value
 
 
-MIN_HOLD_S = 2.0
-"""Shortest duration of a stop, also for the client that stopped."""
-MIN_RESUME_GAP_S = 1.0
-"""A resume within this time of the same client's last one is refused, and counts as the last."""
-_MAX_ASKERS = 32
+# --- requests besides commands: questions, and changes of parameters
 
 
-class StopLatch:
-    """The latch of a stop, with the rules for a resume.
+class Hello(Request, frozen=True):
+    """Check the version of the messages; return the rig's identity."""
+
+    version: int
+
+
+class ReadStatus(Request, frozen=True, tag="status"):
+    """Name and state of the rig, and its last messages."""
+
+
+class State(Request, frozen=True):
+    """Newest tick, and the events numbered above after."""
+
+    after: int = 0
+
+
+class ReadMenus(Request, frozen=True, tag="menus"):
+    """Behaviours, modes of conversation, lid movements; the present one first."""
+
+
+class Tracks(Request, frozen=True):
+    """Tracks, and why the rig refuses them."""
+
+
+class Parameters(Request, frozen=True):
+    """Rules and defaults of keys with a prefix."""
+
+    prefix: str = ""
+
+
+class Get(Request, frozen=True):
+    """Present values of keys with a prefix."""
+
+    prefix: str = ""
+
+
+class Unsaved(Request, frozen=True):
+    """Values that differ from the rig's file."""
+
+
+class Characters(Request, frozen=True):
+    """Names of characters."""
+
+
+class Set(Request, frozen=True):
+    """Apply values of keys, all of them or none."""
+
+    changes: dict[str, Any]
+
+
+class Save(Request, frozen=True):
+    """Write the values to the rig's file, or to an absolute path."""
+
+    path: str | None = None
+
+
+class Revert(Request, frozen=True):
+    """Apply the values of the rig's file again."""
+
+
+class Character(Request, frozen=True):
+    """Apply another character to the rig."""
+
+    name: str
+
+
+class SayPiece(Request, frozen=True):
+    """Say a piece of a stream, base64 of signed 16 bits; returns the unheard length in s."""
+
+    pcm: bytes
+    rate_hz: int
+    channels: int = 1
+    last: bool = False
+    volume: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
+
+
+class Fault(Request, frozen=True):
+    """Execute a fault command of emulated servos (gazerig emulate)."""
+
+    text: str
+
+
+Layer = Literal["sight"]
+Viewpoint = Literal["face", "both", "over its shoulder", "from above"]
+
+
+class ShowView(Request, frozen=True):
+    """Choose what the page's view of the head shows; the page does it, not the rig.
 
     Attributes:
-        why: Reason for the newest stop, "" while the robot is not stopped.
+        layers: Layers for all browsers, None for no change: lines of sight.
+        look_from: Viewpoint of this browser, None for no change.
     """
 
-    def __init__(self) -> None:
-        self.why = ""
-        self._stoppers: set[str] = set()
-        self._stopped_s = 0.0
-        self._asked_s: dict[tuple[str, bool], float] = {}
+    layers: tuple[Layer, ...] | None = None
+    look_from: Viewpoint | None = None
 
-    def stop(self, command: Stop, t_s: float) -> bool:
-        """Stop, or renew a stop; return whether it is a new one."""
-        new = not self.why
-        if new:
-            self._stoppers.clear()
-        if len(self._stoppers) < _MAX_ASKERS:
-            self._stoppers.add(command.who)
-        self._stopped_s = t_s
-        self.why = command.why or "stopped"
-        return new
 
-    @property
-    def stopped_by(self) -> str:
-        """Return the clients that stopped, "" if unknown."""
-        return " and ".join(sorted(filter(None, self._stoppers)))
+Question = (
+    Hello | ReadStatus | State | ReadMenus | Tracks | Parameters | Get | Unsaved | Characters
+)  # fmt: skip
+Change = Set | Save | Revert | Character | SayPiece | Fault
+SLOW: frozenset[str] = frozenset((*map(verb, get_args(Change)), "say"))
+"""Requests that may read or write files."""
+ORDERS: dict[str, type[Command]] = {
+    name: kind for name, kind in COMMANDS.items() if kind not in (Tune, Speak)
+}
+"""Commands that programs may send; the requests set and say check and prepare the others."""
+REQUESTS: dict[str, type[Request]] = {
+    verb(kind): kind for kind in (*get_args(Question | Change), *ORDERS.values())
+}
 
-    def refusal(self, command: Resume, t_s: float) -> str:
-        """Return the reason for a refusal of a resume, "" to accept; each call is an attempt."""
-        asker = (command.who, command.confirmed)
-        last_s = self._asked_s.pop(asker, None)
-        self._asked_s[asker] = t_s
-        while len(self._asked_s) > _MAX_ASKERS:
-            del self._asked_s[next(iter(self._asked_s))]
-        if last_s is not None and t_s - last_s < MIN_RESUME_GAP_S:
-            return f"too many requests to resume: wait {MIN_RESUME_GAP_S:g} s between two"
-        left_s = self._stopped_s + MIN_HOLD_S - t_s
-        if left_s > 0.0:
-            return f"a stop lasts at least {MIN_HOLD_S:g} s: try again in {left_s:.1f} s"
-        if not command.confirmed and self._stoppers != {command.who}:
-            by = f"stopped by {self.stopped_by}" if self.stopped_by else "another client stopped it"
-            return f"{by}: another client must confirm that no hand is in the mechanism"
-        return ""
 
-    def lift(self) -> None:
-        """Lift the stop."""
-        self.why = ""
+def read_request(data: object) -> Request:
+    """Return a request from the values of its JSON; fields with defaults may be omitted.
+
+    Raises:
+        ValueError: It is not a request; the message names the place, the rule and the fields.
+    """
+    try:
+        request: Request = msgspec.convert(data, Question | Change | AnyCommand)
+    except msgspec.ValidationError as error:
+        kind = REQUESTS.get(str(data.get("do"))) if isinstance(data, dict) else None
+        if kind is None:
+            name = str(data.get("do", "")) if isinstance(data, dict) else ""
+            raise ValueError(unknown_text("request", name, REQUESTS)) from None
+        raise ValueError(f"{error}; {_fields_text(kind)}") from None
+    if isinstance(request, Tune | Speak):
+        raise ValueError("this is done by the requests set and say, which check it")
+    return request
+
+
+def _fields_text(kind: type[Request]) -> str:
+    """Return the names of a request's fields, with their choices."""
+    fields = []
+    for field in structs.fields(kind):
+        choices = ", ".join(str(one) for one in get_args(field.type) if isinstance(one, str))
+        fields.append(f"{field.name} ({choices})" if choices else field.name)
+    return f"{verb(kind)} has {', '.join(fields) or 'no fields'}"

@@ -1,6 +1,6 @@
-"""Source of control of the head, as a value and as text.
+"""Source of control of the head, state of a conversation and of tracks: as values and as text.
 
-The page, the status line, other programs and Python all use these texts.
+The page, the status line, other programs, recordings and Python all use these values and texts.
 """
 
 from collections.abc import Sequence
@@ -8,10 +8,13 @@ from typing import Literal
 
 from msgspec import Struct
 
-ControlKind = Literal["gaze", "person", "pointer", "joint", "track", "stopped", "parking"]
-"""gaze: no client, the head chooses; person: a person or program chose the target; pointer: the
-target is a person's mouse pointer; joint: joints are held."""
+from gazerig.gaze.track.track import FINISHED as FINISHED
+from gazerig.gaze.types import TurnState
 
+CHARACTERS_PER_S = 15.0
+"""Rate of speech, for the end of a text without times: about 150 English words a minute."""
+SHOWN_S = 2.0
+"""Time for which an ended track is shown."""
 _WORTH_TELLING_S = 1.0
 """Shorter durations of control are not shown."""
 _MINUTE_S = 60.0
@@ -29,7 +32,7 @@ class ControlState(Struct, frozen=True):
         kind: Kind while it is active: a person or program that chose the target, a person's mouse
             pointer, or held joints.
         who: Name of the client.
-        description: Command as text, e.g. "look at 1 0 0.3".
+        description: Command as text, e.g. "look at 1 0 0.3", "neck_yaw at 17.2 deg".
         joints: Held joints.
         since_s: Start of the same client's uninterrupted control of this kind.
     """
@@ -45,9 +48,13 @@ class ControlState(Struct, frozen=True):
     joints: tuple[str, ...] = ()
     since_s: float = 0.0
 
+    @property
+    def client(self) -> str:
+        """Return the client and its command, e.g. "ann: look at 1 0 0.3", "" if not active."""
+        return f"{self.who or 'a client'}: {self.description}" if self.active else ""
 
-FINISHED = "finished"
-"""End reason of a track that was played to its end."""
+
+NO_CLIENT_CONTROL = ControlState()
 
 
 class TrackState(Struct, frozen=True):
@@ -95,15 +102,38 @@ class TrackState(Struct, frozen=True):
         return not self.end_reason
 
 
-SHOWN_S = 2.0
-"""Time for which an ended track is shown."""
-NO_CLIENT_CONTROL = ControlState()
+class ConversationState(Struct, frozen=True):
+    """State of the conversation after a tick.
+
+    Attributes:
+        number: Number of the state since the start, 0 before the first; a plan that changes during
+            speech keeps it.
+        state: What the voice agent does; interrupted: it listens, after an interruption.
+        partner: Perception's number of the person, None if unknown.
+        since_s: Start of the state.
+        ends_s: Planned end of speech, None if unknown.
+        confidence: Confidence of the planned end, 0..1.
+        text: Beginning of the spoken text.
+        who: Name of the client, "" without one.
+        end_reason: Reason for an end that no client has requested, "" otherwise.
+    """
+
+    number: int = 0
+    state: TurnState = "idle"
+    partner: int | None = None
+    since_s: float = 0.0
+    ends_s: float | None = None
+    confidence: float = 0.0
+    text: str = ""
+    who: str = ""
+    end_reason: str = ""
 
 
-def playing(tracks: Sequence[TrackState]) -> TrackState | None:
-    """Return the newest track that plays, with a sound if one has it; None without a track."""
-    found = [track for track in reversed(tracks) if track.is_playing]
-    return next((track for track in found if track.sound), found[0] if found else None)
+NO_CONVERSATION = ConversationState()
+
+ControlKind = Literal["gaze", "person", "pointer", "joint", "track", "stopped", "parking"]
+"""gaze: no client, the head chooses; person: a person or program chose the target; pointer: the
+target is a person's mouse pointer; joint: joints are held."""
 
 
 class ControlSource(Struct, frozen=True):
@@ -147,28 +177,13 @@ def control_source(
     if lead.active:
         who = lead.who or "a client"
         return ControlSource(lead.kind, who, lead.description, lead.joints, lead.since_s)
-    if (track := playing(tracks)) is not None:
-        names = " and ".join(one.name for one in tracks if one.is_playing)
-        owns = tuple(joint for one in tracks if one.is_playing for joint in one.owns)
-        return ControlSource("track", track.who, names, owns, track.since_s)
+    if playing := [track for track in tracks if track.is_playing]:
+        # The newest, with a sound if one has it.
+        newest = max(playing, key=lambda track: (bool(track.sound), track.number))
+        owns = tuple(joint for track in playing for joint in track.owns)
+        names = " and ".join(track.name for track in playing)
+        return ControlSource("track", newest.who, names, owns, newest.since_s)
     return ControlSource()
-
-
-def control_title(leader: ControlSource) -> str:
-    """Return the source of control in two or three words, e.g. "neck_yaw held", "stopped"."""
-    match leader.kind:
-        case "gaze":
-            return "looks freely"
-        case "person":
-            return f"controlled by {leader.who}"
-        case "pointer":
-            return "looks at the pointer"
-        case "joint":
-            return f"{' and '.join(leader.joints) or 'joints'} held"
-        case "track":
-            return leader.description
-        case _:
-            return leader.kind
 
 
 def control_sentence(leader: ControlSource, t_s: float) -> str:
@@ -182,23 +197,23 @@ def control_sentence(leader: ControlSource, t_s: float) -> str:
         case "gaze":
             return "no client is in control: the head chooses its own targets"
         case "person":
-            said = f"{leader.who} makes it {leader.description}"
+            text = f"{leader.who} makes it {leader.description}"
         case "pointer":
-            said = f"it looks at the pointer of {leader.who}"
+            text = f"it looks at the pointer of {leader.who}"
         case "joint":
-            said = f"{leader.who} holds {leader.description}"
+            text = f"{leader.who} holds {leader.description}"
         case "track":
-            said = f"it plays {leader.description}" + (f" for {leader.who}" if leader.who else "")
+            text = f"it plays {leader.description}" + (f" for {leader.who}" if leader.who else "")
             if leader.joints:
                 count = len(leader.joints)
-                said += f", with {', '.join(leader.joints) if count < 4 else f'{count} joints'}"
+                text += f", with {', '.join(leader.joints) if count < 4 else f'{count} joints'}"
         case "stopped":
             return f"stopped: {leader.description}; the torque is off"
         case "parking":
             return "it moves to its parking pose, then the torque goes off"
     lasted_s = t_s - leader.since_s if leader.since_s is not None else 0.0
     if lasted_s < _WORTH_TELLING_S:
-        return said
+        return text
     if lasted_s < 2.0 * _MINUTE_S:
-        return f"{said}, for {lasted_s:.0f} s"
-    return f"{said}, for {lasted_s / _MINUTE_S:.0f} min"
+        return f"{text}, for {lasted_s:.0f} s"
+    return f"{text}, for {lasted_s / _MINUTE_S:.0f} min"

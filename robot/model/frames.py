@@ -10,7 +10,7 @@ from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import copysign, degrees, radians, sqrt
+from math import copysign, degrees, hypot, radians
 from typing import Annotated, Literal
 
 from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
@@ -231,19 +231,14 @@ Quaternion = tuple[float, float, float, float]
 def quaternion(R: Mat3) -> Quaternion:
     """Return a rotation matrix as a unit quaternion with w >= 0."""
     (a, b, c), (d, e, f), (g, h, i) = R
-    w, x, y, z = (
-        0.5 * sqrt(max(0.0, 1.0 + trace)) for trace in (a + e + i, a - e - i, e - a - i, i - a - e)
+    # Each row is four times a component, times the quaternion; the largest is the most exact.
+    rows = (
+        (1.0 + a + e + i, h - f, c - g, d - b),
+        (h - f, 1.0 + a - e - i, b + d, c + g),
+        (c - g, b + d, 1.0 - a + e - i, f + h),
+        (d - b, c + g, f + h, 1.0 - a - e + i),
     )
-    # The largest is exact; the others follow from sums and differences with it.
-    largest = max(w, x, y, z)
-    if largest == w:
-        found = (w, (h - f) / (4 * w), (c - g) / (4 * w), (d - b) / (4 * w))
-    elif largest == x:
-        found = ((h - f) / (4 * x), x, (b + d) / (4 * x), (c + g) / (4 * x))
-    elif largest == y:
-        found = ((c - g) / (4 * y), (b + d) / (4 * y), y, (f + h) / (4 * y))
-    else:
-        found = ((d - b) / (4 * z), (c + g) / (4 * z), (f + h) / (4 * z), z)
-    sign = copysign(1.0, found[0])
-    w, x, y, z = (sign * value for value in found)
+    row = max(rows, key=lambda row: hypot(*row))
+    size = copysign(hypot(*row), row[0])
+    w, x, y, z = (value / size for value in row)
     return w, x, y, z

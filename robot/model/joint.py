@@ -8,8 +8,9 @@ points are measured and interpolated linearly. Angles are in rad at the joint, s
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil, floor, inf, pi, radians
-from typing import Annotated, Literal, NamedTuple, Protocol
+from typing import Annotated, Literal, NamedTuple
 
 from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S, FAR_DEG
 from gazerig.drivers.bus.servo_models import SERVOS, ServoModelInfo
@@ -41,118 +42,77 @@ class JointLimit(NamedTuple):
         )
 
 
-class LinearLinkage(NamedTuple):
-    """A linear linkage: steps = zero + slope * angle and angle = (steps - zero) * rate."""
+class Linkage:
+    """A linkage between a servo and its joint: a gear, or lines between measured points.
 
-    zero: float
-    slope: float
-    rate: float
-
-
-class Linkage(Protocol):
-    """A linkage between a servo and its joint.
+    The outermost lines extrapolate beyond the points.
 
     Attributes:
         steepest: Largest number of steps per rad, above 0.
         rising: Whether more steps give a larger angle.
-        line: The line of a linear linkage, otherwise None.
-    """
-
-    steepest: float
-    rising: bool
-    line: "LinearLinkage | None"
-
-    def steps(self, angle_rad: float) -> float:
-        """Return the servo position of a joint angle, not rounded."""
-
-    def angle_rad(self, steps: float) -> float:
-        """Return the joint angle of a servo position."""
-
-    def rate_rad(self, steps: float) -> float:
-        """Return the signed angle in rad per step at a servo position."""
-
-
-class ConstantRatio:
-    """A gear with a constant ratio; implements Linkage.
+        line: Steps at 0 rad and signed steps per rad of a gear, otherwise None.
 
     Args:
-        zero: Steps at 0 rad.
-        slope: Signed steps per rad.
-    """
-
-    def __init__(self, zero: float, slope: float) -> None:
-        self.line: LinearLinkage | None = LinearLinkage(zero, slope, 1.0 / slope)
-        self._zero, self._slope, self._rate = self.line
-        self.steepest = abs(slope)
-        self.rising = slope > 0.0
-
-    def steps(self, angle_rad: float) -> float:
-        """Return the servo position of a joint angle, not rounded."""
-        return self._zero + self._slope * angle_rad
-
-    def angle_rad(self, steps: float) -> float:
-        """Return the joint angle of a servo position."""
-        return (steps - self._zero) * self._rate
-
-    def rate_rad(self, steps: float) -> float:
-        """Return the signed angle in rad per step."""
-        return self._rate
-
-
-class MeasuredLinkage:
-    """A linear interpolation of measured points; implements Linkage.
-
-    The outermost lines extrapolate beyond the points.
-
-    Args:
-        angles_rad: Rising angles, at least two.
-        steps: Steps, all rising or all falling.
+        angles_rad: Rising angles of measured points, at least two; of a gear only 0.
+        steps: Their steps, all rising or all falling.
+        slope: Signed steps per rad of a gear, None for measured points.
 
     Raises:
         ValueError: The points are not of that form; the message gives the position.
     """
 
-    def __init__(self, angles_rad: Sequence[float], steps: Sequence[float]) -> None:
-        if len(angles_rad) < 2 or len(angles_rad) != len(steps):
-            raise ValueError("a linkage needs at least two points, each an angle and a position")
-        up = steps[-1] > steps[0]
-        for i in range(1, len(steps)):
-            if angles_rad[i] <= angles_rad[i - 1]:
-                raise ValueError(f"the angles of a linkage must increase; point {i + 1} does not")
-            if (steps[i] > steps[i - 1]) != up or steps[i] == steps[i - 1]:
-                raise ValueError(
-                    "the positions of a linkage must all increase or all decrease; "
-                    f"point {i + 1} does not: measure it again"
-                )
-        self.rising = up
-        self.line: LinearLinkage | None = None
-        self._angles, self._steps = tuple(angles_rad), tuple(float(s) for s in steps)
+    def __init__(
+        self, angles_rad: Sequence[float], steps: Sequence[float], slope: float | None = None
+    ) -> None:
+        self._angles, self._steps = tuple(angles_rad), tuple(map(float, steps))
+        self.line = (self._steps[0], slope) if slope is not None else None
+        self._slopes = (slope,) if slope is not None else _slopes(self._angles, self._steps)
+        self._rate = 1.0 / self._slopes[0]
+        self.rising = self._rate > 0.0
+        self.steepest = max(map(abs, self._slopes))
         # Keys rise for both directions of the rod.
-        self._order = 1.0 if up else -1.0
+        self._order = 1.0 if self.rising else -1.0
         self._keys = tuple(self._order * s for s in self._steps)
-        self._slopes = tuple(
-            (self._steps[i] - self._steps[i - 1]) / (self._angles[i] - self._angles[i - 1])
-            for i in range(1, len(steps))
-        )
-        self._last = len(self._slopes) - 1
-        self.steepest = max(abs(slope) for slope in self._slopes)
 
     def steps(self, angle_rad: float) -> float:
         """Return the servo position of a joint angle, not rounded."""
-        i = min(max(bisect_right(self._angles, angle_rad) - 1, 0), self._last)
+        if self.line is not None:
+            return self.line[0] + self.line[1] * angle_rad
+        i = self._segment(self._angles, angle_rad)
         return self._steps[i] + self._slopes[i] * (angle_rad - self._angles[i])
 
     def angle_rad(self, steps: float) -> float:
         """Return the joint angle of a servo position."""
-        i = self._segment(steps)
+        if self.line is not None:
+            return (steps - self.line[0]) * self._rate
+        i = self._segment(self._keys, self._order * steps)
         return self._angles[i] + (steps - self._steps[i]) / self._slopes[i]
 
     def rate_rad(self, steps: float) -> float:
         """Return the signed angle in rad per step at a servo position."""
-        return 1.0 / self._slopes[self._segment(steps)]
+        if self.line is not None:
+            return self._rate
+        return 1.0 / self._slopes[self._segment(self._keys, self._order * steps)]
 
-    def _segment(self, steps: float) -> int:
-        return min(max(bisect_right(self._keys, self._order * steps) - 1, 0), self._last)
+    def _segment(self, points: Sequence[float], at: float) -> int:
+        return min(max(bisect_right(points, at) - 1, 0), len(self._slopes) - 1)
+
+
+def _slopes(angles: Sequence[float], steps: Sequence[float]) -> tuple[float, ...]:
+    """Return the slopes between measured points; raise ValueError if they are impossible."""
+    if len(angles) < 2 or len(angles) != len(steps):
+        raise ValueError("a linkage needs at least two points, each an angle and a position")
+    up = steps[-1] > steps[0]
+    for i in range(1, len(steps)):
+        if angles[i] <= angles[i - 1]:
+            raise ValueError(f"the angles of a linkage must increase; point {i + 1} does not")
+        if (steps[i] > steps[i - 1]) != up or steps[i] == steps[i - 1]:
+            raise ValueError(
+                "the positions of a linkage must all increase or all decrease; "
+                f"point {i + 1} does not: measure it again"
+            )
+    rows = zip(pairwise(steps), pairwise(angles), strict=True)
+    return tuple([(above - below) / (end - start) for (below, above), (start, end) in rows])
 
 
 _AngleOrPosition = Annotated[float, Bounds(-180, 4095)]
@@ -184,9 +144,6 @@ class JointParams:
     gains: Annotated[tuple[_Gain, _Gain, _Gain] | None, "Position P, I and D Gain of the servo; null: not changed"] = None
     torque_limit: Annotated[float | None, Bounds(0.05, 1),
         "share of its full drive that the servo may use (PWM Limit), which limits both torque and speed; null: not changed"] = None
-    limp_when_idle_s: Annotated[float | None, Bounds(0.2, 3600),
-        "torque off when nothing has moved the joint for so long, so that its servo stays cool and silent; not for joints that "
-        "gaze moves; a jaw without a spring drops; null: never"] = None
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -211,15 +168,16 @@ class JointParams:
                     f"{self.min_deg} and max_deg {self.max_deg} must be within"
                 )
         for key, angle in (("min_deg", self.min_deg), ("max_deg", self.max_deg)):
-            steps = linkage.steps(radians(angle))
-            if not facts.lowest <= steps <= facts.highest:
-                low, high = facts.lowest / facts.unit_steps, facts.highest / facts.unit_steps
-                if facts.unit == "steps":
-                    at = f"is at step {steps:.0f}, outside the servo's {low:.0f}..{high:.0f}"
-                else:
-                    at = f"is at {steps / facts.unit_steps:.0f} {facts.unit}, outside the "
-                    at += f"servo's {low:.0f}..{high:.0f} {facts.unit}"
-                raise ValueError(f"{key} {angle} {at}")
+            if fault := self.position_fault(linkage.steps(radians(angle))):
+                raise ValueError(f"{key} {angle} is at {fault}")
+
+    def position_fault(self, steps: float) -> str:
+        """Return a servo position as text if the servo cannot reach it, otherwise ""."""
+        facts = self.model_facts
+        if facts.lowest <= steps <= facts.highest:
+            return ""
+        low, high, at = (x / facts.unit_steps for x in (facts.lowest, facts.highest, steps))
+        return f"{at:.0f}, outside the servo's {low:.0f}..{high:.0f} {facts.unit}"
 
     @property
     def model_facts(self) -> ServoModelInfo:
@@ -248,11 +206,9 @@ class JointParams:
         facts = self.model_facts
         if self.transmission_points:
             angles, places = zip(*self.transmission_points, strict=True)
-            return MeasuredLinkage(
-                [radians(a) for a in angles], [facts.unit_steps * p for p in places]
-            )
+            return Linkage([radians(a) for a in angles], [facts.unit_steps * p for p in places])
         slope = self.sign * self.ratio * facts.steps_per_turn / (2.0 * pi)
-        return ConstantRatio(facts.unit_steps * self.zero, slope)
+        return Linkage((0.0,), (facts.unit_steps * self.zero,), slope)
 
     def steps(self, angle_rad: float) -> float:
         """Return the servo position of a joint angle, not rounded."""

@@ -7,11 +7,11 @@ lacks is open. Frames and signs are those of gaze.types; the world's origin is t
 yaw axis.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import asin, atan2, hypot, pi, sqrt
 from operator import itemgetter
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from gazerig.gaze.angles import (
     add,
@@ -116,7 +116,6 @@ class Kinematics:
         self._angles_of = itemgetter(*neck, *eyes, *lids_at)
         self._rates_of = itemgetter(*neck)
         self._wanted = tuple(GAZE_JOINTS.index(name) for name in self.names if name in GAZE_JOINTS)
-        self._desired_of = _make_picker(self._wanted)
         self._further = (0.0,) * (len(self.names) - len(self._wanted))
         self._pivot_m = params.pitch_axis_height_mm / 1e3
         self._base: Vec3 = (0.0, 0.0, params.lower_pitch_axis_height_mm / 1e3)
@@ -248,20 +247,18 @@ class Kinematics:
         head, left, right = command.head_rad, command.eye_left_rad, command.eye_right_rad
         shut, span = self._shut, self._span
         # In the order of GAZE_JOINTS.
-        angles = self._desired_of(
-            (
-                *left,
-                *right,
-                0.5 * (left[0] + right[0]),
-                0.5 * (left[1] + right[1]),
-                shut[0] + command.lid_left * span[0],
-                shut[1] + command.lid_right * span[1],
-                shut[2] + command.lower_left * span[2],
-                shut[3] + command.lower_right * span[3],
-                *head,
-            )
+        angles = (
+            *left,
+            *right,
+            0.5 * (left[0] + right[0]),
+            0.5 * (left[1] + right[1]),
+            shut[0] + command.lid_left * span[0],
+            shut[1] + command.lid_right * span[1],
+            shut[2] + command.lower_left * span[2],
+            shut[3] + command.lower_right * span[3],
+            *head,
         )
-        return (*angles, *(further_rad or self._further)) if self._further else angles
+        return (*[angles[i] for i in self._wanted], *(further_rad or self._further))
 
     def further_rad(self, base_rad: Angles2) -> JointAngles:
         """Return the angles of the joints that gaze does not move: 0 except for a lower neck."""
@@ -274,43 +271,18 @@ def _share(value: float) -> float:
     return value if 0.0 < value < 1.0 else 1.0 if value >= 1.0 else 0.0
 
 
-def _make_picker(places: Sequence[int]) -> Callable[[Sequence[float]], JointAngles]:
-    """Return a function that picks the values at some positions of a sequence."""
-    if len(places) > 1:
-        picked: Any = itemgetter(*places)
-    else:  # for one position ``itemgetter`` returns no tuple
-        picked = lambda values: tuple([values[i] for i in places])  # noqa: E731
-    chosen: Callable[[Sequence[float]], JointAngles] = picked
-    return chosen
-
-
-class GazeError(NamedTuple):
-    """The gaze error in rad.
-
-    Attributes:
-        left, right: Angle between each eye's line of sight and the point.
-        whole: The larger of both; if one linkage pans both eyes, that of their mean line of
-            sight, from midway between them.
-    """
-
-    left: float
-    right: float
-    whole: float
-
-
-def gaze_error(p_world_m: Vec3, pose: GazeState, converges: bool = True) -> GazeError:
-    """Return the angular error between a point and the lines of sight.
+def gaze_error(p_world_m: Vec3, pose: GazeState, converges: bool = True) -> float:
+    """Return the angle between a point and the line of sight of the worse eye, rad.
 
     Args:
         p_world_m: The point.
         pose: Poses of head and eyes.
-        converges: Whether each eye pans separately.
+        converges: Whether each eye pans separately; if one linkage pans both, the angle is that of
+            their mean line of sight, from midway between them.
     """
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
     to_left = sub(p_world_m, pose.p_world_eye_left_m)
     to_right = sub(p_world_m, pose.p_world_eye_right_m)
-    error_left, error_right = angle_between(left, to_left), angle_between(right, to_right)
-    whole = max(error_left, error_right)
     if not converges:
-        whole = angle_between(add(left, right), add(to_left, to_right))
-    return GazeError(error_left, error_right, whole)
+        return angle_between(add(left, right), add(to_left, to_right))
+    return max(angle_between(left, to_left), angle_between(right, to_right))

@@ -5,7 +5,7 @@ Units are rad, m and s. Joints are in the order of ``order_joints``.
 
 import re
 from collections.abc import Iterable
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from msgspec import Struct
 
@@ -82,24 +82,6 @@ class JointState(Struct, frozen=True, gc=False):
     measured: tuple[bool, ...] = ()
 
 
-class JointOutcome(NamedTuple):
-    """The guard's result for one joint.
-
-    Attributes:
-        desired_rad: Requested angle.
-        commanded_rad: Sent angle.
-        reason: Reason why they differ, "" if they do not.
-    """
-
-    desired_rad: float
-    commanded_rad: float
-    reason: str
-
-
-LIMP = "limp"
-"""The guard's remark about a joint that has no torque because it is idle."""
-
-
 class GuardResult(Struct, frozen=True, gc=False):
     """The guard's result of a tick.
 
@@ -109,7 +91,7 @@ class GuardResult(Struct, frozen=True, gc=False):
             torque must be switched off).
         reasons: "joint: reason" for every changed joint, empty if ok.
         desired_rad: Requested joint angles.
-        why: One reason per joint, or ``LIMP``, "" if it was not changed; empty if all are "".
+        why: One reason per joint, "" if it was not changed; empty if all are "".
         critical_reasons: The reasons that determine the level.
         joints: Names of the joints.
     """
@@ -121,25 +103,6 @@ class GuardResult(Struct, frozen=True, gc=False):
     why: tuple[str, ...] = ()
     critical_reasons: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
-
-    @property
-    def limp(self) -> tuple[str, ...]:
-        """Return the joints that have no torque because they are idle."""
-        found = zip(self.joints, self.why, strict=False)
-        return tuple([joint for joint, why in found if why == LIMP])
-
-    def applied(self, joint: str) -> JointOutcome:
-        """Return the result for one joint.
-
-        Raises:
-            ValueError: There is no such joint; the message lists the joints.
-        """
-        if joint not in self.joints:
-            raise ValueError(f"no joint {joint!r}; available: {', '.join(self.joints)}")
-        i = self.joints.index(joint)
-        return JointOutcome(
-            self.desired_rad[i], self.command_rad[i], self.why[i] if self.why else ""
-        )
 
 
 class LoopFigures(Struct, frozen=True):

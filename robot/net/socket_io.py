@@ -11,7 +11,7 @@ import stat
 import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any
 
 import msgspec
 
@@ -126,57 +126,7 @@ def connect_to_socket(path: Path, within_s: float) -> socket.socket:
     return caller
 
 
-class Peer(NamedTuple):
-    """Process and user at the other end of a socket."""
-
-    pid: int
-    uid: int
-
-
-class Listener:
-    """Accepts callers of this user.
-
-    Args:
-        end: Listening socket.
-    """
-
-    def __init__(self, end: socket.socket) -> None:
-        self._end = end
-
-    def accept(self) -> socket.socket:
-        """Wait for a caller, who is not identified yet.
-
-        Raises:
-            OSError: the listener was closed.
-        """
-        return self._end.accept()[0]
-
-    def identify(self, caller: socket.socket) -> Peer | None:
-        """Return the caller, None if it may not connect.
-
-        Raises:
-            OSError: the caller is gone.
-        """
-        found = identify_peer(caller)
-        # The folder is closed to others; this is a second check.
-        return found if found.uid == os.getuid() else None
-
-    def __enter__(self) -> Self:
-        """Return the listener itself."""
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        """Close it."""
-        self.close()
-
-    def close(self) -> None:
-        """Stop accepting callers; a pending ``accept`` raises OSError."""
-        with contextlib.suppress(OSError):
-            self._end.shutdown(socket.SHUT_RDWR)
-        self._end.close()
-
-
-def listen(path: Path) -> Listener:
+def listen(path: Path) -> socket.socket:
     """Listen on a socket file that only its owner may open; an existing one is replaced.
 
     Raises:
@@ -198,18 +148,27 @@ def listen(path: Path) -> Listener:
         raise SetupError(
             f"{path}: no socket can be created there ({error.strerror}); no remote control"
         ) from None
-    return Listener(listener)
+    return listener
 
 
-def identify_peer(end: socket.socket) -> Peer:
-    """Return the peer of a Unix socket.
+def shut(end: socket.socket) -> None:
+    """Close a socket; a thread that waits on it gets an OSError or its end."""
+    with contextlib.suppress(OSError):
+        end.shutdown(socket.SHUT_RDWR)
+    end.close()
 
-    Raises:
-        OSError: the connection is gone.
+
+def peer_pid(end: socket.socket) -> int | None:
+    """Return the process at the other end of a Unix socket, None if it is gone or another user's.
+
+    The folder is closed to others; this is a second check.
     """
-    data = end.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    try:
+        data = end.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    except OSError:
+        return None
     pid, uid, _ = struct.unpack("3i", data)
-    return Peer(pid, uid)
+    return int(pid) if uid == os.getuid() else None
 
 
 def remove_dead_sockets(path: Path) -> tuple[int, ...]:
@@ -276,9 +235,7 @@ class Wire:
 
     def close(self) -> None:
         """Close the connection; readers at both ends get its end."""
-        with contextlib.suppress(OSError):
-            self._end.shutdown(socket.SHUT_RDWR)
-        self._end.close()
+        shut(self._end)
         self._writing_end.close()
 
     def read_line(self, first_s: float | None, rest_s: float) -> bytes:

@@ -11,14 +11,14 @@ import os
 import socket
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Container
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from queue import SimpleQueue
+from typing import Any, NamedTuple
 
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.requests import ORDERS, REQUESTS
-from gazerig.robot.net import socket_io as remote_socket
+from gazerig.robot.model.commands import ORDERS
+from gazerig.robot.net import socket_io
 from gazerig.robot.net.excess import (
     CLOSED,
     REST_S,
@@ -31,7 +31,6 @@ from gazerig.robot.net.excess import (
 from gazerig.robot.net.request_handler import RequestHandler, is_stop
 from gazerig.robot.net.socket_io import (
     REQUEST_BYTES,
-    Listener,
     MalformedMessage,
     Wire,
     parse_line,
@@ -56,69 +55,47 @@ _PAUSE_S = 0.005
 """Pause between two packets of a program that sends more."""
 
 
-class WaitingRequest(NamedTuple):
-    """A request, or the answer to one that is already decided, in the order of arrival."""
+class _Waiting(NamedTuple):
+    """A request, or an answer that is already decided; stops: stops before it."""
 
-    request: object
-    answer: dict[str, object] | None = None
+    request: Any
+    answer: dict[str, object] | None
+    stops: int
 
 
-class RequestsAhead:
-    """The requests of one program that were received and not answered yet; thread-safe."""
+class _Program:
+    """A connected program, and its requests that were received and not answered yet.
 
-    def __init__(self) -> None:
-        self._changed = threading.Condition()
-        self._waiting: deque[WaitingRequest] = deque()
-        self._over = False
+    Attributes:
+        waiting: Requests and decided answers in the order of arrival; None after the last one.
+        stops: Number of stops received.
+        excess: Count of its messages that were too many.
+        received: Set when no request can follow.
+    """
+
+    def __init__(self, wire: Wire, peer: str) -> None:
+        self.wire, self.peer = wire, peer
+        self.waiting: SimpleQueue[_Waiting | None] = SimpleQueue()
+        self.stops = 0
+        self.excess = ExcessCount()
+        self.received = threading.Event()
 
     @property
     def is_full(self) -> bool:
         """Return whether too much waits; answers wait if the program does not read them."""
-        return len(self._waiting) >= MOST_AHEAD
+        return self.waiting.qsize() >= MOST_AHEAD
 
-    def add_request(self, request: object) -> None:
-        """Add a request."""
-        with self._changed:
-            self._waiting.append(WaitingRequest(request))
-            self._changed.notify()
+    def add(self, request: object, answer: dict[str, object] | None = None) -> None:
+        """Add a request, or an answer, which is sent after those of the earlier requests."""
+        self.waiting.put(_Waiting(request, answer, self.stops))
 
-    def add_answer(self, answer: dict[str, object], times: int = 1) -> None:
-        """Add an answer, which is sent after those of the earlier requests."""
-        with self._changed:
-            self._waiting.extend([WaitingRequest(None, answer)] * times)
-            self._changed.notify()
-
-    def refuse(self, reason: str, names: Container[str]) -> None:
-        """Refuse all requests with these names that wait."""
-        with self._changed:
-            kept = list(self._waiting)
-            self._waiting.clear()
-            for one in kept:
-                match one.request:
-                    case {"do": str(name), **rest} if name in names:
-                        tag = {"tag": rest["tag"]} if "tag" in rest else {}
-                        self._waiting.append(WaitingRequest(None, {"refused": reason, **tag}))
-                    case _:
-                        self._waiting.append(one)
-
-    def end(self) -> None:
-        """Mark the end: no request follows."""
-        with self._changed:
-            self._over = True
-            self._changed.notify()
-
-    def wait_for_end(self, within_s: float) -> None:
-        """Wait until no request can follow."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._over, within_s)
-
-    def take(self) -> WaitingRequest | None:
-        """Wait for the next request and remove it; return None after the last one."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._waiting or self._over)
-            if not self._waiting:
-                return None
-            return self._waiting.popleft()
+    def refusal(self, waiting: _Waiting) -> str:
+        """Return why a request is refused after what has arrived since, "" if it is not."""
+        if self.excess.is_over:
+            return CLOSED
+        # A resume from before a stop must not be executed after it.
+        is_order = isinstance(waiting.request, dict) and waiting.request.get("do") in ORDERS
+        return STOPPED if is_order and waiting.stops < self.stops else ""
 
 
 _NAMING = threading.Lock()
@@ -138,7 +115,7 @@ class RemoteServer:
         self._clock = RealClock()
         self._budget = TokenBucket(*ALL)
         self.path: Path | None = None
-        self._listener: Listener | None = None
+        self._listener: socket.socket | None = None
         self._lock = threading.Lock()
         self._wires: dict[Wire, None] = {}  # the least recently active first
         self._over = False
@@ -151,22 +128,18 @@ class RemoteServer:
             SetupError: no socket can be opened; the message names the reason.
         """
         uid = os.getuid()
-        folder = remote_socket.socket_folder(os.environ, uid)
-        remote_socket.make_private(folder, uid)
-        remote_socket.remove_dead_sockets(folder)
+        folder = socket_io.socket_folder(os.environ, uid)
+        socket_io.make_private(folder, uid)
+        socket_io.remove_dead_sockets(folder)
         with _NAMING:
-            self.path = remote_socket.unused_path(folder, os.getpid())
-            self._listener = remote_socket.listen(self.path)
+            self.path = socket_io.unused_path(folder, os.getpid())
+            self._listener = socket_io.listen(self.path)
         self._start(self._accept, self._listener)
         return self.path
 
     def serve(self, end: socket.socket) -> None:
         """Answer the requests of the page's process, which names its clients itself."""
-        wire = Wire(end, REQUEST_BYTES)
-        with self._lock:
-            self._wires[wire] = None
-        if not self._start(self._serve, wire, ""):
-            wire.close()
+        self._admit(end, "")
 
     def close(self) -> None:
         """Close all connections and remove the socket."""
@@ -174,10 +147,8 @@ class RemoteServer:
             self.path.unlink(missing_ok=True)
         with self._lock:
             self._over = True
-            listener, self._listener = self._listener, None
-        if listener is not None:
-            listener.close()
-        with self._lock:
+            if self._listener is not None:
+                socket_io.shut(self._listener)
             for wire in self._wires:
                 wire.close()
             threads = tuple(self._threads)
@@ -194,88 +165,66 @@ class RemoteServer:
             thread.start()
         return True
 
-    def _accept(self, listener: Listener) -> None:
-        """Start a thread for every program that connects."""
+    def _accept(self, listener: socket.socket) -> None:
+        """Accept the programs of this user that connect."""
         while not self._over:
             try:
-                end = listener.accept()
+                end, _ = listener.accept()
             except OSError:  # it was closed
                 return
-            self._admit(end, listener)
+            if (pid := socket_io.peer_pid(end)) is None:
+                end.close()
+            else:
+                self._admit(end, f"process {pid}")
 
-    def _admit(self, end: socket.socket, listener: Listener) -> None:
-        """Accept a program if it belongs to this user."""
-        try:
-            caller = listener.identify(end)
-        except OSError:  # gone already
-            caller = None
-        if caller is None:
-            end.close()
-            return
+    def _admit(self, end: socket.socket, peer: str) -> None:
+        """Answer a program's requests; one too many replaces the least recently active."""
         wire = Wire(end, REQUEST_BYTES)
         with self._lock:
-            if self._over:  # closed meanwhile: this connection would stay open
-                wire.close()
-                return
             if len(self._wires) >= _MOST:
                 # A client that wants to stop the head must always be accepted.
                 quietest = next(iter(self._wires))
                 del self._wires[quietest]
                 quietest.close()
             self._wires[wire] = None
-        peer = f"process {caller.pid}"
-        self._start(self._serve, wire, peer)
+        if not self._start(self._serve, _Program(wire, peer)):
+            wire.close()
 
-    def _serve(self, wire: Wire, peer: str) -> None:
+    def _serve(self, program: _Program) -> None:
         """Receive the requests of one program until it disconnects; a second thread answers them.
 
         So a stop is executed at once, whatever the program has sent before it.
         """
-        ahead = RequestsAhead()
-        if not self._start(self._answer_all, wire, peer, ahead):
-            wire.close()
+        if not self._start(self._answer_all, program):
+            program.wire.close()
             return
-        excess = ExcessCount()
         try:
-            while not excess.is_over and self._receive(wire, peer, ahead, excess):
+            while not program.excess.is_over and self._receive(program):
                 pass
-            if excess.is_over:
-                ahead.refuse(CLOSED, REQUESTS)
-                ahead.add_answer({"refused": CLOSED})
-                self._receive_for(REST_S, wire, peer, ahead, excess)
+            if program.excess.is_over:  # only stops, while the other thread sends the last answers
+                program.add(None, {"refused": CLOSED})
+                end_s = self._clock.now_s() + REST_S
+                while (left_s := end_s - self._clock.now_s()) > 0.0:
+                    if not self._receive(program, left_s):
+                        break
         finally:
-            ahead.end()
-        if excess.is_over:  # stops, while the other thread sends the last answers
-            self._receive_for(REST_S, wire, peer, ahead, excess)
-            wire.close()
+            program.received.set()
+            program.waiting.put(None)
 
-    def _receive_for(
-        self, seconds: float, wire: Wire, peer: str, ahead: RequestsAhead, excess: ExcessCount
-    ) -> None:
-        end_s = self._clock.now_s() + seconds
-        while (left_s := end_s - self._clock.now_s()) > 0.0:
-            if not self._receive(wire, peer, ahead, excess, left_s):
-                break
-
-    def _receive(
-        self,
-        wire: Wire,
-        peer: str,
-        ahead: RequestsAhead,
-        excess: ExcessCount,
-        within_s: float | None = None,
-    ) -> bool:
+    def _receive(self, program: _Program, within_s: float | None = None) -> bool:
         """Receive one line, and execute a stop; return whether another line can follow."""
-        if ahead.is_full or excess.is_over:
+        wire, excess = program.wire, program.excess
+        if program.is_full or excess.is_over:
             late_lines = wire.drop_lines(find_stop)
             excess.add(late_lines, self._clock.now_s())
             if not excess.is_over:
-                ahead.add_answer(_TOO_MANY, late_lines)
+                for _ in range(late_lines):
+                    program.add(None, _TOO_MANY)
             if not wire.has_line:  # let other threads work between two packets
                 self._clock.sleep_until(self._clock.now_s() + _PAUSE_S)
         try:
             line = wire.read_line(within_s, _REST_S)
-            late = ahead.is_full or excess.is_over
+            late = program.is_full or excess.is_over
             excess.add(late, self._clock.now_s())
             with self._lock:
                 if wire in self._wires:
@@ -283,39 +232,41 @@ class RemoteServer:
             request = parse_line(line) if not late or find_stop(line) >= 0 else None
         except MalformedMessage as error:
             if not excess.is_over:
-                ahead.add_answer({"refused": str(error)})
+                program.add(None, {"refused": str(error)})
             return not error.over
         except (EOFError, OSError) as error:
             return isinstance(error, TimeoutError)
         if is_stop(request):
-            # A resume from before a stop must not be executed after it.
-            ahead.refuse(STOPPED, ORDERS)
-            ahead.add_answer(self._execute(request, peer))
+            program.stops += 1
+            program.add(None, self._execute(request, program.peer))
         elif not late:
-            ahead.add_request(request)
+            program.add(request)
         elif not excess.is_over:
-            ahead.add_answer(_TOO_MANY)
+            program.add(None, _TOO_MANY)
         return True
 
-    def _answer_all(self, wire: Wire, peer: str, ahead: "RequestsAhead") -> None:
+    def _answer_all(self, program: _Program) -> None:
         """Answer the requests of one program in their order."""
         own = TokenBucket(*EACH)
         try:
-            while (waiting := ahead.take()) is not None:
+            while (waiting := program.waiting.get()) is not None:
                 answer = waiting.answer
-                if answer is None and (text := self._delay(own)):
-                    answer = {"refused": text}
+                if answer is None and (refused := self._delay(own) or program.refusal(waiting)):
+                    tag = waiting.request.get("tag") if isinstance(waiting.request, dict) else None
+                    answer = {"refused": refused} | ({"tag": tag} if tag is not None else {})
                 began_s = time.thread_time()
-                if not self._answer(wire, answer or self._execute(waiting.request, peer)):
+                if not self._answer(
+                    program.wire, answer or self._execute(waiting.request, program.peer)
+                ):
                     return
                 for budget in (own, self._budget):
                     budget.spend(time.thread_time() - began_s)
         finally:
             # A client that has closed, or reads nothing, may have sent a stop before.
-            ahead.wait_for_end(REST_S)
+            program.received.wait(REST_S)
             with self._lock:
-                self._wires.pop(wire, None)
-            wire.close()
+                self._wires.pop(program.wire, None)
+            program.wire.close()
 
     def _execute(self, request: object, peer: str) -> dict[str, object]:
         """Execute a request; return its answer."""

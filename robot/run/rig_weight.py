@@ -7,9 +7,8 @@ from typing import Literal, NamedTuple
 
 from gazerig.config.rig import Rig
 from gazerig.robot.description.statics import NECK_JOINTS, STRONG_SHARE, Statics
-from gazerig.robot.model.assumed_servo import AMBIENT_C, STALL_RISE_C
-from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.types import JointAngles
+from gazerig.robot.model.weight import AMBIENT_C, STALL_RISE_C, MassParams
 from gazerig.robot.run.rig_description import statics_of
 from gazerig.robot.run.rig_limits import park_rad
 

@@ -9,7 +9,6 @@ import numpy as np
 from gazerig.gaze.angles import add, angle_between, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Vec3
-from gazerig.robot.loop.feedback_basis import estimated_joints
 from gazerig.robot.loop.tick import Tick
 
 _FIXATION_RAD_S = radians(40.0)
@@ -84,7 +83,7 @@ class Summary:
                 "median": _percentile_deg(self._errors_mdeg, 50.0),
                 "p95": _percentile_deg(self._errors_mdeg, 95.0),
             },
-            "estimated": list(estimated_joints(last)) if last else [],
+            "estimated": list(last.estimated_joints) if last else [],
             "limited": dict(sorted(self._limited.items())),
             "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
         }

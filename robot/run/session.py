@@ -5,15 +5,14 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.loop.event_text import group_events, is_register_change
-from gazerig.robot.loop.interrupts import Interrupts
+from gazerig.robot.loop.events import group_events, is_register_change
 from gazerig.robot.loop.joint_faults import JointFaults
 from gazerig.robot.loop.loop import LoopCount, Tick, TickLoop
-from gazerig.robot.loop.observers import Observers
-from gazerig.robot.loop.power_down import Again, PowerDown
-from gazerig.robot.loop.real_time import SWITCH_INTERVAL, frozen_objects
+from gazerig.robot.loop.power_down import Again, Interrupts, PowerDown
+from gazerig.robot.loop.tick_stream import Observers
+from gazerig.robot.loop.timing import SWITCH_INTERVAL, frozen_objects
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.moved_opponent import BoxingScene
+from gazerig.robot.model.scene import BoxingScene
 from gazerig.robot.run.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.param_store import ParamStore
@@ -120,7 +119,7 @@ def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> Compose
         from gazerig.robot.run.rig_description import description_of  # with meshes
 
         info = run_info(rig, options)
-        shown = urdf(description_of(rig, looks=False), looks=False).xml
+        shown = urdf(description_of(rig), looks=False).xml
         recorder = Recorder(options.record, info, options.force, options.fast, shown)
         substitutes = substitutes._replace(body=recorder.wrap_body)
     assembly = assemble(rig, options, substitutes)
@@ -131,7 +130,6 @@ def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> Compose
         lambda: assembly.live_params.rig,
         assembly.clock,
         tuning.confined.folder,
-        assembly.robot.joint_latencies_s,
         options.fast,
         assembly.robot.report,
     )
@@ -204,7 +202,7 @@ class Session:
         self.stopped_by = "fault: unexpected error"
         self._count = LoopCount(0, 0, self.stopped_by)
         self._unreleased: tuple[str, ...] = ()
-        observers = Observers(self._say)
+        observers = Observers[Tick](self._say)
         if self._summary is not None:
             observers.add("the summary", self._summary.update)
         observers.add("the watch for faults", self._faults.update)

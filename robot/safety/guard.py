@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.types import LIMP, GuardResult, JointAngles, JointState, Level
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
 from gazerig.robot.safety.collisions import Collisions
 from gazerig.robot.safety.health import FAR_RAD, LEAD_RAD, JointHealth, StallDetector
 from gazerig.robot.safety.motion_limiter import LateTicks, LimitChange, MotionLimiter
@@ -54,9 +54,6 @@ class _Hold(NamedTuple):
 class Guard:
     """The check of all commands, tick by tick.
 
-    Attributes:
-        limp: Numbers of joints whose torque is off as they are idle; their commands follow them.
-
     Args:
         params: Thresholds and times.
         limits: One limit per joint.
@@ -80,20 +77,14 @@ class Guard:
         self._gentle_speed = radians(params.soft_start_speed_deg_s)
         self._late = LateTicks(period_s)
         self._soft = False
-        self._calm = (
-            False  # every joint followed in the last tick, and nothing has changed since then
-        )
-        self._names, self._numbers = joints, range(len(limits))
+        self._names = joints
         self._neck = tuple("neck" in name.split("_") for name in joints)
         self._motion = MotionLimiter(limits)
         self._change = LimitChange(self._motion, limits, reach)
         self._limits = self._motion.limits
-        self._short: dict[int, tuple[int, str]] = {}
-        self._findings = _findings(self._short, joints)
         self._health = JointHealth(limits)
         self._stuck = StallDetector(len(limits))
         self._collisions = Collisions(params.collisions, limits, joints)
-        self.limp: frozenset[int] = frozenset()
         self.reset(0.0, tuple(0.5 * (limit.low_rad + limit.high_rad) for limit in limits))
 
     def retune(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
@@ -105,12 +96,9 @@ class Guard:
         Raises:
             ValueError: A collision leaves no pose inside the limits; nothing has changed.
         """
-        collisions = Collisions(params.collisions, limits, self._names)
-        collisions.take_over_keepers(self._collisions)
-        self._collisions = collisions
+        self._collisions = Collisions(params.collisions, limits, self._names)
         self._gentle_speed = radians(params.soft_start_speed_deg_s)
         self._change.retune(limits)
-        self._calm = False
 
     def reset(self, t_s: float, command_rad: JointAngles) -> None:
         """Start slowly and at rest from the present goals on the bus."""
@@ -127,7 +115,6 @@ class Guard:
 
     def start_gently(self) -> None:
         """Move slowly for some time; each joint also until it first reaches its desired angle."""
-        self._calm = False
         for i in range(len(self._limits)):
             self._motion.forget_gaps(i)
         self._gentle = [True] * len(self._limits)
@@ -181,7 +168,6 @@ class Guard:
             return GuardResult(command, "hold", reasons, desired_rad, why, reasons, self._names)
         self._t_s = t_s
         if self._change.waiting or self._change.outside:
-            self._calm = False
             self._change.step(bool(self._collisions))
         dt_s, missed_s = self._late.split(since_s, t_s, LATE_S)
         if missed_s > 0.0:
@@ -197,54 +183,23 @@ class Guard:
         self, desired_rad: JointAngles, joints: JointState, no_frame: bool, dt_s: float
     ) -> GuardResult:
         """Move all joints; nearly every desired angle is returned unchanged."""
-        motion, far = self._motion, FAR_RAD
-        if not motion.easy_s <= dt_s <= 2.0 * motion.easy_s:
-            motion.update_easy_range(dt_s)
-        command, speed, goal = motion.command, motion.speed, motion.goal
-        usual = self._are_all_well(joints) and not no_frame
-        stale_s = self._t_s - JOINT_TIMEOUT_S
+        motion, stale_s = self._motion, self._t_s - JOINT_TIMEOUT_S
         short: dict[int, tuple[int, str]] = {}
         followed = True
-        rows = zip(
-            self._numbers, desired_rad, joints.position_rad, joints.measured_s, self._stuck.watched,
-            command, speed, goal, motion.easy_speed, motion.easy_low, motion.easy_high, strict=True,
-        )  # fmt: skip
-        for i, desired, position, at_s, watched, p, v, before, easy, low, high in rows:
-            near = -far <= p - position <= far and not watched
-            if near and at_s >= stale_s and (usual or self._is_well(i, joints, no_frame)):
-                wanted = (desired - p) / dt_s
-                if before is p and -easy <= wanted <= easy and -easy <= v <= easy and low <= desired <= high:  # fmt: skip
-                    command[i] = goal[i] = desired
-                    speed[i] = wanted
-                    continue
-                if motion.follow(i, desired, dt_s):
-                    continue
+        rows = zip(desired_rad, joints.position_rad, joints.measured_s, motion.command, strict=True)
+        for i, (desired, position, at_s, now) in enumerate(rows):
+            is_near = -FAR_RAD <= now - position <= FAR_RAD and not self._stuck.watched[i]
+            is_well = is_near and at_s >= stale_s and self._is_well(i, joints, no_frame)
+            if is_well and motion.follow(i, desired, dt_s):
+                continue
             followed = False
             unseen = no_frame and self._neck[i]
             outcome = self._move_joint(i, desired, joints, at_s >= stale_s, unseen, dt_s)
             if outcome[1]:
                 short[i] = outcome
-        self._calm = followed
         if followed:
             return GuardResult(desired_rad, "ok", (), desired_rad, (), (), self._names)
-        if short != self._short:  # findings often stay the same for many ticks
-            self._short, self._findings = short, _findings(short, self._names)
-        level, reasons, why, critical = self._findings
-        return GuardResult(tuple(command), level, reasons, desired_rad, why, critical, self._names)
-
-    def _are_all_well(self, joints: JointState) -> bool:
-        """Return whether only limits, ages and distances must be checked."""
-        calm = self._calm or not (
-            any(self._gentle) or any(self._held) or self._change.waiting or self._change.outside
-        )
-        return calm and not (
-            self._soft
-            or not self._health.fine
-            or self._collisions.exits
-            or self._collisions.still
-            or not all(joints.torque)
-            or any(joints.fault)
-        )
+        return self._result(short, desired_rad)
 
     def _is_well(self, i: int, joints: JointState, no_frame: bool) -> bool:
         """Return whether only limit, age and distance of a joint must be checked."""
@@ -265,7 +220,6 @@ class Guard:
 
     def _slow_down(self, i: int) -> None:
         """Make a joint continue slowly, as after torque is switched on."""
-        self._calm = False
         if not self._gentle[i]:
             self._motion.forget_gaps(i)
         self._gentle[i] = True
@@ -277,12 +231,6 @@ class Guard:
         """Move a joint; return the rank of its level and the reason, 0 and "" if it follows."""
         position = joints.position_rad[i]
         fault = joints.fault[i] if joints.fault else ""
-        if i in self.limp and not fault and joints.torque and not joints.torque[i]:
-            # The next motion begins at its position.
-            if isfinite(position) and position != self._motion.command[i]:
-                self._change.begin(i, position)
-                self._stuck.forget(i)
-            return 0, LIMP
         fresh = fresh and isfinite(position)
         hold = self._servo_hold(i, joints, fault, fresh)
         self._held[i] = hold is not None
@@ -403,31 +351,21 @@ class Guard:
         fast = abs(target - began) > limit.speed_rad_s * dt_s
         return self._health.why[i] or ("too fast" if fast else "too hard")
 
+    def _result(self, short: dict[int, tuple[int, str]], desired_rad: JointAngles) -> GuardResult:
+        """Return the result of a tick; its level is that of the worst joint.
 
-class _Findings(NamedTuple):
-    """The guard's findings for all joints, in the fields of ``GuardResult``."""
-
-    level: Level
-    reasons: tuple[str, ...]
-    why: tuple[str, ...]
-    critical_reasons: tuple[str, ...]
-
-
-def _findings(short: dict[int, tuple[int, str]], joints: tuple[str, ...]) -> _Findings:
-    """Return the findings for all joints; the level is that of the worst joint.
-
-    Args:
-        short: Rank, 1 (limited) to 3 (torque_off), or 0 for a mere remark, and reason by the
-            number of each joint that does not follow.
-        joints: Names of all joints.
-    """
-    if not short:
-        return _Findings("ok", (), (), ())
-    worst = max(rank for rank, _ in short.values())
-    reasons = {i: f"{joints[i]}: {reason}" for i, (rank, reason) in short.items() if rank}
-    return _Findings(
-        _LEVELS[worst],
-        tuple(reasons.values()),
-        tuple([short[i][1] if i in short else "" for i in range(len(joints))]),
-        tuple([reasons[i] for i in reasons if short[i][0] == worst]),
-    )
+        Args:
+            short: Rank, 1 (limited) to 3 (torque_off), and reason by the number of each joint that
+                does not follow.
+            desired_rad: Desired angles.
+        """
+        command, names = tuple(self._motion.command), self._names
+        if not short:
+            return GuardResult(command, "ok", (), desired_rad, (), (), names)
+        worst = max(rank for rank, _ in short.values())
+        reasons = {i: f"{names[i]}: {reason}" for i, (_, reason) in short.items()}
+        why = tuple([short[i][1] if i in short else "" for i in range(len(names))])
+        critical = tuple([reasons[i] for i, (rank, _) in short.items() if rank == worst])
+        return GuardResult(
+            command, _LEVELS[worst], tuple(reasons.values()), desired_rad, why, critical, names
+        )

@@ -13,7 +13,6 @@ from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import JointState
 
 Strain = Literal["", "hot", "overloaded", "voltage"]
-_Column = tuple[float | None, ...]
 WARM_C, HOT_C = 15.0, 5.0
 """Distances below a servo's own temperature limit at which its joint is slowed down and stopped."""
 _COOLER_C = 2.0  # hysteresis: temperatures are whole degrees, without it a joint would stutter
@@ -49,7 +48,6 @@ class JointHealth:
         share: Part of its speed and acceleration that each joint may use, 0 .. 1.
         why: Reason for that part, per joint.
         held: Reason for a complete stop, per joint.
-        fine: Whether no joint is strained.
         warmed: Joints that have become warm since this was cleared, with their temperature and the
             one at which they stop, deg C.
     """
@@ -65,7 +63,6 @@ class JointHealth:
         self.share = [1.0] * count
         self.why: list[Strain] = [""] * count
         self.held: list[Strain] = [""] * count
-        self.fine = True
         self._counting = False
         self._heated = [0.0] * count  # (load^2 - continuous load^2) times seconds
         self._outside_s = [0.0] * count
@@ -74,28 +71,18 @@ class JointHealth:
         self.warmed: list[tuple[int, float, float]] = []
         self._overloaded = [False] * count
         self._no_volts = [False] * count
-        self._seen: tuple[_Column, _Column] = ((), ())
+        self._seen: tuple[object, object] = ((), ())
 
     def step(self, joints: JointState, dt_s: float) -> None:
         """Update with the servos' reports; missing values do not strain a joint."""
-        load, lasting = joints.load, LASTING_LOAD
-        strained = bool(load) and not (max(load) <= lasting and min(load) >= -lasting)
-        before = self._seen
-        seen = (joints.temperature_c, joints.voltage_v)
-        if not strained and seen == before and not self._counting:
+        load, readings = joints.load, (joints.temperature_c, joints.voltage_v)
+        strained = bool(load) and not (max(load) <= LASTING_LOAD and min(load) >= -LASTING_LOAD)
+        if not strained and readings == self._seen and not self._counting:
             return
-        self._seen = seen
-        columns = [(now, old) for now, old in zip(seen, before, strict=True) if now != old]
+        self._seen = readings
         for i in range(len(self._limits)):
-            if (
-                (strained and not -lasting <= load[i] <= lasting)
-                or self._heated[i]
-                or self._outside_s[i]
-                or any(not now or not old or now[i] != old[i] for now, old in columns)
-            ):
-                self._judge(i, joints, dt_s)
+            self._judge(i, joints, dt_s)
         self._counting = any(self._heated) or any(self._outside_s)
-        self.fine = min(self.share) == 1.0 and not any(self.held)
 
     def _judge(self, i: int, joints: JointState, dt_s: float) -> None:
         heat = self._heat(i, _joint_value(joints.temperature_c, i))

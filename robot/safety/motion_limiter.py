@@ -24,9 +24,6 @@ class MotionLimiter:
         goal: Newest desired angles; the command itself if it was reached.
         low, high: Present ranges. A wall inside a joint's own range may be set while the joint can
             stop before it (``keeps_below``, ``keeps_above``).
-        easy_s, easy_speed, easy_low, easy_high: A joint keeps every limit in a step of at least
-            ``easy_s`` if its speeds before and after are within ``easy_speed`` and its angle is
-            between ``easy_low`` and ``easy_high``.
     """
 
     def __init__(self, limits: tuple[JointLimit, ...]) -> None:
@@ -38,26 +35,6 @@ class MotionLimiter:
         self.goal = list(self.command)
         self._lost = [0.0] * len(limits)
         self._slow = [False] * len(limits)
-        self.easy_s = inf
-        self.easy_speed = [0.0] * len(limits)
-        self.easy_low, self.easy_high = list(self.low), list(self.high)
-
-    def update_easy_range(self, dt_s: float) -> None:
-        """Compute the easy range: steps of about this length in it keep every limit."""
-        self.easy_s = 0.9 * dt_s  # ticks vary in length
-        for i in range(len(self.limits)):
-            self._ease(i)
-
-    def _ease(self, i: int) -> None:
-        """Compute a joint's easy range: half the change of speed that a step allows.
-
-        The range ends at twice the braking distance v^2 / 2a before the joint's limits.
-        """
-        limit = self.limits[i]
-        speed = min(limit.speed_rad_s, 0.49 * limit.accel_rad_s2 * self.easy_s)
-        room = speed * speed / limit.accel_rad_s2
-        self.easy_speed[i] = speed
-        self.easy_low[i], self.easy_high[i] = self.low[i] + room, self.high[i] - room
 
     def restart(self, i: int, angle_rad: float) -> None:
         """Reset to an angle, at rest."""
@@ -101,29 +78,27 @@ class MotionLimiter:
         """Set a joint's range to its limit, extended to its command; remove walls."""
         limit, now = self.limits[i], self.command[i]
         self.low[i], self.high[i] = min(limit.low_rad, now), max(limit.high_rad, now)
-        self._ease(i)
 
     def wall_below(self, i: int, wall_rad: float) -> None:
         """Keep a joint above a wall."""
         self.low[i] = max(self.low[i], wall_rad)
-        self._ease(i)
 
     def wall_above(self, i: int, wall_rad: float) -> None:
         """Keep a joint below a wall."""
         self.high[i] = min(self.high[i], wall_rad)
-        self._ease(i)
 
     def keeps_below(self, i: int, wall_rad: float) -> bool:
         """Return whether a joint is below a wall and can stop there."""
-        p, v = self.command[i], self.speed[i]
-        stop = p + 0.5 * v * v / self.limits[i].accel_rad_s2 if v > 0.0 else p
-        return stop <= wall_rad + _ROUNDING_RAD
+        return max(self.command[i], self._stop(i)) <= wall_rad + _ROUNDING_RAD
 
     def keeps_above(self, i: int, wall_rad: float) -> bool:
         """Return whether a joint is above a wall and can stop there."""
-        p, v = self.command[i], self.speed[i]
-        stop = p - 0.5 * v * v / self.limits[i].accel_rad_s2 if v < 0.0 else p
-        return stop >= wall_rad - _ROUNDING_RAD
+        return min(self.command[i], self._stop(i)) >= wall_rad - _ROUNDING_RAD
+
+    def _stop(self, i: int) -> float:
+        """Return where a joint comes to rest if it brakes now."""
+        v = self.speed[i]
+        return self.command[i] + 0.5 * v * abs(v) / self.limits[i].accel_rad_s2
 
     def follow(self, i: int, desired: float, dt_s: float) -> bool:
         """Move to the desired angle if that keeps every limit; return whether it does.

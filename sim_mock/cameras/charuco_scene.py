@@ -13,9 +13,9 @@ import numpy as np
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import ImageArray
+from gazerig.drivers.vision.charuco_board import CharucoBoard
 from gazerig.gaze.angles import add
 from gazerig.gaze.types import Angles3, Floats, HeadGeometry
-from gazerig.robot.model.charuco_board import CharucoBoard
 from gazerig.robot.model.frames import CameraMount, CameraParams
 
 SIZE_PX = (640, 400)

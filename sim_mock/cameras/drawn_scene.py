@@ -6,7 +6,7 @@ Drawing needs OpenCV, which is imported with the first picture.
 from typing import NamedTuple
 
 from gazerig.drivers.types import ImageArray
-from gazerig.robot.model.scene_view import PinholeView
+from gazerig.robot.model.scene import PinholeView
 from gazerig.sim_mock.scenes.scene import Scene
 
 

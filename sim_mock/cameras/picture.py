@@ -19,7 +19,7 @@ from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Floats
 from gazerig.robot.description.mesh import Painted, paint, stored_shape
 from gazerig.robot.description.people import features, part_of, torso
-from gazerig.robot.model.scene_view import PinholeView
+from gazerig.robot.model.scene import PinholeView
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson
 
 _NEAREST_M = 0.06

@@ -17,7 +17,7 @@ from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBl
 from gazerig.drivers.vision.clothing import add_clothing
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount
-from gazerig.robot.model.scene_view import PinholeView, SceneView
+from gazerig.robot.model.scene import PinholeView, SceneView
 from gazerig.sim_mock.cameras.frame_times import FrameParams, FrameTimes
 
 

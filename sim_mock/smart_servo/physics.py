@@ -9,7 +9,7 @@ torque is a share of the stall torque at the rated voltage, PWM a share of full 
 from math import inf, pi
 from typing import NamedTuple
 
-from gazerig.robot.model.assumed_servo import GEAR_FRICTION
+from gazerig.robot.model.weight import GEAR_FRICTION
 
 
 class Physics(NamedTuple):

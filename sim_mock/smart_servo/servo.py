@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import sin
 
-from gazerig.robot.model.assumed_servo import AMBIENT_C
+from gazerig.robot.model.weight import AMBIENT_C
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.physics import (
     STEPS_PER_RAD,

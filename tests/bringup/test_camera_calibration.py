@@ -12,6 +12,7 @@ import pytest
 from desk import GAZE_JOINTS, LIDS
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
+from gazerig.drivers.vision.charuco_board import CharucoBoard, DetectedBoard
 from gazerig.features.bringup.calibration.board_page import PAPERS_MM, write_page
 from gazerig.features.bringup.calibration.board_views import ViewCollector, board_view
 from gazerig.features.bringup.calibration.camera_procedure import neck_angles, neck_steps
@@ -22,7 +23,6 @@ from gazerig.features.bringup.calibration.lens_calibration import (
     calibrate_lens,
 )
 from gazerig.gaze.types import Angles3
-from gazerig.robot.model.charuco_board import CharucoBoard, DetectedBoard
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.intrinsics import project
@@ -263,19 +263,6 @@ def test_a_place_that_is_not_sure_is_refused() -> None:
     small = [(0.3 * y, 0.3 * p, 0.3 * r) for y, p, r in planned()]
     with pytest.raises(CameraCalibrationRefused, match="sure to .* mm and .* deg only"):
         camera_on_head(neck_views(scene, small, 0.6), BOARD_LENS, 640)
-
-
-def test_few_views_and_a_joint_with_the_wrong_sign_are_refused() -> None:
-    scene = scene_elsewhere()
-    views = neck_views(scene, planned())
-    with pytest.raises(CameraCalibrationRefused, match="seen from 7 neck angles"):
-        camera_on_head(views[:7], BOARD_LENS, 640)
-    mirrored = [
-        NeckView(*KINEMATICS.head_pose((-yaw, pitch, roll)), view.seen)
-        for (yaw, pitch, roll), view in zip(planned(), views, strict=True)
-    ]
-    with pytest.raises(CameraCalibrationRefused, match="reprojection error"):
-        camera_on_head(mirrored, BOARD_LENS, 640)
 
 
 def test_angles_planned_stay_inside_the_neck_and_turn_about_all_axes() -> None:

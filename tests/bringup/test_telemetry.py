@@ -27,17 +27,16 @@ from gazerig.features.bringup.telemetry import (
     smart_servo_reader,
 )
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.mass_params import HeadMassParams, MassParams
 from gazerig.robot.model.track_fit import TrackFit
+from gazerig.robot.model.weight import HeadMassParams, MassParams
 from gazerig.robot.run.bus_wiring import bus_names, joints_on
 from gazerig.robot.run.rig_limits import lid_spans, limits
-from gazerig.robot.run.track_file import TOLERANCE_DEG, track_text, write_track
+from gazerig.robot.run.track_file import TOLERANCE_DEG, write_track
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0, sign=-1, ratio=2.0, zero_step=2000)
-GET_POSITION = 0x90
 WRITES = {
     "dynamixel": (7, {0x03, 0x04, 0x05, 0x06, 0x08, 0x10, 0x20, 0x83, 0x93}),
     "feetech": (4, {0x03, 0x04, 0x05, 0x06, 0x08, 0x83}),
@@ -148,16 +147,6 @@ def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees(maker_rig
     assert untold == (None,) * 5
 
 
-def test_a_board_is_asked_for_pulses_alone_and_keeps_its_errors(maker_rig: Rig) -> None:
-    bench = Bench(maker_rig)
-    bench.command("error 4")
-    bench.sent[""].clear()
-    for _ in range(3):
-        assert bench.monitor.sample().unanswered == 0
-    assert {packet[0] for packet in bench.sent[""]} == {GET_POSITION}
-    assert cast(Any, bench.devices[""]).errors == 1 << 4
-
-
 # --- A track that is recorded by hand: torque off, and the head's motion becomes its keys
 
 
@@ -207,12 +196,12 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(
 
     found = record_hand_motion(bench.moved(how), bench.rig.clock, lambda: None, 2.5)
     assert found.ended_by == "the time is over" and set(found.series) == set(desk_rig.names)
-    text = track_text(desk_rig, found.series, "by hand").text
-    path, on_rig = write_track(desk_rig, "mine", text, tmp_path, False)
+    path = tmp_path / "mine.yaml"
+    on_rig = write_track(desk_rig, path, found.series, "by hand")
     track = load_track(path)
     assert len(track.frames) < 40 and on_rig.slowed_by == 1.0
     fit = TrackFit(desk_rig.names, lid_spans(desk_rig))
-    motion = fit.motion(fit.place(track), limits(desk_rig.joints))
+    motion, _ = fit.motion("x", track, limits(desk_rig.joints))
     at = np.linspace(0.1, 2.3, 50)
     played = np.degrees(motion.sample_at(at)[0])
     wanted = np.array([how(t)["neck_pitch"] for t in at])

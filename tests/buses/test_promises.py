@@ -15,7 +15,6 @@ from dynamixel_sdk import PacketHandler
 from fakes.sdk_port import SdkPort
 
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
-from gazerig.drivers.types import LimpableBus
 
 SILENT_S = 3.9
 """An adapter that is away for this long is used again."""
@@ -265,33 +264,6 @@ def test_a_second_open_changes_nothing(name):
     bus.close()
     bus.open()
     assert not has_line(bus.events(), "->")
-
-
-@every_kind()
-def test_single_servos_are_limp_and_hold_again_without_a_jump(name):
-    bench = in_process(name)
-    bus = bench.hold()
-    bench.go(bus, [0.5] * 4)
-    assert isinstance(bus, LimpableBus)
-    bus.set_limp({1})
-    assert bench.holding() == [True, False, True, True]
-    goals = [0.6, 0.9, 0.6, 0.6]
-    feedback = bench.run(bus, 0.5, goals)
-    assert feedback.torque == (True, False, True, True) and feedback.missing == ()
-    assert bench.are_near(bench.true_steps(), [0.6, 0.5, 0.6, 0.6])
-    turn = 0.1 * (bench.kind.high - bench.kind.low)
-    bench.command(f"turn {bench.setups[1].id} {turn}")
-    bench.run(bus, 0.5, goals)
-    place = bench.places()[1]
-    bus.set_limp(())
-    assert all(bench.holding())
-    for _ in range(10):
-        bus.read(bench.now_s())
-        bench.wait(TICK_S)
-    # A board does not know where a hand has turned the joint, which returns.
-    assert abs(bench.places()[1] - place) <= (1.1 * turn if bench.kind.board else 6.0)
-    bench.go(bus, [0.4] * 4)
-    assert bus.events() == () and bus.faults() == ()
 
 
 @every_kind(*FEETECH, *BOARDS, why="it has no watchdog and holds its last goal")

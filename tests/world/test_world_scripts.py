@@ -7,7 +7,7 @@ from world_scripts import read
 
 from gazerig.config.faults import ConfigError
 
-PAGE = (Path(__file__).parents[2] / "docs" / "world" / "world-scripts.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs" / "worlds.md").read_text()
 
 HEAD = "room: living-room\nround_s: 20.0\npeople:\n  anna:\n    start: {start}\n    acts:\n"
 
@@ -58,7 +58,7 @@ def test_a_cup_that_somebody_else_holds_cannot_be_passed(tmp_path: Path) -> None
 
 def test_the_example_on_the_page_can_be_played(tmp_path: Path) -> None:
     file = tmp_path / "page.yaml"
-    file.write_text(PAGE.split("```")[1])
+    file.write_text(PAGE.split("```yaml\n")[1].split("```")[0])
     assert read(file).people["anna"].acts[-1].to == "door"
 
 

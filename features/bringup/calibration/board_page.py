@@ -9,7 +9,13 @@ from PIL import Image
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import output_file
 from gazerig.drivers.types import ImageArray
-from gazerig.robot.model.charuco_board import CharucoBoard
+from gazerig.drivers.vision.charuco_board import (
+    COLUMNS,
+    MARKER_MM,
+    ROWS,
+    SQUARE_MM,
+    CharucoBoard,
+)
 
 PAPERS_MM: dict[str, tuple[float, float]] = {"a4": (297.0, 210.0), "letter": (279.4, 215.9)}
 """Width and height of the paper in landscape format."""
@@ -28,8 +34,7 @@ _BLACK = 0
 def board_page(board: CharucoBoard, paper: str) -> ImageArray:
     """Draw the page: (h, w) grey, 12 px per millimetre."""
     wide_mm, high_mm = PAPERS_MM[paper]
-    par = board.params
-    board_high_mm, room_high_mm = par.rows * par.square_mm, high_mm - 2 * _EDGE_MM - _STRIP_MM
+    board_high_mm, room_high_mm = ROWS * SQUARE_MM, high_mm - 2 * _EDGE_MM - _STRIP_MM
     sheet = np.full((round(high_mm * _PX_PER_MM), round(wide_mm * _PX_PER_MM)), 255, np.uint8)
     drawn = board.image(_PX_PER_MM)
     left = (sheet.shape[1] - drawn.shape[1]) // 2
@@ -43,8 +48,7 @@ def board_page(board: CharucoBoard, paper: str) -> ImageArray:
     lines = (
         f"The line on the left is {RULER_MM} mm long: measure it.",
         "Print at 100 %, not 'fit to page'. Glue it on something flat and stiff.",
-        f"ChArUco board {par.columns} x {par.rows}, squares {par.square_mm:g} mm, "
-        f"markers {par.marker_mm:g} mm.",
+        f"ChArUco board {COLUMNS} x {ROWS}, squares {SQUARE_MM:g} mm, markers {MARKER_MM:g} mm.",
     )
     for number, line in enumerate(lines):
         at = (left + (RULER_MM + 6) * _PX_PER_MM, below + round((1.6 + 3.9 * number) * _PX_PER_MM))

@@ -2,7 +2,7 @@
 
 Only a tilted board determines the focal length of a lens, and only views near the edges of the
 image its centre and distortion. Many similar views fit well but determine little.
-Frames as in gazerig.robot.model.charuco_board and gazerig.robot.model.intrinsics.
+Frames as in gazerig.drivers.vision.charuco_board and gazerig.robot.model.intrinsics.
 """
 
 import cv2
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.robot.model.charuco_board import DetectedBoard
+from gazerig.drivers.vision.charuco_board import DetectedBoard
 
 Floats = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from typing import NamedTuple
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.vision.charuco_board import CharucoBoard
 from gazerig.features.bringup.calibration.hand_eye import NeckView
 from gazerig.features.bringup.manual_control import ManualControl
 from gazerig.gaze.types import Angles2, Angles3, HeadGeometry
-from gazerig.robot.model.charuco_board import CharucoBoard
 from gazerig.robot.model.kinematics import NECK
 
 Look = Callable[[], Shot | None]

@@ -225,7 +225,7 @@ class FaceSteering:
         if tick.target.kind == "part" and tick.gaze.phase != "saccade":
             # The angle between the gaze and the part, as far as the eyes can reach it.
             error = gaze_error(tick.target.p_world_m, tick.pose, self._converges)
-            self.error_deg = degrees(error.whole)
+            self.error_deg = degrees(error)
 
     def _count(self, identity: object) -> int:
         """Return the number of the shift, a new one whenever the target point changes."""

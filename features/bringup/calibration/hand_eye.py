@@ -9,7 +9,7 @@ Joint sensors are not exact (steps of 0.088 deg, play of the gears), and an erro
 head shifts a board at 0.7 m by more than all errors of its corners. So each view also has a small
 rotation of the head as an unknown. The lens is not known exactly either: 1 % of its focal length is
 7 mm of the camera's position. So focal length and centre may change within their usual errors.
-Frames as in gazerig.robot.model.frames; the board's as in gazerig.robot.model.charuco_board.
+Frames as in gazerig.robot.model.frames; the board's as in gazerig.drivers.vision.charuco_board.
 """
 
 from collections.abc import Sequence
@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.vision.charuco_board import DetectedBoard
 from gazerig.features.bringup.calibration.board_views import board_pose
 from gazerig.features.bringup.calibration.lens_calibration import (
     WIDTH_PX,
     CameraCalibrationRefused,
 )
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.model.charuco_board import DetectedBoard
 from gazerig.robot.model.frames import CameraParams, camera_at_pose
 from gazerig.robot.model.intrinsics import project
 

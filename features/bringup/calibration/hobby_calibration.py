@@ -6,6 +6,7 @@ board has no watchdog: a guardian stops the pulses if this program is killed.
 
 from collections.abc import Callable
 from math import degrees
+from typing import Protocol
 
 from gazerig.drivers.bus.servo_models import US_STEPS
 from gazerig.drivers.errors import BusLost
@@ -22,7 +23,6 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     with_calibration,
     zero_name,
 )
-from gazerig.features.bringup.calibration.joint_procedure import Operator
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.robot.guardian.guardian import GuardedBus, Guardian
 from gazerig.robot.model.clock import Clock
@@ -44,6 +44,29 @@ SILENT_S = 2.0
 def angle_now(joint: JointParams, position: float) -> float:
     """Return the angle of a position according to the rig file, to a tenth of a degree."""
     return round(degrees(joint.angle_rad(position * joint.model_facts.unit_steps)), 1) + 0.0
+
+
+class Operator(Protocol):
+    """A person who answers; ``live`` is called more than 20 times a second meanwhile.
+
+    Every method but ``tell`` raises CalibrationStopped if the user requested the end.
+    """
+
+    def tell(self, line: str) -> None:
+        """Show the present activity."""
+        ...
+
+    def wait(self, question: str, live: Callable[[], str]) -> None:
+        """Return when the person is done; ``live`` returns the line to show meanwhile."""
+        ...
+
+    def steer(self, question: str, servo: "HobbyServoAccess") -> None:
+        """Return when the person has moved a hobby servo to the desired position."""
+        ...
+
+    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        """Return the person's number, or the proposed one if the person accepts it."""
+        ...
 
 
 class HobbyServoAccess:

@@ -3,10 +3,8 @@
 Nothing is printed or written here: ``Operator`` asks the questions, and the result is a value.
 """
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
-
 from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
+from gazerig.features.bringup.calibration.hobby_calibration import Operator
 from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     Marks,
@@ -18,32 +16,6 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     zero_name,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import SmartServoAccess
-
-if TYPE_CHECKING:
-    from gazerig.features.bringup.calibration.hobby_calibration import HobbyServoAccess
-
-
-class Operator(Protocol):
-    """A person who answers; ``live`` is called more than 20 times a second meanwhile.
-
-    Every method but ``tell`` raises CalibrationStopped if the user requested the end.
-    """
-
-    def tell(self, line: str) -> None:
-        """Show the present activity."""
-        ...
-
-    def wait(self, question: str, live: Callable[[], str]) -> None:
-        """Return when the person is done; ``live`` returns the line to show meanwhile."""
-        ...
-
-    def steer(self, question: str, servo: "HobbyServoAccess") -> None:
-        """Return when the person has moved a hobby servo to the desired position."""
-        ...
-
-    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        """Return the person's number, or the proposed one if the person accepts it."""
-        ...
 
 
 class PositionTracker:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.model.charuco_board import DetectedBoard
+from gazerig.drivers.vision.charuco_board import DetectedBoard
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import rays
 

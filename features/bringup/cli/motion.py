@@ -25,12 +25,11 @@ from gazerig.features.bringup.manual_control import (
     park_slowly,
     refuse_angle,
 )
-from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.options import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
 from gazerig.robot.loop.body import Body
-from gazerig.robot.loop.event_text import group_events
-from gazerig.robot.loop.interrupts import Interrupts
-from gazerig.robot.loop.power_down import PowerDown
+from gazerig.robot.loop.events import group_events
+from gazerig.robot.loop.power_down import Interrupts, PowerDown
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.run.bus_wiring import guarded_rig_bus
 from gazerig.robot.run.rig_limits import limits, park_rad

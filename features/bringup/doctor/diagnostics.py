@@ -10,7 +10,7 @@ from typing import Literal
 
 import msgspec
 
-from gazerig.robot.loop.event_text import format_ranges
+from gazerig.robot.loop.events import format_ranges
 
 Level = Literal["ok", "note", "warn", "error"]
 LEVELS: tuple[Level, ...] = ("ok", "note", "warn", "error")

@@ -18,7 +18,7 @@ from gazerig.features.world.world_spec import WorldSpec
 from gazerig.gaze.types import Mat3
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
-from gazerig.robot.model.scene_view import PinholeView
+from gazerig.robot.model.scene import PinholeView
 from gazerig.robot.run.drawn_camera import HeadPose, NoFaces
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
@@ -26,7 +26,7 @@ from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import WorldCameraParams
 
 if TYPE_CHECKING:
-    from gazerig.robot.model.scene_view import SceneView
+    from gazerig.robot.model.scene import SceneView
     from gazerig.sim_mock.cameras.rendered import FindMotion, PixelCamera
 
 LATENCY_MS = 60.0

@@ -1,4 +1,4 @@
-// Connection to the rig: the websocket of every program, /api/v1/socket, as in docs/api.md.
+// Connection to the rig: the websocket of every program, /api/v1/socket, as in docs/connect-your-program.md.
 //
 // One connection per tab. It reconnects by itself; the newest state is in `now`, and modules
 // subscribe to the kinds of messages that they need.
@@ -6,7 +6,7 @@
 const AGAIN_MS = 500;
 const LOST_AFTER_MS = 3000; // the server sends at least once a second
 const ANSWER_MS = 10_000;
-const QUERY = "rate_hz=25&pictures=true&rig=true";
+const QUERY = "rate_hz=20&pictures=true&rig=true";
 
 /**
  * Newest messages: state, rig, run; shown: the state at the capture of the picture that is shown;

@@ -3,17 +3,15 @@
 import asyncio
 from collections import deque
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
 from gazerig.robot.dashboard.door.rig_link import BUSY
-from gazerig.robot.model.commands import COMMANDS, REPEATED, ControlCommand
-from gazerig.robot.model.outcome import Progress, command_outcome
-from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.model.requests import ORDERS
+from gazerig.robot.model.commands import COMMANDS, ORDERS, REPEATED, ControlCommand
+from gazerig.robot.model.reply import CommandReply, Progress, command_outcome
 from gazerig.robot.net.excess import STOPPED
-from gazerig.robot.net.topics import ShownPicture
+from gazerig.robot.net.openapi import MOST_RATE_HZ
 
 NO_OUTCOME = {name for name, kind in COMMANDS.items() if kind in REPEATED}
 CONTROLS = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))
@@ -21,14 +19,15 @@ CONTROLS = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind,
 _MOST_QUEUED, _MOST_OUT = 16, 256
 _REPORT_S = 0.25
 """Time in which dropped messages are counted for one refusal, s."""
+_NO_PICTURE = "", b""
 _MOST_OPEN = 64
 """Largest number of orders of one client without an outcome."""
 
 
-class Wishes(NamedTuple):
+class Wishes(msgspec.Struct, frozen=True):
     """What a client receives besides answers: states at a rate, 0 for none, and topics."""
 
-    rate_hz: float = 0.0
+    rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=MOST_RATE_HZ)] = 0.0
     events: bool = False
     pictures: bool = False
     rig: bool = False
@@ -71,7 +70,7 @@ class ClientSocket:
         self._period_s = 1.0 / wishes.rate_hz if wishes.rate_hz else 0.0
         self._due_s = self._not_before_s = 0.0
         self._state = ""
-        self._picture: ShownPicture | None = None
+        self._picture, self._jpeg = _NO_PICTURE, b""
         self._out: deque[str] = deque(maxlen=_MOST_OUT)
         self._open: deque[tuple[object, CommandReply]] = deque(maxlen=_MOST_OPEN)
         self._dropped = 0
@@ -95,9 +94,9 @@ class ClientSocket:
         self._state = text
         self.news.set()
 
-    def add_picture(self, picture: ShownPicture) -> None:
-        """Store a picture instead of one that was not read yet."""
-        self._picture = picture
+    def add_picture(self, text: str, jpeg: bytes) -> None:
+        """Store a picture, as encoded, instead of one that was not read yet."""
+        self._picture = text, jpeg
         self.news.set()
 
     def add_progress(self, progress: Progress) -> None:
@@ -160,15 +159,18 @@ class ClientSocket:
         self.queue_message({"refused": BUSY, "messages": self._dropped})
         self._dropped = 0
 
-    def outgoing(self) -> str | ShownPicture:
+    def outgoing(self) -> str | bytes:
         """Return the next message to send, answers and events first, "" if there is none."""
+        if self._jpeg:  # its text has just been sent
+            jpeg, self._jpeg = self._jpeg, b""
+            return jpeg
         if self._out:
             return self._out.popleft()
         if self._state:
             state, self._state = self._state, ""
             return state
-        picture, self._picture = self._picture, None
-        return picture or ""
+        (picture, self._jpeg), self._picture = self._picture, _NO_PICTURE
+        return picture
 
 
 def tag_of(message: Mapping[str, object]) -> dict[str, object]:

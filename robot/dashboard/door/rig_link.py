@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from gazerig.robot.dashboard.door.sockets import until_one_ends
-from gazerig.robot.model.requests import SLOW
+from gazerig.robot.model.commands import SLOW
 from gazerig.robot.net.excess import TOO_MANY
 from gazerig.robot.net.socket_io import ANSWER_BYTES
 

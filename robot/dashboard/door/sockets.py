@@ -62,6 +62,17 @@ async def close_socket(
         request.transport.abort()
 
 
+async def send_uncompressed(socket: web.WebSocketResponse, data: bytes) -> None:
+    """Send bytes as they are over a socket that compresses other messages."""
+    writer = socket._writer
+    assert writer is not None
+    writer.compress, compress = 0, writer.compress
+    try:
+        await socket.send_bytes(data)
+    finally:
+        writer.compress = compress
+
+
 async def _forward(message: aiohttp.WSMessage, there: Socket) -> None:
     if message.type is aiohttp.WSMsgType.BINARY:
         await there.send_bytes(message.data)

@@ -6,9 +6,11 @@ is computed here, at the page's rate.
 
 import pickle
 import time
+from bisect import bisect_left
 from collections import Counter, deque
 from dataclasses import replace
 from math import inf
+from operator import itemgetter
 from typing import NamedTuple
 
 from msgspec import UNSET, structs
@@ -17,25 +19,25 @@ from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.drivers.process.passed_image import PassedImage, receive, take_image
 from gazerig.drivers.types import Detections
+from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES
 from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
 from gazerig.robot.description.build import RigShape
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.tick import Tick, TickRecord
-from gazerig.robot.loop.tick_feed import TickFeed
 from gazerig.robot.loop.tick_stream import decode, encode
-from gazerig.robot.loop.tick_text import perception_text
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.scene_view import PinholeView, SceneView
+from gazerig.robot.model.scene import PinholeView, SceneView
 from gazerig.robot.net.topics import RigInfo, RunState, ShownPicture
 
 TICKS, RIG, STATE, DETECTED = b"t", b"g", b"a", b"d"
 """First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, and a frame."""
 _KEPT = 400
 """Number of gaze points that are kept for frames which arrive late: those of two seconds."""
-_DRAWING_SHARE = 0.1
+_DRAWING_SHARE = 0.07
 """Largest share of a processor for drawing images of a simulated camera that delivers none."""
 
 
@@ -235,5 +237,25 @@ class RigFeed:
         # The page's process encodes; the control loop's imports this module too, without OpenCV.
         from gazerig.robot.dashboard.feed.camera_picture import camera_picture
 
-        _, point_m = min(self._gaze, key=lambda one: abs(one[0] - found.captured_s))
+        first_later = bisect_left(self._gaze, found.captured_s, key=itemgetter(0))
+        _, point_m = self._gaze[min(first_later, len(self._gaze) - 1)]
         return camera_picture(found, lens, R, p_m, point_m)
+
+
+def perception_text(tick: Tick) -> str:
+    """Return age of the frame, camera conditions and distances of faces.
+
+    e.g. "frame 63 ms old | face 1 at 0.98 m by camera, +- 1 cm"
+    """
+    if tick.percept is None:
+        return "no frame yet"
+    parts = [f"frame {1e3 * tick.percept.age_s(tick.t_s):.0f} ms old", *tick.camera_conditions]
+    head = tick.pose.p_world_head_m
+    for face in tick.percept.faces:
+        parts.append(
+            f"face {face.id} at {norm(sub(face.p_world_m, head)):.2f} m by {face.distance_from}, "
+            f"+- {100.0 * face.along_sd_m:.0f} cm"
+            + (", looks at the head" if face.looks_at_head else "")
+            + (", speaks" if face.speaks else "")
+        )
+    return " | ".join(parts)

@@ -21,6 +21,7 @@ from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.errors import SetupError, require_package
 from gazerig.drivers.types import DetectedFace, ImageArray
+from gazerig.drivers.vision.charuco_board import CharucoBoard
 from gazerig.features.bringup.calibration.board_page import RULER_MM, write_page
 from gazerig.features.bringup.calibration.board_views import MOST_VIEWS, ViewCollector
 from gazerig.features.bringup.calibration.camera_procedure import (
@@ -53,8 +54,7 @@ from gazerig.robot.cli.terminal import (
     say,
     status,
 )
-from gazerig.robot.loop.interrupts import Interrupts
-from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard
+from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
@@ -125,7 +125,7 @@ def calibrate_camera(
             _refuse_fixed(loaded)
         if not dry_run:
             refuse_unwritable(rig, out)
-        board = CharucoBoard(BoardParams().scaled(ruler / RULER_MM))
+        board = CharucoBoard(ruler / RULER_MM)
         person = TerminalPerson(Lines(None), stopped, yes)
         source = OakSource(loaded.oak) if oak else Webcam(camera or 0, loaded.webcam)
         with _Eye(loaded, board, None if mock else source, stopped) as eye:

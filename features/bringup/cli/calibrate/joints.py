@@ -46,10 +46,8 @@ from gazerig.features.bringup.cli.rig_writer import (
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
 from gazerig.robot.guardian.guardian import Guardian
-from gazerig.robot.loop.interrupts import Interrupts
-from gazerig.robot.loop.power_down import PowerDown
+from gazerig.robot.loop.power_down import Interrupts, PowerDown
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.coupling import joint_partners
 from gazerig.robot.run.bus_wiring import release_plan
 
 
@@ -131,7 +129,8 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     for name in asked or ():
         if name not in rig.joints:
             raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
-    coupled = joint_partners(rig.couplings.values())
+    pairs = [pair.joints for pair in rig.couplings.values()]
+    coupled = dict([*pairs, *[(second, first) for first, second in pairs]])
     for name in rig.names:
         if name in coupled and (not asked or name in asked):
             text = f"{name} is moved together with {coupled[name]} by two servos: {_BY_LEVEL}"

@@ -1,0 +1,471 @@
+"""Commands to a robot: their queue, and their execution at the beginning of a tick."""
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from math import degrees, inf, radians
+from typing import TYPE_CHECKING
+
+from msgspec import structs
+
+from gazerig.gaze.angles import add, direction, rotate, scale
+from gazerig.gaze.attention.conversation import MODES
+from gazerig.gaze.attention.startle import FLINCH, Startle
+from gazerig.gaze.track.track_trigger import TrackTrigger
+from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
+from gazerig.params import unknown_text
+from gazerig.robot.loop.client_control import ClientControl
+from gazerig.robot.loop.conversation import Conversation
+from gazerig.robot.loop.reachability import jog_reply, look_reply
+from gazerig.robot.loop.stop import StopControl
+from gazerig.robot.model.commands import (
+    NO_TRACK,
+    Ask,
+    Command,
+    ControlCommand,
+    EndTrack,
+    Express,
+    Jog,
+    Look,
+    LookAt,
+    LookAtDirection,
+    LookAtInHead,
+    LookAtPerson,
+    LookAtPixel,
+    MoveOpponent,
+    Play,
+    Renew,
+    Resume,
+    Say,
+    SetLevel,
+    Speak,
+    Stop,
+    SyncTrack,
+    Talk,
+    Tune,
+)
+from gazerig.robot.model.joint import JointLimit
+from gazerig.robot.model.reply import CommandReply, Ticket
+from gazerig.robot.model.scene import MovableOpponent
+from gazerig.robot.model.types import JointAngles
+
+if TYPE_CHECKING:
+    from gazerig.robot.loop.loop import Robot
+
+MAX_WAITING = 64
+MAX_PER_TICK = 8
+"""Commands executed in one tick, without stops. At most one of them changes parameters, as that
+takes longest."""
+_NEAR_END_RAD = radians(0.05)
+"""A slider at the end of a joint's range is rounded to a tenth of a degree."""
+_LID_COMMANDS = ("wink left", "wink right")
+
+
+class CommandQueue:
+    """The commands since the last tick, from any thread, and the tickets of their replies."""
+
+    def __init__(self) -> None:
+        self._commands: deque[tuple[Command, Ticket]] = deque()
+        self._stops: deque[tuple[Command, Ticket]] = deque()
+        self._replies: list[tuple[Ticket, CommandReply]] = []
+
+    def __len__(self) -> int:
+        """Return the number of queued commands."""
+        return len(self._commands) + len(self._stops)
+
+    def add(self, command: Command) -> Ticket:
+        """Queue a command. Thread-safe.
+
+        Raises:
+            ValueError: The queue is full. A stop is never refused.
+        """
+        ticket = Ticket()
+        if isinstance(command, Stop):
+            if len(self._stops) >= MAX_WAITING:
+                with suppress(IndexError):  # the loop has just taken it
+                    return self._stops[-1][1]  # same effect as another stop
+            self._stops.append((command, ticket))
+        elif len(self._commands) >= MAX_WAITING:
+            raise ValueError(f"too many requests: {MAX_WAITING} commands are waiting, try again")
+        else:
+            self._commands.append((command, ticket))
+        return ticket
+
+    def reply(self, ticket: Ticket, reply: CommandReply) -> None:
+        """Store the reply to a command until ``give_replies``."""
+        self._replies.append((ticket, reply))
+
+    def give_replies(self, t_s: float) -> None:
+        """Give the replies; called when others can see the tick of t_s, which executed them."""
+        replies, self._replies = self._replies, []
+        for ticket, reply in replies:
+            ticket.answer(structs.replace(reply, t_s=t_s))
+
+    def take_stops(self) -> list[tuple[Command, Ticket]]:
+        """Remove and return all stops; refuse queued commands that would move the head."""
+        taken = [self._stops.popleft() for _ in range(len(self._stops))]
+        for _ in range(len(self._commands) if taken else 0):
+            command, ticket = self._commands.popleft()
+            if isinstance(command, ControlCommand | Resume):
+                self.reply(ticket, CommandReply("it has been stopped meanwhile"))
+            else:
+                self._commands.append((command, ticket))
+        return taken
+
+    def take(self) -> list[tuple[Command, Ticket]]:
+        """Remove and return the commands of this tick, stops first."""
+        taken = self.take_stops()
+        tunes, most = 0, len(taken) + MAX_PER_TICK
+        while self._commands and len(taken) < most:
+            tunes += isinstance(self._commands[0][0], Tune)
+            if tunes > 1:
+                break
+            taken.append(self._commands.popleft())
+        return taken
+
+
+class CommandExecutor:
+    """The executor of commands on one robot, with the states that commands leave behind.
+
+    Attributes:
+        lead: Control of gaze or joints by a client.
+        stop: Stops and resumes.
+        conversation: State that a voice agent reports.
+        commanded_rad: Joint angles last sent to the servos; joints are held from there.
+        opponent: Boxer in the emulated world and the start of its scene; None without one.
+
+    Args:
+        robot: The robot.
+    """
+
+    def __init__(self, robot: "Robot") -> None:
+        self._robot = robot
+        self.lead = ClientControl(robot.body.names)
+        self.stop = StopControl(robot.body, robot.messages)
+        self.conversation = Conversation()
+        self.commanded_rad: JointAngles = ()
+        self.opponent: tuple[MovableOpponent, Callable[[], float | None]] | None = None
+        self._known: set[int] = set()
+        self._taken_over = False
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the tracks that rules have played."""
+        self._trigger, self._startle = TrackTrigger(), Startle()
+
+    def models_took_over(self) -> bool:
+        """Return once whether the gaze models take control again, from the present pose."""
+        taken_over, self._taken_over = self._taken_over, False
+        return taken_over
+
+    # --- checks, in the client's thread
+
+    def menus(self) -> dict[str, tuple[str, ...]]:
+        """Return the choices of ``Ask``: menu -> choices, the present one first."""
+        robot, top_down = self._robot, self._robot.attention.top_down
+        menus = {
+            "behaviour": _put_first(top_down.chosen_behaviour, top_down.behaviours),
+            "conversation": _put_first(robot.conversation_gaze.chosen_mode, MODES),
+            "lids": _LID_COMMANDS,
+        }
+        animation = robot.animation
+        if animation.expressions:
+            menus["expression"] = _put_first(animation.expression, animation.expressions)
+        names = (NO_TRACK, *robot.track_choices.names)
+        menus["track"] = _put_first(robot.track_choices.playing or NO_TRACK, names)
+        return menus
+
+    def refuse_impossible(self, command: Command) -> None:
+        """Refuse a command that names something that this robot does not have.
+
+        Raises:
+            ValueError: The message lists the available choices.
+        """
+        robot = self._robot
+        match command:
+            case Ask(menu, choice):
+                menus = self.menus()
+                if menu not in menus:
+                    raise ValueError(unknown_text("menu", menu, menus))
+                if choice not in menus[menu]:
+                    raise ValueError(unknown_text(menu, choice, menus[menu]))
+            case Jog(angles_rad):
+                names = robot.body.names
+                for name, _ in angles_rad:
+                    if name not in names:
+                        raise ValueError(unknown_text("joint", name, names))
+            case Express(name):
+                robot.animation.require("expression", name)
+            case SetLevel(name):
+                robot.animation.require("level", name)
+            case Say():
+                raise ValueError("this run has no voice")
+            case Play() | Speak():
+                robot.track_choices.require(command, robot.guard.limits)
+
+    # --- execution, in the loop's thread
+
+    def complete(self, command: Command) -> Command:
+        """Return a command as it is executed, with everything that a recording needs."""
+        robot = self._robot
+        if isinstance(command, Ask) and command.menu == "track":
+            command = Play("" if command.choice == NO_TRACK else command.choice)
+        if isinstance(command, Play) and command.track:
+            return robot.track_choices.complete(command, robot.guard.limits)
+        tick = robot.newest
+        if tick is None or tick.detections is None or not isinstance(command, LookAtPixel):
+            return command
+        point = command.p_world_m or robot.pixels.point(
+            command.pixel_px, tick.detections, tick.percept, command.distance_m, command.captured_s
+        )
+        return structs.replace(command, p_world_m=point)
+
+    def execute(self, command: Command, t_s: float) -> CommandReply:
+        """Execute a command; return its reply, with the reason if it is refused now."""
+        if self.stop.reason and isinstance(command, ControlCommand | Play | Speak):
+            return CommandReply(f"stopped ({self.stop.reason}): resume first")
+        try:
+            return self._execute(command, t_s) or CommandReply()
+        except ValueError as error:
+            return CommandReply(str(error))
+
+    def _execute(self, command: Command, t_s: float) -> CommandReply | None:
+        robot = self._robot
+        match command:
+            case Ask(menu, choice):
+                self._choose(menu, choice, t_s)
+            case Jog():
+                return self._jog(command, t_s)
+            case Look():
+                return self._look(command, t_s)
+            case Play() | Speak():
+                return self._play(command, t_s)
+            case EndTrack():
+                return robot.track_choices.end(command, t_s)
+            case SyncTrack():
+                robot.track_choices.sync(command, t_s)
+            case Express(name, strength):
+                robot.animation.express(name, strength)
+            case SetLevel(name, value):
+                robot.animation.set_level(name, value, t_s)
+            case MoveOpponent(point):
+                self._move_opponent(t_s, point)
+            case Talk():
+                if command.person is not None and command.person not in self._known:
+                    self._face(command.person)
+                if message := self.conversation.report(command, t_s):
+                    robot.messages.append(message)
+                self._converse(t_s)
+            case Renew(who=who):
+                talks = self.conversation.renew(who, t_s)
+                if not self.lead.renew(who, t_s) and not talks:
+                    return CommandReply(f"the head is no longer controlled by {who or 'you'}")
+            case Stop():
+                self.stop.halt(command, t_s)
+                self.lead.end(f"stopped: {command.why}")
+                robot.track_choices.drop_present(t_s)
+            case Resume() if self.stop.reason:
+                goals = self.stop.resume(command, t_s)
+                if isinstance(goals, CommandReply):
+                    return goals
+                robot.guard.reset(t_s, goals)
+                self._taken_over = True
+            case Tune():
+                robot.messages += robot.tune(command, t_s)
+        return None
+
+    def end_expired(self, t_s: float) -> None:
+        """End a client's control that was not renewed or has expired, and expired levels."""
+        messages = self._robot.messages
+        self._move_opponent(t_s)
+        if why := self.lead.expiry_reason(t_s):
+            client = self.lead.state.client
+            messages.append(f"{client}: {why}, so the gaze models are in control again")
+            self._change_control(lambda: self.lead.end(why))
+        if why := self.conversation.expiry_reason(t_s):
+            state = self.conversation.state
+            messages.append(f"conversation: {state.state} of {state.who or 'a client'} ends: {why}")
+            self.conversation.end(why, t_s)
+            self._converse(t_s)
+        for name in self._robot.animation.drop_lapsed(t_s):
+            messages.append(f"level {name}: not set any more, so it returns to 0")
+
+    def remember_people(self, percept: Percept | None) -> None:
+        """Remember the people of a frame, whom commands may name although they are out of view."""
+        if percept is not None:
+            self._known.update(face.id for face in percept.faces)
+
+    def _choose(self, menu: str, choice: str, t_s: float) -> None:
+        """Apply a choice of a menu."""
+        robot = self._robot
+        if menu == "behaviour":
+            robot.attention.top_down.behave(choice)
+        elif menu == "conversation":
+            robot.conversation_gaze.choose_mode(choice, t_s)
+            robot.lids.set_conversation(robot.conversation_gaze.converses)
+        elif menu == "expression":
+            robot.animation.express(choice)
+        else:
+            robot.lids.wink("left" if choice == "wink left" else "right", t_s)
+
+    def _converse(self, t_s: float) -> None:
+        """Let gaze and lids follow the state of conversation; when idle, the chosen mode."""
+        state, gaze = self.conversation.state, self._robot.conversation_gaze
+        gaze.enter(state.state, state.partner, state.ends_s, state.confidence, t_s)
+        self._robot.lids.set_conversation(gaze.converses)
+
+    def _look(self, command: Look, t_s: float) -> CommandReply:
+        """Give a client control of the gaze, or free it."""
+        if isinstance(command, LookAtPerson):
+            face, captured_s = self._face(command.id)
+            self._change_control(lambda: self.lead.look(command, t_s, face=face, seen_s=captured_s))
+        else:
+            point = self._point(command)
+            self._change_control(lambda: self.lead.look(command, t_s, point))
+        target, robot = self.lead.chosen_target(None, t_s), self._robot
+        if target is None:  # the gaze is free again
+            return CommandReply()
+        reply = look_reply(target, robot.oculomotor, robot.kinematics, robot.guard.limits)
+        return structs.replace(reply, control_number=self.lead.state.number)
+
+    def _point(self, command: Look) -> Vec3 | None:
+        """Return the point in the world to look at, None to free the gaze.
+
+        Raises:
+            ValueError: The point cannot be found now; the message gives the reason.
+        """
+        R, p = self._robot.poses.head_pose(inf)
+        match command:
+            case LookAt(point):
+                return point
+            case LookAtInHead(point):
+                return add(p, rotate(R, point))
+            case LookAtDirection(angles, frame, distance_m):
+                ahead = scale(direction(angles), distance_m)
+                return add(p, rotate(R, ahead) if frame == "head" else ahead)
+            case LookAtPixel(p_world_m=point) if point is not None:
+                return point
+        raise ValueError("there is no camera frame yet")
+
+    def _face(self, number: int) -> tuple[Face, float]:
+        """Return the face of a person and the time of its frame.
+
+        Raises:
+            ValueError: No visible person has that number; the message lists the visible people.
+        """
+        percept = self._robot.newest.percept if self._robot.newest is not None else None
+        faces = percept.faces if percept is not None else ()
+        for face in faces:
+            if face.id == number and percept is not None:
+                return face, percept.captured_s
+        visible = [str(face.id) for face in faces]
+        raise ValueError(unknown_text("visible person", str(number), visible, "nobody"))
+
+    def _jog(self, command: Jog, t_s: float) -> CommandReply:
+        """Move the given joints and hold the others; without any, free the joints."""
+        robot, tracks = self._robot, self._robot.track_choices
+        if command.angles_rad and (dropped := tracks.drop_present(t_s)):
+            robot.messages.append(f"track {dropped} ends: a client controls the joints")
+        self._change_control(lambda: self.lead.jog(command, self.commanded_rad, t_s))
+        if command.angles_rad:
+            robot.guard.start_gently()  # a slider may jump from end to end
+        number = self.lead.state.number * self.lead.state.active
+        reply = jog_reply(command, robot.body.names, robot.guard.limits)
+        return structs.replace(reply, control_number=number)
+
+    def _change_control(self, change: Callable[[], None]) -> None:
+        """Change the client in control; the models start slowly if they take over joints."""
+        held, active = bool(self.lead.pose_rad), self.lead.state.active
+        change()
+        if held and not self.lead.pose_rad:
+            self._taken_over = True
+            self._robot.guard.start_gently()
+        if self.lead.state.active and not active:
+            self._robot.messages.append(f"controlled by {self.lead.state.client}")
+
+    def _move_opponent(self, t_s: float, point: Vec3 | None = None) -> None:
+        """Advance a boxer of the emulated world, or move its fist; a repeated run has none."""
+        if self.opponent is None:
+            return
+        opponent, start_s = self.opponent[0], self.opponent[1]()
+        if start_s is None:
+            return
+        if point is not None:
+            opponent.move(point, t_s - start_s)
+        else:
+            opponent.update(t_s - start_s)
+
+    def _play(self, command: Play | Speak, t_s: float) -> CommandReply:
+        """Play a track on top of the gaze, unless a client holds the joints."""
+        starts = isinstance(command, Speak) or bool(command.track)
+        if starts and self.lead.pose_rad:
+            return CommandReply(f"{self.lead.state.client}: the joints are held at their angles")
+        robot = self._robot
+        reply = robot.track_choices.play(command, t_s, self.commanded_rad, robot.guard.limits)
+        if starts:
+            by = f" for {command.who}" if command.who else ""
+            robot.messages.append(f"track{by}: {reply.text()}")
+        return reply
+
+    # --- tracks that no client has asked for
+
+    def follow_turn(self, t_s: float) -> None:
+        """Let the gaze follow the present turn, and play a listener's nod."""
+        if self.conversation.active and (name := self._robot.conversation_gaze.step(t_s)):
+            self._play_unasked(Play(name, who="conversation"), t_s)
+
+    def react_by_track(
+        self, target: Target, percept: Percept | None, pose: GazeState, t_s: float
+    ) -> None:
+        """Play the track of the present rule when the gaze reaches the rule's target.
+
+        That of the startle is played when something flies at the face.
+
+        Args:
+            target: Target that attention has chosen.
+            percept: Visible people.
+            pose: Measured poses of head and eyes.
+            t_s: Present time.
+        """
+        top_down = self._robot.attention.top_down
+        name = self._trigger.step(
+            top_down.behaviour, top_down.rule, target, t_s, top_down.named_ids
+        )
+        if name:
+            self._play_unasked(Play(name, who=f"rule {top_down.behaviour}"), t_s)
+        startles = top_down.startles and not top_down.plans  # a boxer watches the fists
+        if startles and self._startle.step(percept, pose.p_world_head_m, t_s):
+            self._play_unasked(Play(FLINCH, who="startle"), t_s)
+
+    def _play_unasked(self, command: Play, t_s: float) -> None:
+        """Play a track unless a client or a show moves the head."""
+        tracks, limits = self._robot.track_choices, self._robot.guard.limits
+        if self.stop.reason or self.lead.state.active or tracks.ends_show(command, limits):
+            return
+        reply = self._play(tracks.complete(command, limits), t_s)
+        if reply.refused:
+            self._robot.messages.append(f"track for {command.who} {reply.text()}")
+
+
+def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> None:
+    """Refuse angles outside the joints' present ranges.
+
+    Raises:
+        ValueError: The message names each such joint and its range.
+    """
+    ranges: Mapping[str, JointLimit] = dict(zip(joints, limits, strict=True))
+    outside = []
+    for name, angle in command.angles_rad:
+        low, high = ranges[name][:2] if name in ranges else (angle, angle)
+        if not low - _NEAR_END_RAD <= angle <= high + _NEAR_END_RAD:
+            outside.append(
+                f"{name} {degrees(angle):.1f} deg is outside its range, "
+                f"{degrees(low):g}..{degrees(high):g} deg"
+            )
+    if outside:
+        raise ValueError("; ".join(outside))
+
+
+def _put_first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names with the present choice first."""
+    return (present, *(name for name in names if name != present))

@@ -1,0 +1,165 @@
+"""Events of a run: found in consecutive ticks, kept for other threads, and grouped as text."""
+
+import re
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import takewhile
+
+from gazerig.gaze.types import ORDERED, Target
+from gazerig.robot.loop.client_control import GONE_S
+from gazerig.robot.loop.head_state import EventKind, HeadEvent
+from gazerig.robot.loop.tick import Tick, target_name
+from gazerig.robot.model.control_source import FINISHED
+from gazerig.robot.model.reply import Progress
+
+_MOST_EVENTS, _MOST_MESSAGES = 2000, 100
+"""Number of stored events, and of messages besides."""
+_SERVO = re.compile(r"servo (\d+)")
+_REGISTER = re.compile(r": .+ (-?\d+ -> -?\d+|set)$")
+
+_Change = tuple[str, EventKind, int | str]
+"""Text, kind and subject of an event."""
+
+
+class TickFeed:
+    """One slot for the newest tick and rings of events; the loop never waits for readers.
+
+    Attributes:
+        newest: The newest tick, None before the first.
+        ticks: Number of ticks.
+        number: Number of the newest event, 0 before the first.
+    """
+
+    def __init__(self) -> None:
+        self.newest: Tick | None = None
+        self.ticks = self.number = 0
+        self._events: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)
+        # Separate, because the others are many and would displace messages.
+        self._messages: deque[HeadEvent] = deque(maxlen=_MOST_MESSAGES)
+        self._seen_s: dict[int, float] = {}
+        self._joining: deque[Callable[[Progress], bool]] = deque()
+        self._followers: list[Callable[[Progress], bool]] = []
+
+    def update(self, tick: Tick) -> None:
+        """Store the newest tick and its events; called by the loop.
+
+        Those of parking are not events.
+        """
+        last, self.newest = self.newest, tick
+        self.ticks += 1
+        for text in tick.events:
+            self._messages.append(self._add(tick, (text, "message", "")))
+        if last is not None and not tick.parking:
+            for change in (*_gaze_changes(last, tick), *_track_changes(last, tick)):
+                self._add(tick, change)
+        for change in self._people_changes(tick):
+            self._add(tick, change)
+        while self._joining:
+            self._followers.append(self._joining.popleft())
+        if self._followers:
+            now = self.progress()
+            self._followers = [one for one in self._followers if not one(now)]
+
+    def follow(self, follower: Callable[[Progress], bool]) -> None:
+        """Call a function with the progress of every tick until it returns True."""
+        self._joining.append(follower)
+
+    def progress(self) -> Progress:
+        """Return the states of control and tracks in the newest tick."""
+        tick = self.newest
+        return Progress(tick.client_control, tick.tracks) if tick is not None else Progress()
+
+    def events(self, after: int = 0) -> tuple[HeadEvent, ...]:
+        """Return the stored events with numbers above ``after``, the oldest first."""
+        newest_first = reversed(list(self._events))  # a copy, because the loop may append meanwhile
+        return (*takewhile(lambda event: event.number > after, newest_first),)[::-1]
+
+    def messages(self) -> tuple[HeadEvent, ...]:
+        """Return the last events of the bus, the camera and programs, the oldest first."""
+        return tuple(self._messages)
+
+    def _add(self, tick: Tick, change: _Change) -> HeadEvent:
+        self.number += 1
+        event = HeadEvent(self.number, tick.t_s, *change)
+        self._events.append(event)
+        return event
+
+    def _people_changes(self, tick: Tick) -> Iterator[_Change]:
+        """Yield arrivals, and departures of people who have not been seen for some time."""
+        for face in tick.percept.faces if tick.percept is not None else ():
+            if face.id not in self._seen_s:
+                yield f"person {face.id} has arrived", "person_arrived", face.id
+            self._seen_s[face.id] = tick.t_s
+        for person, seen_s in tuple(self._seen_s.items()):
+            if tick.t_s - seen_s > GONE_S:
+                del self._seen_s[person]
+                yield f"person {person} has left", "person_left", person
+
+
+def _gaze_changes(last: Tick, tick: Tick) -> Iterator[_Change]:
+    """Yield starts and ends of saccades, new targets and blinks."""
+    was, now = last.gaze, tick.gaze
+    another = now.saccades != was.saccades
+    if was.phase == "saccade" and (another or now.phase != "saccade"):
+        yield _target_change("the eyes land at", "saccade_landing", last.target)
+    before, after = last.target, tick.target
+    if (after.kind, after.id, after.part) != (before.kind, before.id, before.part):
+        yield _target_change("the target is", "target", after)
+    if now.phase == "saccade" and (another or was.phase != "saccade"):
+        yield _target_change("saccade to", "saccade_start", after)
+    if now.blink and not was.blink:
+        yield "blink", "blink", ""
+
+
+def _track_changes(last: Tick, tick: Tick) -> Iterator[_Change]:
+    """Yield the cues that tracks have passed, and the ends of tracks."""
+    if tick.tracks is last.tracks:
+        return
+    before = {track.number: track for track in last.tracks}
+    for now in tick.tracks:
+        was = before.get(now.number)
+        if now.cues > (was.cues if was is not None else 0):
+            yield f"{now.name} passes the cue {now.cue}", "cue", now.cue
+        if not now.is_playing and was is not None and was.is_playing:
+            finished = now.end_reason == FINISHED
+            text = "has finished" if finished else f"ended: {now.end_reason}"
+            yield f"{now.name} {text}", "track_finished", now.name
+
+
+def _target_change(text: str, kind: EventKind, target: Target) -> _Change:
+    name = target_name(target)
+    return f"{text} {'the chosen point' if target.kind == ORDERED else name}", kind, name
+
+
+def group_events(events: Iterable[str]) -> list[str]:
+    """Group events that differ only in their servo, e.g. "servos 1-9: Return Delay Time 250 -> 0".
+
+    An event is "neck_yaw (servo 7): what" or "servo 7: what"; other texts stay unchanged.
+    """
+    whose: dict[str, list[str]] = {}
+    for event in events:
+        who, colon, what = event.partition(": ")
+        whose.setdefault(what if colon else event, []).append(who if colon else "")
+    lines = []
+    for what, names in whose.items():
+        ids = [int(found[1]) for name in names if (found := _SERVO.search(name))]
+        several = len(names) > 1 and len(ids) == len(names)
+        who = f"servos {format_ranges(ids)}" if several else ", ".join(filter(None, names))
+        lines.append(f"{who}: {what}" if who else what)
+    return lines
+
+
+def is_register_change(event: str) -> bool:
+    """Return whether an event only reports that a register of a servo was set."""
+    return _REGISTER.search(event) is not None
+
+
+def format_ranges(numbers: Sequence[int]) -> str:
+    """Format numbers with runs joined: 1-3, 7."""
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(f"{r[0]}-{r[-1]}" if len(r) > 1 else f"{r[0]}" for r in runs)

@@ -1,0 +1,64 @@
+"""Emulated scenes: their picture, and a boxer whom a person can move."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, runtime_checkable
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import ImageArray
+from gazerig.gaze.types import Mat3, Vec3
+
+
+class PinholeView(NamedTuple):
+    """A pinhole camera at a time.
+
+    Attributes:
+        t_s: Time since the start of the scene in s.
+        lens: Intrinsics for pictures of this size; distortion is not drawn.
+        size_px: Width and height.
+        R: Rotation of the camera in the world, with optical axes.
+        p_m: Position of the camera in the world.
+    """
+
+    t_s: float
+    lens: Intrinsics
+    size_px: tuple[int, int]
+    R: Mat3
+    p_m: Vec3
+
+
+class SceneView(Protocol):
+    """A renderer of a scene through a pinhole camera."""
+
+    def draw(self, seen_by: PinholeView) -> ImageArray:
+        """Return the picture of a camera, (h, w, 3) BGR."""
+
+    def close(self) -> None:
+        """Free the renderer's resources; safe to call twice."""
+
+
+class MovableOpponent(Protocol):
+    """A boxer; its times are those of the scene."""
+
+    @property
+    def spans_s(self) -> Sequence[tuple[float, float]]:
+        """Return the times in which a person moved it, (start, end)."""
+
+    def move(self, p_m: Vec3, t_s: float) -> None:
+        """Move the leading fist to a point."""
+
+    def update(self, t_s: float) -> None:
+        """Advance the motion to a time."""
+
+
+@runtime_checkable
+class BoxingScene(Protocol):
+    """A scene that may have such a boxer."""
+
+    @property
+    def opponent(self) -> MovableOpponent | None:
+        """Return the boxer, None without one."""
+
+
+def has_opponent(scene: object) -> bool:
+    """Return whether a scene, or its shapes, has a boxer that a person can move."""
+    return isinstance(scene, BoxingScene) and scene.opponent is not None
