@@ -54,6 +54,8 @@ _REMEMBER_PERSON_S = 300.0
 # angle and time on, faces that appear or jump there are in a film.
 _JUMP_M, _JUMP_M_S = 0.1, 2.0
 _FILM_RAD, _FILM_S, _JUMPS = radians(12.0), 30.0, 4
+# Time after which a person who is out of sight may be one in view whose clothes are known.
+_LOST_S = 0.8
 # A person in fewer frames than this may be a false detection, which is not remembered. Number of
 # frames with clothes after which the number is final. Largest number of stored people who left.
 _KNOWN, _CLOTHED, _MOST_LEFT = 10, 5, 30
@@ -177,7 +179,7 @@ class Tracker:
         if track.returned_person is not None:
             self._left.append(track.returned_person)
         # Without clothes, one who was missed for a moment is not another who appears nearby.
-        lost_s = IN_SIGHT_S if track.clothes.frames >= _CLOTHED else FORGET_S
+        lost_s = _LOST_S if track.clothes.frames >= _CLOTHED else FORGET_S
         gone = [
             one
             for one in self._tracks
