@@ -22,7 +22,6 @@ from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.robot.dashboard.feed.rig_feed import LiveRig, RigFeed, rig_message
 from gazerig.robot.description.build import describe
 from gazerig.robot.guardian.process import releaser
-from gazerig.robot.guardian.release_plan import decode, encode
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.run.buses import release_plan
 from gazerig.robot.run.emulated import emulated_lines
@@ -87,7 +86,7 @@ def test_the_guardian_switches_its_torque_off(example):
     port = InProcessPort(device, sleep_until=clock.sleep_until)
     for servo in device.servos.values():
         servo.torque = True
-    (plan,) = decode(encode((release_plan(rig, "", "/dev/ttyUSB0"),)))
+    plan = pickle.loads(pickle.dumps(release_plan(rig, "", "/dev/ttyUSB0")))
     assert releaser(plan)(port) == ()
     assert not any(servo.torque for servo in device.servos.values())
     device.faults.command("lose 3")

@@ -10,10 +10,11 @@ from served_rigs import hide_real_ports, served
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.feetech.family import FEETECH, FEETECH_SCS
+from gazerig.drivers.feetech.memory_table import FeetechParams
 from gazerig.drivers.servo_bus.discovery import count_corrupt, scan_ids
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.robot.guardian.process import releaser
-from gazerig.robot.guardian.release_plan import ReleasePlan, decode, encode
+from gazerig.robot.guardian.release_plan import ReleasePlan
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -62,9 +63,8 @@ def test_the_guardian_lets_go_of_servos_without_sync_read():
     bench = Bench()
     for servo_id in (1, 2):
         assert Transactions(bench.port, FEETECH_SCS).write(servo_id, "torque_enable", 1)
-    plan = ReleasePlan("feetech", "", 1_000_000, (1, 2), family="feetech scs")
-    (again,) = decode(encode((plan,)))
-    assert releaser(again)(bench.port) == ()
+    plan = ReleasePlan("feetech", "", (1, 2), FeetechParams(), "feetech scs")
+    assert releaser(plan)(bench.port) == ()
     assert [bench.chain[i].read(40, 1)[1] for i in (1, 2)] == [b"\x00", b"\x00"]
 
 

@@ -1,6 +1,8 @@
 """Program side of the guardian: starts the process and wraps the buses that it guards."""
 
+import base64
 import os
+import pickle
 import select
 import subprocess
 from collections.abc import Sequence
@@ -12,13 +14,12 @@ from gazerig.drivers.process import child_process
 from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
 from gazerig.robot.guardian.heartbeat import (
     IDLE,
-    MAX_PLANS,
     RELEASED,
     RELEASING,
     Heartbeat,
     shared_file,
 )
-from gazerig.robot.guardian.release_plan import ReleasePlan, encode
+from gazerig.robot.guardian.release_plan import ReleasePlan
 from gazerig.robot.model.clock import RealClock
 
 RETRY_S = 1.0
@@ -54,14 +55,9 @@ class Guardian:
 
     Args:
         plans: Servos to release, one plan for each port.
-
-    Raises:
-        ValueError: there are more than ``MAX_PLANS`` ports.
     """
 
     def __init__(self, plans: tuple[ReleasePlan, ...]) -> None:
-        if len(plans) > MAX_PLANS:
-            raise ValueError(f"{len(plans)} ports are too many for one guardian: {MAX_PLANS}")
         self.plans = plans
         self._fd = shared_file()
         self._heartbeat = Heartbeat(self._fd)
@@ -158,7 +154,11 @@ class Guardian:
             return
         self._check_s = now_s + CHECK_S
         code = self._process.poll()
-        hangs = code is None and self._is_hung(self._process.pid, now_s)
+        if self._heartbeat.checks != self._looks[0]:
+            self._looks = self._heartbeat.checks, now_s
+        # A guardian that is still starting has not read yet: its last time is infinity.
+        late = now_s - self._looks[1] > HUNG_S
+        hangs = code is None and (late or child_process.is_suspended(self._process.pid))
         if code is None and not hangs or now_s < self._restart_s:
             return
         self._restart_s = now_s + RESTART_S
@@ -169,11 +169,7 @@ class Guardian:
         for i in range(len(self.plans)):
             if self.is_releasing(i):  # the dead guardian cannot complete the release
                 self._heartbeat.set_state(i, RELEASED)
-        if code is None:
-            why = "did not respond"
-        else:
-            ended = f"signal {-code}" if code < 0 else f"exit code {code}"
-            why = f"ended unexpectedly ({ended})"
+        why = "did not respond" if hangs else f"ended unexpectedly (exit code {code})"
         self._events.append(f"the guardian {why}: started again")
         try:
             self._start()
@@ -207,13 +203,6 @@ class Guardian:
             ending.kill()
             ending.wait()
 
-    def _is_hung(self, pid: int, now_s: float) -> bool:
-        """Return whether the guardian is suspended or has not read the heartbeat for too long."""
-        if self._heartbeat.checks != self._looks[0]:
-            self._looks = self._heartbeat.checks, now_s
-        # A guardian that is still starting has not read yet: its last time is infinity.
-        return now_s - self._looks[1] > HUNG_S or child_process.is_suspended(pid)
-
     @staticmethod
     def _close_pipes(process: "subprocess.Popen[bytes]") -> None:
         for pipe in (process.stdin, process.stdout):
@@ -227,7 +216,7 @@ class Guardian:
         self._process = child_process.start(
             _MODULE,
             str(self._fd),
-            encode(self.plans),
+            base64.b85encode(pickle.dumps(self.plans)).decode(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             bufsize=0,

@@ -4,9 +4,10 @@ Run by gazerig.robot.guardian.guardian as
 
     python -m gazerig.robot.guardian.process HEARTBEAT_FD PLANS
 
-with one end of a pipe as standard input, whose other end the program holds, and a pipe as
-standard output, to which it writes one byte when it is ready. It shares nothing with the
-program but the memory of the heartbeat, and opens a port only to release servos.
+where PLANS is a tuple of ``ReleasePlan``, pickled and in base 85. One end of a pipe is its standard
+input, whose other end the program holds, and a pipe is its standard output, to which it writes one
+byte when it is ready. It shares nothing with the program but the memory of the heartbeat, and opens
+a port only to release servos.
 
 It ends when the program has ended or has closed the pipe; servos that are still armed are
 released first. Signals to a whole group (Ctrl-C, a closed terminal, the end of a service) are
@@ -21,15 +22,13 @@ import select
 import signal
 import sys
 from collections.abc import Callable
-from typing import Any
 
 from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import DriverError
-from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.process.visible_text import visible
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, HangDetector, Heartbeat
-from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe
+from gazerig.robot.guardian.release_plan import ReleasePlan, describe
 from gazerig.robot.model.clock import RealClock
 
 LOOK_S = 0.02
@@ -61,35 +60,30 @@ def _smart(plan: ReleasePlan) -> Releaser:
     from gazerig.drivers.bus.servo_models import FAMILIES
     from gazerig.drivers.servo_bus.torque import disable_torque
 
-    family = FAMILIES[plan.family or plan.kind]
-    return lambda port: disable_torque(port, family, plan.baud, plan.ids)
+    family = FAMILIES[plan.family]
+    return lambda port: disable_torque(port, family, plan.params.baud, plan.ids)
 
 
 def _maestro(plan: ReleasePlan) -> Releaser:
     from gazerig.drivers.hobby_board.board import stop_pulses
     from gazerig.drivers.maestro.board import MaestroBoard
 
-    params = MaestroParams(plan.crc, plan.channels)
-    return lambda port: stop_pulses(MaestroBoard(port, params), plan.ids)
+    return lambda port: stop_pulses(MaestroBoard(port, plan.params), plan.ids)
 
 
 def _pca9685(plan: ReleasePlan) -> Releaser:
     from gazerig.drivers.hobby_board.board import stop_pulses
-    from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Params
+    from gazerig.drivers.pca9685.board import Pca9685Board
 
-    params = Pca9685Params(plan.address)
-    return lambda port: stop_pulses(Pca9685Board(port, params), plan.ids)
+    return lambda port: stop_pulses(Pca9685Board(port, plan.params), plan.ids)
 
 
 def _package_releaser(plan: ReleasePlan) -> Releaser:
     from gazerig.drivers.plugins import BUS, BusPlugin, load
 
     release = load(BUS, plan.kind, BusPlugin).release
-    params: Any = pickle.loads(base64.b85decode(plan.settings))  # written by release_plan.pickled
-    if release is None:
-        return lambda port: ()
-    wanted = release
-    return lambda port: wanted(port, params, plan.ids)
+    assert release is not None, "a bus that needs no release has no plan"
+    return lambda port: release(port, plan.params, plan.ids)
 
 
 RELEASERS: dict[BusKind, Callable[[ReleasePlan], Releaser]] = {
@@ -192,8 +186,7 @@ class ProgramWatch:
 def say(line: str) -> None:
     """Write a line to standard error, which may be closed, for example with the terminal."""
     with contextlib.suppress(OSError):
-        wipe = "\r\x1b[K" if os.isatty(2) else ""
-        os.write(2, f"{wipe}{visible(line)}\n".encode(errors="replace"))
+        os.write(2, f"{visible(line)}\n".encode(errors="replace"))
 
 
 def main(heartbeat_fd: int, plans: str) -> None:
@@ -201,7 +194,7 @@ def main(heartbeat_fd: int, plans: str) -> None:
     parent = os.getppid()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
-    watch = ProgramWatch(Heartbeat(heartbeat_fd), decode(plans), parent)
+    watch = ProgramWatch(Heartbeat(heartbeat_fd), pickle.loads(base64.b85decode(plans)), parent)
     with contextlib.suppress(BrokenPipeError):
         os.write(sys.stdout.fileno(), b".")
     watch.run()

@@ -1,9 +1,6 @@
-"""Data to release the servos of one port, short enough for a command line."""
+"""Data to release the servos of one port."""
 
-import base64
-import json
-import pickle
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS, BusKind
 
@@ -12,39 +9,16 @@ class ReleasePlan(NamedTuple):
     """Servos of one port and the parameters of its line.
 
     port: path of the serial port
-    baud: bit/s
-    ids: ids of the servos; channels of a Maestro
-    crc, channels: settings of a Maestro, as in gazerig.drivers.maestro.board
-    address: address of a PCA9685
+    ids: ids of the servos; channels of a board of hobby servos
+    params: parameters of the kind of bus, as in the rig's file
     family: name of the family of smart servos
-    settings: parameters of a package's bus, from ``pickle_params``
     """
 
     kind: BusKind
     port: str
-    baud: int
     ids: tuple[int, ...]
-    crc: bool = False
-    channels: int = 12
-    address: int = 0x40
+    params: Any
     family: str = ""
-    settings: str = ""
-
-
-def pickle_params(params: object) -> str:
-    """Return the parameters of a package's bus as text."""
-    return base64.b85encode(pickle.dumps(params)).decode()
-
-
-def encode(plans: tuple[ReleasePlan, ...]) -> str:
-    """Return plans as one word of a command line."""
-    return json.dumps(plans)
-
-
-def decode(text: str) -> tuple[ReleasePlan, ...]:
-    """Return the plans from the text of ``encode``."""
-    plans = [ReleasePlan(*fields) for fields in json.loads(text)]
-    return tuple(plan._replace(ids=tuple(plan.ids)) for plan in plans)
 
 
 def describe(plan: ReleasePlan) -> str:

@@ -13,7 +13,7 @@ from gazerig.drivers.serial.list_ports import check_exists, check_owner, serial_
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.guardian.guardian import GuardedBus, Guardian
-from gazerig.robot.guardian.release_plan import ReleasePlan, pickle_params
+from gazerig.robot.guardian.release_plan import ReleasePlan
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.run.emulated import emulated_lines, servo_index, start_step
 from gazerig.robot.run.options import RunOptions
@@ -188,11 +188,7 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
     return ReleasePlan(
         config.kind,
         path,
-        config.section.baud,
         tuple(rig.joints[joint].id for joint in joints),
-        config.maestro.crc,
-        config.maestro.channels,
-        config.pca9685.address,
+        config.section,
         SERVOS[rig.joints[joints[0]].model].family,
-        "" if is_ours(BUS, config.kind) else pickle_params(config.section),
     )
