@@ -14,7 +14,6 @@ import pytest
 from command_line import invoked
 from described_rigs import SHIPPED, Poses, compare, random_angles, shipped
 from emulated_rig import EmulatedRig
-from fakes.runs import simulated
 
 from gazerig.config.schema import Rig
 from gazerig.robot.description.build import joint_torques_nm
@@ -28,7 +27,7 @@ from gazerig.robot.model.weight import CounterweightParams, HeadMassParams, Mass
 from gazerig.robot.run.buses import rig_bus
 from gazerig.robot.run.rig_description import (
     description_of,
-    rest_park_deg,
+    neck_loads,
     sag_compensation,
     statics_of,
 )
@@ -244,23 +243,11 @@ def test_torques_are_those_of_mujoco(name: str) -> None:
     for _ in range(5):
         angles = {
             name: rng.uniform(radians(joint.min_deg), radians(joint.max_deg))
-            for name, joint in rig.joints.items()
+            for name, joint in statics.joints.items()
         }
         expected = mujoco_loads_nm(rig, angles)
-        assert statics.load_nm(angles) == pytest.approx(expected, abs=1e-9)
-        neck = {name: angle for name, angle in angles.items() if "neck" in name}
-        quick = statics_of(rig, of_neck=True).load_nm(neck)
-        assert quick == pytest.approx({n: statics.load_nm(neck)[n] for n in quick}, abs=1e-12)
-
-
-def test_a_head_rests_where_its_weight_has_no_lever_or_on_its_stop() -> None:
-    rest = statics_of(shipped("desk")).rest_pose({})
-    assert degrees(rest["neck_pitch"]) == pytest.approx(-10.8, abs=0.1)
-    statics = statics_of(heavy("desk"))
-    assert statics.rest_pose({})["neck_pitch"] == radians(-35.0)
-    assert statics.limp_rad("neck_pitch", {"neck_pitch": radians(-12.0)}) == radians(-35.0)
-    loads = statics_of(shipped("desk")).load_nm(rest)
-    assert loads["neck_pitch"] == pytest.approx(0.0, abs=2e-3)
+        loads = statics.load_nm(angles)
+        assert loads == pytest.approx({name: expected[name] for name in loads}, abs=1e-9)
 
 
 class Neck:
@@ -322,15 +309,11 @@ def test_sag_is_made_up_for_without_a_jump_and_within_the_limits(
     assert neck.emulated.where()["neck_pitch"] <= 35.0
 
 
-def test_a_head_that_would_sink_is_parked_where_it_rests() -> None:
-    assert rest_park_deg(shipped("desk")) == shipped("desk").park_deg
-    rig = heavy("desk")
-    made = simulated(rig)
-    try:
-        assert made.notes[-1].startswith("parks neck_pitch at -35 deg")
-        at = rig.names.index("neck_pitch")
-        made.robot.start(made.clock)
-        assert made.robot.park(made.park_rad, made.clock, made.loop)
-        assert degrees(made.robot.body.read(made.clock.now_s()).position_rad[at]) < -32.5
-    finally:
-        made.close()
+def test_check_names_a_load_that_is_too_much_and_a_head_that_sinks() -> None:
+    told = [one for one in neck_loads(heavy("desk")) if one[0] == "neck_pitch"]
+    assert [bool(remedy) for _, _, remedy in told] == [False, True]
+    assert "32% of its stall torque, at neck_pitch -35" in told[0][1] and "sinks" in told[1][1]
+    far = MassParams(head=HeadMassParams(com_mm=(60.0, 0.0, 30.0)))
+    hot = [one for one in neck_loads(heavy("desk", far)) if one[0] == "neck_pitch"]
+    assert "42%" in hot[0][1] and "hot" in hot[0][2]
+    assert not any(remedy for _, _, remedy in neck_loads(shipped("desk")))

@@ -20,12 +20,14 @@ def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and list all faults at once; no servo is contacted."""
     with clear_errors(rig):
         from gazerig.config.schema import load_rig
-        from gazerig.robot.run.rig_description import weight_findings
+        from gazerig.robot.run.rig_description import neck_loads
 
         loaded = load_rig(rig)
         say(good_text(rig, loaded))
-        for finding in (*_find_radians(loaded), *weight_findings(loaded)):
-            say(f"{rig}: {finding}")
+        for hint in _find_radians(loaded):
+            say(f"{rig}: {hint}")
+        for joint, load, remedy in neck_loads(loaded):
+            say(f"{rig}: {joint}: {load}{remedy and f'; {remedy}'}")
         for line in _track_lines(loaded):
             say(line)
 

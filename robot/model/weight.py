@@ -21,8 +21,6 @@ GEAR_FRICTION = 0.03
 """Dry friction of motor and gear as a fraction of the stall torque."""
 AMBIENT_C = 30.0
 """Temperature of the air in a head."""
-STALL_RISE_C = 150.0
-"""Final warming of a stalled servo above the air."""
 
 GRAVITY_M_S2 = 9.81
 ORIGIN: Vec3 = (0.0, 0.0, 0.0)

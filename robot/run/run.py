@@ -48,8 +48,6 @@ from gazerig.robot.run.models import GazeModels, random_generators, rig_kinemati
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_description import (
     description_of,
-    park_notes,
-    rest_park_pose,
     sag_compensation,
     shape_of,
 )
@@ -215,7 +213,7 @@ class Run:
         # A shipped walk is reported only if verbose.
         shipped = rig.gaze.scanpath.transition_matrix in shipped_names("scanpaths")
         note = row_sums_note(models.walk) if options.verbose or not shipped else None
-        self.notes = (*notes, *([note] if note is not None else []), *park_notes(rig))
+        self.notes = (*notes, *([note] if note is not None else []))
 
     def close(self) -> None:
         """End the processes started for it; the robot closes its own camera and bus."""
@@ -240,7 +238,8 @@ class Run:
     @property
     def park_rad(self) -> JointAngles:
         """Return the pose for parking, before torque is switched off."""
-        return rest_park_pose(self.rig)
+        park = park_rad(self.rig)
+        return tuple(park.get(name, 0.0) for name in self.rig.names)
 
     @property
     def camera_params(self) -> CameraParams:

@@ -35,7 +35,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
 )
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
-from gazerig.robot.run.rig_description import weight_findings
+from gazerig.robot.run.rig_description import neck_loads
 from gazerig.robot.run.rig_limits import bus_names
 from gazerig.robot.safety.start_range import find_far_outside
 
@@ -69,8 +69,8 @@ def doctor(
                     findings += _examine_and_fix(model, bus, line, fix, tell)
         eyes = [examine_detector(model.detector)]
         eyes += [
-            Diagnostic(level, what, joint, remedy)
-            for level, joint, what, remedy in weight_findings(model)
+            Diagnostic("warn" if remedy else "note", what, joint, remedy)
+            for joint, what, remedy in neck_loads(model)
         ]
         show_findings(eyes, tell)
         findings += eyes

@@ -32,7 +32,6 @@ from gazerig.robot.loop.events import group_events
 from gazerig.robot.loop.power_down import Interrupts, PowerDown
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.run.buses import guarded_rig_bus
-from gazerig.robot.run.rig_description import rest_park_deg
 from gazerig.robot.run.rig_limits import limits, park_rad
 from gazerig.robot.safety.guard import Guard
 
@@ -158,7 +157,7 @@ def holding_rig(
     guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=1.0 / RATE_HZ)
     control = ManualControl(body, guard, RealClock(), speed_deg_s, stopped)
     with PowerDown(
-        (lambda again: park_slowly(control, rest_park_deg(rig), again)) if park else None,
+        (lambda again: park_slowly(control, rig.park_deg, again)) if park else None,
         control.stop,
         say,
         interrupts,
