@@ -230,12 +230,14 @@ def _mechanism(rig: Rig) -> Faults:
         elif fault := unreachable_text(pair, rig.joints):
             yield f"couplings.{name}", fault
     if rig.mass != MassParams():
-        from gazerig.robot.description.build import RigShape, rig_mass_faults  # few rigs need it
+        from gazerig.robot.description.build import RigShape, head_mass_fault  # few rigs need it
 
         lids = dict.fromkeys(LIDS, (-0.4, 0.4))  # their angles hardly matter to the masses
-        yield from rig_mass_faults(
-            RigShape(rig.name, rig.geometry, rig.joints, lids, rig.couplings, rig.camera, rig.mass)
+        shape = RigShape(
+            rig.name, rig.geometry, rig.joints, lids, rig.couplings, rig.camera, rig.mass
         )
+        if fault := head_mass_fault(shape):
+            yield "mass.head.mass_kg", fault
 
 
 def _names(rig: Rig) -> Faults:

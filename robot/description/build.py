@@ -6,11 +6,9 @@ both eyes' centres, and any other joints of the rig. Angles are those of the rig
 with their signs (robot/model/kinematics.py).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from math import radians
 from typing import NamedTuple
-
-import numpy as np
 
 from gazerig.gaze.angles import add, rotation, scale, sub
 from gazerig.gaze.types import Vec3
@@ -22,7 +20,6 @@ from gazerig.robot.description.links import (
     CameraView,
     Description,
     Ellipsoid,
-    Inertia,
     Link,
     LinkJoint,
     Visual,
@@ -107,10 +104,18 @@ def describe(rig: RigShape) -> Description:
     return _Builder(rig).description()
 
 
-def rig_mass_faults(rig: RigShape) -> Iterator[tuple[str, str]]:
-    """Find masses that are impossible for such a head: key in the rig's file, and the fault."""
-    plain = describe(rig._replace(mass=MassParams()))
-    yield from mass.mass_faults(rig.mass, _measures(rig.geometry), plain)
+def head_mass_fault(rig: RigShape) -> str:
+    """Return why the mass of a head is impossible, "" if it is not."""
+    given_kg = rig.mass.head.mass_kg
+    links = describe(rig._replace(mass=MassParams())).links
+    at = [link.name for link in links].index(HEAD)
+    rest_kg = sum(one.mass_kg for one in mass.carried_links(links[at + 1 :]))
+    if given_kg is None or given_kg > 1.01 * rest_kg:
+        return ""
+    return (
+        f"the head weighs {given_kg:g} kg with all it carries, and eyes, lids and other parts of "
+        f"it weigh {rest_kg:.3g} kg already"
+    )
 
 
 def _measures(geometry: GeometryParams) -> HeadMeasures:
@@ -201,11 +206,7 @@ class _Builder:
         if end > top + 1e-3:
             looks.append(tube("column", self._measures, end - top, (x, y, top)))
         body = Ellipsoid((x, y, top - 0.5 * tall), (1.2 * unit, 2.3 * unit, 0.5 * tall))
-        # It does not move.
-        inertia = Inertia(1.5, (x, y, top - 0.6 * tall), np.diag((0.010, 0.006, 0.012)))
-        self._links.append(
-            Link(BASE, None, inertia=inertia, visuals=tuple(looks), collisions=(body,))
-        )
+        self._links.append(Link(BASE, None, visuals=tuple(looks), collisions=(body,)))
 
     def _head(self, neck: str, p_m: Vec3, carried: list[Link]) -> Link:
         """Return the head without the links that it carries."""

@@ -3,14 +3,13 @@
 Lengths in metres, tensors about the centre of mass.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from math import dist
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.description.links import ORIGIN, Description, Inertia, Link, Visual
+from gazerig.robot.description.links import ORIGIN, Inertia, Link, Visual
 from gazerig.robot.description.mesh import stored_shell
 from gazerig.robot.description.parts import MIDDLE, HeadMeasures
 from gazerig.robot.model.weight import MassParams
@@ -22,8 +21,6 @@ SERVO_KG = 0.023
 _SERVO_HALF_M: Vec3 = (0.010, 0.013, 0.017)
 
 HEAD = "head"
-_FARTHEST = 2.0
-"""Largest distance of a centre of mass from the head's middle, in distances between the eyes."""
 _CONTENT_HALF: Vec3 = (1.5, 1.1, 0.6)
 """Half axes of a head's contents (servos, frame, counterweight), in distances between the eyes."""
 
@@ -52,34 +49,6 @@ def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[I
         for one in params.counterweights.values()
     ]
     return join_inertias((own, *weights)) if weights else own
-
-
-def mass_faults(
-    params: MassParams, measures: HeadMeasures, built: Description
-) -> Iterator[tuple[str, str]]:
-    """Find masses that are impossible for such a head: key in its file, and the fault.
-
-    Args:
-        params: mass parameters of the rig.
-        measures: dimensions of the head.
-        built: description of the same rig with the masses of its shapes.
-    """
-    wanted, names = params.head, [link.name for link in built.links]
-    rest_kg = sum(one.mass_kg for one in carried_links(built.links[names.index(HEAD) + 1 :]))
-    if wanted.mass_kg is not None and wanted.mass_kg <= 1.01 * rest_kg:
-        yield (
-            "mass.head.mass_kg",
-            f"the head weighs {wanted.mass_kg:g} kg with all it carries, and eyes, lids and other "
-            f"parts of it weigh {rest_kg:.3g} kg already",
-        )
-    elif wanted.com_mm is not None:
-        away = dist(_from_pivot(wanted.com_mm, measures), measures.scaled(MIDDLE))
-        if away > _FARTHEST * measures.interocular_m:
-            yield (
-                "mass.head.com_mm",
-                "this centre of mass is outside the head: give it ahead, left and above of the "
-                "neck's pitch axis, in mm",
-            )
 
 
 def carried_links(links: Iterable[Link]) -> list[Inertia]:

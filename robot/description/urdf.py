@@ -1,19 +1,15 @@
 """A description as URDF, which ROS, Foxglove and most simulators read: text and its meshes. Pure.
 
-URDF has no ellipsoids: they are scaled meshes of a ball. Meshes are in the same folder with
-relative paths, so no package is needed.
+Meshes have relative paths, so no package is needed. Only MJCF has shapes for collisions.
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Collection
 from math import atan2, cos, hypot, sin
 from typing import NamedTuple
 
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.description.links import Description, Link, Visual
+from gazerig.robot.description.links import Description, Link
 from gazerig.robot.description.mesh_files import element, mesh_files
-
-_BALL = Visual("ball_of_radius_1", "ball")
 
 
 class Urdf(NamedTuple):
@@ -51,14 +47,8 @@ def urdf(description: Description, folder: str = "meshes", *, looks: bool = True
             _place(part, visual.p_m, visual.R)
             element(element(part, "geometry"), "mesh", filename=f"{folder}/{visual.name}.obj")
             assets |= mesh_files(visual)
-        for shape in link.collisions:
-            part = element(body, "collision")
-            element(part, "origin", xyz=shape.p_m)
-            ball = f"{folder}/{_BALL.name}.obj"
-            element(element(part, "geometry"), "mesh", filename=ball, scale=shape.half_m)
-            assets |= mesh_files(_BALL)
         if link.parent is not None:
-            _add_joint(root, link, link.parent, {joint.name for joint in description.joints})
+            _add_joint(root, link, link.parent)
     ET.indent(root)
     text = ET.tostring(root, encoding="unicode")
     return Urdf(f'<?xml version="1.0"?>\n{text}\n', assets)
@@ -73,11 +63,9 @@ def _place(parent: ET.Element, p_m: Vec3, R: Mat3) -> None:
     element(parent, "origin", xyz=p_m, rpy=(atan2(s * c - k * f, k * e - s * b), pitch, yaw))
 
 
-def _add_joint(root: ET.Element, link: Link, parent: str, taken: Collection[str]) -> None:
+def _add_joint(root: ET.Element, link: Link, parent: str) -> None:
     joint = link.joint
     name, kind = (f"{link.name}_fixed", "fixed") if joint is None else (joint.name, "revolute")
-    while joint is None and name in taken:
-        name += "_"
     hinge = element(root, "joint", name=name, type=kind)
     element(hinge, "parent", link=parent)
     element(hinge, "child", link=link.name)
