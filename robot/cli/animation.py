@@ -142,5 +142,5 @@ def _track_line(track: Mapping[str, Any]) -> str:
     head = f"{track['name']:<14}{track['description']}"
     if track["refused"]:
         return f"{head}; not on this rig: {track['refused']}"
-    slower = f", slower by {track['slowed_by']:.2f}" if track["slowed_by"] > 1.0 else ""
-    return f"{head} ({track['duration_s']:.1f} s{slower})"
+    limited = track["limited"] and f"; {track['limited']}"
+    return f"{head} ({track['duration_s']:.1f} s{limited})"

@@ -1,7 +1,7 @@
 """Tracks of a robot: the available ones, their fit to this rig, and their control."""
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -30,7 +30,7 @@ class TrackInfo(Struct, frozen=True):
         name: Name of the track.
         description: Its description.
         duration_s: Duration in s, 0 if it is refused.
-        slowed_by: Factor by which it takes longer than defined.
+        limited: Where it is slower or smaller than defined, "" if it is not.
         refused: Reason why this rig cannot do it, "" if it can.
         owns: Joints that gaze does not move meanwhile.
         sound: Path of its sound, "" without one.
@@ -40,7 +40,7 @@ class TrackInfo(Struct, frozen=True):
     name: str
     description: str
     duration_s: float = 0.0
-    slowed_by: float = 1.0
+    limited: str = ""
     refused: str = ""
     owns: tuple[str, ...] = ()
     sound: str = ""
@@ -55,8 +55,6 @@ class TrackChoices:
         player: Plays them.
         fit: Fits them to the rig.
         latency_s: Latency of the joints, by which motion is ahead of its sound.
-        changes: Returns the tracks whose files have changed since the last call, or the fault of
-            a file.
     """
 
     def __init__(
@@ -65,34 +63,23 @@ class TrackChoices:
         player: TrackPlayer,
         fit: TrackFit,
         latency_s: float = 0.0,
-        changes: Callable[[], Mapping[str, Track | str]] = dict,
     ) -> None:
         self.latency_s = latency_s
-        self._tracks: dict[str, Track | str] = dict(tracks)
-        self._player, self._fit = player, fit
-        self._changes, self._changed = changes, set[str]()
+        self._tracks, self._player, self._fit = tracks, player, fit
         self._fitted = lru_cache(_MOST_KEPT)(self._fit_track)
         self._started: list[tuple[PlayingTrack, TrackState]] = []
         self._number = 0
 
     # --- the available ones
 
-    def _known(self) -> dict[str, Track | str]:
-        """Return all tracks, or the faults of their files, as they are now."""
-        if changed := self._changes():
-            self._tracks |= changed
-            self._changed |= changed.keys()
-            self._fitted.cache_clear()
-        return self._tracks
-
     @property
     def names(self) -> tuple[str, ...]:
         """Return the tracks whose joints this rig has. Thread-safe."""
         found = []
-        for name, track in self._known().items():
+        for name, track in self._tracks.items():
             with contextlib.suppress(TrackRefused):
-                if isinstance(track, Track) and self._fit.rows(track):
-                    found.append(name)
+                self._fit.rows(track)
+                found.append(name)
         return tuple(found)
 
     def all_tracks(self, limits: Sequence[JointLimit]) -> tuple[TrackInfo, ...]:
@@ -101,17 +88,15 @@ class TrackChoices:
         Args:
             limits: Limits of the joints.
         """
-        return tuple([self._info(name, track, limits) for name, track in self._known().items()])
+        return tuple([self._info(name, track, limits) for name, track in self._tracks.items()])
 
-    def _info(self, name: str, track: Track | str, limits: Sequence[JointLimit]) -> TrackInfo:
-        description = track.description if isinstance(track, Track) else ""
+    def _info(self, name: str, track: Track, limits: Sequence[JointLimit]) -> TrackInfo:
         try:
             motion, reply = self.prepare(Play(name), limits)
         except ValueError as refused:
-            return TrackInfo(name, description, refused=str(refused))
-        track = motion.track
+            return TrackInfo(name, track.description, refused=str(refused))
         return TrackInfo(
-            name, description, motion.duration_s, reply.slowed_by, "", self._fit.owns(track),
+            name, track.description, motion.duration_s, reply.limited, "", self._fit.owns(track),
             track.sound, tuple(track.cues.items()),
         )  # fmt: skip
 
@@ -129,8 +114,6 @@ class TrackChoices:
             motion = self._fit.speech(track, level, mouth, duration_s, limits)
             return motion, TrackReply(SPEECH, motion.duration_s)
         name, how = command.track, (command.speed, command.sound_s, tuple(limits))
-        if command.definition is not None:
-            return self._fit.motion(name, command.definition, how[2], *how[:2])
         return self._fitted(name, *how)
 
     def _fit_track(
@@ -154,19 +137,17 @@ class TrackChoices:
         Raises:
             ValueError: It cannot; the message lists the available tracks or cues.
         """
-        self._known()
         if isinstance(command, Speak) or command.track:
             motion, _ = self.prepare(command, limits)
             _start_s(command, motion)
 
     def complete(self, command: Play, limits: Sequence[JointLimit]) -> Play:
-        """Return a command with what a recording needs: the duration of a sound, a new track."""
+        """Return a command with what a recording needs: the duration of its sound."""
         try:
             motion, _ = self.prepare(command, limits)
         except ValueError:  # ``play`` reports it
             return command
-        new = motion.track if command.track in self._changed else command.definition
-        return structs.replace(command, sound_s=motion.sound_s, definition=new)
+        return structs.replace(command, sound_s=motion.sound_s)
 
     # --- playing
 
@@ -240,7 +221,7 @@ class TrackChoices:
         duration_s = begins_s - t_s + lead_s + motion.duration_s * max(1, rounds)
         duration_s -= motion.time_at(from_s)
         reply = structs.replace(reply, duration_s=duration_s, number=self._number)
-        limited = [reply.text().partition("; ")[2]]
+        limited = [reply.limited]
         if track.sound and motion.rate != 1.0:
             limited.append("without its sound, which plays at speed 1 only")
         state = TrackState(

@@ -56,32 +56,20 @@ class TrackReply(Struct, frozen=True):
     Attributes:
         name: Name of the track.
         duration_s: Time until everything is at rest again.
-        slowed_by: Factor by which it takes longer than requested.
-        slow_joint: Joint whose limits need this factor.
-        reduced_joints: (joint, share of its motion that its range leaves).
-        left_out: Joints of the track that the rig lacks.
+        limited: Where it is slower or smaller than defined, and what the rig lacks; "" if nothing.
         number: Number of the track (``gazerig.robot.model.control_source.TrackState``).
     """
 
     name: str
     duration_s: float
-    slowed_by: float = 1.0
-    slow_joint: str = ""
-    reduced_joints: tuple[tuple[str, float], ...] = ()
-    left_out: tuple[str, ...] = ()
+    limited: str = ""
     number: int = 0
 
     def text(self) -> str:
         """Return one line for users."""
         if not self.name:
             return f"tracks end within {self.duration_s:.2f} s"
-        parts = [f"{self.name} takes {self.duration_s:.1f} s"]
-        if self.slow_joint:
-            parts.append(f"slower by {self.slowed_by:.2f} for {self.slow_joint}")
-        parts += [f"{joint} moves {share:.0%} as far" for joint, share in self.reduced_joints]
-        if self.left_out:
-            parts.append(f"without {', '.join(self.left_out)}")
-        return "; ".join(parts)
+        return f"{self.name} takes {self.duration_s:.1f} s{self.limited and f'; {self.limited}'}"
 
 
 class CommandReply(Struct, frozen=True):

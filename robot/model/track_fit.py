@@ -93,21 +93,17 @@ class TrackFit:
         Raises:
             TrackRefused: The rig has nothing that it moves.
         """
-        rows, left_out = self.rows(track)
-        rows, reduced = self._clip(rows, limits)
+        rows, lacking = self.rows(track)
+        rows, limited = self._clip(rows, limits)
         owned = frozenset([self.channels.index(channel_of_joint(j)) for j in self.owns(track)])
         strain = self._strain(owned, limits)
         motion = TrackMotion(track, rows, len(self.channels), owned, strain, speed, sound_s)
-        slowed = motion.slowed_by > 1.0 + _SLOWED
-        reply = TrackReply(
-            name,
-            motion.duration_s,
-            motion.slowed_by if slowed else 1.0,
-            self.joints[motion.slowest] if slowed else "",
-            reduced,
-            left_out,
-        )
-        return motion, reply
+        if motion.slowed_by > 1.0 + _SLOWED:
+            slow = self.joints[motion.slowest]
+            limited.insert(0, f"slower by {motion.slowed_by:.2f} for {slow}")
+        if lacking:
+            limited.append(f"without {', '.join(lacking)}")
+        return motion, TrackReply(name, motion.duration_s, "; ".join(limited))
 
     def speech(
         self,
@@ -135,7 +131,7 @@ class TrackFit:
                 motion.lead_s = 0.5 * self._ranges[level].smoothing_s
         return motion
 
-    def rows(self, track: Track) -> tuple[list[ChannelKeys], tuple[str, ...]]:
+    def rows(self, track: Track) -> tuple[list[ChannelKeys], list[str]]:
         """Return a track's keys on the rig's channels, and what the rig lacks and leaves out.
 
         The eyes of a rig without a neck move instead, unless the track moves them as well.
@@ -170,7 +166,7 @@ class TrackFit:
             )
         lacking += [name for name in track.owns if not self._members(name)]
         named = [name.removeprefix(LEVEL).replace("head_", "neck_") for name in lacking]
-        return rows, tuple(dict.fromkeys(named))
+        return rows, list(dict.fromkeys(named))
 
     def owns(self, track: Track) -> tuple[str, ...]:
         """Return the joints of the rig that a track owns."""
@@ -183,13 +179,13 @@ class TrackFit:
 
     def _clip(
         self, rows: Sequence[ChannelKeys], limits: Sequence[JointLimit]
-    ) -> tuple[list[ChannelKeys], tuple[tuple[str, float], ...]]:
-        """Return the keys within the ranges of the joints, and the share that these leave.
+    ) -> tuple[list[ChannelKeys], list[str]]:
+        """Return the keys within the ranges of the joints, and a text for each smaller motion.
 
         Lids are limited by their openings, and eyes that compensate for the head move as far as
         they can.
         """
-        found, smaller = [], dict[str, float]()
+        found, smaller = [], list[str]()
         for row in rows:
             values = row.values
             for joint, limit in zip(self.joints, limits, strict=True):
@@ -198,10 +194,11 @@ class TrackFit:
                 clipped = np.clip(values, min(0.0, limit.low_rad), max(0.0, limit.high_rad))
                 worst = int(np.abs(values - clipped).argmax())
                 if abs(values[worst] - clipped[worst]) > 1e-6:
-                    smaller[joint] = float(clipped[worst] / values[worst])
+                    share = float(clipped[worst] / values[worst])
+                    smaller.append(f"{joint} moves {share:.0%} as far")
                 values = clipped
             found.append(row._replace(values=values))
-        return found, tuple(smaller.items())
+        return found, smaller
 
     def _strain(self, owned: frozenset[int], limits: Sequence[JointLimit]) -> Strain:
         """Return the factors by which motion must take longer to keep the limits.

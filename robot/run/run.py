@@ -60,7 +60,6 @@ from gazerig.robot.run.rig_limits import (
 )
 from gazerig.robot.run.run_rig import run_info, with_options
 from gazerig.robot.run.surroundings import RunRoom, refuse_missing_rules, scene_of, world
-from gazerig.robot.run.track_file import TrackFolder
 from gazerig.robot.run.voice import RunVoice
 from gazerig.robot.safety.guard import Guard
 
@@ -168,7 +167,7 @@ class Run:
             attention = chooser or with_rule(rig, models.attention)
             if rule is not None:
                 attention = RuleChooser(rule, attention, _label("attention", rule))
-            self.tracks = _tracks(rig, models, options.rig)
+            self.tracks = _tracks(rig, models)
             self.robot = Robot(
                 wrap_body(self.body) if wrap_body is not None else self.body,
                 models.kinematics,
@@ -309,14 +308,13 @@ class Run:
         browser.close()
 
 
-def _tracks(rig: Rig, models: GazeModels, rig_file: str) -> TrackChoices:
+def _tracks(rig: Rig, models: GazeModels) -> TrackChoices:
     """Return the tracks of a rig, those in the folder beside its file included."""
     return TrackChoices(
         tracks_of(rig.track_files),
         models.animation.tracks,
         TrackFit(rig.names, lid_spans(rig), face_tables(rig)),
         rig.gaze.oculomotor.eye_lag_ms / 1e3,
-        TrackFolder(rig_file).changes,
     )
 
 

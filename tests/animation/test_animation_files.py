@@ -56,7 +56,7 @@ def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(
         (0.5, -8.0, None),
         (1.0, 0.0, 4.0),
     ]
-    assert reply.slowed_by == 1.0 and reply.duration_s == pytest.approx(1.4)
+    assert reply.limited == "" and reply.duration_s == pytest.approx(1.4)
 
 
 BAD = {

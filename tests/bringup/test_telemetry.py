@@ -198,7 +198,7 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(
     path = tmp_path / "mine.yaml"
     on_rig = write_track(desk_rig, path, found.series, "by hand")
     track = load_track(path)
-    assert len(track.frames) < 40 and on_rig.slowed_by == 1.0
+    assert len(track.frames) < 40 and on_rig.limited == ""
     fit = TrackFit(desk_rig.names, lid_spans(desk_rig))
     motion, _ = fit.motion("x", track, limits(desk_rig.joints))
     at = np.linspace(0.1, 2.3, 50)

@@ -64,19 +64,13 @@ function listed(parts) {
 
 /** What limits have changed of an order, "" if nothing; reply: a CommandReply. */
 export function limits(reply) {
-  if (reply.track) return trackLimits(reply.track);
+  if (reply.track) {
+    const { name, limited } = reply.track;
+    return limited ? `${spaced(name)}: ${spaced(limited)}` : "";
+  }
   const joints = (reply.joints ?? []).filter((one) => one.reason)
     .map((one) => `${spaced(one.joint)}: ${one.reason}`).join("; ");
   if (!reply.asked_m) return joints;
   const off = degrees(reply.error_rad ?? 0);
   return off < 1 ? "" : `it looks ${off.toFixed(0)} deg off${joints && `: ${joints}`}`;
-}
-
-function trackLimits({ name, slowed_by, slow_joint, reduced_joints, left_out }) {
-  const parts = (reduced_joints ?? []).map(
-    ([joint, share]) => `${spaced(joint)} moves ${(100 * share).toFixed(0)} % as far`,
-  );
-  if (slow_joint) parts.unshift(`slower by ${slowed_by.toFixed(2)} for ${spaced(slow_joint)}`);
-  if (left_out?.length) parts.push(`without ${left_out.map(spaced).join(", ")}`);
-  return parts.length ? `${spaced(name)}: ${parts.join("; ")}` : "";
 }
