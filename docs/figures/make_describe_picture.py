@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.description.files import description_files
+from gazerig.robot.description.files import scene_files
 from gazerig.robot.run.rig_description import description_of
 
 PICTURE = Path(__file__).parent / "describe.png"
@@ -26,7 +26,7 @@ _POSES = {
 def _picture(rig: str, bodies: bool) -> np.ndarray:
     """Return a picture of a rig on its table, red first; ``bodies``: its collision shapes."""
     description = description_of(load_rig(rig))
-    files = description_files(description, ["mjcf"])
+    files = scene_files(description)
     text = files.pop("scene.xml").decode()
     text = text.replace('offwidth="1280" offheight="960"', 'offwidth="1560" offheight="1920"')
     model = mujoco.MjModel.from_xml_string(text, files)

@@ -20,7 +20,7 @@ from gazerig.features.lab.film_writer import film_writer
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.study.design import SEED, Study
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.files import description_files
+from gazerig.robot.description.files import scene_files
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.types import order_joints
 from gazerig.robot.run.options import RunOptions
@@ -73,7 +73,7 @@ def _render(study: Study, key: str, path: Path, progress: Callable[[str, float],
     ticks = list[Tick]()
     simulate(rig, options, watch=ticks.append)
     description = description_of(rig)
-    files = description_files(description, ["mjcf"])
+    files = scene_files(description)
     model = mujoco.MjModel.from_xml_string(files.pop("scene.xml").decode(), files)
     data = mujoco.MjData(model)
     renderer = Renderer(model, SIZE_PX, SIZE_PX, RendererParams(_SHADOW_PX, _SAMPLES))

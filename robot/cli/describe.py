@@ -21,47 +21,28 @@ def describe(
             help="Folder to write to; default: the rig's name with _description, in this folder."
         ),
     ] = None,
-    mjcf: Annotated[bool, typer.Option("--mjcf", help="Write MJCF, for MuJoCo.")] = False,
-    urdf: Annotated[
-        bool, typer.Option("--urdf", help="Write URDF, for ROS, Foxglove and most simulators.")
-    ] = False,
-    glb: Annotated[
-        bool, typer.Option("--glb", help="Write binary glTF, for browsers and Blender.")
-    ] = False,
     force: ForceOption = False,
 ) -> None:
-    """Write a rig as a robot description: MJCF, URDF and glTF with meshes, or one of them."""
+    """Write a rig as a robot description: MJCF, URDF and glTF with meshes."""
     with clear_errors(rig):
         from gazerig.config.schema import load_rig
-        from gazerig.robot.description.files import FORMATS, description_files, file_name
+        from gazerig.robot.description.files import description_files
         from gazerig.robot.run.rig_description import description_of
 
-        loaded = load_rig(rig)
-        description = description_of(loaded)
-        asked = dict(zip(FORMATS, (mjcf, urdf, glb), strict=True))
-        wanted = [name for name, one in asked.items() if one] or list(FORMATS)
-        folder = out or Path(f"{file_name(description.name)}_description")
+        description = description_of(load_rig(rig))
+        name = description.name
+        folder = out or Path(f"{name}_description")
         if folder.exists() and not folder.is_dir():
             raise SetupError(f"{folder} is a file: name a folder to write to")
         make_folder(folder)
-        files = description_files(description, wanted)
-        paths = {folder / name: data for name, data in files.items()}
-        refuse_existing(*paths, force=force)
-        for path in {path.parent for path in paths}:
-            make_folder(path)
-        for path, data in paths.items():
+        files = {folder / path: data for path, data in description_files(description).items()}
+        refuse_existing(*files, force=force)
+        for parent in {path.parent for path in files}:
+            make_folder(parent)
+        for path, data in files.items():
             write_file(path, data, force)
-        for path in paths:
-            hint = _HINTS.get("scene" if path.stem.startswith("scene") else path.suffix)
-            if hint is not None:
-                say(f"{path}: {hint.format(path)}")
-        say(f"{folder / 'meshes'}: {sum('/' in name for name in files)} files")
-
-
-_HINTS = {
-    ".xml": "a separate MuJoCo model, to be added to a world",
-    "scene": "the same on a table: python -m mujoco.viewer --mjcf={}",
-    ".urdf": "for RViz, Foxglove and other simulators",
-    ".glb": "for browsers and Blender",
-}
-"""How to open each file, by its ending."""
+        say(f"{folder / name}.xml: a separate MuJoCo model, to be added to a world")
+        scene = folder / "scene.xml"
+        say(f"{scene}: the same on a table: python -m mujoco.viewer --mjcf={scene}")
+        say(f"{folder / name}.urdf: for RViz, Foxglove and other simulators")
+        say(f"{folder / name}.glb: for browsers and Blender")

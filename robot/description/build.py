@@ -6,6 +6,7 @@ both eyes' centres, and any other joints of the rig. Angles are those of the rig
 with their signs (robot/model/kinematics.py).
 """
 
+import re
 from collections.abc import Mapping
 from math import radians
 from typing import NamedTuple
@@ -156,7 +157,9 @@ class _Builder:
         )
         self._links += [housing, Link(OPTICAL_FRAME, CAMERA, R=OPTICAL)]
         field = radians(camera.horizontal_field_deg)
-        return Description(rig.name, tuple(self._links), CameraView(field, *rig.image_px))
+        # A name that files and programs accept.
+        name = re.sub(r"[^A-Za-z0-9_-]+", "_", rig.name).strip("_") or "rig"
+        return Description(name, tuple(self._links), CameraView(field, *rig.image_px))
 
     def _joint(self, name: str, axis: Vec3, follows: str = "") -> LinkJoint:
         limit = self._rig.joints[follows or name].limit()

@@ -1,16 +1,9 @@
 """The files of a description that ``gazerig describe`` writes, by their paths in its folder."""
 
-import re
-from collections.abc import Collection
-from typing import Literal
-
 from gazerig.robot.description.links import Description
 from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.description.urdf import urdf
-
-Format = Literal["mjcf", "urdf", "glb"]
-FORMATS: tuple[Format, ...] = ("mjcf", "urdf", "glb")
 
 MESHES = "meshes"
 _SCENE = """<mujoco model="{name} on a table">
@@ -34,36 +27,25 @@ _SCENE = """<mujoco model="{name} on a table">
 """
 
 
-def file_name(name: str) -> str:
-    """Return a rig's name as a file name."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "rig"
+def scene_files(description: Description) -> dict[str, bytes]:
+    """Return the rig as a MuJoCo model, a scene with it on a table, and their meshes, by path."""
+    text, assets = mjcf(description, folder=MESHES)
+    scene = _SCENE.format(name=description.name, floor=FLOOR_M)
+    return {
+        f"{description.name}.xml": text.encode(),
+        "scene.xml": scene.encode(),
+        **{f"{MESHES}/{file}": data for file, data in assets.items()},
+    }
 
 
-def description_files(
-    description: Description, formats: Collection[Format] = FORMATS
-) -> dict[str, bytes]:
-    """Return the content of all files by their paths in the output folder.
+def description_files(description: Description) -> dict[str, bytes]:
+    """Return all files by their paths in the output folder: MJCF, URDF and glTF."""
+    from gazerig.robot.description.gltf import gltf  # takes .5 s of CPU time
 
-    Args:
-        description: description of the rig.
-        formats: mjcf: the rig as a MuJoCo model, and a scene with it on a table; urdf; glb.
-    """
-    name = file_name(description.name)
-    named = description._replace(name=name)
-    found: dict[str, bytes] = {}
-    if "mjcf" in formats:
-        text, assets = mjcf(named, folder=MESHES)
-        found[f"{name}.xml"] = text.encode()
-        found["scene.xml" if name != "scene" else "scene_.xml"] = _SCENE.format(
-            name=name, floor=FLOOR_M
-        ).encode()
-        found |= {f"{MESHES}/{file}": data for file, data in assets.items()}
-    if "urdf" in formats:
-        text, assets = urdf(named, MESHES)
-        found[f"{name}.urdf"] = text.encode()
-        found |= {f"{MESHES}/{file}": data for file, data in assets.items()}
-    if "glb" in formats:
-        from gazerig.robot.description.gltf import gltf  # takes .5 s of CPU time
-
-        found[f"{name}.glb"] = gltf(named)
-    return found
+    text, assets = urdf(description, MESHES)
+    return {
+        **scene_files(description),
+        f"{description.name}.urdf": text.encode(),
+        **{f"{MESHES}/{file}": data for file, data in assets.items()},
+        f"{description.name}.glb": gltf(description),
+    }

@@ -1,7 +1,7 @@
 """A description as binary glTF: a tree of nodes with meshes, for browsers and modelling programs.
 
-A joint is a separate node between a link and its parent. Its rotation by the joint's angle about
-the axis in its extras moves its children. y is up, as glTF requires, below a root that turns z up.
+The node of a link that a joint turns has the name of the joint. y is up, as glTF requires, below a
+root that turns z up.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from trimesh.visual.material import PBRMaterial
 
 from gazerig.gaze.angles import compose, turn_about
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.description.links import IDENTITY, ORIGIN, ROUGHNESS, Description, Visual
+from gazerig.robot.description.links import ORIGIN, ROUGHNESS, Description, Visual
 from gazerig.robot.description.texture import add_texture
 from gazerig.robot.model.frames import quaternion
 
@@ -25,33 +25,23 @@ _ROOT = "world"
 def gltf(description: Description) -> bytes:
     """Return a description as a binary glTF file, with its lids open and all other joints at 0."""
     scene: Any = trimesh.Scene(base_frame=_ROOT)
-    names = {_ROOT, *(link.name for link in description.links)}
+    names = {link.name: link.joint.name if link.joint else link.name for link in description.links}
     joints: dict[str, dict[str, Any]] = {}
     for link in description.links:
-        parent = link.parent or _ROOT
+        parent = names[link.parent] if link.parent else _ROOT
         R, p = (link.R, link.p_m) if link.parent else (_Y_UP, ORIGIN)
+        node = names[link.name]
         if link.joint is not None:
-            node = link.joint.name  # may have the name of a link
-            while node in names:
-                node += "_"
             R = compose(R, turn_about(link.joint.axis, link.joint.awake_rad))
-            scene.graph.update(frame_from=parent, frame_to=node, matrix=_matrix(R, p))
             w, x, y, z = quaternion(R)
-            extras = {
-                "joint": link.joint.name,
-                "axis": list(link.joint.axis),
-                "low_rad": link.joint.low_rad,
-                "high_rad": link.joint.high_rad,
-            }
-            joints[node] = {"extras": extras, "rotation": [x, y, z, w], "translation": list(p)}
-            parent, R, p = node, IDENTITY, ORIGIN
-        scene.graph.update(frame_from=parent, frame_to=link.name, matrix=_matrix(R, p))
+            joints[node] = {"rotation": [x, y, z, w], "translation": list(p)}
+        scene.graph.update(frame_from=parent, frame_to=node, matrix=_matrix(R, p))
         for visual in link.visuals:
             scene.add_geometry(
                 _mesh(visual),
                 node_name=f"{visual.name}_mesh",
                 geom_name=visual.name,
-                parent_node_name=link.name,
+                parent_node_name=node,
                 transform=_matrix(visual.R, visual.p_m),
             )
 

@@ -4,9 +4,9 @@ Meshes have relative paths, so no package is needed. Only MJCF has shapes for co
 """
 
 import xml.etree.ElementTree as ET
-from math import atan2, cos, hypot, sin
 from typing import NamedTuple
 
+from gazerig.gaze.angles import angles_of
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.description.links import Description, Link
 from gazerig.robot.description.mesh_files import element, mesh_files
@@ -56,11 +56,8 @@ def urdf(description: Description, folder: str = "meshes", *, looks: bool = True
 
 def _place(parent: ET.Element, p_m: Vec3, R: Mat3) -> None:
     """Add a pose; its angles turn about fixed x, y and z axes, in this order."""
-    (a, b, c), (d, e, f), (g, _, _) = R
-    yaw, pitch = atan2(d, a), atan2(-g, hypot(a, d))
-    # From the rotation without yaw, so that it is also valid if pitch is a right angle.
-    s, k = sin(yaw), cos(yaw)
-    element(parent, "origin", xyz=p_m, rpy=(atan2(s * c - k * f, k * e - s * b), pitch, yaw))
+    yaw, pitch, roll = angles_of(R)
+    element(parent, "origin", xyz=p_m, rpy=(roll, -pitch, yaw))
 
 
 def _add_joint(root: ET.Element, link: Link, parent: str) -> None:
