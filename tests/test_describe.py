@@ -202,7 +202,6 @@ def test_the_whole_model_is_compiled_with_looks(name: str) -> None:
         low, high = model.joint(joint.name).range
         limit = shipped(name).joints[joint.follows or joint.name].limit()
         assert (low, high) == pytest.approx((limit.low_rad, limit.high_rad), abs=1e-12)
-    assert model.ncam == 1
     looks = [visual.name for link in description.links for visual in link.visuals]
     assert len(set(looks)) == len(looks) == model.nmesh
     # Nothing touches in the parking pose and straight ahead.

@@ -18,7 +18,6 @@ from gazerig.robot.description.links import (
     CAMERA,
     OPTICAL_FRAME,
     ORIGIN,
-    CameraView,
     Description,
     Ellipsoid,
     Link,
@@ -87,7 +86,6 @@ class RigShape(NamedTuple):
     """Values of a rig's YAML from which a description is built.
 
     lids: angles of the lid joints shut and open
-    image_px: width and height of the camera's frames
     """
 
     name: str
@@ -97,7 +95,6 @@ class RigShape(NamedTuple):
     couplings: Mapping[str, CouplingParams]
     camera: CameraParams
     mass: MassParams = MassParams()
-    image_px: tuple[int, int] = (640, 480)
 
 
 def describe(rig: RigShape) -> Description:
@@ -156,10 +153,9 @@ class _Builder:
             visuals=(Visual(CAMERA, "camera"),),
         )
         self._links += [housing, Link(OPTICAL_FRAME, CAMERA, R=OPTICAL)]
-        field = radians(camera.horizontal_field_deg)
         # A name that files and programs accept.
         name = re.sub(r"[^A-Za-z0-9_-]+", "_", rig.name).strip("_") or "rig"
-        return Description(name, tuple(self._links), CameraView(field, *rig.image_px))
+        return Description(name, tuple(self._links))
 
     def _joint(self, name: str, axis: Vec3, follows: str = "") -> LinkJoint:
         limit = self._rig.joints[follows or name].limit()

@@ -96,29 +96,16 @@ CAMERA, OPTICAL_FRAME = "camera_link", "camera_optical_frame"
 """Links of the camera: x forward, y left, z up; x right, y down, z forward (as in ROS)."""
 
 
-class CameraView(NamedTuple):
-    """Field of view of the camera, and the size of its frames."""
-
-    horizontal_field_rad: float
-    width_px: int
-    height_px: int
-
-
 class Description(NamedTuple):
     """A rig as a tree of links, parents first."""
 
     name: str
     links: tuple[Link, ...]
-    camera: CameraView
 
     @property
     def joints(self) -> tuple[LinkJoint, ...]:
         """Return all joints, also those that follow others."""
         return tuple(link.joint for link in self.links if link.joint is not None)
-
-    def link(self, name: str) -> Link:
-        """Return a link by its name."""
-        return next(link for link in self.links if link.name == name)
 
     def angles(self, names: Sequence[str], position_rad: Sequence[float]) -> dict[str, float]:
         """Return the angle of every joint, those that follow others included.

@@ -5,11 +5,10 @@ world is the rig's base. Its parts collide with the world, not with each other.
 """
 
 import xml.etree.ElementTree as ET
-from math import atan, degrees, tan
 from typing import NamedTuple
 
 from gazerig.gaze.angles import compose, turn_about
-from gazerig.robot.description.links import OPTICAL_FRAME, ROUGHNESS, Description, Link
+from gazerig.robot.description.links import ROUGHNESS, Description, Link
 from gazerig.robot.description.mesh_files import element, mesh_files
 from gazerig.robot.model.frames import quaternion
 
@@ -62,15 +61,6 @@ def mjcf(
                 body, "geom", name=name, type="mesh", mesh=name, material=name, contype="0",
                 conaffinity="0", group=_LOOKS_GROUP, mass="0", pos=visual.p_m, quat=quaternion(visual.R),
             )  # fmt: skip
-    # MuJoCo's camera looks along -z with y up; the optical frame looks along z with y down.
-    camera = description.camera
-    field_y = 2.0 * atan(
-        tan(0.5 * camera.horizontal_field_rad) * camera.height_px / camera.width_px
-    )
-    element(
-        bodies[OPTICAL_FRAME], "camera", name="camera", fovy=degrees(field_y),
-        xyaxes="1 0 0 0 -1 0", resolution=(camera.width_px, camera.height_px),
-    )  # fmt: skip
     _add_servos(root, description)
     ET.indent(root)
     return Mjcf(ET.tostring(root, encoding="unicode") + "\n", files)

@@ -3,7 +3,7 @@
 Head frame: origin midway between the eyes, x ahead, y left, z up.
 """
 
-from math import cos, dist, radians, sin
+from math import cos, radians, sin
 from typing import NamedTuple
 
 from gazerig.gaze.angles import rotation, scale
@@ -71,15 +71,6 @@ class HeadMeasures(NamedTuple):
     def bodies(self) -> tuple[Ellipsoid, ...]:
         """Return the head in collisions."""
         return tuple(Ellipsoid(*map(self.scaled, body)) for body in _BODIES)
-
-
-def measures_of(left_m: Vec3, right_m: Vec3, pivot_m: Vec3 | None = None) -> HeadMeasures:
-    """Return the dimensions of a head from the centres of its eyes in any frame, and its pivot."""
-    plain = HeadMeasures()
-    interocular_m = round(dist(left_m, right_m), 4) or plain.interocular_m
-    if pivot_m is None:
-        pivot_m = scale(plain.pivot_m, interocular_m / plain.interocular_m)
-    return HeadMeasures(interocular_m, pivot_m)
 
 
 def meeting_rad(upper_span_rad: float, lower_span_rad: float) -> float:

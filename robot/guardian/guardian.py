@@ -132,13 +132,9 @@ class Guardian:
         """Report to the guardian that a port's torque is off."""
         self._heartbeat.arm(plan, False)
 
-    def is_releasing(self, plan: int) -> bool:
-        """Return whether the guardian is releasing a plan's servos now."""
-        return self._heartbeat.state(plan) == RELEASING
-
-    def is_released(self, plan: int) -> bool:
-        """Return whether the guardian has released a plan's servos or is releasing them."""
-        return self._heartbeat.state(plan) != IDLE
+    def state(self, plan: int) -> int:
+        """Return whether the guardian has left a plan's servos alone, releases or released them."""
+        return self._heartbeat.state(plan)
 
     def acknowledge(self, plan: int) -> None:
         """Record that the loop has noticed the release; the guardian may release again."""
@@ -167,7 +163,7 @@ class Guardian:
             self._process.wait()
         self._close_pipes(self._process)
         for i in range(len(self.plans)):
-            if self.is_releasing(i):  # the dead guardian cannot complete the release
+            if self.state(i) == RELEASING:  # the dead guardian cannot complete the release
                 self._heartbeat.set_state(i, RELEASED)
         why = "did not respond" if hangs else f"ended unexpectedly (exit code {code})"
         self._events.append(f"the guardian {why}: started again")
@@ -178,10 +174,7 @@ class Guardian:
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
-        if not self._events:
-            return ()
-        events = tuple(self._events)
-        self._events.clear()
+        events, self._events = tuple(self._events), []
         return events
 
     def leave(self, plan: int) -> None:
@@ -271,8 +264,9 @@ class GuardedBus:
         """
         self._beat()
         self._guardian.check(now_s)
-        if self._lost_hold or self._guardian.is_released(self._plan):
-            if self._guardian.is_releasing(self._plan):
+        state = self._guardian.state(self._plan)
+        if self._lost_hold or state != IDLE:
+            if state == RELEASING:
                 return self._silent
             self._restore_torque(now_s)
         feedback = self._bus.read(now_s)
@@ -304,7 +298,7 @@ class GuardedBus:
             ValueError: a goal is not a number, or their number is not that of the servos.
         """
         self._beat()
-        if self._lost_hold or self._guardian.is_released(self._plan):
+        if self._lost_hold or self._guardian.state(self._plan) != IDLE:
             return
         self._bus.write(goals_steps)
 

@@ -36,7 +36,6 @@ def shape_of(rig: Rig) -> RigShape:
         rig.couplings,
         rig.camera,
         rig.mass,
-        (rig.webcam.width_px, rig.webcam.height_px),
     )
 
 
