@@ -116,9 +116,7 @@ class Run:
         self.models = models = GazeModels(rig, random)
         drawn = options.pixels or (options.world is not None and not options.no_pictures)
         in_process = options.scene is None and options.world is None
-        self.view, notes = place_camera(
-            rig, options, models.kinematics, in_process or (drawn and not options.fast)
-        )
+        self.view, notes = place_camera(rig, options, models.kinematics, in_process or drawn)
         self._messages: list[str] = []
         with ExitStack() as opened:
             # Bus and surroundings
@@ -146,7 +144,7 @@ class Run:
                 if steps is not None:
                     head = true_head_pose(steps, rig, rig_kinematics(rig))
                 seen = scene_camera(
-                    rig, view, options, now_s, detector, self.scene, head, random["camera"]
+                    rig, view, options, detector, self.scene, head, random["camera"]
                 )
             else:
                 seen = real_camera(rig, view, options, now_s, detector)
@@ -212,8 +210,8 @@ class Run:
                 self.robot.report,
             )
             self._opened = opened.pop_all()
-        # A shipped walk is reported only if verbose.
         shipped = rig.gaze.scanpath.transition_matrix in shipped_names("scanpaths")
+        # A shipped walk is reported only if verbose.
         note = row_sums_note(models.walk) if options.verbose or not shipped else None
         self.notes = (*notes, *([note] if note is not None else []), *park_notes(rig))
 
