@@ -177,16 +177,6 @@ def test_motion_ends_a_look_away() -> None:
 # ---- without a conversation -----------------------------------------------------------
 
 
-def test_silent_bouts_of_mutual_gaze_last_as_long_as_people_prefer() -> None:
-    found = stays(aversion(17), 6000.0)
-    mutual = np.array([s.seconds for s in found if s.kind == "face"])
-    away = np.array([s.seconds for s in found if s.kind == "away"])
-    assert np.median(mutual) == pytest.approx(3.3, rel=0.06)
-    assert np.std(np.log(mutual)) == pytest.approx(0.43, abs=0.04)
-    assert mutual.max() <= 14.5 + DT
-    assert away.mean() == pytest.approx(0.6, rel=0.06) and away.max() < 4.0
-
-
 def test_a_target_that_a_user_has_chosen_is_left_in_a_conversation_only() -> None:
     model = aversion(18)
     t = leaves_at(model)

@@ -7,7 +7,7 @@ test states otherwise.
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from math import cos, degrees, pi, radians, sin, tan
+from math import cos, degrees, hypot, pi, radians, sin, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +32,7 @@ from gazerig.gaze.angles import (
 )
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.oculomotor.binocular import BinocularController, EyeGeometry, Eyes, OppositeAngles
-from gazerig.gaze.oculomotor.gaze_point import OculomotorParams, endpoint
+from gazerig.gaze.oculomotor.gaze_point import OculomotorParams, Refixations, endpoint
 from gazerig.gaze.oculomotor.head import HeadParams, HeadShare
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.oculomotor.saccade_trajectory import RedirectedTrajectory, SaccadeTrajectory
@@ -535,3 +535,24 @@ def test_e31_opposite_angles_hold_the_gaze_through_a_turn_about_one_axis() -> No
 def test_eyes_that_begin_out_of_range_begin_straight() -> None:
     eyes, _ = stand(OppositeAngles(), (0.0, 0.0, 0.0), (1.0, 1.0, 0.125))
     assert eyes == ((0.0, 0.0), (0.0, 0.0))
+
+
+def test_e19_no_eye_beyond_its_limit_and_no_head_beyond_its_range() -> None:
+    rng = np.random.default_rng(5)
+    rig = Rig(eye_deg=35.0, geometry=DESK, neck_deg=60.0)
+    targets = [_any_target(rng, 0.2 * k, k) for k in range(101)]
+    trace = rig.run(lambda t: targets[int(t / 0.2)], 20.0)
+    for command in trace.commands:
+        eyes = (*command.eye_left_rad, *command.eye_right_rad)
+        assert max(abs(a) for a in eyes) <= radians(35.0) + 1e-12
+    assert 50.0 < np.abs(trace.head).max() <= 60.0 + 1e-9
+
+
+def test_a_new_target_is_looked_at_in_its_middle_and_a_moving_one_is_only_followed() -> None:
+    points = Refixations(np.random.default_rng(0))
+    times = np.arange(0.0, 20.0, 0.005)
+    assert not any(points.is_due(t, still=False) for t in times)
+    assert any(points.is_due(20.0 + t) for t in times)
+    assert 0.0 < degrees(hypot(*points.offset_rad)) <= 1.28
+    points.reset()
+    assert points.offset_rad == (0.0, 0.0)

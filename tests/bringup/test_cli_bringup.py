@@ -218,24 +218,6 @@ def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig: Path, tmp_pa
     assert "joints.left_eye_pan.zero_step" in done.err
 
 
-@pytest.mark.parametrize(
-    ("kind", "words", "says"),
-    [
-        ("desk", ("--joint", "nose"), "no such joint; there is left_eye_pan"),
-        ("desk", ("--joint", "neck_yaw", "--answers", "EMPTY"), "no answer left to: turn neck_yaw"),
-        ("maker", ("--set-middle",), "only Feetech STS servos"),
-    ],
-)
-def test_what_cannot_be_is_said(
-    rigs: dict[str, str], tmp_path: Path, kind: str, words: tuple[str, ...], says: str
-) -> None:
-    before = Path(rigs[kind]).read_bytes()
-    words = tuple(answers_in(tmp_path) if word == "EMPTY" else word for word in words)
-    done = calibrate(rigs[kind], "--mock", *words)
-    assert done.code == 2 and says in done.err, done.err
-    assert Path(rigs[kind]).read_bytes() == before
-
-
 # --- on a port that another program serves, from a process of its own
 
 

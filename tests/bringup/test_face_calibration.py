@@ -90,18 +90,6 @@ def chosen(made: FaceSteering, t_s: float, *faces: Face, captured_s: float | Non
 # --- whom it looks at
 
 
-def test_the_part_goes_with_the_face_and_the_head_with_its_centre() -> None:
-    made = steering()
-    chosen(made, 0.0, face(1, 1.0))
-    assert made.press("left") is None
-    for yaw in (2.6, 3.1, 3.6):
-        there = face(1, 0.9, 0.2, yaw)
-        target = chosen(made, 0.1, there)
-        expected = point_world_m((0.0, 5.0, 0.0), there.p_world_m, there.R_world_face)
-        assert target.p_world_m == pytest.approx(expected)
-        assert target.centre_world_m == there.p_world_m and target.part == "N"
-
-
 def test_a_stale_picture_shows_nobody_and_keys_wait() -> None:
     made = steering()
     chosen(made, 1.0, face(1, 1.0))
