@@ -167,19 +167,6 @@ def test_a_run_records_the_frames_of_its_camera_and_never_over_a_file(tmp_path):
         RunOptions(mock=True, record_camera=tmp_path / "x.mcap").check_and_complete()
 
 
-def test_full_disk_ends_the_recording_and_not_the_camera(tmp_path, monkeypatch):
-    def full(self, captured_s, number, messages) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(RecordingWriter, "add", full)
-    recorder = CameraRecorder(tmp_path / "r.mcap")
-    for k in range(6):
-        recorder.add(shot(k))
-    recorder.finish()
-    (line,) = recorder.events()
-    assert line.endswith("recording ended: No space left on device")
-
-
 def test_slow_disk_leaves_pictures_out_and_says_so(tmp_path, monkeypatch):
     go, written = threading.Event(), list[int]()
 

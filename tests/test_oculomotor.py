@@ -41,8 +41,6 @@ from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState
 from gazerig.robot.run.gaze_models import rig_kinematics
 
-PEOPLE = OculomotorParams(refixations=False, eye_lag_ms=5.0)
-
 
 def test_e17_gaze_timeline_of_a_60_degree_shift() -> None:
     head = HeadParams(goal_model="attention", base_speed_deg_s=70.0)
@@ -76,19 +74,6 @@ def test_only_a_near_target_takes_range_of_the_eyes() -> None:
     assert degrees(share.for_near_target(radians(15.0)).reach_rad) == pytest.approx(15.0)
 
 
-def test_scattered_landings_are_corrected_by_small_saccades() -> None:
-    after, misses = [], []
-    for seed in range(12):
-        trace = Rig(params=PEOPLE, dice=seed).run(still(28.0), 0.8)
-        misses.append(trace.error[trace.landed + 1])
-        assert trace.saccades == (2 if misses[-1] > 1.2 else 1)
-        if trace.saccades == 2:
-            after.append(trace.rest_s)
-        assert trace.error[-1] < 0.1 and not trace.in_flight[-1]
-    assert 1.2 < np.mean(misses) < 3.2  # 0.08 of 28 deg
-    assert after and min(after) >= 0.1 and max(after) <= 0.205
-
-
 def test_the_head_faces_the_centre_while_the_gaze_wanders_over_parts() -> None:
     rig = Rig()
     centre = scale(direction((radians(45.0), 0.0)), 1.0)
@@ -118,14 +103,6 @@ def test_e31_eyes_hold_the_gaze_through_any_turn_of_the_head() -> None:
             error = angle_between(line_of_sight(seen, left), sub(fixed.p_world_m, eye))
             assert degrees(error) < 0.1
     assert degrees(seen.head_rad[0]) == pytest.approx(40.0)
-
-
-def test_a_point_on_the_nose_is_converged_on_no_nearer_than_the_limit() -> None:
-    rig = Rig()
-    near = target((0.02, 0.0, 0.0), kind="thing", top_down=True)
-    command = rig.run(lambda t: near, 2.0).commands[-1]
-    vergence = degrees(command.eye_right_rad[0] - command.eye_left_rad[0])
-    assert 17.0 < vergence < 18.0
 
 
 def test_it_begins_where_head_and_eyes_are() -> None:

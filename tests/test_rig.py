@@ -21,7 +21,6 @@ from gazerig.config.parameters import (
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
 from gazerig.drivers.errors import SetupError
 from gazerig.params import Declaration, declarations
-from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import Parameter
 from gazerig.robot.run.bus_wiring import bus_ports
 
@@ -172,9 +171,6 @@ def test_ports_are_named_by_their_bus(mixed: Rig) -> None:
 # --- Knobs: every parameter of a rig by its key, with the rules and words of its file
 
 
-LENS = {"size_px": (640, 480), "focal_px": (500.0, 500.0)}
-
-
 @pytest.fixture(scope="module")
 def knobs(desk_rig: Rig) -> tuple[Parameter, ...]:
     return parameters(desk_rig, desk_rig)
@@ -201,26 +197,6 @@ def test_all_have_words_and_structure_waits_for_the_next_start(
     for parameter in knobs:
         assert parameter.description, parameter.key
         assert parameter.kind != "choice" or parameter.choices, parameter.key
-
-
-def test_entries_and_groups_come_and_go(desk_rig: Rig) -> None:
-    rule: dict[str, Value] = {"look_at": "hand", "salience": 1.0}
-    other = apply_changes(
-        desk_rig,
-        {
-            "gaze.top_down.rules.point": rule,
-            "face_parts_mm.N": (1, 2, 3),
-            "park_deg.neck_yaw": 3.0,
-            "camera.lens": {**LENS, "centre_px": (320.0, 240.0)},
-        },
-    )
-    assert other.face_parts_mm == {"N": (1.0, 2.0, 3.0)}
-    assert value_of(other, "gaze.top_down.rules.point.salience") == 1.0
-    assert apply_changes(desk_rig, differences(desk_rig, other)) == other
-    assert apply_changes(other, differences(other, desk_rig)) == desk_rig
-    flat = differences(desk_rig, other)
-    assert flat["gaze.top_down.rules.point.look_at"] == "hand"
-    assert flat["camera.lens.focal_px"] == (500.0, 500.0)
 
 
 @settings(max_examples=30, deadline=None)

@@ -33,10 +33,6 @@ def test_scan_lists_every_servo():
     assert rows[0][1] == "xl330-m077" and rows[8][1] == "xc330-m288"
     assert {row[3] for row in rows} == {"1000000"}
     assert "9 servos on" in out and "searched dynamixel at 1000000, 57600, " in out
-    code, out, _ = invoked("scan", "--mock", "--kind", "dynamixel", "--json")
-    found = json.loads(out)
-    assert code == 0 and [servo["id"] for servo in found["servos"]] == list(range(1, 10))
-    assert found["servos"][6]["model"] == "xc330-m288"
 
 
 # --- doctor

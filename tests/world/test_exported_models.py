@@ -1,6 +1,5 @@
 """The exported MJCF in MuJoCo alone moves as the running world; its URDF has the same masses."""
 
-from dataclasses import replace
 from math import radians
 from typing import Any
 
@@ -12,7 +11,6 @@ from world_rigs import WorldBench, arm, write
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.description.urdf import urdf
-from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.run.rig_description import description_of
 from gazerig.robot.run.servo_drives import servo_drives
 
@@ -63,17 +61,6 @@ def test_an_exported_motor_holds_and_stalls_as_that_of_the_running_world(
         mujoco.mj_step(model, data)
     torque_nm = data.qfrc_actuator[model.joint(joint).dofadr[0]]
     assert torque_nm == pytest.approx(in_world_nm, rel=0.05)
-
-
-def test_two_servos_of_a_pair_share_their_joints(desk_rig: Rig) -> None:
-    """Each of a differential's joints has the rotors, friction and torque of both."""
-    alone = servo_drives(desk_rig)["neck_pitch"]
-    pair = CouplingParams("neck_pitch", "neck_roll")
-    both = servo_drives(replace(desk_rig, couplings={"neck": pair}))
-    for name in ("neck_pitch", "neck_roll"):
-        assert both[name].armature_kg_m2 == pytest.approx(2.0 * alone.armature_kg_m2)
-        assert both[name].force_nm == pytest.approx(2.0 * alone.force_nm)
-        assert both[name].friction_nm == pytest.approx(2.0 * alone.friction_nm)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
