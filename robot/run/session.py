@@ -119,7 +119,7 @@ def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> Compose
         from gazerig.robot.run.rig_description import description_of  # with meshes
 
         info = run_info(rig, options)
-        shown = urdf(description_of(rig, looks=False), looks=False).xml
+        shown = urdf(description_of(rig), looks=False).xml
         recorder = Recorder(options.record, info, options.force, options.fast, shown)
         substitutes = substitutes._replace(body=recorder.wrap_body)
     assembly = assemble(rig, options, substitutes)
@@ -202,7 +202,7 @@ class Session:
         self.stopped_by = "fault: unexpected error"
         self._count = LoopCount(0, 0, self.stopped_by)
         self._unreleased: tuple[str, ...] = ()
-        observers = Observers(self._say)
+        observers = Observers[Tick](self._say)
         if self._summary is not None:
             observers.add("the summary", self._summary.update)
         observers.add("the watch for faults", self._faults.update)

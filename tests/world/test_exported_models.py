@@ -21,7 +21,7 @@ def exported(rig: Rig) -> Any:
     """Return the MJCF that ``gazerig describe`` writes, compiled."""
     import mujoco
 
-    description = description_of(rig, looks=False).with_drives(servo_drives(rig))
+    description = description_of(rig).with_drives(servo_drives(rig))
     return mujoco.MjModel.from_xml_string(mjcf(description, looks=False).xml)
 
 
@@ -67,7 +67,7 @@ def test_an_exported_motor_holds_and_stalls_as_that_of_the_running_world(
 def test_masses_of_a_urdf_are_those_of_the_mjcf_and_possible(mujoco: Any, name: str) -> None:
     """As MuJoCo's importer reads them."""
     rig = load_rig(name)
-    text = urdf(description_of(rig, looks=False).with_drives(servo_drives(rig)), looks=False)
+    text = urdf(description_of(rig).with_drives(servo_drives(rig)), looks=False)
     read, model = mujoco.MjModel.from_xml_string(text.xml, text.assets), exported(rig)
     for i in range(1, model.nbody):
         body = model.body(i)
