@@ -173,17 +173,6 @@ def test_an_opponent_has_two_hands_and_a_third_that_comes_later_protects_nothing
     assert any(plan.action == "attack" and "chest" in plan.why for plan in plans)
 
 
-def test_a_hand_that_is_not_seen_any_more_is_where_it_was_for_a_while() -> None:
-    bout = Bout()
-    bout.see(guarding, 9)
-    # One that is seen with another number is the one of those two that was nearer.
-    plans = bout.see(seen, 81, fist(7, (0.9, 0.4, -0.2)))
-    unknown = next(k for k, plan in enumerate(plans) if "not both hands" in plan.why)
-    assert unknown * DT_S == pytest.approx(0.6, abs=2 * DT_S)
-    assert all("guard is closed" in plan.why for plan in plans[:unknown])
-    assert all("not both hands" in plan.why for plan in plans[unknown:])
-
-
 @pytest.mark.parametrize(("v_z_m_s", "opens"), [(-1.2, True), (-0.3, False), (1.2, False)])
 def test_hands_that_dropped_out_of_the_picture_leave_the_face_open(
     v_z_m_s: float, opens: bool

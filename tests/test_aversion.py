@@ -185,20 +185,3 @@ def test_a_target_that_a_user_has_chosen_is_left_in_a_conversation_only() -> Non
     assert again[0] == "face" and "away" in again
     model.choose_mode("talk", t + 40.0)
     assert set(kinds(model, t + 40.0, 40.0, ordered=True)) == {"face", "away"}
-
-
-def test_thinkers_look_up_speakers_aside_and_for_the_given_times() -> None:
-    ways: dict[TurnState, np.ndarray] = {}
-    for state in ("thinking", "speaking"):
-        model = aversion(20)
-        model.enter(state, None, None, 0.0, 0.0)
-        ways[state] = angles_and_ways(model, 3000.0)[1]
-    assert np.mean(np.abs(ways["thinking"] - 90.0) < 40.0) == pytest.approx(0.7, abs=0.05)
-    aside = np.abs((ways["speaking"] + 90.0) % 180.0 - 90.0) < 40.0
-    assert aside.mean() == pytest.approx(0.78, abs=0.05)
-    model = aversion(21)
-    model.retune("people", AversionParams(speaking_s=(1.5, 4.0)), ConversationParams())
-    model.enter("speaking", None, None, 0.0, 0.0)
-    found = stays(model, 3000.0, 0.05)
-    for kind, mean_s in (("face", 1.5), ("away", 4.0)):
-        assert np.mean([s.seconds for s in found if s.kind == kind]) == pytest.approx(mean_s, 0.1)
