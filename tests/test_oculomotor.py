@@ -177,23 +177,6 @@ def _any_target(rng: np.random.Generator, at_s: float, shift: int) -> Target:
     )
 
 
-@settings(max_examples=16)
-@given(
-    yaw=st.floats(-70, 70), pitch=st.floats(-30, 30), salience=st.floats(0, 3), top=st.booleans()
-)
-def test_gaze_lands_on_any_still_target(
-    yaw: float, pitch: float, salience: float, top: bool
-) -> None:
-    rig = Rig(eye_deg=35.0, geometry=DESK)
-    trace = rig.run(still(yaw, salience, top, pitch), 2.5)
-    assert trace.error[-1] <= 0.5
-    speeds = [
-        angle_between(a.gaze_point_world_m, b.gaze_point_world_m) / DT
-        for a, b in zip(trace.commands, trace.commands[1:], strict=False)
-    ]
-    assert degrees(max(speeds)) <= 520.0
-
-
 # ---- Saccades of the gaze point: bent in flight, falling short, corrected; re-fixations.
 
 

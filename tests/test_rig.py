@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mixed_rig import mixed_rig, mixed_text
+from mixed_rig import mixed_text
 
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.parameters import (
@@ -19,10 +19,8 @@ from gazerig.config.parameters import (
     value_of,
 )
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
-from gazerig.drivers.errors import SetupError
 from gazerig.params import Declaration, declarations
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.run.bus_wiring import bus_ports
 
 DESK = shipped_path("rigs", "desk")
 
@@ -101,11 +99,6 @@ def test_rules_between_sections(old: str, new: str, place: str, rule: str, tmp_p
 # Rigs with other joints and other buses than the desk's: valid files, and the result
 
 
-@pytest.fixture
-def mixed(tmp_path: Path) -> Rig:
-    return mixed_rig(tmp_path)
-
-
 def faults(tmp_path: Path, text: str) -> str:
     file = tmp_path / "wrong.yaml"
     file.write_text(text, encoding="utf-8")
@@ -157,15 +150,6 @@ def test_what_cannot_be_is_said(tmp_path: Path, old: str, new: str, says: str) -
     assert old in text
     said = faults(tmp_path, text.replace(old, new, 1))
     assert says in said, said
-
-
-def test_ports_are_named_by_their_bus(mixed: Rig) -> None:
-    assert bus_ports(mixed, None)["tilt"] == "/dev/ttyACM1"
-    given = bus_ports(mixed, "/dev/x,neck=/dev/y")
-    assert (given[""], given["neck"], given["tilt"]) == ("/dev/x", "/dev/y", "/dev/ttyACM1")
-    with pytest.raises(SetupError, match="expected PORT, neck=PORT, tilt=PORT"):
-        bus_ports(mixed, "lids=/dev/z")
-    assert bus_ports(load_rig("maker"), "/dev/z") == {"": "/dev/z"}
 
 
 # --- Knobs: every parameter of a rig by its key, with the rules and words of its file

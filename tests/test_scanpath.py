@@ -12,7 +12,6 @@ from present import present
 
 from gazerig.config.load import load, shipped_path
 from gazerig.gaze.scanpath.fit import PartFixation, fit_walk
-from gazerig.gaze.scanpath.models import MarkovWalk
 from gazerig.gaze.scanpath.scanpath import (
     ENTRY_PARTS,
     Scanpath,
@@ -69,15 +68,6 @@ def test_e40_dwell_times() -> None:
         assert times.min() > 0.0
         assert times.mean() == pytest.approx(WALK.dwell_mean_s[part], rel=0.04)
         assert times.std() == pytest.approx(WALK.dwell_sd_s[part], rel=0.10)
-
-
-def test_tempo() -> None:
-    def walk(seed: int, params: ScanpathParams) -> MarkovWalk:
-        return markov_walk(params, WALK, np.random.default_rng(seed))
-
-    slow = walk(5, replace(PRINTED, rate_scale=0.5))
-    quick = walk(5, PRINTED)
-    assert slow.dwell_s(1) == pytest.approx(2.0 * quick.dwell_s(1))
 
 
 def test_wrong_shapes_are_named() -> None:
