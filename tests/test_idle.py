@@ -138,3 +138,29 @@ def test_who_does_not_explore_rests_straight_ahead_until_told_to() -> None:
     assert "glance" in {model.step(120.0 + 0.1 * k).kind for k in range(600)}
     model.retune(still)
     assert {model.step(180.0 + 0.1 * k).kind for k in range(1200)} == {"rest"}
+
+
+def test_search_stays_about_the_place_of_the_loss() -> None:
+    offsets = []
+    for seed in range(100):
+        model = idle(seed)
+        model.remember(seen())
+        lost = yaw_deg(seen())
+        found = looks(run(model, 0.0, 8.0))
+        search = [t for t, _ in found if t.kind == "search"]
+        assert 2 <= len(search) <= 12
+        offsets += [yaw_deg(t) - lost for t in search]
+    assert abs(np.mean(offsets)) < 2.0
+    assert 6.0 < np.std(offsets) < 16.0
+
+
+def test_each_glance_is_a_look_of_its_own() -> None:
+    model = idle(7)
+    model.remember(seen())
+    targets = run(model, 0.0, 60.0)
+    model.remember(seen(at_s=60.0))
+    targets += run(model, 60.1, 120.0)
+    ids = [t.id for t, _ in looks(targets) if t.kind in ("search", "glance")]
+    assert len(ids) > 20
+    assert ids == list(range(-2, -2 - len(ids), -1))
+    assert {t.id for t in targets if t.kind == "rest"} == {-1}
