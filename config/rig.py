@@ -23,14 +23,14 @@ from gazerig.gaze.attention.conversation import AversionParams, ConversationPara
 from gazerig.gaze.attention.idle import IdleParams
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.lids.blink import LidParams
-from gazerig.gaze.mouth.mouth_keys import MouthParams
+from gazerig.gaze.mouth.mouth import MouthParams
 from gazerig.gaze.oculomotor.drift import DriftLaw
 from gazerig.gaze.oculomotor.gaze_point import OculomotorParams
 from gazerig.gaze.oculomotor.head import HeadParams
 from gazerig.gaze.oculomotor.pursuit import PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
-from gazerig.gaze.track.level import LevelParams
+from gazerig.gaze.track.animation import LevelParams
 from gazerig.params import Bounds, Choices, Unit, Unlisted
 from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.model.clock import LoopParams

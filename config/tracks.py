@@ -16,7 +16,7 @@ from gazerig.config.load import (
     shipped_path,
 )
 from gazerig.config.shipped_files import file_in_folders
-from gazerig.gaze.track.track import MAX_DURATION_S, Track, frame_faults, loop_fault
+from gazerig.gaze.track.track import Track
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 _GAZE_JOINT = (
@@ -32,7 +32,7 @@ def load_track(path: Path) -> Track:
     Raises:
         gazerig.config.load.ConfigError: lists every fault.
     """
-    checks: list[Check[Track]] = [*CHECKS, partial(_sound_file, path)]
+    checks: list[Check[Track]] = [_names, partial(_sound_file, path)]
     track = load(path, Track, checks=checks, largest=_LARGEST)
     return replace(track, sound=str(path.parent / track.sound)) if track.sound else track
 
@@ -84,32 +84,17 @@ def track_name(file: str) -> str:
     raise ConfigError([ConfigFault(file, None, "", rule)])
 
 
-def _frame_times(track: Track) -> Iterable[tuple[str, str]]:
-    for key in ("frames", "frames_without_neck"):
-        for i, rule in frame_faults(getattr(track, key)):
-            yield f"{key}.{i}.time_s", rule
-    if rule := loop_fault(track):
-        yield "loop_s", rule
-    last_s = max([frame.time_s for frame in track.frames], default=MAX_DURATION_S)
-    for cue, time_s in track.cues.items():
+def _names(track: Track) -> Iterable[tuple[str, str]]:
+    yield from track.faults()
+    for cue in track.cues:
         if not JOINT_NAME.fullmatch(cue):
             yield f"cues.{cue}", "not a name; use lower-case letters, digits and _"
-        elif time_s > last_s and not track.sound:
-            yield f"cues.{cue}", f"is after the last frame, which is at {last_s:g} s"
     for i, name in enumerate(track.owns):
         if not JOINT_NAME.fullmatch(name):
             yield f"owns.{i}", "not the name of a joint; write neck, eyes, lids or a joint"
-
-
-def _joint_names(track: Track) -> Iterable[tuple[str, str]]:
-    for key in ("frames", "frames_without_neck"):
-        for i, frame in enumerate(getattr(track, key)):
-            for joint in frame.joints_deg:
-                if joint in GAZE_JOINTS:
-                    yield f"{key}.{i}.joints_deg.{joint}", _GAZE_JOINT
-                elif not JOINT_NAME.fullmatch(joint):
-                    yield f"{key}.{i}.joints_deg.{joint}", "not the name of a joint"
-
-
-CHECKS = (_frame_times, _joint_names)
-"""Rules across frames."""
+    for i, frame in enumerate(track.frames):
+        for joint in frame.joints_deg:
+            if joint in GAZE_JOINTS:
+                yield f"frames.{i}.joints_deg.{joint}", _GAZE_JOINT
+            elif not JOINT_NAME.fullmatch(joint):
+                yield f"frames.{i}.joints_deg.{joint}", "not the name of a joint"

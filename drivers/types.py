@@ -229,6 +229,8 @@ class Located(NamedTuple):
     thickness_m: for a moving thing, diameter of the largest disc within its patch, at its distance;
         from_side: it extends beyond the left or right edge of the image
     clothing: for a person, colours of the clothes, None if they are not visible
+    flat: for a face, whether the measured depth on both sides and above it is that of the face, as
+        for a picture or a screen
     """
 
     kind: str
@@ -256,6 +258,7 @@ class Located(NamedTuple):
     from_side: bool = False
     upper_m: tuple[float, float, float] | None = None
     clothing: Clothing | None = None
+    flat: bool = False
 
 
 class LocatedFrame(NamedTuple):

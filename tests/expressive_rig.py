@@ -6,7 +6,7 @@ from fakes.runs import simulated
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import RULES, load_rig
-from gazerig.gaze.track.level import LevelParams
+from gazerig.gaze.track.animation import LevelParams
 from gazerig.robot.run.assemble import Assembly
 
 

@@ -16,7 +16,6 @@ from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
 from gazerig.gaze.types import PART_NAMES, Floats
 from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import tick_control_source
 from gazerig.robot.model.commands import (
     AnyCommand,
     Ask,
@@ -425,10 +424,7 @@ def test_leads_are_counted_and_their_ends_have_reasons(running: Running) -> None
 
 def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:
     tick = running.go(0.1)[-1]
-    assert (
-        tick_control_source(tick) == ControlSource()
-        and not tick_control_source(tick).overrides_gaze
-    )
+    assert tick.control_source == ControlSource() and not tick.control_source.overrides_gaze
     state = head_state(tick)
     assert state.headline.startswith("looks at person 1") and state.gaze.kind == "face"
     assert state.gaze.part in PART_NAMES.values() and state.saliences[0].id == 1
@@ -441,7 +437,7 @@ def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running:
     for _ in range(6):
         running.order(Jog((("neck_yaw", 0.3),), who="ann"))
         tick = running.go(0.5)[-1]
-    leads = tick_control_source(tick)
+    leads = tick.control_source
     assert (leads.kind, leads.who, leads.since_s) == ("joint", "ann", first.t_s)
     assert leads.joints == ("neck_yaw", "neck_pitch")
     state = head_state(tick)
@@ -464,7 +460,7 @@ def test_a_point_and_a_pointer_are_led_by_who_chose_them(
     for _ in range(10):
         running.order(LookAt((1.0, 0.2, 0.3), who="ann", pointer=pointer))
         tick = running.go(0.2)[-1]
-    assert tick_control_source(tick).kind == kind
+    assert tick.control_source.kind == kind
     assert head_state(tick).headline == said
 
 
@@ -477,7 +473,7 @@ def test_stopped_says_that_and_nothing_else(running: Running) -> None:
     assert state.headline == state.gaze.reason == "stopped: STOP was pressed; the torque is off"
     running.go(2.0)
     running.order(Resume(who="ann"))
-    assert tick_control_source(running.go(0.1)[-1]) == ControlSource()
+    assert running.go(0.1)[-1].control_source == ControlSource()
 
 
 def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) -> None:
@@ -486,7 +482,7 @@ def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) ->
     made = running.made
     ticks: list[Tick] = []
     assert made.robot.park(made.park_rad, made.clock, made.loop, watch=ticks.append)
-    assert {tick_control_source(tick).kind for tick in ticks} == {"parking"} and len(ticks) > 5
+    assert {tick.control_source.kind for tick in ticks} == {"parking"} and len(ticks) > 5
     assert head_state(ticks[-1]).headline == control_sentence(ControlSource("parking"), 0.0)
     yaw = [
         tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks

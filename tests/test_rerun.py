@@ -112,10 +112,10 @@ description: a show
 owns: [neck, eyes]
 cues: {here: 0.8}
 frames:
-  - {time_s: 0.4, look_at: [1.0, 0.3, 0.2], levels: {mouth: 0.7}}
-  - {time_s: 0.8, head_yaw_deg: 8, eyes_yaw_deg: 3, express: surprised, strength: 0.5}
-  - {time_s: 1.4, head_yaw_deg: -6, look_at: person}
-  - {time_s: 2.0, head_yaw_deg: 0, eyes_yaw_deg: 0, look_at: null}
+  - {time_s: 0.4, levels: {mouth: 0.7}}
+  - {time_s: 0.8, head_yaw_deg: 8, eyes_yaw_deg: 3, joints_deg: {right_brow: 3}}
+  - {time_s: 1.4, head_yaw_deg: -6}
+  - {time_s: 2.0, head_yaw_deg: 0, eyes_yaw_deg: 0}
 """
 COMMANDS: dict[int, Command] = {
     100: Play("a_show", loop=True, from_s="here"), 260: Play("wink_brow"),

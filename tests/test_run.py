@@ -266,16 +266,3 @@ def test_check(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
         assert part in said
     lines = [line for line in said.splitlines() if line.startswith(f"{rig}:")]
     assert len(lines) >= 4 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)
-
-
-def test_a_track_in_radians_gets_a_hint(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    path, track = tmp_path / "my.yaml", tmp_path / "turn.yaml"
-    path.write_text(
-        DESK.read_text(encoding="utf-8") + "\ntrack_files: [turn.yaml]\n", encoding="utf-8"
-    )
-    for yaw, hinted in ((0.35, True), (20.0, False)):
-        frames = f"[{{time_s: 1, head_yaw_deg: {yaw}, head_pitch_deg: -0.1}}]"
-        track.write_text(f"description: a turn\nframes: {frames}\n", encoding="utf-8")
-        assert typed("check", str(path)) == 0
-        said = capfd.readouterr().err
-        assert ("turn.yaml: no angle is above 0.35: degrees?" in said) == hinted, said

@@ -14,13 +14,10 @@ FRAME_S = 0.01
 """Time between two values."""
 WINDOW_S = 0.02
 """Length of the sound that a value describes, centred at its time."""
-EXPONENT = 0.6
+_EXPONENT = 0.6
 _BAND_HZ = 500.0, 4000.0
 _BLOCK = 2000
-_LOUD = 0.95
-MOUTH_SIZE = 0.9
-"""Opening at the loudest parts."""
-_SHUT = 10.0 ** (-30.0 / 20.0 * EXPONENT)
+_SHUT = 10.0 ** (-30.0 / 20.0 * _EXPONENT)
 """Loudness at which the mouth is shut: 30 dB below the loudest parts."""
 
 
@@ -60,20 +57,6 @@ def frame_start(number: int, rate_hz: float) -> int:
     return round(number * FRAME_S * rate_hz)
 
 
-def loud_pressure(pressures: Floats) -> float:
-    """Return the pressure of the loudest parts, 0 for silence."""
-    heard = pressures[pressures > 1e-4]
-    return float(np.quantile(heard, _LOUD)) if len(heard) else 0.0
-
-
-def openings(pressures: Floats, loud: float) -> Floats:
-    """Return openings 0..1 by loudness, 1 at the loudest parts.
-
-    Args:
-        pressures: (n,) from ``band_pressures``.
-        loud: Pressure of the loudest parts; 0: all are shut.
-    """
-    if loud <= 0.0:
-        return np.zeros(len(pressures))
-    opened: Floats = np.clip(((pressures / loud) ** EXPONENT - _SHUT) / (1.0 - _SHUT), 0.0, 1.0)
-    return opened
+def opening(pressure: float, loud: float) -> float:
+    """Return the opening 0..1 by loudness, 1 at the pressure of the loudest parts."""
+    return float(min(max((pressure / loud) ** _EXPONENT - _SHUT, 0.0) / (1.0 - _SHUT), 1.0))

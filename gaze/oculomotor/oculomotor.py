@@ -222,11 +222,6 @@ class Oculomotor:
         """Return whether the gaze has arrived: no saccade to a new target is due or in flight."""
         return self._gaze.has_arrived
 
-    @property
-    def ranges_rad(self) -> tuple[tuple[Angles2, Angles2], ...]:
-        """Return ((yaw low, high), (pitch low, high)) of left eye, right eye and head."""
-        return (*self._eye_limits, self._head.range_rad)
-
     def speak(self, loudness: float | None) -> None:
         """Move the head as a speaker does, by a loudness 0..1, or, for None, as a silent person."""
         if self._drift is not None:

@@ -1,80 +1,182 @@
 """Motion added to gaze: tracks, expressions and levels as offsets of the head's pose.
 
-Gaze continues: the eyes compensate offsets of the head's angles and stay on their target (the
-vestibulo-ocular reflex of ``gazerig.gaze.oculomotor.oculomotor``).
+An expression is a named offset that blends in over time. A level is a value 0..1 that a program
+sets many times per second, such as the opening of a jaw. Gaze continues: the eyes compensate
+offsets of the head's angles and stay on their target (the vestibulo-ocular reflex of
+``gazerig.gaze.oculomotor.oculomotor``).
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
-from gazerig.gaze.mouth.speech_track import SPEECH
-from gazerig.gaze.track.expression import Expressions
-from gazerig.gaze.track.level import LevelRange, Levels
+import numpy as np
+
+from gazerig.gaze.minimum_jerk import MinimumJerkBlend
 from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.track.track import POSE_CHANNELS
 from gazerig.gaze.track.track_player import TrackPlayer
+from gazerig.gaze.types import Floats
+from gazerig.params import Bounds
 
-_FIRST_JOINT = len(POSE_CHANNELS)
-
-
-class AnimationTables(NamedTuple):
-    """Tables of a rig's animations.
-
-    expressions: offset of each at full strength; blend_s: time from one to another
-    mouth: the level that opens the mouth, None without one
-    """
-
-    expressions: Mapping[str, PoseOffset]
-    blend_s: float
-    levels: Mapping[str, LevelRange]
-    mouth: LevelRange | None = None
+HOLD_S = 0.5
+"""A level that was not set for this time returns to 0, as its program may have ended."""
+NEUTRAL = "neutral"
+"""The initial expression; without an entry in the rig's table all its offsets are 0."""
+_LIDS = slice(5, 9)
 
 
-NO_TABLES = AnimationTables({}, 0.5, {})
+@dataclass(frozen=True)
+class LevelParams:
+    """Motion of one level."""
+
+    # fmt: off
+    joint: Annotated[str, "joint that the level moves: any but those of the eyes"]
+    low_deg: Annotated[float, Bounds(-180, 180), "angle added to the joint at level 0"]
+    high_deg: Annotated[float, Bounds(-180, 180), "angle added to the joint at level 1"]
+    smoothing_ms: Annotated[float, Bounds(10, 500), "time within which the joint follows a step of the level"] = 80.0
+    # fmt: on
+
+
+class FaceRange(NamedTuple):
+    """Offsets of an expression or a level at 0 and at 1, and the time of a step between them."""
+
+    low: PoseOffset
+    high: PoseOffset
+    smoothing_s: float
+
+    @property
+    def gain(self) -> Floats:
+        """Return the difference of both, flat."""
+        return np.subtract(self.high.to_flat(), self.low.to_flat())
+
+
+class FaceTables(NamedTuple):
+    """Expressions of a rig, neutral first, and its levels; mouth: level that opens it, or ""."""
+
+    expressions: Mapping[str, FaceRange]
+    levels: Mapping[str, FaceRange]
+    mouth: str = ""
+
+
+NO_TABLES = FaceTables({}, {})
 
 
 class Animation:
     """Sum of all motions besides gaze, as one offset per tick.
 
-    expressions, levels, tracks: parts that accept the commands
+    Args:
+        joints: Joints that gaze does not move.
+        tables: Expressions and levels.
+
+    Attributes:
+        tracks: Player of tracks.
+        expression: Name of the present expression.
     """
 
-    def __init__(self, joints: tuple[str, ...] = (), tables: AnimationTables = NO_TABLES) -> None:
-        """Create it at rest.
-
-        Args:
-            joints: from ``gazerig.robot.model.types.further_joints``.
-            tables: expressions and levels.
-        """
-        self.expressions = Expressions(tables.expressions, tables.blend_s, len(joints))
-        self.levels = Levels(tables.levels, len(joints))
-        self.tracks = TrackPlayer(len(joints), self.expressions)
-        self._sum = NO_OFFSET
-        self._mouth = tables.mouth
+    def __init__(self, joints: tuple[str, ...] = (), tables: FaceTables = NO_TABLES) -> None:
+        self.tracks = TrackPlayer(len(joints))
+        self._tables = tables
+        self._ranges = {**tables.expressions, **tables.levels}
+        self._gains = {name: one.gain for name, one in self._ranges.items()}
+        rest = np.array(NO_OFFSET._replace(joints_rad=(0.0,) * len(joints)).to_flat())
+        self._low = rest + sum([one.low.to_flat() - rest for one in self._ranges.values()])
+        self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Begin at rest at a time."""
-        self.expressions.reset()
-        self.levels.reset()
+        self._blends = {
+            name: MinimumJerkBlend((1.0 if name == NEUTRAL else 0.0,), one.smoothing_s)
+            for name, one in self._ranges.items()
+        }
+        self.expression = NEUTRAL
+        self._until_s: dict[str, float] = {}
+        self._shares = dict.fromkeys(self._ranges, 0.0)
+        self._speaks = False
+        self._face, self._at_rest = self._low, False
         self.tracks.reset()
+        self._sum = PoseOffset.from_flat(self._low.tolist())
+
+    @property
+    def expressions(self) -> tuple[str, ...]:
+        """Return the known expressions, neutral first; empty if the rig has no table."""
+        return tuple(self._tables.expressions)
+
+    def require(self, kind: str, name: str) -> None:
+        """Raise ValueError for an unknown expression or level; the message lists the known ones."""
+        known = self._tables.expressions if kind == "expression" else self._tables.levels
+        if name not in known and (kind, name) != ("expression", NEUTRAL):
+            listed = ", ".join(known) or f"none: add a table {kind}s to the rig"
+            raise ValueError(f"no {kind} {name!r}; available: {listed}")
+
+    def express(self, name: str, strength: float = 1.0) -> None:
+        """Move to an expression, from the next step on.
+
+        Raises:
+            ValueError: It is unknown; the message lists the known ones.
+        """
+        self.require("expression", name)
+        self.expression, self._at_rest = name, False
+        for other in self._tables.expressions:
+            self._blends[other].move_to((strength if other == name else 0.0,))
+
+    def set_level(self, name: str, value: float, t_s: float) -> None:
+        """Set a level to a value 0..1, from the next step on.
+
+        Raises:
+            ValueError: It is unknown; the message lists the known ones.
+        """
+        self.require("level", name)
+        self._blends[name].move_to((value,))
+        self._at_rest = False
+        self._until_s.pop(name, None)
+        if value > 0.0:
+            self._until_s[name] = t_s + HOLD_S
+
+    def drop_lapsed(self, t_s: float) -> tuple[str, ...]:
+        """Drop levels to 0 that were not set for ``HOLD_S``; return their names."""
+        fallen = tuple([name for name, until_s in self._until_s.items() if t_s >= until_s])
+        for name in fallen:
+            self.set_level(name, 0.0, t_s)
+        return fallen
 
     def step(self, t_s: float) -> PoseOffset:
-        """Return the offset of the pose in this tick."""
-        expressions, levels, tracks = self.expressions, self.levels, self.tracks
-        if expressions.moves or levels.moves or tracks.moves:
-            face = expressions.step(t_s).combine(levels.step(t_s))
-            self._sum = face.combine(tracks.step(t_s))
-            if tracks.owned.layers:
-                joints = [
-                    tracks.owned.mix(_FIRST_JOINT + i, a)
-                    for i, a in enumerate(self._sum.joints_rad)
-                ]
-                self._sum = self._sum._replace(joints_rad=tuple(joints), owned=tracks.owned)
+        """Return the offset of the pose in this tick; at rest it is the same object."""
+        tracks = self.tracks
+        if self._at_rest and not tracks.moves:
+            return self._sum
+        moved = tracks.step(t_s)
+        self._speak(t_s)
+        if not self._at_rest:
+            self._shares = {name: blend.step(t_s)[0] for name, blend in self._blends.items()}
+            self._face = self._low.copy()
+            for name, share in self._shares.items():
+                self._face += share * self._gains[name]
+            self._at_rest = all([blend.is_at_rest for blend in self._blends.values()])
+        flat = self._face + moved
+        flat[_LIDS] = self._face[_LIDS] * (1.0 + moved[_LIDS])
+        if not tracks.owned.layers:
+            self._sum = PoseOffset.from_flat(flat.tolist())
+            return self._sum
+        first = len(POSE_CHANNELS)
+        flat[first:] = [tracks.owned.mix(first + i, a) for i, a in enumerate(flat[first:].tolist())]
+        self._sum = PoseOffset.from_flat(flat.tolist())._replace(owned=tracks.owned)
         return self._sum
+
+    def _speak(self, t_s: float) -> None:
+        """Let the mouth follow a speech that knows its openings; it shuts at the end of any."""
+        mouth, speech = self._tables.mouth, self.tracks.speech
+        if mouth and speech is not None and speech.motion.mouth is not None:
+            at_s = speech.position_s(t_s) + speech.lead_s
+            self.set_level(mouth, float(np.interp(at_s, *speech.motion.mouth)), t_s)
+        elif mouth and speech is None and self._speaks:
+            self.set_level(mouth, 0.0, t_s)
+        self._speaks = speech is not None
 
     @property
     def loudness(self) -> float | None:
         """Return the loudness 0..1 of a speech by its mouth, 1 without one; None: no speech."""
-        if not any([one.name == SPEECH for one in self.tracks.voices]):
+        if self.tracks.speech is None:
             return None
-        return 1.0 if self._mouth is None else self._mouth.value_of(self._sum)
+        mouth = self._tables.mouth
+        return self._shares[mouth] if mouth else 1.0

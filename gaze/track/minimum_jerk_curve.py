@@ -8,7 +8,6 @@ passes the values in between more slowly. Any unit; speed and acceleration are p
 """
 
 from bisect import bisect_right
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,42 +19,37 @@ _SHARES = np.linspace(0.0, 1.0, 33)[:, None]
 
 
 class MinimumJerkCurve:
-    """A curve from rest through key values to rest at the last of them.
-
-    duration_s: time of the last key
+    """A curve from rest at a value through key values to rest at the last of them.
 
     Args:
-        start: the value at time 0.
-        times_s: times of the keys, increasing, the first above 0.
-        values: values at those times.
+        times_s: (n,) Times of the keys, increasing, the first above 0.
+        values: (n,) Values at those times.
+        start: Value at time 0.
 
     Raises:
-        ValueError: the times do not increase from 0.
+        ValueError: The times do not increase from 0.
     """
 
-    def __init__(self, start: float, times_s: Sequence[float], values: Sequence[float]) -> None:
-        self._knots = np.array([0.0, *times_s])
+    def __init__(self, times_s: Floats, values: Floats, start: float = 0.0) -> None:
+        self._knots = np.append(0.0, times_s)
         span = np.diff(self._knots)
-        if len(span) != len(values) or not (span > 0.0).all():
-            raise ValueError("the times of the keys must increase from 0, one for each value")
-        position = np.array([start, *values])
+        if not (span > 0.0).all():
+            raise ValueError("the times of the keys must increase from 0")
+        position = np.append(start, values)
         self._table = _coefficients(span, position, *_states(position, span))
         self._rows: list[list[float]] = self._table.T.tolist()
         self._starts: list[float] = self._knots[:-1].tolist()
-        self.duration_s, self._last = float(self._knots[-1]), float(position[-1])
 
     def value_at(self, t_s: float) -> float:
         """Return the value at a time since the start."""
-        if t_s >= self.duration_s:
-            return self._last
         i = max(0, bisect_right(self._starts, t_s) - 1)
         c0, c1, c2, c3, c4, c5 = self._rows[i]
-        t = max(0.0, t_s - self._starts[i])
+        t = min(max(0.0, t_s), float(self._knots[-1])) - self._starts[i]
         return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
 
     def sample_at(self, times_s: Floats) -> tuple[Floats, Floats, Floats]:
         """Return (n,) values, speeds and accelerations at (n,) times."""
-        times = np.clip(times_s, 0.0, self.duration_s)
+        times = np.clip(times_s, 0.0, self._knots[-1])
         i = np.searchsorted(self._knots[1:-1], times, side="right")
         return _evaluate(self._table[:, i], times - self._knots[i])
 

@@ -1,24 +1,24 @@
 """Offset that is added to the pose by gaze, and angles that tracks give instead of it."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from gazerig.gaze.track.track import LID_CHANNELS, POSE_CHANNELS
 from gazerig.gaze.types import Angles2, Angles3
 
-Layers = dict[int, list[tuple[float, float]]]
-"""Channel -> (value, weight) of each track that owns it, the newest last."""
 _EYES, _LIDS = POSE_CHANNELS.index("eyes_yaw"), POSE_CHANNELS.index(LID_CHANNELS[0])
 
 
 class OwnedPose:
     """Values of the channels that tracks own in one tick, and what gaze would have given.
 
-    layers: replaced in every tick
+    layers: of each channel, (value, weight) of each track that owns it, the newest last; replaced
+        in every tick
     gaze: the last value by gaze of each channel, from which a track blends out
     """
 
     def __init__(self) -> None:
-        self.layers: Layers = {}
+        self.layers: dict[int, list[tuple[float, float]]] = {}
         self.gaze: dict[int, float] = {}
 
     def mix(self, channel: int, value: float) -> float:
@@ -61,24 +61,13 @@ class PoseOffset(NamedTuple):
     joints_rad: tuple[float, ...] = ()
     owned: OwnedPose | None = None
 
-    def combine(self, other: "PoseOffset") -> "PoseOffset":
-        """Return both combined: angles are added, factors of the lids multiplied."""
-        if not any(self.joints_rad) and self[:3] == NO_OFFSET[:3]:
-            return other
-        if not any(other.joints_rad) and other[:3] == NO_OFFSET[:3]:
-            return self
-        a, b = self.to_flat(), other.to_flat()
-        lids = [x * y for x, y in zip(a[5:9], b[5:9], strict=True)]
-        angles = [x + y for x, y in zip(a, b, strict=True)]
-        return PoseOffset.from_flat((*angles[:5], *lids, *angles[9:]))
-
     def to_flat(self) -> tuple[float, ...]:
         """Return all values as one sequence: head, eyes, lids, joints."""
         return (*self.head_rad, *self.eyes_rad, *self.lids, *self.joints_rad)
 
     @classmethod
-    def from_flat(cls, values: tuple[float, ...]) -> "PoseOffset":
-        """Return the offset from the result of ``flat``."""
+    def from_flat(cls, values: Sequence[float]) -> "PoseOffset":
+        """Return the offset from the result of ``to_flat``."""
         yaw, pitch, roll, eye_yaw, eye_pitch, a, b, c, d, *joints = values
         return cls((yaw, pitch, roll), (eye_yaw, eye_pitch), (a, b, c, d), tuple(joints))
 

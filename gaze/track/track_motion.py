@@ -1,6 +1,5 @@
-"""Motion of one track on one rig, on a clock that is slower only where a joint needs it."""
+"""Motion of one track on one rig, slower only where a joint needs it."""
 
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from math import sqrt
 from typing import NamedTuple
@@ -8,14 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.track import Track
 from gazerig.gaze.types import Floats
 
-_LEAD_IN_S = 0.02
-"""Time from rest to the position at which a track begins in its middle, before it is slowed."""
 _SHARES = np.unique([*np.linspace(0.0, 1.0, 25), 0.5 - sqrt(3.0) / 6.0, 0.5 + sqrt(3.0) / 6.0])
 """Places between two keys at which limits are checked: also those of the largest acceleration
 between two rests."""
 _BLOCK = 500
+_BLEND_STRAIN = 1.09
+"""Factor that joints may need in a blend, which may use more of their limits than a motion."""
 _ROUNDS, _KEPT = 12, 1.0 + 1e-3
 """Most corrections of the times between keys, and the ratio to a limit at which they end."""
 
@@ -32,14 +32,6 @@ class ChannelKeys(NamedTuple):
     values: Floats
 
 
-class TrackEvents(NamedTuple):
-    """What a track does besides motion: times in s, increasing, and values."""
-
-    looks: tuple[tuple[float, object], ...] = ()
-    expressions: tuple[tuple[float, tuple[str, float]], ...] = ()
-    cues: tuple[tuple[float, str], ...] = ()
-
-
 class TrackMotion:
     """Curves of one track on one rig.
 
@@ -47,63 +39,59 @@ class TrackMotion:
     begins in motion is led in from rest: the time that its first key needs comes before its
     beginning, at positions below it.
 
-    curves: (channel, curve) pairs; a channel may have several
-    duration_s, length_s: time of its motion, and the position at its end
-    rate: mean speed of the position; ``speed`` if nothing behind the first key is slower
-    slowed_by, slowest: factor by which it takes longer, and index of the joint that needs it, or -1
-
     Args:
-        rows: its keys.
-        channels: number of channels.
-        owned: channels that it owns.
-        events: gaze points, expressions and cues.
-        strain: factors that the joints need.
-        speed: factor on its defined speed.
-        from_s: position at which it begins.
+        track: The track.
+        rows: Its keys.
+        count: Number of channels of the rig.
+        owned: Channels that it owns.
+        strain: Factors that the joints need.
+        speed: Factor on its defined speed.
+        sound_s: Duration of its sound, 0 without one.
+
+    Attributes:
+        channels: Channels that it moves or owns.
+        mouth: Times and openings of the mouth of a speech, None without one.
+        rate: Mean speed of the position; ``speed`` if nothing behind the first key is slower.
+        slowed_by: Factor by which it takes longer.
+        slowest: Index of the joint that needs this, or -1.
+        length_s: Position at its end.
+        duration_s: Time from its start to its end.
     """
 
     def __init__(
-        self, rows: Sequence[ChannelKeys], channels: int, owned: frozenset[int],
-        events: TrackEvents, strain: Strain, speed: float = 1.0, from_s: float = 0.0,
+        self, track: Track, rows: Sequence[ChannelKeys], count: int, owned: frozenset[int],
+        strain: Strain, speed: float = 1.0, sound_s: float = 0.0,
     ) -> None:  # fmt: skip
-        self.owned, self.events, self.speed = owned, events, speed
-        self._count, self._strain = channels, strain
-        self._rows = [_cut(row, from_s) for row in rows] if from_s > 0.0 else rows
+        self.track, self.owned, self.sound_s, self.speed = track, owned, sound_s, speed
         self.channels = owned | {row.channel for row in rows}
-        begin_s = from_s - _LEAD_IN_S if from_s > 0.0 else 0.0
-        self._positions = np.unique(
-            np.concatenate(([begin_s], *(row.times_s for row in self._rows)))
-        )
-        self._times = (self._positions - begin_s) / speed
-        self.slowed_by, self.slowest = 1.0, -1
-        # The way from rest to a position in the middle does not count as slower.
-        first = int(from_s > 0.0)
-        requested_s = np.ptp(self._times[first:])
+        self.mouth: tuple[Floats, Floats] | None = None
+        self.cues = sorted((time_s, name) for name, time_s in track.cues.items())
+        self._rows, self._count, self._strain = rows, count, strain
+        self._positions = np.unique(np.concatenate(([0.0], *(row.times_s for row in rows))))
+        self._times = self._positions / speed
+        self.slowest = -1
         self._slow_down()
-        if requested_s > 0.0:
-            self.slowed_by = float(np.ptp(self._times[first:]) / requested_s)
+        requested_s = self._positions[-1] / speed
+        self.slowed_by = float(self._times[-1] / requested_s) if requested_s else 1.0
         if len(self._times) > 1:
             self._positions[0] = self._positions[1] - self._times[1] * speed
         moved_s = float(np.ptp(self._positions))
         self.rate = round(moved_s / self._times[-1], 6) if moved_s else speed
-        ends = [found[-1][0] for found in events if found]
-        self.length_s = max([float(self._positions[-1]), *ends])
-        self.duration_s = float(self._times[-1])
-        self._events_s = [[at_s for at_s, _ in found] for found in events[:2]]
+        last_s = float(self._positions[-1])
+        self.length_s = max([last_s, sound_s, *(time_s for time_s, _ in self.cues)])
+        self.duration_s = float(self._times[-1]) + (self.length_s - last_s) / speed
 
     def _slow_down(self) -> None:
         """Make the curves, with more time between keys where a joint would be too fast."""
         for attempt in range(_ROUNDS + 2):
-            self.curves = [
+            self._curves = [
                 (
-                    channel,
+                    row.channel,
                     MinimumJerkCurve(
-                        0.0,
-                        np.interp(times_s, self._positions, self._times).tolist(),
-                        values.tolist(),
+                        np.interp(row.times_s, self._positions, self._times), row.values
                     ),
                 )
-                for channel, times_s, values in self._rows
+                for row in self._rows
             ]
             factors = self._factors()
             if factors.max(initial=1.0) <= _KEPT:
@@ -127,34 +115,52 @@ class TrackMotion:
             found.append(factors.reshape(*times.shape, -1).max(axis=1))
         return np.concatenate(found) if found else np.zeros((0, 1))
 
-    def sample_at(self, times_s: Floats, delays_s: Sequence[float] = ()) -> Floats:
-        """Return (3, n, channels) values, speeds and accelerations at (n,) times since its start.
-
-        delays_s: of each channel; () for none
-        """
+    def sample_at(self, times_s: Floats) -> Floats:
+        """Return (3, n, channels) values, speeds and accelerations at (n,) times."""
         found: Floats = np.zeros((3, len(times_s), self._count))
-        for channel, curve in self.curves:
-            late_s = delays_s[channel] if delays_s else 0.0
-            found[:, :, channel] += curve.sample_at(times_s - late_s)
+        for channel, curve in self._curves:
+            found[:, :, channel] += curve.sample_at(times_s)
         return found
+
+    def values_at(self, time_s: float) -> dict[int, float]:
+        """Return the value of each channel that it moves at a time since its start."""
+        found = dict.fromkeys(self.channels, 0.0)
+        for channel, curve in self._curves:
+            found[channel] += curve.value_at(time_s)
+        return found
+
+    @property
+    def moves(self) -> bool:
+        """Return whether it moves or owns a joint."""
+        return bool(self._curves or self.owned)
 
     def position_at(self, time_s: float) -> float:
         """Return the position in the track at a time since its start."""
-        later_s = max(0.0, time_s - self.duration_s)
+        later_s = max(0.0, time_s - float(self._times[-1]))
         return float(np.interp(time_s, self._times, self._positions)) + later_s * self.speed
 
-    def event_at(self, kind: int, position_s: float) -> int:
-        """Return the index of the newest gaze point (0) or expression (1), -1 before the first."""
-        return bisect_right(self._events_s[kind], position_s) - 1
+    def time_at(self, position_s: float) -> float:
+        """Return the time since its start at a position."""
+        later_s = max(0.0, position_s - float(self._positions[-1]))
+        return float(np.interp(position_s, self._positions, self._times)) + later_s / self.speed
 
+    def blend_s(self, time_s: float, base: Floats, least_s: float, rising: bool) -> float:
+        """Return the shortest time in which it can grow from or fade to a base within limits.
 
-def _cut(row: ChannelKeys, from_s: float) -> ChannelKeys:
-    """Return the keys from a position on, the first of them there; the last one stays."""
-    begins = MinimumJerkCurve(0.0, row.times_s.tolist(), row.values.tolist()).value_at(from_s)
-    first_s = from_s + _LEAD_IN_S
-    later = row.times_s > first_s
-    later[-1] = True
-    times_s = np.maximum(row.times_s[later], first_s)
-    return ChannelKeys(
-        row.channel, np.append(from_s, times_s), np.append(begins, row.values[later])
-    )
+        Args:
+            time_s: Time since its start at which the blend begins.
+            base: (channels,) Values at its other end.
+            least_s: Shortest time.
+            rising: Whether it grows from the base.
+        """
+        for blend_s in [1.25**i * least_s for i in range(16)]:
+            times = np.linspace(0.0, blend_s, 81)
+            s = times / blend_s
+            weight = s**3 * (10.0 + s * (6.0 * s - 15.0))
+            value = self.sample_at(time_s + times)[0] - base
+            value *= (weight if rising else 1.0 - weight)[:, None]
+            speed = np.gradient(value, times, axis=0)
+            acceleration = np.gradient(speed, times, axis=0)
+            if self._strain(speed, acceleration).max() <= _BLEND_STRAIN:
+                break
+        return blend_s

@@ -2,14 +2,13 @@
 
 import contextlib
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from gazerig.drivers.errors import SetupError
 from gazerig.drivers.sound.params import KINDS
 from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.look_and_stop import PidOption
@@ -51,29 +50,23 @@ def express(
 @app.command()
 def level(
     name: Annotated[str, typer.Argument(help="A level of the rig's table, such as mouth.")],
-    value: Annotated[
-        str,
-        typer.Argument(
-            metavar="0..1 | -", help="Or - to read values from standard input, one per line."
-        ),
-    ],
+    value: Annotated[float, typer.Argument(min=0.0, max=1.0)],
     seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="Keep it for S seconds; otherwise until Ctrl-C.")
-    ] = None,
+        float, typer.Option(min=0.0, help="Keep it for S seconds; otherwise until Ctrl-C.")
+    ] = inf,
     pid: PidOption = None,
 ) -> None:
     """Set a level, such as the opening of a jaw, while this command runs; then it falls to 0."""
-    with clear_errors():
-        values = (
-            (_number(line) for line in sys.stdin if line.strip())
-            if value == "-"
-            else _repeat_value(_number(value), seconds)
-        )
-        with RobotClient.connect(pid, "gazerig ctl level") as rig:
-            with contextlib.suppress(KeyboardInterrupt):
-                for one in values:
-                    rig.send(SetLevel(name, one))
-            rig.send(SetLevel(name, 0.0))
+    clock = RealClock()
+    end_s = clock.now_s() + seconds
+    with clear_errors(), RobotClient.connect(pid, "gazerig ctl level") as rig:
+        with contextlib.suppress(KeyboardInterrupt):
+            while True:
+                rig.send(SetLevel(name, value))
+                if clock.now_s() >= end_s:
+                    break
+                clock.sleep_until(min(end_s, clock.now_s() + _SET_EVERY_S))
+        rig.send(SetLevel(name, 0.0))
 
 
 @app.command()
@@ -104,9 +97,6 @@ def play(
     pid: PidOption = None,
 ) -> None:
     """Play a track on the running head, or list all tracks with their fit to this rig."""
-    with clear_errors():
-        if track is None and (speed, count, start, loop) != (1.0, 0, "0", False):
-            raise SetupError("--speed, --count, --from and --loop need a track, e.g. nod")
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
         if track is None or listed:
             for one in rig.tracks():
@@ -154,23 +144,3 @@ def _track_line(track: Mapping[str, Any]) -> str:
         return f"{head}; not on this rig: {track['refused']}"
     slower = f", slower by {track['slowed_by']:.2f}" if track["slowed_by"] > 1.0 else ""
     return f"{head} ({track['duration_s']:.1f} s{slower})"
-
-
-def _repeat_value(value: float, seconds: float | None) -> Iterator[float]:
-    """Repeat a value for a time, often enough to keep it."""
-    clock = RealClock()
-    end_s = clock.now_s() + (inf if seconds is None else seconds)
-    yield value
-    while (now_s := clock.now_s()) < end_s:
-        clock.sleep_until(min(end_s, now_s + _SET_EVERY_S))
-        yield value
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 <= value <= 1.0:
-        raise SetupError(f"{text.strip()!r:.40} is not a level: give a number 0..1")
-    return value

@@ -61,9 +61,9 @@ def export(
 ) -> None:
     """Export a run as CSV for eye-tracking tools: samples and events, degrees, + left and + up."""
     with clear_errors():
-        from gazerig.robot.loop.tick_text import ESTIMATED
         from gazerig.robot.recording.export_csv import csv_files, write_csv
         from gazerig.robot.recording.gaze_angles import (
+            ESTIMATED,
             collect_gaze_angles,
             find_intervals,
             label_samples,

@@ -35,22 +35,18 @@ _SMALLEST_DEG = 4.0
 
 
 def unit_lines(rig: str) -> list[str]:
-    """Return a hint for ranges and for each own track whose angles look like radians.
+    """Return a hint for ranges that look like radians.
 
     Raises:
         ConfigError: the rig is invalid.
     """
-    from gazerig.config.load import find_file
     from gazerig.config.schema import load_rig
-    from gazerig.config.tracks import load_track
-    from gazerig.robot.run.track_file import radians_hint, track_angles_deg
+    from gazerig.robot.run.track_file import radians_hint
 
     loaded = load_rig(rig)
     ends = [end for one in loaded.joints.values() for end in (one.min_deg, one.max_deg)]
-    hints = {f"{rig}: min_deg and max_deg of all joints": radians_hint(ends, _SMALLEST_DEG)}
-    for file in loaded.track_files:
-        hints[file] = radians_hint(track_angles_deg(load_track(find_file("tracks", file))))
-    return [f"{where}: {hint}" for where, hint in hints.items() if hint]
+    hint = radians_hint(ends, _SMALLEST_DEG)
+    return [f"{rig}: min_deg and max_deg of all joints: {hint}"] if hint else []
 
 
 def weight_lines(rig: str) -> list[str]:

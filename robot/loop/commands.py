@@ -12,7 +12,6 @@ from gazerig.gaze.angles import add, direction, rotate, scale
 from gazerig.gaze.attention.conversation import MODES
 from gazerig.gaze.attention.startle import FLINCH, Startle
 from gazerig.gaze.lids.lids import Lids
-from gazerig.gaze.track.track import KEEP
 from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
 from gazerig.robot.loop.client_control import ClientControl
@@ -172,9 +171,9 @@ class CommandExecutor:
             "conversation": _put_first(robot.conversation_gaze.chosen_mode, MODES),
             "lids": tuple(_LID_COMMANDS),
         }
-        expressions = robot.animation.expressions
-        if expressions.names:
-            menus["expression"] = _put_first(expressions.name, expressions.names)
+        animation = robot.animation
+        if animation.expressions:
+            menus["expression"] = _put_first(animation.expression, animation.expressions)
         names = (NO_TRACK, *robot.track_choices.names)
         menus["track"] = _put_first(robot.track_choices.playing or NO_TRACK, names)
         return menus
@@ -201,9 +200,9 @@ class CommandExecutor:
                             f"this rig has no joint {name!r}; available: {', '.join(names)}"
                         )
             case Express(name):
-                robot.animation.expressions.require(name)
+                robot.animation.require("expression", name)
             case SetLevel(name):
-                robot.animation.levels.require(name)
+                robot.animation.require("level", name)
             case Say():
                 raise ValueError("this run has no voice")
             case Play() | Speak():
@@ -216,7 +215,7 @@ class CommandExecutor:
         robot = self._robot
         if isinstance(command, Ask) and command.menu == "track":
             command = Play("" if command.choice == NO_TRACK else command.choice)
-        if isinstance(command, Play | Speak):
+        if isinstance(command, Play) and command.track:
             return robot.track_choices.complete(command, robot.guard.limits)
         tick = robot.newest
         if tick is None or tick.detections is None or not isinstance(command, LookAtPixel):
@@ -249,13 +248,13 @@ class CommandExecutor:
             case Play() | Speak():
                 return self._play(command, t_s)
             case EndTrack():
-                return robot.track_choices.end(command, t_s, robot.guard.limits)
+                return robot.track_choices.end(command, t_s)
             case SyncTrack():
                 robot.track_choices.sync(command, t_s)
             case Express(name, strength):
-                robot.animation.expressions.express(name, strength)
+                robot.animation.express(name, strength)
             case SetLevel(name, value):
-                robot.animation.levels.set(name, value, t_s)
+                robot.animation.set_level(name, value, t_s)
             case MoveOpponent(point):
                 self._move_opponent(t_s, point)
             case Talk():
@@ -295,7 +294,7 @@ class CommandExecutor:
             messages.append(f"conversation: {state.state} of {state.who or 'a client'} ends: {why}")
             self.conversation.end(why, t_s)
             self._converse(t_s)
-        for name in self._robot.animation.levels.drop_lapsed(t_s):
+        for name in self._robot.animation.drop_lapsed(t_s):
             messages.append(f"level {name}: not set any more, so it returns to 0")
 
     def remember_people(self, percept: Percept | None) -> None:
@@ -312,7 +311,7 @@ class CommandExecutor:
             robot.conversation_gaze.choose_mode(choice, t_s)
             robot.lids.set_conversation(robot.conversation_gaze.converses)
         elif menu == "expression":
-            robot.animation.expressions.express(choice)
+            robot.animation.express(choice)
         else:
             _LID_COMMANDS[choice](robot.lids, t_s)
 
@@ -419,13 +418,12 @@ class CommandExecutor:
         if self.conversation.active and (name := self._robot.conversation_gaze.step(t_s)):
             self._play_unasked(Play(name, who="conversation"), t_s)
 
-    def direct_by_track(
+    def react_by_track(
         self, target: Target, percept: Percept | None, pose: GazeState, t_s: float
-    ) -> Target:
-        """Return the gaze target of a track, or else attention's.
+    ) -> None:
+        """Play the track of the present rule when the gaze reaches the rule's target.
 
-        The track of the present rule is played when the gaze reaches the rule's target, and that
-        of the startle when something flies at the face.
+        That of the startle is played when something flies at the face.
 
         Args:
             target: Target that attention has chosen.
@@ -433,7 +431,7 @@ class CommandExecutor:
             pose: Measured poses of head and eyes.
             t_s: Present time.
         """
-        robot, top_down = self._robot, self._robot.attention.top_down
+        top_down = self._robot.attention.top_down
         name = self._trigger.step(
             top_down.behaviour, top_down.rule, target, t_s, top_down.named_ids
         )
@@ -442,9 +440,6 @@ class CommandExecutor:
         startles = top_down.startles and not top_down.plans  # a boxer watches the fists
         if startles and self._startle.step(percept, pose.p_world_head_m, t_s):
             self._play_unasked(Play(FLINCH, who="startle"), t_s)
-        if robot.animation.tracks.look is KEEP:
-            return target
-        return robot.track_choices.target(target, percept, pose.p_world_head_m, t_s)
 
     def _play_unasked(self, command: Play, t_s: float) -> None:
         """Play a track unless a client or a show moves the head."""

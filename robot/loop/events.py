@@ -8,8 +8,7 @@ from itertools import takewhile
 from gazerig.gaze.types import ORDERED, Target
 from gazerig.robot.loop.client_control import GONE_S
 from gazerig.robot.loop.head_state import EventKind, HeadEvent
-from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import target_name
+from gazerig.robot.loop.tick import Tick, target_name
 from gazerig.robot.model.control_source import FINISHED
 from gazerig.robot.model.reply import Progress
 

@@ -10,8 +10,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from gazerig.gaze.angles import add, unit, yaw_pitch
-from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.angles import yaw_pitch
 from gazerig.gaze.types import (
     ORDERED,
     PART_NAMES,
@@ -23,8 +22,7 @@ from gazerig.gaze.types import (
     Target,
     Vec3,
 )
-from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import target_name, tick_control_source
+from gazerig.robot.loop.tick import Tick, cyclopean_direction, target_name
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
     NO_CONVERSATION,
@@ -232,7 +230,7 @@ class HeadReport(Struct, frozen=True):
 
 def head_state(tick: Tick) -> HeadState:
     """Return the state of a head in a tick."""
-    percept, source = tick.percept, tick_control_source(tick)
+    percept, source = tick.percept, tick.control_source
     chooses = not source.overrides_gaze
     gaze, headline = _gaze(tick, source)
     return HeadState(
@@ -299,12 +297,11 @@ def _gaze(tick: Tick, source: ControlSource) -> tuple[GazeReading, str]:
             name = phase = source.kind
     if guard.level == "torque_off" and source.kind not in ("stopped", "parking"):
         headline = reason = f"the torque is off: {' and '.join(guard.critical_reasons[:1])}"
-    sight = add(line_of_sight(pose, left=True), line_of_sight(pose, left=False))
     reading = GazeReading(
         name,
         reason,
         gaze.gaze_point_world_m,
-        yaw_pitch(unit(sight)),
+        yaw_pitch(cyclopean_direction(tick)),
         pose.p_world_head_m,
         pose.head_rad,
         pose.eye_left_rad,

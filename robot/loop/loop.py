@@ -135,8 +135,8 @@ class Robot:
             refuse_out_of_range(command, self.body.names, self.guard.limits)
         if isinstance(command, MoveOpponent) and self._executor.opponent is None:
             raise ValueError("no opponent to move: the run is in no world with a boxer")
-        if isinstance(command, Play):  # only a recording has the text of a track
-            command = structs.replace(command, yaml="")
+        if isinstance(command, Play):  # only a recording defines a track
+            command = structs.replace(command, definition=None)
         return self.replay_command(command)
 
     def replay_command(self, command: Command) -> Ticket:
@@ -177,10 +177,6 @@ class Robot:
     def tracks(self) -> tuple[TrackInfo, ...]:
         """Return all tracks with their fit to this rig."""
         return self.track_choices.all_tracks(self.guard.limits)
-
-    def joint_latencies_s(self) -> tuple[float, ...]:
-        """Return the time of every joint from a command to its motion. Thread-safe."""
-        return self.track_choices.latencies_s()
 
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
         """Open camera and bus, switch the torque on and start from the present angles.
@@ -270,7 +266,7 @@ class Robot:
         percept = self.perception.see(detections, self.poses)
         executor.follow_turn(t_s)
         chosen = self.attention.choose(percept, pose, t_s)
-        chosen = executor.direct_by_track(chosen, percept, pose, t_s)
+        executor.react_by_track(chosen, percept, pose, t_s)
         target = lead.target(chosen, percept, t_s)
         rests_s = self._scanpath.rests_until_s
         target = self.conversation_gaze.look(
@@ -392,7 +388,7 @@ class Robot:
     def _frame_age_s(self, percept: Percept | None, t_s: float) -> float:
         """Return the age of the frame that the gaze depends on.
 
-        A target chosen by a client, and a neck or a point of a track, do not depend on the camera.
+        A target chosen by a client, and the neck of a track, do not depend on the camera.
         """
         if not self._executor.lead.needs_camera or self.animation.tracks.replaces_gaze:
             return 0.0

@@ -164,7 +164,6 @@ class PowerDown:
 
     Attributes:
         cause: Reason for the end in the line, "" for none.
-        result: Text of the result, "" before the end.
         unreleased: Messages about servos whose torque may still be on.
     """
 
@@ -183,7 +182,6 @@ class PowerDown:
         self._off, self._left, self._quiet = off, left, quiet
         self._starting = self._on = False
         self.cause = ""
-        self.result = ""
         self.unreleased: tuple[str, ...] = ()
 
     def switch_on(self, start: Callable[[], T]) -> T:
@@ -244,7 +242,6 @@ class PowerDown:
             how += f"torque-off could not be sent ({_error_text(error)}){self._left}"
             self.unreleased = (_error_text(error),)
         self._on = self._starting = False
-        self.result = how
         with contextlib.suppress(Exception):
             if failed or not self._quiet:
                 self._report(f"stopped by {self.cause}: {how}" if self.cause else how)

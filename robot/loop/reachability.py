@@ -1,7 +1,7 @@
 """Reachability of a commanded gaze or pose, joint by joint, before the rig moves."""
 
 from collections.abc import Sequence
-from math import pi, radians
+from math import radians
 
 from gazerig.gaze.angles import add, norm, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
@@ -54,9 +54,9 @@ def look_reply(
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
     far_m = norm(sub(target.p_world_m, pose.p_world_head_m))
     met = add(pose.p_world_head_m, scale(unit(add(left, right)), far_m))
-    ranges = _ranges(oculomotor, kinematics, limits)
     joints = []
-    for name, wanted, got, (low, high) in zip(kinematics.names, asked, done, ranges, strict=True):
+    rows = zip(kinematics.names, asked, done, limits, strict=True)
+    for name, wanted, got, (low, high, *_) in rows:
         if name.endswith("lid") or abs(wanted - got) <= _SAME_RAD:
             continue
         if not low + _SAME_RAD < got < high - _SAME_RAD:
@@ -85,27 +85,3 @@ def jog_reply(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit])
 
 def _command(head: Angles3, left: Angles2, right: Angles2) -> GazeCommand:
     return GazeCommand(head, left, right, 1.0, 1.0, "fixate", False, (0.0, 0.0, 0.0), 0, 0, 0)
-
-
-def _ranges(
-    oculomotor: Oculomotor, kinematics: Kinematics, limits: Sequence[JointLimit]
-) -> list[Angles2]:
-    """Return the narrower of the gaze's and the guard's range of each joint."""
-    left, right, head = oculomotor.ranges_rad
-    lows, highs = (
-        kinematics.inverse(
-            _command(
-                (head[0][end], head[1][end], (-pi, pi)[end]),
-                (left[0][end], left[1][end]),
-                (right[0][end], right[1][end]),
-            )
-        )
-        for end in (0, 1)
-    )
-    rows = zip(kinematics.names, lows, highs, limits, strict=True)
-    return [
-        (limit.low_rad, limit.high_rad)
-        if name.endswith("lid")
-        else (max(low, limit.low_rad), min(high, limit.high_rad))
-        for name, low, high, limit in rows
-    ]

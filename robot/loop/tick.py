@@ -5,14 +5,16 @@ from msgspec import UNSET, Struct, UnsetType
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, unit
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target, Vec3
+from gazerig.gaze.types import PART_NAMES, GazeCommand, GazeState, Percept, Target, Vec3, body_name
 from gazerig.robot.model.commands import AnyCommand
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
     NO_CONVERSATION,
+    ControlSource,
     ControlState,
     ConversationState,
     TrackState,
+    control_source,
 )
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
@@ -52,6 +54,26 @@ class Tick(Struct, frozen=True, gc=False, omit_defaults=True):
     def controlled_by(self) -> str:
         """Return the client that controls gaze or joints, and its command; "" without one."""
         return self.client_control.client
+
+    @property
+    def control_source(self) -> ControlSource:
+        """Return the source of control of the head."""
+        return control_source(self.stopped, self.parking, self.client_control, self.tracks)
+
+    @property
+    def camera_conditions(self) -> tuple[str, ...]:
+        """Return the conditions that impair the camera, each with its remedy."""
+        return self.detections.conditions if self.detections is not None else ()
+
+    @property
+    def estimated_joints(self) -> tuple[str, ...]:
+        """Return the joints whose servos have no feedback.
+
+        A hobby servo takes a goal and reports no position. Its position is estimated as its goal,
+        moved at its known speed: no sensor detects sticking, slipping or oscillation.
+        """
+        rows = zip(self.guard_result.joints, self.joints.measured, strict=False)
+        return tuple([name for name, measured in rows if not measured])
 
     def parking_tick(
         self,
@@ -133,3 +155,10 @@ def stopped_result(
 def cyclopean_direction(tick: Tick) -> Vec3:
     """Return the unit mean of both measured lines of sight, in the world."""
     return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
+
+
+def target_name(target: Target) -> str:
+    """Return a target's name for users, e.g. "face 3: left eye"."""
+    kind = "motion" if target.kind == "thing" else target.kind
+    name = body_name(kind, target.id)
+    return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"

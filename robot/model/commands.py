@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 import msgspec
 from msgspec import Meta, Struct, structs
 
-from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED, Track
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """Value of a key in a rig's YAML."""
@@ -48,7 +48,6 @@ _Position = Annotated[float, Meta(ge=0.0, le=MAX_DURATION_S)]
 _Number = Annotated[int, Meta(ge=0, le=2**53)]
 """Number of a person or a track: every client and recording can hold it."""
 _SpeechTime = Annotated[float, Meta(ge=0.0, le=MAX_SPEECH_S)]
-_Lead = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], ...]
 _ControlTime = Annotated[float, Meta(gt=0.0, le=86_400.0)]
 _TalkTime = Annotated[float, Meta(ge=0.0, le=600.0)]
 
@@ -201,10 +200,8 @@ class Play(ClientCommand, frozen=True):
         times: Number of repetitions, 0 for the track's own.
         from_s: Position in the track, in s or as the name of a cue, at which it begins.
         loop: Repeat it until it is ended, as a track with ``loop: true`` does.
-        lead_s: Latencies of all joints, by which the motion of a track with sound is early; set on
-            execution for the recording.
         sound_s: Duration of its sound, set on execution.
-        yaml: The track, set on execution if its file is newer than the run.
+        definition: The track, set on execution if its file is newer than the run.
     """
 
     track: _Name
@@ -212,9 +209,8 @@ class Play(ClientCommand, frozen=True):
     times: Annotated[int, Meta(ge=0, le=MAX_COUNT)] = 0
     from_s: _Position | _Name = 0.0
     loop: bool = False
-    lead_s: _Lead | None = None
     sound_s: _Position = 0.0
-    yaml: str = ""
+    definition: Track | None = None
 
 
 class EndTrack(ClientCommand, frozen=True):
@@ -289,15 +285,13 @@ class Speak(ClientCommand, frozen=True):
         level: Level of the rig's table that opens the mouth, "" without one.
         mouth: (time in s, opening 0..1) pairs; the mouth shuts at the end.
         volume: Factor 0..1.
-        lead_s: As in Play.
     """
 
     sound: str
     duration_s: Annotated[float, Meta(gt=0.0, le=MAX_SPEECH_S)]
     level: str = ""
-    mouth: Annotated[tuple[tuple[_SpeechTime, _Share], ...], Meta(max_length=40_000)] = ()
+    mouth: Annotated[tuple[tuple[_SpeechTime, _Share], ...], Meta(max_length=61_000)] = ()
     volume: _Share = 1.0
-    lead_s: _Lead | None = None
 
 
 class MoveOpponent(Command, frozen=True, tag="opponent"):

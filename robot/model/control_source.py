@@ -8,12 +8,11 @@ from typing import Literal
 
 from msgspec import Struct
 
+from gazerig.gaze.track.track import FINISHED as FINISHED
 from gazerig.gaze.types import TurnState
 
 CHARACTERS_PER_S = 15.0
 """Rate of speech, for the end of a text without times: about 150 English words a minute."""
-FINISHED = "finished"
-"""End reason of a track that was played to its end."""
 SHOWN_S = 2.0
 """Time for which an ended track is shown."""
 _WORTH_TELLING_S = 1.0

@@ -14,7 +14,17 @@ from math import copysign, degrees, hypot, radians
 from typing import Annotated, Literal
 
 from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
-from gazerig.gaze.angles import add, angles_of, compose, rotate, rotation, scale, sub, transpose
+from gazerig.gaze.angles import (
+    add,
+    angles_of,
+    compose,
+    rotate,
+    rotation,
+    scale,
+    sub,
+    transpose,
+    yaw_pitch,
+)
 from gazerig.gaze.types import Angles2, Angles3, HeadGeometry, Mat3, Vec3
 from gazerig.params import Bounds
 
@@ -33,6 +43,7 @@ _Focal = Annotated[float, Bounds(10, 100_000)]
 _Centre = Annotated[float, Bounds(-10_000, 20_000)]
 _Bend = Annotated[float, Bounds(-100, 100)]
 _Millimetres = Annotated[float, Bounds(-2000, 2000)]
+_Degrees = Annotated[float, Bounds(-180, 180)]
 
 
 @dataclass(frozen=True)
@@ -65,6 +76,9 @@ class CameraParams:
         "degrees clockwise by which the camera's frames are turned upright; all other values here refer to upright frames"] = 0
     mirrored: Annotated[bool, "the camera delivers mirror images: left and right are exchanged before the rotation"] = False
     lens: Annotated[LensParams | None, "measured lens; without it, the field of view is used"] = None
+    ignore_deg: Annotated[tuple[tuple[_Degrees, _Degrees, _Degrees, _Degrees], ...],
+        "directions from the camera in which nothing is looked at, such as a television: least and largest yaw (to the "
+        "left), least and largest pitch (upwards), where 0, 0 is straight ahead of the neck base"] = ()
     # fmt: on
 
 
@@ -158,6 +172,15 @@ class CameraMount:
             (radians(params.yaw_deg), radians(params.pitch_deg), radians(params.roll_deg))
         )
         self._R = compose(turn, OPTICAL)
+        self._ignore_rad = [tuple(map(radians, window)) for window in params.ignore_deg]
+
+    def is_ignored(self, way: Vec3) -> bool:
+        """Return whether the rig ignores what is in a direction from the camera."""
+        yaw, pitch = yaw_pitch(way)
+        return any(
+            right <= yaw <= left and low <= pitch <= high
+            for right, left, low, high in self._ignore_rad
+        )
 
     def rotation(self, R_world_head: Mat3) -> Mat3:
         """Return R_world_camera for an orientation of the head."""

@@ -95,9 +95,7 @@ def _inner_keys(times_s: Floats, values: Floats, tolerance: float) -> list[int]:
     """Return the indices of the keys between two stops, and the last."""
     chosen = [len(values) - 1]
     for _ in range(_MOST_KEYS):
-        curve = MinimumJerkCurve(
-            float(values[0]), times_s[chosen].tolist(), values[chosen].tolist()
-        )
+        curve = MinimumJerkCurve(times_s[chosen], values[chosen], float(values[0]))
         error = np.abs(curve.sample_at(times_s)[0] - values)
         if error.max() <= tolerance:
             break

@@ -12,7 +12,6 @@ from msgspec import structs
 from gazerig.robot.loop.command_handler import REFUSALS, CommandHandler, PathGuard
 from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.head_state import HeadReport, head_state
-from gazerig.robot.loop.tick_text import camera_conditions
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import (
     Character,
@@ -90,7 +89,7 @@ class LoopMonitor:
             **structs.asdict(state),
             "ticks": self._feed.ticks,
             "age_s": self._clock.now_s() - tick.t_s,
-            "camera": camera_conditions(tick),
+            "camera": tick.camera_conditions,
             "said": [event.text for event in self._feed.messages()[-_WORDS:]],
         }
 

@@ -67,6 +67,10 @@ _LEAST_SHARE, _MOST_SPREAD_M, _LEAST_SD = 0.3, 0.12, 0.01
 # age of five at least 40 mm (Dodgson, "Variation and extrema of human interpupillary distance",
 # 2004): ratios of 1.29 and 1.55 at most.
 _MOST_DEPTH_RATIO = 1.6
+# A face is flat if the depth beside and above it differs by at most this at 0 m, and in addition
+# per squared metre: a stereo camera's error grows so. The face of a person who leans at a wall is
+# .18 m before it.
+_FLAT_M, _FLAT_PER_M2 = 0.05, 0.01
 # The centre of a patch wanders within it; the error of its flow is proportional to the flow and to
 # the search range.
 _MIDDLE_OF_RADIUS, _PLACED_M = 0.3, 0.002
@@ -170,6 +174,7 @@ def _face(face: DetectedFace, found: Detections, lens: Intrinsics) -> Located | 
         from_side=x < edge_px or x + width > found.width_px - edge_px,
         signs=signs,
         clothing=face.clothing,
+        flat=_is_flat(face, found),
     )
 
 
@@ -259,6 +264,20 @@ def _depth_ratio(
     if not 1.0 / _MOST_DEPTH_RATIO < share < _MOST_DEPTH_RATIO:
         return None
     return share, hypot(_LEAST_SD, 0.5 * spread / z)
+
+
+def _is_flat(face: DetectedFace, found: Detections) -> bool:
+    """Return whether a face is in one plane with what is beside and above it."""
+    x, y, width, height = face.box_px
+    size = 0.5 * width, 0.5 * height
+    middle, *around = (
+        _depth(found, (x + across * width, y + down * height, *size))
+        for across, down in ((0.25, 0.25), (-1.0, 0.0), (1.5, 0.0), (0.25, -1.0))
+    )
+    if middle is None:
+        return False
+    most_m = _FLAT_M + _FLAT_PER_M2 * middle[0] ** 2
+    return all(one is not None and abs(one[0] - middle[0]) < most_m for one in around)
 
 
 def _is_face_of(person: DetectedPerson, face: DetectedFace) -> bool:

@@ -79,7 +79,7 @@ def resolve_identities(
                 continue
             if k != i and other.clothes.frames >= _CLOTHES_PROVED:
                 gain = max((new if lost else own) - worn[k][j], -_MOST_OF_FRAME)
-                gain = min(gain, _MOST_OF_FRAME if worn[k][j] < _FITS else 0.0)
+                gain = min(gain, _MOST_OF_FRAME if not lost or worn[k][j] < _FITS else 0.0)
                 doubt = _DOUBT_KEPT * before.get(other.id, 0.0) + gain
                 if doubt > 1.0:
                     known.doubts[other.id] = doubt
@@ -134,7 +134,7 @@ def _return_cost(gone: SeenPerson, new: SeenPerson) -> float:
     gone_s = new.seen_s - gone.seen_s
     if norm(sub(gone.p_world_m, new.p_world_m)) > _AT_ONCE_M + _WALKS_M_S * gone_s:
         return inf
-    cost = _SOON + _PER_DECADE * log10(1.0 + gone_s / _FIRST_S)
+    cost = _SOON + _PER_DECADE * log10(max(gone_s, 0.1) / _FIRST_S)
     cost += min(((new.p_world_m[2] - gone.p_world_m[2]) / _HEIGHT_SD_M) ** 2, _MOST)
     if gone.face_size is not None and new.face_size is not None:
         cost += min((log(new.face_size / gone.face_size) / _SIZE_SD) ** 2, _MOST)

@@ -94,8 +94,13 @@ class Perception:
         located = detections.located
         if located is None or located.intrinsics != self._locator.intrinsics(detections):
             located = self._locator(detections)
-        faces = [place_in_world(face, R, p) for face in located.faces]
-        things = [place_in_world(thing, R, p) for thing in located.things]
+        faces, things = (
+            [one for one in places if not self._mount.is_ignored(sub(one.p_m, p))]
+            for places in (
+                [place_in_world(face, R, p) for face in located.faces],
+                [place_in_world(thing, R, p) for thing in located.things],
+            )
+        )
         palms = located.palms and [place_in_world(one, R, p) for one in located.palms]
         people = [track for track in self._tracks if track.is_person]
         carried: list[tuple[int, Located]] = []

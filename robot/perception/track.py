@@ -96,8 +96,9 @@ _SIGMAS, _MEAN_S, _OF_TURN, _ANEW_S, _STEADY_RAD = 3.0, 0.33, 0.05, 1.9, 0.02
 # A face that has rested for no longer than this lives. A person whose face was not visible for
 # longer, and who has rested for so long, may be a bottle or a coat.
 _LIVES_S, _COUNTS_S = 5.0, 18.0
-# Time for which a face in a film is known as such.
-_FILMED_S = 30.0
+# Time for which a face in a film is known as such; share of flat frames above which a face is a
+# picture.
+_FILMED_S, _FLAT = 30.0, 0.5
 
 
 @dataclass(slots=True)
@@ -245,6 +246,7 @@ class BodyTrack:
         before the first measured distance
     looks_at_head: of a face, whether the person looked at the head in its last frame; None if
         uncertain
+    flat: of a face, share of recent frames in which it was flat
     speech: of a face, recent motion of the mouth
     eyes, eyes_s: of a face, last detection that showed the eyes, and its capture time
     clothes: of a person, learned clothes
@@ -262,6 +264,7 @@ class BodyTrack:
     life: Life
     face_size: float | None = None
     looks_at_head: bool | None = None
+    flat: float = 0.0
     speech: Speech = Speech()
     eyes: Located | None = None
     eyes_s: float = -inf
@@ -314,8 +317,9 @@ class BodyTrack:
 
     @property
     def is_alive(self) -> bool:
-        """Return whether a face has recently moved and is not in a film."""
-        return self.life.still_s <= _LIVES_S and self.at_s - self.filmed_s > _FILMED_S
+        """Return whether a face has recently moved, and is neither in a film nor in a picture."""
+        filmed = self.at_s - self.filmed_s <= _FILMED_S or self.flat > _FLAT
+        return self.life.still_s <= _LIVES_S and not filmed
 
     @property
     def counts(self) -> bool:

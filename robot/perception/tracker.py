@@ -42,7 +42,7 @@ _OF_THINGS = ProcessNoise(1.0, 10.0)
 _FIRST_SPEED_M_S = 0.7
 """Standard deviation of the speed of a new track."""
 _TURN_GAIN, _GAIN = 0.3, 0.15
-"""Weights of a new frame in the smoothed orientation, and length and size, of a face."""
+"""Weights of a new frame in the smoothed orientation, and length, size and flatness, of a face."""
 _COAST_PERSON_S = 1.2
 """A person whose face is not visible is reported for longer, as people are searched rarely."""
 _REMEMBER_FACE_S = 20.0
@@ -185,7 +185,9 @@ class Tracker:
         if track.returned_person is not None:
             self._left.append(track.returned_person)
         gone = [
-            one for one in self._tracks if one.is_person and one is not track and one.is_remembered
+            one
+            for one in self._tracks
+            if one.is_person and one is not track and one.unseen_s > IN_SIGHT_S
         ]
         before, known = track.returned_person, [*self._left, *map(_person, gone)]
         recent = [one for one in known if track.at_s - one.seen_s <= _REMEMBER_PERSON_S]
@@ -235,6 +237,7 @@ class Tracker:
             track.R_world_face = track.looks_at_head = None
         else:
             before, track.faced_s = track.R_world_face, track.at_s
+            track.flat += _GAIN * (detection.flat - track.flat)
             if before is None:
                 track.R_world_face, track.face_length = R, detection.face_length
             else:

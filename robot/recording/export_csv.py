@@ -14,8 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from gazerig.drivers.files.file_output import output_file, refuse_existing, write_file
-from gazerig.robot.loop.tick_text import ESTIMATED
-from gazerig.robot.recording.gaze_angles import MOVEMENTS, GazeAngles, LabelledInterval, Labels
+from gazerig.robot.recording.gaze_angles import (
+    ESTIMATED,
+    MOVEMENTS,
+    GazeAngles,
+    LabelledInterval,
+    Labels,
+)
 
 _GAZE = (
     "time_s", "x_deg", "y_deg", "left_x_deg", "left_y_deg", "right_x_deg", "right_y_deg",

@@ -17,9 +17,9 @@ best fits the measured gaze. Amplitudes and speeds are measured.
 """
 
 from array import array
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable
 from math import degrees, nan
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +28,11 @@ from gazerig.gaze.angles import add, angle_between, sub, yaw_pitch
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3, body_name
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import Basis, basis_of, estimated_joints
 from gazerig.robot.model.commands import Jog, Stop
 
 Ints = NDArray[np.int64]
+Basis = Literal["measured", "partly estimated", "estimated"]
+ESTIMATED = "estimated from commands and known servo speeds, not measured"
 
 MOVEMENTS = ("", "fixation", "saccade", "pursuit")
 """Movements of the eyes; "" if none of these: they were moved by hand, had no torque, or were at
@@ -153,7 +154,7 @@ class GazeAnglesBuilder:
         lids = (pose.lid_left, pose.lid_right, pose.lower_left, pose.lower_right)
         head = tuple(map(degrees, head_in_space(pose)))
         self._joints = tick.guard_result.joints
-        self._estimated.update(dict.fromkeys(estimated_joints(tick)))
+        self._estimated.update(dict.fromkeys(tick.estimated_joints))
         if missing:
             lost_left, lost_right = not _LEFT.isdisjoint(missing), not _RIGHT.isdisjoint(missing)
             cyclopean = _LOST if lost_left or lost_right else cyclopean
@@ -405,3 +406,20 @@ def _great_circle_deg(a_deg: Floats, b_deg: Floats) -> float:
     # Haversine: exact for small angles.
     h = np.sin((yb - ya) / 2) ** 2 + np.cos(ya) * np.cos(yb) * np.sin((xb - xa) / 2) ** 2
     return float(np.degrees(2.0 * np.arcsin(min(1.0, np.sqrt(h)))))
+
+
+def basis_of(
+    joints: Collection[str], estimated: Collection[str], counts: Callable[[str], bool]
+) -> Basis:
+    """Return whether a figure is measured or estimated.
+
+    Args:
+        joints: Joints of the rig.
+        estimated: Joints without feedback.
+        counts: Returns whether the figure depends on a joint of this name.
+    """
+    hidden = [counts(name) for name in estimated]
+    if not any(hidden):
+        return "measured"
+    whole = sum(hidden) == sum(counts(name) for name in joints)
+    return "estimated" if whole else "partly estimated"

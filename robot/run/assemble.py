@@ -4,7 +4,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from math import radians
-from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -13,8 +12,6 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
 from gazerig.config.shipped_files import shipped_names
 from gazerig.config.tracks import tracks_of
-from gazerig.drivers.errors import SetupError
-from gazerig.drivers.sound.sound_file import check_sound
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp
@@ -24,7 +21,6 @@ from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
 from gazerig.gaze.track.animation import Animation
-from gazerig.gaze.track.track import MAX_DURATION_S
 from gazerig.robot.dashboard.feed.rig_feed import ShownRig
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.chooser import TargetChooser
@@ -34,7 +30,6 @@ from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClo
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.scene import BoxingScene
-from gazerig.robot.model.track_fit import TrackRefused
 from gazerig.robot.model.types import JointAngles, further_joints
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
@@ -50,7 +45,7 @@ from gazerig.robot.run.live_params import Components, LiveParams
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.program_parts import NO_PARTS, ProgramParts
 from gazerig.robot.run.rig_description import sag_compensation, shape_of
-from gazerig.robot.run.rig_limits import animation_tables, face_parts_m, lid_spans, limits, park_rad
+from gazerig.robot.run.rig_limits import face_parts_m, face_tables, lid_spans, limits, park_rad
 from gazerig.robot.run.rig_weight import park_note
 from gazerig.robot.run.run_bus import RunBus, run_bus
 from gazerig.robot.run.run_rig import scene_of, with_options
@@ -270,7 +265,7 @@ def _build_components(
     top_down, idle = TopDown(gaze.top_down), Idle(gaze.idle, random.idle)
     attention = Attention(gaze.attention, bottom_up, top_down, idle, random.reaction, random.stays)
     looks_away = gaze.looks_away, gaze.aversion, gaze.conversation
-    animation = Animation(further_joints(rig.joints), animation_tables(rig))
+    animation = Animation(further_joints(rig.joints), face_tables(rig))
     return Components(
         body=body,
         guard=Guard(
@@ -308,24 +303,11 @@ def _build_components(
             animation.tracks,
             rig.names,
             lid_spans(rig),
-            animation_tables(rig),
+            face_tables(rig),
             rig.gaze.oculomotor.eye_lag_ms / 1e3,
-            _sound_s,
-            TrackFolder(rig_file),
+            TrackFolder(rig_file).changes,
         ),
     )
-
-
-def _sound_s(path: str) -> float:
-    """Return the duration of a track's sound, s.
-
-    Raises:
-        TrackRefused: it cannot be played.
-    """
-    try:
-        return check_sound(Path(path), MAX_DURATION_S).duration_s
-    except SetupError as error:
-        raise TrackRefused(str(error)) from None
 
 
 def _build_robot(

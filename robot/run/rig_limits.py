@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from math import radians
 
 from gazerig.config.rig import Rig
-from gazerig.gaze.track.animation import AnimationTables
-from gazerig.gaze.track.level import LevelParams, LevelRange
+from gazerig.gaze.track.animation import NEUTRAL, FaceRange, FaceTables
 from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.types import Angles2, Vec3
 from gazerig.robot.model.joint import JointLimit, JointParams
@@ -89,12 +88,24 @@ def park_rad(rig: Rig) -> dict[str, float]:
     return {name: radians(angle) for name, angle in rig.park_deg.items()}
 
 
-def animation_tables(rig: Rig) -> AnimationTables:
+def face_tables(rig: Rig) -> FaceTables:
     """Return the pose offsets of expressions and levels."""
-    expressions = {name: pose_offset(rig, angles) for name, angles in rig.expressions.items()}
-    levels = {name: _level_range(rig, level) for name, level in rig.levels.items()}
-    mouth = levels.get(rig.gaze.mouth.level)
-    return AnimationTables(expressions, rig.expression_blend_s, levels, mouth)
+    rest = pose_offset(rig, {})
+    faces = {NEUTRAL: {}, **rig.expressions} if rig.expressions else {}
+    expressions = {
+        name: FaceRange(rest, pose_offset(rig, angles), rig.expression_blend_s)
+        for name, angles in faces.items()
+    }
+    levels = {
+        name: FaceRange(
+            pose_offset(rig, {level.joint: level.low_deg}),
+            pose_offset(rig, {level.joint: level.high_deg}),
+            level.smoothing_ms / 1e3,
+        )
+        for name, level in rig.levels.items()
+    }
+    mouth = rig.gaze.mouth.level
+    return FaceTables(expressions, levels, mouth if mouth in levels else "")
 
 
 def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:
@@ -113,10 +124,3 @@ def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:
     a, b, c, d = (1.0 + offsets.get(name, 0.0) / spans.get(name, 1.0) for name in LIDS)
     joints = tuple(offsets.get(name, 0.0) for name in further_joints(rig.joints))
     return NO_OFFSET._replace(head_rad=(yaw, pitch, roll), lids=(a, b, c, d), joints_rad=joints)
-
-
-def _level_range(rig: Rig, level: LevelParams) -> LevelRange:
-    low, high = (
-        pose_offset(rig, {level.joint: angle}) for angle in (level.low_deg, level.high_deg)
-    )
-    return LevelRange(low, high, level.smoothing_ms / 1e3)

@@ -16,11 +16,10 @@ from gazerig.robot.dashboard.door.token_file import hide_token
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.rig_feed import LiveRig
-from gazerig.robot.dashboard.feed.status_line import StatusLine
+from gazerig.robot.dashboard.feed.status_line import StatusLine, health_text
 from gazerig.robot.loop.loop import LoopCount
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.loop.tick_stream import Observers, TickStream, failure_text
-from gazerig.robot.loop.tick_text import health_text
 from gazerig.robot.loop.timing import LoopTiming, busy_text
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.scene import has_opponent

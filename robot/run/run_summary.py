@@ -10,7 +10,6 @@ from gazerig.gaze.angles import add, angle_between, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Vec3
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import estimated_joints
 
 _FIXATION_RAD_S = radians(40.0)
 """Largest speed of a fixation; 30 is usual, and a servo step in 20 ms is already 4.4 deg/s."""
@@ -84,7 +83,7 @@ class Summary:
                 "median": _percentile_deg(self._errors_mdeg, 50.0),
                 "p95": _percentile_deg(self._errors_mdeg, 95.0),
             },
-            "estimated": list(estimated_joints(last)) if last else [],
+            "estimated": list(last.estimated_joints) if last else [],
             "limited": dict(sorted(self._limited.items())),
             "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
         }

@@ -130,7 +130,6 @@ def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> Compose
         lambda: assembly.live_params.rig,
         assembly.clock,
         tuning.confined.folder,
-        assembly.robot.joint_latencies_s,
         options.fast,
         assembly.robot.report,
     )

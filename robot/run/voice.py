@@ -1,20 +1,18 @@
 """Voice of a run: texts and files that the head says, streams, and the sounds of tracks.
 
-A speech is prepared in the caller's thread: its samples are read, and its mouth is computed. The
-command ``Speak`` contains the keys of the mouth, so a recorded run repeats it without the sound.
-A thread compares the tracks of the newest tick with the sound that is played. It starts and stops
-the sound, and corrects the track's clock by the position that is really heard. In simulated time
-nothing is played.
+A speech is prepared in the caller's thread: its samples are read, and the openings of its mouth are
+computed. The command ``Speak`` contains them, so a recorded run repeats it without the sound. In
+every tick the tracks are compared with the sound that is played: it starts and stops with them, and
+the position that is really heard corrects the track's clock. In simulated time nothing is played.
 """
 
 import contextlib
-import shutil
 import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from msgspec import structs
@@ -27,17 +25,9 @@ from gazerig.drivers.sound.playback import SoundEvent
 from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
 from gazerig.drivers.sound.sound_file import check_sound, read_samples, write_wav
 from gazerig.drivers.sound.speech import speak
-from gazerig.gaze.mouth.loudness import MOUTH_SIZE, band_pressures, loud_pressure, openings
-from gazerig.gaze.mouth.mouth_keys import (
-    JawLimits,
-    MouthKey,
-    estimated_closures,
-    mouth_keys,
-    phoneme_closures,
-)
-from gazerig.gaze.mouth.speech_track import SPEECH
-from gazerig.gaze.mouth.stream_mouth import StreamMouth
-from gazerig.gaze.track.track import LIMIT_SHARE
+from gazerig.gaze.mouth.mouth import Mouth, phoneme_closures
+from gazerig.gaze.track.track import FINISHED
+from gazerig.gaze.track.track_player import SPEECH
 from gazerig.gaze.types import Floats
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.clock import Clock
@@ -51,16 +41,18 @@ from gazerig.robot.model.commands import (
     SyncTrack,
     check_command,
 )
-from gazerig.robot.model.control_source import FINISHED, TrackState
+from gazerig.robot.model.control_source import TrackState
 from gazerig.robot.model.reply import CommandTaker
 
 STREAM_DELAY_S = 0.15
 """Time from the arrival of a stream's first piece until it is heard."""
 
-_STREAM_TRACK_S = 600.0
+_STREAM, _STREAM_TRACK_S = "stream", 600.0
+"""Sound and longest duration of the track of a stream."""
 _WATCH_S = 0.02
 _SYNC_EVERY_S, _SYNC_ERROR_S = 0.25, 0.003
-_RESTART_ERROR_S = 0.2
+_AGAIN_S = 0.1
+"""Step back of a track's position with which its sound begins again, as it repeats."""
 _OPEN_S = 2.0
 _REPLY_S = 1.0
 _ABANDONED_S = 5.0
@@ -72,24 +64,21 @@ _LEAD_IN_S = 0.05
 
 
 class _Stream(NamedTuple):
-    """A stream that is being said; ``lead_s``: latency of the mouth's joint."""
+    """A stream that is being said."""
 
-    mouth: StreamMouth
+    mouth: Mouth
     rate_hz: int
     channels: int
-    track: int
-    lead_s: float
 
 
 class RunVoice:
-    """The voice of one head. Except ``update``, all methods may be called by any thread.
+    """The voice of one head. Except ``update`` and ``stop``, any thread may call all methods.
 
     Args:
         command: Queues a command for the next tick.
         rig: Returns the present rig.
         clock: Clock of the loop.
         folder: Folder of the rig's file, for relative paths.
-        latencies_s: Returns the latencies of all joints.
         fast: Whether time is simulated: nothing is played.
         report: Takes a line for the events of the next tick; called in ``update``.
     """
@@ -100,28 +89,23 @@ class RunVoice:
         rig: Callable[[], Rig],
         clock: Clock,
         folder: Path,
-        latencies_s: Callable[[], Sequence[float]],
         fast: bool,
         report: Callable[[str], object],
     ) -> None:
         self._command, self._rig, self._clock, self._report = command, rig, clock, report
-        self._folder, self._latencies_s, self._fast = folder, latencies_s, fast
+        self._folder, self._fast = folder, fast
         self._player: SoundPlayer | None = None
-        self._device = rig().sound.device
+        self._device = ""
         self._lock = threading.RLock()
-        self._wake = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._opener: threading.Thread | None = None
+        self._fault = ""
         self._closed = False
         self._tick: Tick | None = None
-        self._seen: tuple[object, ...] = ()
         self._played: TrackState | None = None
-        self._synced_s = self._started_s = 0.0
-        self._fed_s = 0.0
+        self._watched_s = self._fed_s = 0.0
         self._over = False
         self._stream: _Stream | None = None
-        self._texts = 0
-        self._scratch: Path | None = None
-        self._lines = deque[str](maxlen=20)
+        self._files = deque[Any](maxlen=_KEPT_FILES)
 
     # --- speech
 
@@ -141,15 +125,15 @@ class RunVoice:
         if what.lower().endswith(KINDS):
             sound = check_sound(self._find(what, confined), MAX_SPEECH_S)
             samples = read_samples(sound).astype(np.float64)
-            keys = self._mouth(samples, len(samples) / sound.duration_s)
-            speech = Speak(sound.path, sound.duration_s, self._level, keys)
+            speech = self._speech(sound.path, samples, len(samples) / sound.duration_s)
         else:
             said = speak(what, params.voice)
             silent_s = _LEAD_IN_S + params.latency_ms / 1e3
-            silence = bytes(2 * round(silent_s * said.rate_hz))
+            pcm = bytes(2 * round(silent_s * said.rate_hz)) + said.pcm
             phonemes = [(name, t_s + silent_s) for name, t_s in said.phonemes]
-            speech = self._from_pcm(silence + said.pcm, said.rate_hz, 1, phonemes)
-        self._open_loudspeaker()
+            path = "" if self._fast else self._write(pcm, said.rate_hz)
+            speech = self._speech(path, _mono(pcm, 1), said.rate_hz, phonemes)
+        self._open_loudspeaker(params.device)
         return structs.replace(speech, volume=command.volume, who=command.who)
 
     def prepare_stream(
@@ -161,36 +145,21 @@ class RunVoice:
             SoundError: the format is not possible.
         """
         check_format(rate_hz, channels)
-        return structs.replace(self._from_pcm(b"".join(pieces), rate_hz, channels, ()), who=who)
+        speech = self._speech("", _mono(b"".join(pieces), channels), rate_hz)
+        return structs.replace(speech, who=who)
 
-    def _from_pcm(
-        self,
-        pcm: bytes,
-        rate_hz: int,
-        channels: int,
-        phonemes: Sequence[tuple[str, float]],
+    def _speech(
+        self, path: str, samples: Floats, rate_hz: float, spoken: Sequence[tuple[str, float]] = ()
     ) -> Speak:
-        samples = _mono(pcm, channels)
-        path = "" if self._fast else str(self._write(pcm, rate_hz, channels))
-        keys = self._mouth(samples, rate_hz, phonemes)
-        return Speak(path, len(samples) / rate_hz, self._level, keys)
-
-    def _mouth(
-        self, samples: Floats, rate_hz: float, spoken: Sequence[tuple[str, float]] = ()
-    ) -> tuple[MouthKey, ...]:
-        """Return the keys of the mouth, () if the rig has none."""
-        rig = self._rig()
+        """Return the command of a sound, with the openings of the mouth if the rig has one."""
+        duration_s = len(samples) / rate_hz
         if not self._level:
-            return ()
-        level = rig.levels[self._level]
-        pressures = band_pressures(samples, rate_hz)
-        opening = MOUTH_SIZE * openings(pressures, loud_pressure(pressures))
-        end_s = len(samples) / rate_hz
-        closures = phoneme_closures(spoken, end_s) if spoken else estimated_closures(opening)
-        span_deg = abs(level.high_deg - level.low_deg) / LIMIT_SHARE
-        joint = rig.joints[level.joint]
-        limits = JawLimits(joint.max_speed_deg_s / span_deg, joint.max_accel_deg_s2 / span_deg)
-        return mouth_keys(opening, closures, limits)
+            return Speak(path, duration_s)
+        mouth = Mouth(rate_hz)
+        mouth.add(samples)
+        if spoken:
+            mouth.close(phoneme_closures(spoken, duration_s))
+        return Speak(path, duration_s, self._level, mouth.keys(duration_s))
 
     def _find(self, name: str, confined: bool) -> Path:
         """Return a file in the folders of sounds, or at its absolute path.
@@ -207,22 +176,29 @@ class RunVoice:
         except ValueError as error:
             raise SoundError(f"{name}: {error}; see sound.folders") from None
 
-    def _write(self, pcm: bytes, rate_hz: int, channels: int) -> Path:
+    def _write(self, pcm: bytes, rate_hz: int) -> str:
         """Write samples to a file that exists until the run ends, or some texts later."""
-        with self._lock:
-            if self._scratch is None:
-                self._scratch = Path(tempfile.mkdtemp(prefix="gazerig-voice-"))
-            self._texts += 1
-            path = Path(self._scratch, f"{self._texts % _KEPT_FILES}.wav")
-        write_wav(path, pcm, rate_hz, channels)
-        return path
+        file = tempfile.NamedTemporaryFile(prefix="gazerig-voice-", suffix=".wav")  # noqa: SIM115
+        self._files.append(file)
+        write_wav(Path(file.name), pcm, rate_hz)
+        return file.name
 
-    def _open_loudspeaker(self, muted: bool = False) -> None:
-        """Open the loudspeaker, so that the sound begins with the motion."""
+    def _open_loudspeaker(self, device: str) -> None:
+        """Open a loudspeaker, so that the sound begins with the motion.
+
+        Raises:
+            SoundError: it cannot be opened, or the run has ended.
+        """
         if self._fast:
             return
         with self._lock:
-            player = self._use_device(SILENT_DEVICE if muted else self._rig().sound.device)
+            if self._closed:
+                raise SoundError("the run has ended")
+            if self._player is not None and self._device != device:
+                self._player.close()
+                self._player = None
+            self._device = device
+            player = self._player = self._player or SoundPlayer(device)
             player.prepare()
         end_s = self._clock.now_s() + _OPEN_S
         while not player.is_open and self._clock.now_s() < end_s:
@@ -231,27 +207,6 @@ class RunVoice:
                 failed = [one.reason for one in player.events() if one.kind == "failed"]
             if failed:
                 raise SoundError(failed[0])
-
-    def _use_device(self, device: str) -> SoundPlayer:
-        """Return the player on a device, instead of that on another one."""
-        if self._player is not None and self._device != device:
-            self._player.close()
-            self._player = None
-        self._device = device
-        return self._require_player()
-
-    def _require_player(self) -> SoundPlayer:
-        if self._closed:
-            raise SoundError("the run has ended")
-        if self._player is None:
-            self._player = SoundPlayer(self._device)
-        self._start_thread()
-        return self._player
-
-    def _start_thread(self) -> None:
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._follow, name="voice", daemon=True)
-            self._thread.start()
 
     # --- streams
 
@@ -280,51 +235,38 @@ class RunVoice:
                     f"this head has no level {self._rig().gaze.mouth.level!r} that a sound without "
                     "volume could move"
                 )
-            self._open_loudspeaker(muted=not volume)
+            self._open_loudspeaker(self._rig().sound.device if volume else SILENT_DEVICE)
         now_s = self._clock.now_s()
         with self._lock:
-            tick = self._tick
+            tick, player = self._tick, self._player
+            if player is None:
+                raise SoundError("the run has ended")
             if tick is not None and tick.stopped:
                 raise SoundError("the head is stopped: resume it first")
-            player = self._require_player()
-            begins = self._stream is None
-            if begins:
-                self._start_stream(player, rate_hz, channels, volume)
-            stream = self._stream
-            assert stream is not None
+            stream = self._stream or self._start_stream(player, rate_hz, channels, volume)
             if (rate_hz, channels) != (stream.rate_hz, stream.channels):
                 raise SoundError(
                     f"the stream has {stream.channels} channels at {stream.rate_hz} Hz: "
                     "finish it before another one"
                 )
-            try:
-                player.feed(pcm, now_s)
-            except SoundError:
-                if begins:
-                    self._end_stream(tick)
-                raise
+            player.feed(pcm, now_s)
             self._fed_s = now_s
             stream.mouth.add(_mono(pcm, channels))
             return player.ahead_s(now_s)
 
     def _start_stream(
         self, player: SoundPlayer, rate_hz: int, channels: int, volume: float
-    ) -> None:
-        rig = self._rig()
+    ) -> _Stream:
         check_format(rate_hz, channels)
-        ticket = self._command(Speak("", _STREAM_TRACK_S, self._level))
+        ticket = self._command(Speak(_STREAM, _STREAM_TRACK_S, self._level))
         reply = ticket.wait(_REPLY_S) if ticket is not None else None
         if reply is None or reply.track is None:
             raise SoundError(reply.refused if reply is not None else "the control loop hangs")
-        now_s = self._clock.now_s()
-        self._played = None  # the stream replaces it; to stop it later would stop the stream
-        player.open_stream(rate_hz, channels, now_s + STREAM_DELAY_S, volume * rig.sound.volume)
-        mouth = StreamMouth(rate_hz)
-        lead_s = 0.0
-        if self._level:
-            lead_s = self._latencies_s()[rig.names.index(rig.levels[self._level].joint)]
-        self._stream = _Stream(mouth, rate_hz, channels, reply.track.number, lead_s)
-        self._wake.set()
+        self._played = TrackState(reply.track.number, SPEECH, sound=_STREAM)
+        heard_s = self._clock.now_s() + STREAM_DELAY_S
+        player.open_stream(rate_hz, channels, heard_s, volume * self._rig().sound.volume)
+        self._stream = _Stream(Mouth(rate_hz), rate_hz, channels)
+        return self._stream
 
     def finish(self) -> None:
         """Mark the end of the stream; what has arrived is said."""
@@ -335,114 +277,112 @@ class RunVoice:
     # --- the loop's thread
 
     def update(self, tick: Tick) -> None:
-        """Store a tick, and report lines for its events; called by the loop."""
+        """Let the sound follow the tracks of a tick, and their clock the sound.
+
+        It never waits: while another thread opens the loudspeaker, the next tick is followed.
+        """
         self._tick = tick
-        ends = [(one.number, one.end_reason) for one in tick.tracks] if tick.tracks else []
-        seen = (tick.stopped, ends)
-        if seen != self._seen:
-            self._seen = seen
-            if not self._fast and (
-                self._thread is not None or any(one.sound for one in tick.tracks)
-            ):
-                self._start_thread()
-                self._wake.set()
-        while self._lines:
-            self._report(self._lines.popleft())
+        if self._fast or not self._lock.acquire(blocking=False):
+            return
+        try:
+            self._follow(tick)
+        except (SetupError, OSError) as error:
+            self._fail(str(error), tick)
+        finally:
+            self._lock.release()
 
-    def stop(self) -> None:
-        """Stop all sound, as the head parks."""
-        self._tick = None
-        self._wake.set()
+    def _follow(self, tick: Tick) -> None:
+        player, played, opener = self._player, self._played, self._opener
+        if opener is not None and not opener.is_alive():
+            self._opener, fault, self._fault = None, self._fault, ""
+            if fault:
+                raise SoundError(fault)
+        if player is not None and played is not None:
+            for event in player.events():
+                self._handle(event, tick)
+            if played.number > max([one.number for one in tick.tracks], default=0):
+                return  # the tick is older than the stream
+        wanted = _sounding_track(tick)
+        if played is not None and (wanted is None or wanted.number != played.number):
+            if player is not None and not _has_finished(played, tick):
+                player.stop()
+            self._played = self._stream = None
+        if wanted is None:
+            return
+        if wanted.sound == _STREAM:
+            if player is not None and self._stream is not None:
+                self._follow_stream(self._stream, player)
+        elif player is None or self._device != self._rig().sound.device or self._opener:
+            self._open_aside()
+        else:
+            self._follow_sound(player, wanted, tick)
 
-    def close(self) -> None:
-        """End the sound and its process."""
-        with self._lock:
-            self._closed = True
-            self._wake.set()
-            if self._player is not None:
-                self._player.close()
-            if self._scratch is not None:
-                shutil.rmtree(self._scratch, ignore_errors=True)
-        if self._thread is not None:
-            self._thread.join(1.0)
-
-    # --- the voice's thread
-
-    def _follow(self) -> None:
-        """Let the sound follow the tracks, and the tracks' clock the sound, until the run ends."""
-        while not self._closed:
-            active = self._played is not None or self._stream is not None
-            self._wake.wait(_WATCH_S if active else None)
-            self._wake.clear()
-            with self._lock:
-                if self._closed:
-                    return
-                tick, now_s = self._tick, self._clock.now_s()
-                try:
-                    player = self._require_player()
-                    for event in player.events():
-                        self._handle_event(event, tick)
-                    if self._stream is not None:
-                        self._follow_stream(self._stream, player, tick, now_s)
-                    self._follow_tracks(player, tick, now_s)
-                except (SetupError, OSError) as error:
-                    self._fail(str(error), tick)
-
-    def _handle_event(self, event: SoundEvent, tick: Tick | None) -> None:
+    def _handle(self, event: SoundEvent, tick: Tick) -> None:
         if event.kind == "failed":
             self._fail(event.reason, tick)
         elif event.kind == "stalled":
-            self._lines.append("the stream has stalled: the mouth closes until it continues")
+            self._report("the stream has stalled: the mouth closes until it continues")
         elif event.kind == "ended":
             self._over = True
             if self._stream is not None:
-                self._end_stream(tick)
+                self._stream = None
+                self._try(EndTrack(SPEECH))
 
-    def _fail(self, reason: str, tick: Tick | None) -> None:
+    def _fail(self, reason: str, tick: Tick) -> None:
         """Report a failure once, and end the track of the sound."""
-        self._lines.append(reason)
-        self._over = True
-        if self._stream is not None:
-            self._end_stream(tick)
-        elif self._played is not None:
-            self._try(EndTrack(self._played.name))
+        self._report(reason)
+        self._over, self._stream = True, None
+        if (failed := self._played or _sounding_track(tick)) is not None:
+            self._try(EndTrack(failed.name))
 
-    def _follow_tracks(self, player: SoundPlayer, tick: Tick | None, now_s: float) -> None:
-        """Start, stop or synchronise the sound of the newest track that has one."""
-        wanted, stream = _sounding_track(tick), self._stream
-        if stream is not None and wanted is not None and wanted.number < stream.track:
-            wanted = None  # the tick is older than the stream
-        if tick is None or wanted is None:
-            if self._played is not None and not _has_finished(self._played.number, tick):
-                player.stop()
-            self._played = None
+    def _open_aside(self) -> None:
+        """Open the loudspeaker of a track in another thread, as it takes longer than a tick."""
+        if self._opener is not None:
             return
-        track_s = wanted.position_s + now_s - tick.t_s
-        if self._played is None or self._played.number != wanted.number:
-            self._end_stream(tick)
-            self._start_sound(wanted, tick)
+
+        def open_device() -> None:
+            try:
+                self._open_loudspeaker(self._rig().sound.device)
+            except SetupError as error:
+                self._fault = str(error)
+
+        self._opener = threading.Thread(target=open_device, name="loudspeaker", daemon=True)
+        self._opener.start()
+
+    def _follow_sound(self, player: SoundPlayer, wanted: TrackState, tick: Tick) -> None:
+        """Start the sound of a track, or let the track follow it."""
+        before, self._played = self._played, wanted
+        sound = self._rig().sound
+        latency_s, now_s = sound.latency_ms / 1e3, self._clock.now_s()
+        if before is None or wanted.position_s < before.position_s - _AGAIN_S:
+            self._over = False
+            start_s = tick.t_s - wanted.position_s - latency_s
+            player.play(wanted.sound, wanted.position_s, start_s, wanted.volume * sound.volume)
             return
-        self._played = wanted
         heard_s = player.position_s(now_s)
-        if heard_s is None:
+        if heard_s is None or self._over or now_s - self._watched_s < _SYNC_EVERY_S:
             return
-        error_s = heard_s - self._latency_s - track_s
-        if abs(error_s) > _RESTART_ERROR_S and (not self._over or error_s > 0.0):  # a seek
-            if now_s - self._started_s > 5.0 * _RESTART_ERROR_S:
-                self._start_sound(wanted, tick)
-        elif not self._over and now_s - self._synced_s >= _SYNC_EVERY_S:
-            self._synced_s = now_s
-            if abs(error_s) > _SYNC_ERROR_S:
-                # The command is executed in the next tick.
-                until_s = max(0.0, tick.t_s + 1.0 / self._rig().loop.rate_hz - now_s)
-                self._try(SyncTrack(wanted.number, track_s + error_s + until_s, "sound"))
+        self._watched_s = now_s
+        track_s = wanted.position_s + now_s - tick.t_s
+        error_s = heard_s - latency_s - track_s
+        if abs(error_s) > _SYNC_ERROR_S:
+            # The command is executed in the next tick.
+            until_s = max(0.0, tick.t_s + 1.0 / self._rig().loop.rate_hz - now_s)
+            self._try(SyncTrack(wanted.number, track_s + error_s + until_s, "sound"))
 
-    def _start_sound(self, wanted: TrackState, tick: Tick) -> None:
-        self._played, self._over, self._started_s = wanted, False, self._clock.now_s()
-        start_s = tick.t_s - wanted.position_s - self._latency_s
-        self._use_device(self._rig().sound.device).play(
-            wanted.sound, wanted.position_s, start_s, wanted.volume * self._rig().sound.volume
-        )
+    def _follow_stream(self, stream: _Stream, player: SoundPlayer) -> None:
+        """Open the mouth by the part of the stream that will be heard when it has moved."""
+        now_s, rig, level = self._clock.now_s(), self._rig(), self._level
+        if now_s - self._watched_s < _WATCH_S:
+            return
+        self._watched_s = now_s
+        if now_s - self._fed_s > _ABANDONED_S and player.ahead_s(now_s) < _WATCH_S:
+            player.finish_stream()
+        heard_s = player.position_s(now_s)
+        if level and heard_s is not None:
+            ahead_s = rig.levels[level].smoothing_ms / 1e3 * _SMOOTHING_LAG + 0.5 * _WATCH_S
+            ahead_s += (rig.gaze.oculomotor.eye_lag_ms - rig.sound.latency_ms) / 1e3
+            self._try(SetLevel(level, stream.mouth.opening_at(heard_s + ahead_s)))
 
     @property
     def _level(self) -> str:
@@ -450,68 +390,38 @@ class RunVoice:
         level = self._rig().gaze.mouth.level
         return level if level in self._rig().levels else ""
 
-    @property
-    def _latency_s(self) -> float:
-        return self._rig().sound.latency_ms / 1e3
-
-    def _follow_stream(
-        self, stream: _Stream, player: SoundPlayer, tick: Tick | None, now_s: float
-    ) -> None:
-        """Open the mouth by the part of the stream that will be heard when it has moved."""
-        if tick is None or tick.stopped or _has_ended(stream.track, tick):
-            player.stop()
-            self._end_stream(tick)
-            return
-        if now_s - self._fed_s > _ABANDONED_S and player.ahead_s(now_s) < _WATCH_S:
-            player.finish_stream()
-        if not self._level:
-            return
-        heard_s = player.position_s(now_s)
-        opening = 0.0
-        if heard_s is not None:
-            smoothing_s = self._rig().levels[self._level].smoothing_ms / 1e3
-            ahead_s = smoothing_s * _SMOOTHING_LAG + stream.lead_s + 0.5 * _WATCH_S
-            ahead_s -= self._latency_s
-            opening = MOUTH_SIZE * stream.mouth.opening_at(heard_s + ahead_s)
-        self._try(SetLevel(self._level, opening))
-
-    def _end_stream(self, tick: Tick | None) -> None:
-        """End the stream: the mouth shuts, and its track ends unless another has replaced it."""
-        stream, self._stream = self._stream, None
-        if stream is None:
-            return
-        if self._level:
-            self._try(SetLevel(self._level, 0.0))
-        if tick is not None and not _has_ended(stream.track, tick):
-            self._try(EndTrack(SPEECH))
-
     def _try(self, command: Command) -> None:
         """Queue a command; a refusal is not important, as the next one follows."""
         with contextlib.suppress(ValueError):
             self._command(command)
 
+    def stop(self) -> None:
+        """Stop all sound, as the head parks."""
+        self._tick = self._played = self._stream = None
+        if self._player is not None:
+            self._player.stop()
 
-def _sounding_track(tick: Tick | None) -> TrackState | None:
+    def close(self) -> None:
+        """End the sound and its process."""
+        with self._lock:
+            self._closed = True
+            if self._player is not None:
+                self._player.close()
+            self._player = None
+            self._files.clear()
+
+
+def _sounding_track(tick: Tick) -> TrackState | None:
     """Return the newest track whose sound is to be heard."""
-    if tick is None or tick.stopped:
+    if tick.stopped:
         return None
     found = [one for one in tick.tracks if one.sound and one.is_playing and one.speed == 1.0]
     return max(found, key=lambda one: one.number, default=None)
 
 
-def _has_ended(number: int, tick: Tick) -> bool:
-    """Return whether a track has ended; the tick may be older than the track."""
-    newest = max([one.number for one in tick.tracks], default=0)
-    return newest >= number and not any(
-        one.number == number and one.is_playing for one in tick.tracks
-    )
-
-
-def _has_finished(number: int, tick: Tick | None) -> bool:
+def _has_finished(played: TrackState, tick: Tick) -> bool:
     """Return whether a track has reached its end, and its sound with it."""
-    return tick is not None and any(
-        one.number == number and one.end_reason == FINISHED for one in tick.tracks
-    )
+    return any(one.number == played.number and one.end_reason == FINISHED for one in tick.tracks)
 
 
 def _mono(pcm: bytes, channels: int) -> Floats:

@@ -45,11 +45,6 @@ class Collisions:
         self.exits: dict[int, float] = {}
         self.still: set[int] = set()
 
-    def take_over_keepers(self, before: "Collisions") -> None:
-        """Take over the keepers of the pairs in an earlier instance."""
-        kept = dict(zip(before._pairs, before._keeper, strict=True))
-        self._keeper = [kept.get(pair, 0) for pair in self._pairs]
-
     def __bool__(self) -> bool:
         """Return whether there is any pair."""
         return bool(self._pairs)

@@ -82,8 +82,6 @@ class Guard:
         self._motion = MotionLimiter(limits)
         self._change = LimitChange(self._motion, limits, reach)
         self._limits = self._motion.limits
-        self._short: dict[int, tuple[int, str]] = {}
-        self._findings = _findings(self._short, joints)
         self._health = JointHealth(limits)
         self._stuck = StallDetector(len(limits))
         self._collisions = Collisions(params.collisions, limits, joints)
@@ -98,9 +96,7 @@ class Guard:
         Raises:
             ValueError: A collision leaves no pose inside the limits; nothing has changed.
         """
-        collisions = Collisions(params.collisions, limits, self._names)
-        collisions.take_over_keepers(self._collisions)
-        self._collisions = collisions
+        self._collisions = Collisions(params.collisions, limits, self._names)
         self._gentle_speed = radians(params.soft_start_speed_deg_s)
         self._change.retune(limits)
 
@@ -203,11 +199,7 @@ class Guard:
                 short[i] = outcome
         if followed:
             return GuardResult(desired_rad, "ok", (), desired_rad, (), (), self._names)
-        if short != self._short:  # findings often stay the same for many ticks
-            self._short, self._findings = short, _findings(short, self._names)
-        level, reasons, why, critical = self._findings
-        command = tuple(motion.command)
-        return GuardResult(command, level, reasons, desired_rad, why, critical, self._names)
+        return self._result(short, desired_rad)
 
     def _is_well(self, i: int, joints: JointState, no_frame: bool) -> bool:
         """Return whether only limit, age and distance of a joint must be checked."""
@@ -359,31 +351,21 @@ class Guard:
         fast = abs(target - began) > limit.speed_rad_s * dt_s
         return self._health.why[i] or ("too fast" if fast else "too hard")
 
+    def _result(self, short: dict[int, tuple[int, str]], desired_rad: JointAngles) -> GuardResult:
+        """Return the result of a tick; its level is that of the worst joint.
 
-class _Findings(NamedTuple):
-    """The guard's findings for all joints, in the fields of ``GuardResult``."""
-
-    level: Level
-    reasons: tuple[str, ...]
-    why: tuple[str, ...]
-    critical_reasons: tuple[str, ...]
-
-
-def _findings(short: dict[int, tuple[int, str]], joints: tuple[str, ...]) -> _Findings:
-    """Return the findings for all joints; the level is that of the worst joint.
-
-    Args:
-        short: Rank, 1 (limited) to 3 (torque_off), or 0 for a mere remark, and reason by the
-            number of each joint that does not follow.
-        joints: Names of all joints.
-    """
-    if not short:
-        return _Findings("ok", (), (), ())
-    worst = max(rank for rank, _ in short.values())
-    reasons = {i: f"{joints[i]}: {reason}" for i, (rank, reason) in short.items() if rank}
-    return _Findings(
-        _LEVELS[worst],
-        tuple(reasons.values()),
-        tuple([short[i][1] if i in short else "" for i in range(len(joints))]),
-        tuple([reasons[i] for i in reasons if short[i][0] == worst]),
-    )
+        Args:
+            short: Rank, 1 (limited) to 3 (torque_off), and reason by the number of each joint that
+                does not follow.
+            desired_rad: Desired angles.
+        """
+        command, names = tuple(self._motion.command), self._names
+        if not short:
+            return GuardResult(command, "ok", (), desired_rad, (), (), names)
+        worst = max(rank for rank, _ in short.values())
+        reasons = {i: f"{names[i]}: {reason}" for i, (_, reason) in short.items()}
+        why = tuple([short[i][1] if i in short else "" for i in range(len(names))])
+        critical = tuple([reasons[i] for i, (rank, _) in short.items() if rank == worst])
+        return GuardResult(
+            command, _LEVELS[worst], tuple(reasons.values()), desired_rad, why, critical, names
+        )

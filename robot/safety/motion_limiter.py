@@ -89,15 +89,16 @@ class MotionLimiter:
 
     def keeps_below(self, i: int, wall_rad: float) -> bool:
         """Return whether a joint is below a wall and can stop there."""
-        p, v = self.command[i], self.speed[i]
-        stop = p + 0.5 * v * v / self.limits[i].accel_rad_s2 if v > 0.0 else p
-        return stop <= wall_rad + _ROUNDING_RAD
+        return max(self.command[i], self._stop(i)) <= wall_rad + _ROUNDING_RAD
 
     def keeps_above(self, i: int, wall_rad: float) -> bool:
         """Return whether a joint is above a wall and can stop there."""
-        p, v = self.command[i], self.speed[i]
-        stop = p - 0.5 * v * v / self.limits[i].accel_rad_s2 if v < 0.0 else p
-        return stop >= wall_rad - _ROUNDING_RAD
+        return min(self.command[i], self._stop(i)) >= wall_rad - _ROUNDING_RAD
+
+    def _stop(self, i: int) -> float:
+        """Return where a joint comes to rest if it brakes now."""
+        v = self.speed[i]
+        return self.command[i] + 0.5 * v * abs(v) / self.limits[i].accel_rad_s2
 
     def follow(self, i: int, desired: float, dt_s: float) -> bool:
         """Move to the desired angle if that keeps every limit; return whether it does.

@@ -18,7 +18,7 @@ from gazerig.gaze.track.track import LIMIT_SHARE
 from gazerig.robot.description.links import Link, LinkJoint
 from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.run.rig_limits import lid_spans, limits
-from gazerig.robot.run.track_file import track_text, write_track
+from gazerig.robot.run.track_file import write_track
 
 
 def table(folder: Path, text: str) -> Path:
@@ -50,8 +50,8 @@ EXCEL = "\ufeffsep=;\r\n;;\r\n" + WIDE.replace(",", ";").replace(".", ",").repla
 def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(
     desk_rig: Rig, text: str, tmp_path: Path
 ) -> None:
-    found = track_text(desk_rig, read(table(tmp_path, text), 24.0), "x").text
-    path, reply = write_track(desk_rig, "mine", found, tmp_path, False)
+    path = tmp_path / "mine.yaml"
+    reply = write_track(desk_rig, path, read(table(tmp_path, text), 24.0), "x")
     assert [(f.time_s, f.head_pitch_deg, f.head_yaw_deg) for f in load_track(path).frames] == [
         (0.5, -8.0, None),
         (1.0, 0.0, 4.0),
@@ -71,7 +71,7 @@ BAD = {
 @pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
 def test_bad_rows_are_named_with_their_line(desk_rig: Rig, text: str, tmp_path: Path) -> None:
     with pytest.raises(SetupError) as caught:
-        track_text(desk_rig, read(table(tmp_path, text)), "x")
+        read(table(tmp_path, text))
     assert BAD[text] in str(caught.value)
 
 
@@ -282,7 +282,7 @@ def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(
     track = load_track(tmp_path / "far.yaml")
     assert track.owns == ("neck_yaw",)
     fit, bounds = TrackFit(desk_rig.names, lid_spans(desk_rig)), limits(desk_rig.joints)
-    motion = fit.motion(fit.place(track), bounds)
+    motion, _ = fit.motion("x", track, bounds)
     lead_s = 0.02 - motion.position_at(0.0)
     yaw = np.degrees(motion.sample_at(np.array(times) + lead_s)[0, :, 0])
     assert yaw == pytest.approx([40.0, -20.0, 30.0], abs=1e-3)
@@ -295,9 +295,7 @@ def test_a_table_moves_the_head_and_the_eyes_stay_on_their_target(
     desk_rig: Rig, tmp_path: Path
 ) -> None:
     path = table(tmp_path, "time,neck_yaw,left_eye_pan\n0,0,0\n0.5,8,-8\n1.2,0,0\n")
-    path, _ = write_track(
-        desk_rig, "nod", track_text(desk_rig, read(path), "x").text, tmp_path, False
-    )
-    frames = load_track(path).frames
+    write_track(desk_rig, tmp_path / "nod.yaml", read(path), "x")
+    frames = load_track(tmp_path / "nod.yaml").frames
     assert [frame.head_yaw_deg for frame in frames] == [8.0, 0.0]
     assert [frame.eyes_yaw_deg for frame in frames] == [None, None]  # the line of sight

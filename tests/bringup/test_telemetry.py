@@ -31,7 +31,7 @@ from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.model.weight import HeadMassParams, MassParams
 from gazerig.robot.run.bus_wiring import bus_names, joints_on
 from gazerig.robot.run.rig_limits import lid_spans, limits
-from gazerig.robot.run.track_file import TOLERANCE_DEG, track_text, write_track
+from gazerig.robot.run.track_file import TOLERANCE_DEG, write_track
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
@@ -207,12 +207,12 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(
 
     found = record_hand_motion(bench.moved(how), bench.rig.clock, lambda: None, 2.5)
     assert found.ended_by == "the time is over" and set(found.series) == set(desk_rig.names)
-    text = track_text(desk_rig, found.series, "by hand").text
-    path, on_rig = write_track(desk_rig, "mine", text, tmp_path, False)
+    path = tmp_path / "mine.yaml"
+    on_rig = write_track(desk_rig, path, found.series, "by hand")
     track = load_track(path)
     assert len(track.frames) < 40 and on_rig.slowed_by == 1.0
     fit = TrackFit(desk_rig.names, lid_spans(desk_rig))
-    motion = fit.motion(fit.place(track), limits(desk_rig.joints))
+    motion, _ = fit.motion("x", track, limits(desk_rig.joints))
     at = np.linspace(0.1, 2.3, 50)
     played = np.degrees(motion.sample_at(at)[0])
     wanted = np.array([how(t)["neck_pitch"] for t in at])

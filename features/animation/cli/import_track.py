@@ -64,20 +64,23 @@ def import_track(
     with clear_errors(rig):
         from gazerig.features.animation.animation import joint_map
         from gazerig.features.animation.animation_file import read_animation
-        from gazerig.robot.run.track_file import track_text, write_track
+        from gazerig.robot.run.track_file import write_track
 
         loaded = load_rig(rig)
         found = read_animation(
             file, loaded, joint_map(loaded, joints or []), fps=fps, clip=clip, centre_deg=degrees
         )
-        made = track_text(
+        for note in found.notes:
+            say(f"{file}: {note}")
+        called = name or re.sub(r"[^a-z0-9]+", "_", file.stem.lower()).strip("_")
+        path = folder / f"{called}.yaml"
+        reply = write_track(
             loaded,
+            path,
             found.series,
             f"from {file.name}",
+            force=force,
             tolerance_deg=0.3,  # servos show no less
             owned=found.poses if owns is None else owns,
         )
-        for note in (*found.notes, *made.notes):
-            say(f"{file}: {note}")
-        called = name or re.sub(r"[^a-z0-9]+", "_", file.stem.lower()).strip("_")
-        print_track_fit(loaded.name, *write_track(loaded, called, made.text, folder, force))
+        print_track_fit(loaded.name, path, reply)

@@ -75,7 +75,7 @@ def record_track(
 ) -> None:
     """Record a track in YAML: by hand with torque off, or with --live of a running head."""
     with clear_errors(rig, port, mock):
-        from gazerig.robot.run.track_file import track_text, write_track
+        from gazerig.robot.run.track_file import write_track
 
         loaded = load_rig(rig)
         track_name(f"{name}.yaml")
@@ -93,15 +93,10 @@ def record_track(
         say(f"recorded {len(recorded.series)} joints; ended: {recorded.ended_by}")
         for one in recorded.left_out:
             say(f"{one}: answered too seldom and is left out")
-        made = track_text(
-            loaded,
-            recorded.series,
-            "recorded from a running head" if live else "recorded by hand",
-            owned=live,
-        )
-        for note in made.notes:
-            say(note)
-        print_track_fit(loaded.name, *write_track(loaded, name, made.text, folder, force))
+        path = folder / f"{name}.yaml"
+        description = "recorded from a running head" if live else "recorded by hand"
+        reply = write_track(loaded, path, recorded.series, description, force=force, owned=live)
+        print_track_fit(loaded.name, path, reply)
 
 
 def _record_hand(

@@ -32,9 +32,9 @@ from gazerig.gaze.attention.conversation import face_extent_deg
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.loop.tick import Tick, cyclopean_direction
-from gazerig.robot.loop.tick_text import Basis, basis_of, estimated_joints
 from gazerig.robot.model.commands import Ask
 from gazerig.robot.model.types import GAZE_JOINTS, order_joints
+from gazerig.robot.recording.gaze_angles import Basis, basis_of
 
 PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""
@@ -211,7 +211,7 @@ class GazeTraceBuilder:
             if isinstance(command, Ask) and command.menu == "conversation":
                 self._mode = command.choice if command.choice in MODES else self._mode
         self._names = tick.guard_result.joints
-        self._estimated.update(estimated_joints(tick))
+        self._estimated.update(tick.estimated_joints)
         if self._last_s is not None:
             self._kinds[tick.target.kind] += tick.t_s - self._last_s
         self._last_s = tick.t_s

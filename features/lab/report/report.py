@@ -19,7 +19,7 @@ from gazerig.features.lab.report.figures import COLOURS, DRAWINGS, Drawing, Show
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.measures import judge_run
 from gazerig.features.lab.report.statistics import MeasureResult
-from gazerig.robot.loop.tick_text import ESTIMATED
+from gazerig.robot.recording.gaze_angles import ESTIMATED
 from gazerig.robot.recording.read import RunRecording, report_bad_contents
 from gazerig.robot.recording.run_info import RunInfo
 

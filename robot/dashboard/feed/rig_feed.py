@@ -19,6 +19,7 @@ from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.drivers.process.passed_image import PassedImage, receive, take_image
 from gazerig.drivers.types import Detections
+from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES
 from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
@@ -26,7 +27,6 @@ from gazerig.robot.description.build import RigShape
 from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.tick import Tick, TickRecord
 from gazerig.robot.loop.tick_stream import decode, encode
-from gazerig.robot.loop.tick_text import perception_text
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import Kinematics
@@ -240,3 +240,22 @@ class RigFeed:
         first_later = bisect_left(self._gaze, found.captured_s, key=itemgetter(0))
         _, point_m = self._gaze[min(first_later, len(self._gaze) - 1)]
         return camera_picture(found, lens, R, p_m, point_m)
+
+
+def perception_text(tick: Tick) -> str:
+    """Return age of the frame, camera conditions and distances of faces.
+
+    e.g. "frame 63 ms old | face 1 at 0.98 m by camera, +- 1 cm"
+    """
+    if tick.percept is None:
+        return "no frame yet"
+    parts = [f"frame {1e3 * tick.percept.age_s(tick.t_s):.0f} ms old", *tick.camera_conditions]
+    head = tick.pose.p_world_head_m
+    for face in tick.percept.faces:
+        parts.append(
+            f"face {face.id} at {norm(sub(face.p_world_m, head)):.2f} m by {face.distance_from}, "
+            f"+- {100.0 * face.along_sd_m:.0f} cm"
+            + (", looks at the head" if face.looks_at_head else "")
+            + (", speaks" if face.speaks else "")
+        )
+    return " | ".join(parts)

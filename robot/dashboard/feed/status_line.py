@@ -3,16 +3,12 @@
 from collections.abc import Callable
 from math import inf
 
+from gazerig.drivers.process.host_lateness import LATE_COMPUTER
 from gazerig.drivers.types import BusHealth
 from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.tick_text import (
-    camera_conditions,
-    guard_text,
-    health_text,
-)
 from gazerig.robot.loop.timing import busy_text
-from gazerig.robot.model.types import LoopFigures
+from gazerig.robot.model.types import GuardResult, LoopFigures
 
 _LINE_S = 0.2
 _RATE_S = 1.0
@@ -53,6 +49,24 @@ class StatusLine:
                 head_state(tick).headline,
                 guard_text(tick.guard_result),
                 health_text(self._health()),
-                *[f"camera: {text.partition(':')[0]}" for text in camera_conditions(tick)],
+                *[f"camera: {text.partition(':')[0]}" for text in tick.camera_conditions],
             ]
             self._write(" | ".join(filter(None, parts)))
+
+
+def guard_text(guard_result: GuardResult) -> str:
+    """Return the guard's effect on the desired angles, e.g. "limited (neck_yaw: too fast, +2)"."""
+    if not guard_result.reasons:
+        return guard_result.level.replace("_", " ")
+    more = f", +{len(guard_result.reasons) - 1}" if len(guard_result.reasons) > 1 else ""
+    return f"{guard_result.level.replace('_', ' ')} ({guard_result.reasons[0]}{more})"
+
+
+def health_text(health: BusHealth) -> str:
+    """Return the state of the bus, e.g. "bus: timeout 3 times"; lateness is not counted."""
+    errors = [
+        f"{kind} {n} time{'s' if n > 1 else ''}"
+        for kind, n in sorted(health.errors.items())
+        if n and kind != LATE_COMPUTER
+    ]
+    return f"bus: {', '.join(errors)}" if errors else "bus ok"
