@@ -13,8 +13,8 @@ import yaml
 from yaml.reader import ReaderError
 
 from gazerig.config.faults import ConfigFault
-from gazerig.config.validation import suggestion_text
 from gazerig.drivers.files.file_input import read_limited
+from gazerig.params import suggestion_text
 
 LARGEST = 400_000  # bytes; a rig has about 12 000
 _DEPTH = 40  # levels; a rig has about 5

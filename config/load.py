@@ -20,11 +20,11 @@ from gazerig.config.plugin_sections import put_plugins, take_plugins
 from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import SHIPPED, is_path
 from gazerig.config.shipped_files import shipped_names as shipped_names
-from gazerig.config.validation import fault_at, fill, suggestion_text, validate
-from gazerig.params import Declaration, declarations
+from gazerig.config.validation import fault_at, fill, validate
+from gazerig.params import Declaration, declarations, suggestion_text
 
 T = TypeVar("T")
-_FILES = re.compile(r"\.track_files\.\d+|\.meshes\..*\.file")
+_FILES = re.compile(r"\.track_files\.\d+")
 """Keys of a rig with file paths, relative to the folder of the file that contains them."""
 _PATH = re.compile(r"[^~]*[./]")
 """Start of a path to resolve; a name alone selects a shipped track."""

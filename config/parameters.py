@@ -10,8 +10,8 @@ from typing import Any
 
 from gazerig.config.load import ConfigError, validate_rules
 from gazerig.config.rig import GazeConfig, Rig
-from gazerig.config.schema import RULES, refusal, unknown_text
-from gazerig.params import Declaration, declarations
+from gazerig.config.schema import RULES, refusal
+from gazerig.params import Declaration, declarations, unknown_text
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import Parameter
 

@@ -32,7 +32,6 @@ from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.gaze.track.animation import LevelParams
 from gazerig.params import Bounds, Choices, Unit, Unlisted
-from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.model.clock import LoopParams
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import CameraParams
@@ -152,8 +151,6 @@ class Rig(PluginSections):
     lid_joints: Annotated[LidJoints, "lid angles of a rig with lids"] = LidJoints()
     couplings: Annotated[Mapping[str, CouplingParams],
         "pairs of joints that two servos move together, each pair under any name"] = field(default_factory=dict)
-    meshes: Annotated[Mapping[str, MeshParams],
-        "mesh files that replace the generated shapes, by the name of the link"] = field(default_factory=dict)
     mass: Annotated[MassParams, "masses and their balance"] = MassParams()
     park_deg: Annotated[Mapping[str, _Degrees],
         "pose to which the joints move before torque is switched off; omitted joints go to 0"] = field(default_factory=dict)

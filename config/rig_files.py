@@ -26,7 +26,7 @@ _KIND_OF_KEY = {
     "character": "characters",
 }
 """Keys of a rig that contain a shipped name or a file, and the kind of the names."""
-_FILE_KEYS = re.compile(r"track_files|sound\.folders|meshes\..+\.file")
+_FILE_KEYS = re.compile(r"track_files|sound\.folders")
 """Other keys that contain files."""
 _LOCAL_KEYS = re.compile(r"(doors|bus\.port|buses\..+\.port|sound\.voice)(\..+)?")
 """Keys that start programs or open devices of this computer."""

@@ -1,6 +1,6 @@
 """Rigs, rule sets and face walks by name or path, and rules between the sections of a rig."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from math import inf, sqrt
 from pathlib import Path
@@ -16,14 +16,13 @@ from gazerig.config.load import (
 )
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
-from gazerig.config.validation import suggestion_text
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.hobby_board.board import HobbyBoardParams
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import PARTS
-from gazerig.params import declarations
+from gazerig.params import declarations, unknown_text
 from gazerig.robot.model.coupling import unreachable_text
 from gazerig.robot.model.guard_params import forbidden_pairs
 from gazerig.robot.model.kinematics import LIDS, NECK
@@ -105,12 +104,6 @@ def load_walk(name_or_path: str) -> Walk:
 _EYES = {*GAZE_JOINTS} - {*LIDS, *NECK}
 Faults = Iterable[tuple[str, str]]
 """Dotted key and broken rule of each fault."""
-
-
-def unknown_text(kind: str, name: str, names: Collection[str]) -> str:
-    """Return that nothing of a kind has a name, with a similar name and all names."""
-    near = suggestion_text(name.lower(), names) or ";"
-    return f"no {kind} {name!r}{near} available: {', '.join(names) or 'none'}"
 
 
 def _joint_names(rig: Rig) -> Faults:

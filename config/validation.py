@@ -6,7 +6,7 @@
 import dataclasses
 import json
 import reprlib
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Container, Iterator
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from functools import cache
@@ -18,7 +18,7 @@ from pydantic_core import ErrorDetails
 
 from gazerig.config.faults import ConfigFault
 from gazerig.config.shipped_files import SHIPPED
-from gazerig.params import Declaration, declarations
+from gazerig.params import Declaration, declarations, suggestion_text
 
 T = TypeVar("T")
 Step = str | int
@@ -121,12 +121,6 @@ def expected_text(declared: Declaration) -> str:
         text += f" with the keys {', '.join(declarations(declared.params))}"
     words = (*map(repr, declared.choices), text, "null" if declared.optional else "")
     return " or ".join(filter(None, words))
-
-
-def suggestion_text(word: str, words: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" if a known word is similar, otherwise ""."""
-    near = get_close_matches(word, list(words), n=1)
-    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def _faults(into: type, path: Path, details: ErrorDetails) -> list[ConfigFault]:

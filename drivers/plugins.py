@@ -9,7 +9,6 @@ import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
 from operator import attrgetter
@@ -17,6 +16,7 @@ from traceback import walk_tb
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from gazerig.drivers.errors import DriverError, PluginError, SetupError
+from gazerig.params import unknown_text
 
 if TYPE_CHECKING:
     from gazerig.drivers.bus.servo_models import ServoModelInfo
@@ -265,9 +265,7 @@ def find(group: str, name: str) -> Registration:
         makers = " and ".join(one.maker for one in found)
         raise PluginError(f"{what} {name!r} comes with {makers}: uninstall one of them")
     names = [*SHIPPED[group], *dict.fromkeys(one.name for one in there)]
-    near = get_close_matches(name, names, 1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
-    raise PluginError(f"no {what} is called {name!r}: {hint}there is {', '.join(names) or 'none'}")
+    raise PluginError(unknown_text(what, name, names))
 
 
 P = TypeVar("P", bound=Plugin)

@@ -51,19 +51,8 @@ class AsyncOrder:
         return outcome
 
 
-def _order(
-    method: Callable[Concatenate[Head, _P], Order],
-) -> "Callable[Concatenate[AsyncHead, _P], AsyncOrder]":
-    def send(head: "AsyncHead", /, *args: _P.args, **named: _P.kwargs) -> AsyncOrder:
-        work = asyncio.to_thread(method, head._connected, *args, **named)
-        return AsyncOrder(asyncio.ensure_future(work))
-
-    send.__doc__ = method.__doc__
-    return send
-
-
 def _call(
-    method: Callable[Concatenate[RemoteHead, _P], _T],
+    method: Callable[Concatenate[Any, _P], _T],
 ) -> "Callable[Concatenate[AsyncHead, _P], asyncio.Task[_T]]":
     def call(head: "AsyncHead", /, *args: _P.args, **named: _P.kwargs) -> "asyncio.Task[_T]":
         work = asyncio.to_thread(method, head._connected, *args, **named)
@@ -71,6 +60,18 @@ def _call(
 
     call.__doc__ = method.__doc__
     return call
+
+
+def _order(
+    method: Callable[Concatenate[Head, _P], Order],
+) -> "Callable[Concatenate[AsyncHead, _P], AsyncOrder]":
+    call = _call(method)
+
+    def send(head: "AsyncHead", /, *args: _P.args, **named: _P.kwargs) -> AsyncOrder:
+        return AsyncOrder(call(head, *args, **named))
+
+    send.__doc__ = method.__doc__
+    return send
 
 
 class AsyncHead:

@@ -8,6 +8,7 @@ from gazerig.config.schema import load_rig
 from gazerig.errors import Refused
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles3, Target, Vec3
+from gazerig.params import unknown_text
 from gazerig.robot.loop.reachability import look_reply, reached_joints
 from gazerig.robot.model.commands import LookAt, check_command
 from gazerig.robot.model.reply import JointReply
@@ -105,8 +106,7 @@ def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
     """
     kinematics, _ = kinematics_and_oculomotor(_load(rig), 0)
     if strange := [name for name in joints_rad if name not in kinematics.names]:
-        there = ", ".join(kinematics.names)
-        raise Refused(f"this rig has no joint {strange[0]!r}; available: {there}")
+        raise Refused(unknown_text("joint", strange[0], kinematics.names))
     angles = tuple([float(joints_rad.get(name, 0.0)) for name in kinematics.names])
     at_rest = (0.0,) * len(angles)
     pose = kinematics.forward(JointState(angles, at_rest, at_rest, ()))

@@ -2,41 +2,51 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal, overload
+from typing import Literal, TypedDict, Unpack, overload
 
 from gazerig.config.schema import layers_of
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.local_head import LocalHead, RunningHead, SimulatedHead
 from gazerig.robot.loop.chooser import Chooser
-from gazerig.robot.recording.playback_devices import NoCamera
+from gazerig.robot.recording.body_playback import NoCamera
 from gazerig.robot.run.assemble import Substitutes
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.program_parts import ProgramParts
 
 
-@overload
-def open(
-    rig: str = "desk", *, fast: Literal[True], mock: bool = True,
-    bus: Literal["emulated", "ideal"] | None = None,
-    scene: str | None = None, world: str | None = None, video: Path | str | None = None,
-    camera: Camera | None = None, detector: FaceDetector | None = None,
-    attention: Chooser | None = None, character: str | None = None, profile: str | None = None,
-    seed: int = 0, record: Path | str | None = None, say: Callable[[str], None] | None = None,
-) -> SimulatedHead: ...  # fmt: skip
+class _Options(TypedDict, total=False):
+    """Options of ``open`` for real and for simulated time."""
+
+    mock: bool
+    bus: Literal["emulated", "ideal"] | None
+    port: str | None
+    page: str | None
+    token_file: Path | str | None
+    scene: str | None
+    world: str | None
+    video: Path | str | None
+    camera: int | str | Camera | FrameSource | None
+    oak: bool
+    detector: FaceDetector | None
+    attention: Chooser | None
+    character: str | None
+    profile: str | None
+    seed: int
+    record: Path | str | None
+    say: Callable[[str], None] | None
 
 
 @overload
 def open(
-    rig: str = "desk", *, fast: Literal[False] = False, mock: bool = False,
-    bus: Literal["emulated", "ideal"] | None = None,
-    port: str | None = None, page: str | None = None, token_file: Path | str | None = None,
-    scene: str | None = None, world: str | None = None, video: Path | str | None = None,
-    camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
-    detector: FaceDetector | None = None, attention: Chooser | None = None,
-    character: str | None = None, profile: str | None = None, seed: int = 0,
-    record: Path | str | None = None, say: Callable[[str], None] | None = None,
-) -> RunningHead: ...  # fmt: skip
+    rig: str = "desk", *, fast: Literal[True], **options: Unpack[_Options]
+) -> SimulatedHead: ...
+
+
+@overload
+def open(
+    rig: str = "desk", *, fast: Literal[False] = False, **options: Unpack[_Options]
+) -> RunningHead: ...
 
 
 def open(

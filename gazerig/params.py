@@ -11,7 +11,8 @@ only.
 import dataclasses
 import types
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from difflib import get_close_matches
 from functools import cache
 from typing import Any, Literal
 
@@ -205,3 +206,23 @@ def _numbers(schema: Any) -> Iterator[Any]:
                 yield from _numbers(item)
         case {"schema": inner} | {"values_schema": inner}:
             yield from _numbers(inner)
+
+
+def suggestion_text(word: str, words: Iterable[str]) -> str:
+    """Return "; did you mean 'x'?" if a known word is similar, otherwise ""."""
+    near = get_close_matches(word, list(words), n=1)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def unknown_text(kind: str, name: str, names: Iterable[str], without: str = "none") -> str:
+    """Return that nothing of a kind has a name, with a similar name and all names.
+
+    Args:
+        kind: Kind of the named things.
+        name: The unknown name.
+        names: Known names.
+        without: Remedy if there are no names.
+    """
+    known = list(names)
+    near = suggestion_text(name.lower(), known) or ";"
+    return f"no {kind} {name!r}{near} available: {', '.join(known) or without}"

@@ -9,7 +9,6 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 EXAMPLE = "1-6:xl330-m077,7-9:xc330-m288"
 MIDDLE = 2048
-DEFAULT_FIRMWARE = ServoSpec(1, "").firmware
 
 _PART = re.compile(r"(\d+)(?:-(\d+))?:([^@]+)(?:@(\d+))?")
 _LINES: dict[BusKind, type[DynamixelLine | FeetechLine]] = {

@@ -83,9 +83,9 @@ def measure(name: str, options: tuple[float, int, bool]) -> Row:
     began_s = time.process_time()
     try:
         if name.startswith("human/"):
-            from human.measured_run import measured_run
+            from human.measured_run import Runs
 
-            figures = module.measure(measured_run, seconds, range(seeds))
+            figures = module.measure(Runs(seconds, range(seeds)))
         else:
             figures = module.measure(full)
         row.figures = {figure: float(value) for figure, value in figures.items()}

@@ -20,7 +20,8 @@ from msgspec.structs import replace
 
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
-from gazerig.robot.dashboard.door.page_files import PageFiles
+from gazerig.robot.dashboard.door.page_door import add_headers
+from gazerig.robot.dashboard.door.page_files import add_page_files
 from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.loop.track_choices import TrackInfo
@@ -88,7 +89,8 @@ class Stub:
     async def open(self) -> str:
         """Serve, and return the address."""
         app = web.Application(middlewares=[self._refuse_missing])
-        PageFiles({}).add_to(app.router)
+        app.on_response_prepare.append(add_headers)
+        add_page_files(app.router)
         app.router.add_get("/view/", _answer_view)
         app.router.add_get("/api/v1/socket", self._serve_socket)
         app.router.add_get("/api/v1/waveform", _answer_waveform)

@@ -165,14 +165,6 @@ def test_an_open_place_is_attacked_once_and_again_after_a_rest(parted: bool) -> 
     assert ("chest" in plans[starts[0]].why) == parted
 
 
-def test_nothing_is_open_before_both_hands_are_known() -> None:
-    for rows in ((), (fist(2, (0.9, 0.4, -0.2)),)):
-        plans = Bout().see(seen, 60, *rows)
-        assert {plan.text for plan in plans} == {"wait: not both hands of the opponent are known"}
-    far = Bout().see(seen, 60, fist(2, (2.9, 0.4, -0.6)), nose=(3.0, 0.0, 0.0))
-    assert {plan.text for plan in far} == {"wait: no opponent within reach"}
-
-
 def test_an_opponent_has_two_hands_and_a_third_that_comes_later_protects_nothing() -> None:
     """A hand that reaches in from aside, or an arm taken for one, before the chest."""
     bout = Bout()
@@ -245,18 +237,6 @@ def looks(model: Attention, percepts: list[Percept]) -> list[Target]:
     return [model.choose(one, looking(), one.captured_s) for one in percepts]
 
 
-def test_the_place_to_be_hit_is_a_target_of_its_own_that_moves_with_the_opponent() -> None:
-    model = planned_attention()
-    frames = [guarding(0.0), *(opened((1 + k) * DT_S, parted=True) for k in range(9))]
-    last = looks(model, frames)[-1]
-    assert (last.kind, last.id, last.salience, last.top_down) == ("attack_target", -1, 1.4, True)
-    assert last.p_world_m == pytest.approx((1.0, 0.0, -0.3))
-    assert last.plan.startswith("attack: chest is open")
-    moved = structs.replace(opened(10 * DT_S, parted=True), faces=(face((0.95, 0.02, 0.0)),))
-    (then,) = looks(model, [moved])
-    assert then.p_world_m == pytest.approx((0.95, 0.02, -0.3)) and then.shift == last.shift
-
-
 def test_a_choice_of_the_menu_overrules_the_planner_until_it_is_given_back() -> None:
     model = planned_attention()
     assert model.top_down.behaviours == ("attack", "guard", "wait", PLANNED)
@@ -280,21 +260,6 @@ def test_a_choice_of_the_menu_overrules_the_planner_until_it_is_given_back() -> 
     )
     later = [punch(k * DT_S) for k in range(13, 16)]
     assert looks(model, later)[-1].plan.startswith("guard: hand 3 arrives")
-
-
-@pytest.mark.parametrize("boxes", [True, False])
-def test_a_sinking_hand_is_watched_in_a_match(boxes: bool) -> None:
-    model = planned_attention(boxes)
-    sinks = [
-        seen(
-            k * DT_S,
-            fist(2, LEFT),
-            fist(3, (0.88, -0.3, 0.2 - 0.03 * max(0, k - 30)), (0.0, 0.0, -0.9 * (k > 30))),
-        )
-        for k in range(44)
-    ]
-    kinds = {one.kind for one in looks(model, sinks)}
-    assert ("hand" in kinds) == boxes
 
 
 def test_without_a_planner_nothing_is_planned_and_planned_is_no_choice() -> None:

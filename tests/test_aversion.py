@@ -87,12 +87,6 @@ def test_who_never_looks_away_passes_targets_untouched() -> None:
         assert model.look(seen, HEAD, k * DT) is seen
 
 
-def test_only_faces_are_looked_away_from() -> None:
-    model = aversion(mode="talk")
-    hand = replace(face(), kind="hand")
-    assert all(model.look(hand, HEAD, k * DT) is hand for k in range(3000))
-
-
 def angles_and_ways(model: ConversationGaze, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """Return distance and direction of the stays, 0 right and 90 up, degrees."""
     to_face = unit(sub(FACE, HEAD))
@@ -115,22 +109,6 @@ def test_how_far_away_follows_the_published_law() -> None:
     assert far.max() == pytest.approx(30.0, abs=0.01)
 
 
-@pytest.mark.parametrize("distance_m", [0.4, 0.8, 2.5])
-def test_a_look_away_passes_beside_the_face_however_near_it_is(distance_m: float) -> None:
-    model = aversion(3)
-    near = replace(face(), p_world_m=(0.05 + distance_m, 0.0, 0.2), centre_world_m=None)
-    places = set()
-    for k in range(20_000):
-        look = model.look(near, HEAD, 0.05 * k)
-        if look.kind == "away":
-            places.add(look.p_world_m)
-    assert len(places) > 100
-    for place in places:
-        x, y, z = (a - b for a, b in zip(place, HEAD, strict=True))
-        across, up = y / x * distance_m / 0.085, z / x * distance_m / 0.125
-        assert np.hypot(across, up) > 1.0 + 0.02 * distance_m
-
-
 def test_a_look_away_leaves_when_the_rest_on_a_part_is_over() -> None:
     model = aversion(4)
     for k in range(4000):
@@ -140,30 +118,6 @@ def test_a_look_away_leaves_when_the_rest_on_a_part_is_over() -> None:
     # It returns when its own time is over, whatever the walk over the face chooses.
     later = [model.look(face(), HEAD, 40.1 + 0.01 * k, rests_until_s=inf).kind for k in range(400)]
     assert later.index("face") > 15
-
-
-@pytest.mark.parametrize(("mode", "most"), [("talk", 30.0), ("listen", 22.7), ("think", 30.0)])
-def test_away_is_beside_the_face_and_within_the_cap(mode: str, most: float) -> None:
-    model = aversion(8, mode=mode)
-    far, _ = angles_and_ways(model, 4000.0)
-    assert far.min() >= 5.0 - 1e-6 and far.max() <= most + 1e-6
-    assert far.mean() > 9.0
-
-
-@pytest.mark.parametrize("before", ["none", "talk", "listen"])
-def test_thinking_looks_away_at_once(before: str) -> None:
-    model = aversion(10, mode=before)
-    assert model.look(face(), HEAD, 0.0).kind == "face"
-    model.choose_mode("think", 0.01)
-    assert model.look(face(), HEAD, 0.02).kind == "away"
-
-
-def test_thinking_looks_mostly_up_and_for_longer() -> None:
-    model = aversion(10, mode="think")
-    found = [s for s in stays(model, 3000.0, 0.05) if s.kind == "away"]
-    assert np.mean([s.seconds for s in found]) == pytest.approx(3.54, abs=0.3)
-    assert np.std([s.seconds for s in found]) == pytest.approx(1.26, abs=0.25)
-    assert 0.7 < np.mean([s.place[2] > FACE[2] for s in found]) < 0.85
 
 
 def test_the_head_takes_its_share_in_a_thinkers_look_away() -> None:
@@ -202,14 +156,6 @@ def test_every_place_and_return_is_one_new_shift_and_the_count_never_falls() -> 
     assert after == replace(face(250), shift=after.shift)
 
 
-def test_another_face_is_looked_at_before_it_is_looked_away_from() -> None:
-    model = aversion(13, mode="talk")
-    t = leaves_at(model)
-    other = model.look(face(2, name=5), HEAD, t + DT)
-    assert (other.kind, other.id) == ("face", 5)
-    assert model.look(face(2, name=5), HEAD, t + 2 * DT).kind == "face"
-
-
 @pytest.mark.parametrize("state", ["thinking", "speaking"])
 def test_the_look_away_of_a_turn_goes_on_with_another_partner(state: TurnState) -> None:
     model = aversion(15)
@@ -226,14 +172,6 @@ def test_motion_ends_a_look_away() -> None:
     still, walker = (Salience(9, "thing", translation=v) for v in (0.5, 2.0))
     assert model.look(replace(face(), saliences=(still,)), HEAD, t + DT).kind == "away"
     assert model.look(replace(face(), saliences=(walker,)), HEAD, t + 2 * DT).kind == "face"
-
-
-def test_a_change_of_the_conversation_returns_to_the_face() -> None:
-    model = aversion(14, mode="think")
-    t = leaves_at(model)
-    model.choose_mode("listen", t)
-    assert set(kinds(model, t, 1.0)) == {"face"}
-    model.choose_mode("listen", t + 1.0)  # the same again changes nothing
 
 
 # ---- without a conversation -----------------------------------------------------------
@@ -257,15 +195,6 @@ def test_a_target_that_a_user_has_chosen_is_left_in_a_conversation_only() -> Non
     assert again[0] == "face" and "away" in again
     model.choose_mode("talk", t + 40.0)
     assert set(kinds(model, t + 40.0, 40.0, ordered=True)) == {"face", "away"}
-
-
-def test_looking_away_in_silence_can_be_switched_on_and_off_while_it_runs() -> None:
-    model = aversion(19, looks_away="none")
-    assert {s.kind for s in stays(model, 60.0)} == set()
-    model.retune("people", *PARAMS)
-    assert "away" in kinds(model, 60.0, 20.0)
-    model.retune("none", *PARAMS)
-    assert set(kinds(model, 90.0, 40.0)) == {"face"}
 
 
 def test_thinkers_look_up_speakers_aside_and_for_the_given_times() -> None:

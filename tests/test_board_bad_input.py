@@ -26,8 +26,8 @@ def jog(rig: str, *words: str) -> str:
 @pytest.mark.parametrize(
     ("was", "written", "reported"),
     [
-        ("kind: pca9685", "kind: pca6985", "bus.kind: no bus is called 'pca6985': did you mean "
-         "'pca9685'? there is dynamixel, feetech, maestro, pca9685"),
+        ("kind: pca9685", "kind: pca6985", "bus.kind: no bus 'pca6985'; did you mean "
+         "'pca9685'? available: dynamixel, feetech, maestro, pca9685"),
         ("0x40", "0x70", "bus.pca9685: address 0x70 is reserved: boards have 0x40 to 0x77"),
         ("kind: pca9685", "kind: maestro", "/dev/i2c-1 is an I2C bus, not a serial port: name the "
          "adaptor's port with --port or in the YAML, or set the kind of the bus to pca9685"),

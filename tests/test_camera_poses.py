@@ -39,13 +39,6 @@ def test_only_times_that_are_remembered_have_an_answer():
     assert ring.rotation_at(10.0) is None
 
 
-def test_turn_between_two_pictures():
-    ring = filled(100)
-    # What was straight ahead in the earlier picture, in the axes of the later one.
-    assert ring.rotation_between(10.2, 10.1) == pytest.approx(turn(-10.0), abs=1e-6)
-    assert ring.rotation_between(10.2, 9.0) is None
-
-
 def test_another_process_shares_it():
     ring = filled(40)
     context = multiprocessing.get_context("spawn")

@@ -1,16 +1,13 @@
 """A camera's frames are the same after recording, whatever happens to the writer."""
 
-import json
 import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
 from present import present
 
-from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera.capture_loop import CameraParts, CaptureLoop
 from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.pinhole import Intrinsics
@@ -75,36 +72,6 @@ def test_pictures_depth_lens_and_times_come_out_exactly(file):
         assert not one.image.flags.writeable
 
 
-def test_standard_tools_read_the_file(file):
-    with file.open("rb") as stream:
-        reader = make_reader(stream)
-        summary = present(reader.get_summary())
-        assert present(summary.statistics).message_count == 3 * len(TIMES_S)
-        names = {schema.name for schema in summary.schemas.values()}
-        assert {"foxglove.CompressedImage", "foxglove.CameraCalibration"} <= names
-        _, _, message = next(iter(reader.iter_messages(topics=[fmt.LENS])))
-        assert message.log_time == round(TIMES_S[0] * 1e9)
-        lens = json.loads(message.data)
-        assert (lens["width"], lens["height"]) == (64, 48)
-        assert lens["K"] == [310.5, 0.0, 31.5, 0.0, 311.25, 23.5, 0.0, 0.0, 1.0]
-
-
-def test_what_the_camera_does_not_give_is_not_there(tmp_path):
-    (found,) = frames_of(write(tmp_path / "plain.mcap", [shot(0, whole=False)]))
-    assert (found.depth_m, found.lens) == (None, None)
-
-
-def test_a_frame_that_is_no_later_than_the_one_before_is_left_out(tmp_path):
-    """A clock that was set back: frames are played by their times, which rise."""
-    shots = [
-        shot(k)._replace(captured_s=5000.0 + t) for k, t in enumerate((0.0, 0.2, 0.1, 0.2, 0.3))
-    ]
-    found = frames_of(write(tmp_path / "back.mcap", shots))
-    assert [one.captured_s for one in found] == pytest.approx([0.0, 0.2, 0.3])
-    for one, k in zip(found, (0, 1, 4), strict=True):
-        assert np.array_equal(one.image, shots[k].image)
-
-
 @pytest.mark.parametrize("share", [0.999, 0.9, 0.5, 0.3])
 def test_cut_file_gives_its_whole_pictures(file, share):
     data = file.read_bytes()
@@ -116,17 +83,6 @@ def test_cut_file_gives_its_whole_pictures(file, share):
         assert replay.events() == ("seen.mcap was not closed: its complete frames are played",)
     for k, one in enumerate(frames_of(file)):
         assert_same(one, shot(k))
-
-
-def test_damage_inside_a_picture_is_named(file):
-    data = bytearray(file.read_bytes())
-    where = data.rindex(b'"data":"') + 40
-    data[where : where + 400] = b"!" * 400
-    file.write_bytes(bytes(data))
-    *_, before, last = CameraReplay(file).play_once()
-    with pytest.raises(CameraError, match=r"frame 6 of .* is damaged .*copy the file again"):
-        last.read()
-    assert_same(before.read(), shot(4))
 
 
 @pytest.mark.parametrize(
@@ -209,13 +165,6 @@ def test_a_run_records_the_frames_of_its_camera_and_never_over_a_file(tmp_path):
     assert set(events) == {"something of the source"}
     with pytest.raises(SetupError, match="--oak or --camera"):
         RunOptions(mock=True, record_camera=tmp_path / "x.mcap").check_and_complete()
-
-
-def test_recorder_that_cannot_write_its_file_frees_the_source(tmp_path):
-    source = Source()
-    with pytest.raises(CameraError, match="cannot write"):
-        looked(source, tmp_path / "no" / "r.mcap")
-    assert not source.is_open
 
 
 def test_full_disk_ends_the_recording_and_not_the_camera(tmp_path, monkeypatch):

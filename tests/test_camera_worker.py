@@ -137,14 +137,6 @@ def test_slot_holds_the_newest_find_and_close_ends_the_thread(source):
     assert present(camera.latest(0.0)).number == 7
 
 
-def test_fault_of_the_source_reaches_the_loop(source):
-    camera = opened(source)
-    source.lose()
-    for _ in range(2):
-        ends_with(camera, "check its cable")
-    camera.close()
-
-
 def test_fault_of_the_detector_reaches_the_loop_in_one_line(source):
     class Broken:
         def find(self, picture):
@@ -155,37 +147,6 @@ def test_fault_of_the_detector_reaches_the_loop_in_one_line(source):
     error = ends_with(camera, "RuntimeError: layer 3 has no weights")
     assert isinstance(error.__cause__, RuntimeError)
     camera.close()
-
-
-def test_waits_between_tries_double_up_to_the_longest(source):
-    waits: list[float] = []
-    clock = [0.0]
-    care = CameraRecovery(0.1, 0.35, give_up_s=1.0)
-    parts = CameraParts(lambda: source, EveryOther)
-    camera = CameraWorker(parts, lambda: clock[0], care, in_thread=True)
-
-    class Stop(threading.Event):
-        def wait(self, timeout=None) -> bool:
-            waits.append(timeout)
-            clock[0] += timeout
-            return self.is_set()
-
-    camera._stop = Stop()
-    camera.open()
-    source.fails_to_open = True
-    source.lose()
-    ends_with(camera, "plug it in")
-    assert waits == pytest.approx([0.1, 0.2, 0.35, 0.35])
-    camera.close()
-
-
-def test_close_does_not_wait_for_a_lost_camera(source):
-    camera = opened(source, care=CameraRecovery(60.0, 60.0, give_up_s=86_400.0))
-    source.lose()
-    wait_for(lambda: source.closed)
-    camera.close()
-    wait_for(lambda: not threads())
-    assert camera.latest(0.0) is None
 
 
 def test_slow_detector_skips_pictures_and_queues_none(tmp_path):
@@ -285,30 +246,6 @@ class Ticking:
         pass
 
 
-class Flawed(Ticking):
-    """A source that fails at its tenth frame, not as a lost camera does."""
-
-    def take(self, now_s, stop):
-        if self.number == 9:
-            raise RuntimeError("no memory")
-        return super().take(now_s, stop)
-
-
-class Stuck(Ticking):
-    """A source that cannot be closed."""
-
-    def close(self):
-        raise RuntimeError("no answer")
-
-
-def test_an_error_as_a_process_closes_its_source_is_reported():
-    camera = process(Stuck)
-    camera.open()
-    wait_for(lambda: camera.frames)
-    camera.close()
-    assert camera.events() == ("closing the camera: RuntimeError: no answer",)
-
-
 @pytest.mark.parametrize(
     ("end", "care", "reported"),
     [
@@ -362,11 +299,4 @@ def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     path.unlink()  # it cannot be opened for its second showing
     ends_with(camera, "no readable film or image at")
     assert any(line.startswith("camera lost") for line in camera.events())
-    camera.close()
-
-
-def test_an_exception_in_the_process_ends_the_camera_with_its_reason():
-    camera = process(Flawed)
-    camera.open()
-    ends_with(camera, "failed (RuntimeError: no memory)")
     camera.close()

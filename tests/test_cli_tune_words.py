@@ -3,12 +3,9 @@
 from math import pi
 
 import pytest
-from present import present
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.cli.entry_point import QUICK, is_quick
-from gazerig.robot.cli.look_and_stop import read_look
-from gazerig.robot.cli.tune import app, read_pairs, read_value
+from gazerig.robot.cli.ctl import read_look, read_pairs, read_value
 from gazerig.robot.model.commands import (
     LookAt,
     LookAtDirection,
@@ -41,19 +38,3 @@ def test_pairs_and_points() -> None:
     for words in (["1", "2"], ["person", "1.5"], ["person"], ["pixel", "1"], ["free", "1"]):
         with pytest.raises(SetupError, match="give X Y Z in metres"):
             read_look(words)
-
-
-def test_the_quick_way_knows_all_its_commands_and_no_other() -> None:
-    here = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
-    groups = {present(group.typer_instance).info.name for group in app.registered_groups}
-    assert here | groups == QUICK
-    assert is_quick(["stop"], {}) and is_quick(["ctl", "set", "a", "1"], {})
-    for words in ([], ["run"], ["stop", "--help"], ["ctl", "get", "--debug"]):
-        assert not is_quick(words, {})
-    for typed, quick in (
-        ("gazerig ctl set a", True),
-        ("gazerig st", False),
-        ("gazerig ctl", False),
-    ):
-        environ = {"_GAZERIG_COMPLETE": "complete_bash", "COMP_WORDS": typed}
-        assert is_quick([], environ) is quick

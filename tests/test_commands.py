@@ -360,7 +360,7 @@ def test_a_person_is_followed_with_the_scanpath_on_the_face(running: Running) ->
 
 
 def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(running: Running) -> None:
-    assert running.do(LookAtPerson(99))[0].refused.startswith("person 99 is not visible; visible: ")
+    assert running.do(LookAtPerson(99))[0].refused.startswith("no visible person '99'; available: ")
     percept = running.go(0.006)[-1].percept
     assert percept is not None
     running.do(LookAtPerson(percept.faces[0].id, stay=True))

@@ -71,11 +71,6 @@ def test_a_file_that_cannot_be_used(tmp_path: Path, text: str | bytes, fault: st
         read_yaml(tmp_path / "rig.yaml")
 
 
-def test_two_documents_in_one_file_are_refused(tmp_path: Path) -> None:
-    (fault,) = faults_of(tmp_path, GOOD + "---\nname: b\n")
-    assert fault.startswith("rig.yaml:10: not valid YAML: a second document; write one")
-
-
 def test_an_absent_file_is_named_with_a_near_one(tmp_path: Path) -> None:
     write(tmp_path, GOOD, "nod.yaml")
     with pytest.raises(ConfigError) as caught:
@@ -84,15 +79,6 @@ def test_an_absent_file_is_named_with_a_near_one(tmp_path: Path) -> None:
         f"{tmp_path / 'nodd.yaml'}: No such file or directory; did you mean 'nod.yaml'? "
         "name a YAML file that you may read"
     )
-
-
-def test_a_file_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(path: Path, largest: int) -> bytes:
-        raise PermissionError(13, "Permission denied", str(path))
-
-    monkeypatch.setattr("gazerig.config.entries.read_limited", refuse)  # the tests may run as root
-    with pytest.raises(ConfigError, match=r"rig\.yaml: Permission denied"):
-        read_yaml(write(tmp_path, GOOD))
 
 
 def test_a_document_knows_its_lines_and_keeps_its_text(tmp_path: Path) -> None:

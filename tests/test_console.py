@@ -2,8 +2,7 @@
 
 import pytest
 
-from gazerig.robot.cli.browser import has_desktop
-from gazerig.robot.cli.run import report_faults
+from gazerig.robot.cli.run import has_desktop, report_faults
 
 DESK = {"DISPLAY": ":0"}
 

@@ -7,8 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from commanded_robot import NECK, Running
-from fakes.runs import simulated
+from commanded_robot import Running
 from gaze_targets import target
 
 import gazerig
@@ -22,7 +21,7 @@ from gazerig.gaze.attention.conversation import (
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
 from gazerig.robot.loop.head_state import HeadState, head_state
-from gazerig.robot.model.commands import LookAt, Renew, Speak, Talk, TalkOrder
+from gazerig.robot.model.commands import LookAt, Renew, Talk, TalkOrder
 from gazerig.robot.model.control_source import ConversationState
 from gazerig.robot.model.reply import CommandReply
 
@@ -99,12 +98,6 @@ def test_the_newer_of_two_agents_has_the_conversation(running: Running) -> None:
 # Gaze
 
 
-def share_on(running: Running, face: int, seconds: float) -> float:
-    """Return the share of the time in which a person is the target, also while looking away."""
-    ticks = running.go(seconds)
-    return sum(one.target.id == face for one in ticks) / len(ticks)
-
-
 def wait_for(running: Running, kind: str, within_s: float) -> float:
     """Return the time until the target is of a kind, inf if it is not in time."""
     start_s = running.ticks[-1].t_s
@@ -128,64 +121,10 @@ def test_a_turn_is_thought_spoken_and_interrupted_with_the_gaze(running: Running
     assert wait_for(running, "face", 0.3) < 0.02
 
 
-def test_a_short_answer_is_given_with_the_gaze_on_the_face(running: Running) -> None:
-    running.do(Talk("thinking", stay=True), 1.0)
-    running.do(Talk("speaking", text="Yes, of course.", stay=True))
-    assert {tick.target.kind for tick in running.go(1.2)} == {"face"}
-
-
-def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
-    made = simulated(scene="three-people", seed=3)
-    made.robot.start(made.clock)
-    running = Running(made)
-    running.go(12.0)
-    percept = running.ticks[-1].percept
-    assert percept is not None
-    addressee = next(face.id for face in percept.faces if face.id != running.ticks[-1].target.id)
-    running.do(Talk("speaking", addressee, seconds=60.0, stay=True), 0.5)
-    assert running.ticks[-1].target.id == addressee
-    assert 0.6 < share_on(running, addressee, 30.0) < 0.95
-    running.do(Talk("listening", stay=True), 2.0)
-    on, alone, shifts, onset = 0, 0, list[float](), (-1, 0.0)
-    for tick in running.go(60.0):
-        assert tick.percept is not None
-        speaks = [face.id for face in tick.percept.faces if face.speaks]
-        if len(speaks) == 1:
-            if speaks[0] != onset[0]:
-                onset = (speaks[0], tick.t_s)
-            alone, on = alone + 1, on + (tick.target.id == speaks[0])
-            if tick.target.id == speaks[0] and onset[1] > 0.0:
-                shifts.append(tick.t_s - onset[1])
-                onset = (speaks[0], -1.0)
-    assert on / alone > 0.8
-    assert len(shifts) > 5 and sorted(shifts)[len(shifts) // 2] < 0.4
-    # The partner who interrupts is looked at, whoever's mouth has moved before.
-    running.do(Talk("speaking", addressee, seconds=60.0, stay=True))
-    for _ in range(300):
-        tick = running.go(0.1)[-1]
-        assert tick.percept is not None
-        seen = {face.id: face.speaks for face in tick.percept.faces}
-        if tick.target.id not in (-1, addressee) and addressee in seen and any(seen.values()):
-            break
-    running.do(Talk("interrupt", stay=True), 0.1)
-    assert {tick.target.id for tick in running.go(1.0)} == {addressee}
-    made.robot.stop()
-    made.close()
-
-
 def test_a_listener_nods_on_the_robot() -> None:
     with gazerig.open("desk", fast=True, scene="face-to-face") as head:
         head.listening()
         assert head.run_until(lambda state: any(one.name == NOD for one in state.tracks), 40.0)
-
-
-def test_a_speakers_head_moves_more_than_a_silent_one(running: Running) -> None:
-    moved = []
-    for one in (Talk("idle"), Talk("speaking", stay=True), Talk("idle"), Speak("", 6.0)):
-        running.do(one, 1.0)
-        goals = np.array([tick.guard_result.command_rad[NECK] for tick in running.go(4.0)])
-        moved.append(np.median(np.abs(np.diff(goals, axis=0))))
-    assert min(moved[1::2]) > 2.0 * max(moved[::2])
 
 
 def test_a_websocket_renews_what_its_program_controls() -> None:
@@ -227,16 +166,3 @@ def test_a_look_away_stays_beside_a_face_that_moves_into_it() -> None:
     moved = look(away.p_world_m, 0.3)  # the face is where the gaze was
     assert moved.kind == "away" and moved.shift > away.shift
     assert angle_between(moved.p_world_m, away.p_world_m) > radians(7.0)
-
-
-def test_a_look_over_two_turns_is_no_stare() -> None:
-    model, head, face = gaze(1), (0.0, 0.0, 0.0), target(top_down=True)
-    model.look(face, head, 0.0)
-    model.enter("speaking", None, 10.0, 1.0, 0.0)
-    model.look(face, head, 0.5)
-    model.step(8.5)  # on the face before the end
-    kinds = [model.look(face, head, 8.5 + 0.1 * n).kind for n in range(15)]
-    assert set(kinds) == {"face"}
-    model.enter("listening", None, None, 0.0, 10.0)
-    kinds = [model.look(face, head, 10.0 + 0.1 * n).kind for n in range(145)]
-    assert kinds[0] == "face" and "away" in kinds

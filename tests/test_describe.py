@@ -16,22 +16,17 @@ from described_rigs import SHIPPED, Poses, compare, random_angles, shipped
 from emulated_rig import EmulatedRig
 from fakes.runs import simulated
 
-from gazerig.config.load import ConfigError
-from gazerig.config.rig_files import AllowedFolder
-from gazerig.config.schema import Rig, load_rig
-from gazerig.drivers.errors import SetupError
+from gazerig.config.schema import Rig
 from gazerig.robot.description.build import joint_torques_nm
 from gazerig.robot.description.files import description_files
 from gazerig.robot.description.links import Description
-from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.description.mjcf import Mjcf, mjcf
-from gazerig.robot.description.own_meshes import read_mesh
 from gazerig.robot.description.urdf import Urdf, urdf
 from gazerig.robot.loop.body import Body
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.weight import CounterweightParams, HeadMassParams, MassParams
 from gazerig.robot.run.bus_wiring import rig_bus
-from gazerig.robot.run.rig_description import description_of, sag_compensation, shape_of, statics_of
+from gazerig.robot.run.rig_description import description_of, sag_compensation, statics_of
 from gazerig.robot.run.rig_limits import park_rad
 from gazerig.robot.run.rig_weight import rest_park_deg
 
@@ -214,82 +209,6 @@ def test_the_whole_model_is_compiled_with_looks(name: str) -> None:
     assert data.ncon == 0
 
 
-# ---- A user's own meshes replace the program's
-
-
-RIG = """name: mine
-profile: robot
-bus: {kind: dynamixel, port: /dev/ttyUSB0}
-geometry:
-  {pitch_axis_height_mm: 0, eyes_ahead_mm: 0, eyes_above_mm: 90, interocular_mm: 62}
-joints:
-  eyes_pan: {id: 1, model: xl330-m077, min_deg: -35, max_deg: 35, max_speed_deg_s: 600, max_accel_deg_s2: 45000}
-  eyes_tilt: {id: 2, model: xl330-m077, min_deg: -30, max_deg: 30, max_speed_deg_s: 600, max_accel_deg_s2: 45000}
-camera: {mount: base, position_mm: [10, 0, 140]}
-meshes:
-"""
-
-
-def _rig(folder: Path, mesh: str) -> Path:
-    path = folder / "mine.yaml"
-    path.write_text(RIG + mesh)
-    return path
-
-
-def _box(path: Path) -> None:
-    import trimesh
-
-    trimesh.creation.box((20.0, 40.0, 60.0)).export(path)
-
-
-def test_an_stl_in_millimetres_is_shown_where_the_file_says(tmp_path: Path) -> None:
-    import mujoco
-
-    (tmp_path / "parts").mkdir()
-    _box(tmp_path / "parts" / "skull.stl")
-    path = _rig(
-        tmp_path,
-        "  head: {file: parts/skull.stl, position_mm: [-40, 0, 10], rotation_deg: [90, 0, 0]}\n",
-    )
-    description = description_of(load_rig(str(path)))
-    (look,) = description.link("head").visuals
-    points = look.painted().mesh.vertices @ np.array(look.R).T + look.p_m
-    assert np.allclose(points.min(axis=0), (-0.06, -0.01, -0.02))
-    assert np.allclose(points.max(axis=0), (-0.02, 0.01, 0.04))
-    # Faces of a box stay flat.
-    normals = look.painted().normals
-    assert normals is not None and np.allclose(np.abs(normals).max(axis=1), 1.0, atol=1e-6)
-    text = mjcf(description)
-    model = mujoco.MjSpec.from_string(text.xml, assets=text.assets).compile()
-    assert "head_own" in {model.geom(i).name for i in range(model.ngeom)}
-
-
-def test_a_gltf_file_stands_upright(tmp_path: Path) -> None:
-    import trimesh
-
-    tall = trimesh.creation.box((0.1, 0.5, 0.2))  # y is up in glTF, and z towards the viewer
-    tall.export(tmp_path / "tall.glb")
-    painted = read_mesh(MeshParams(str(tmp_path / "tall.glb"), metres_per_unit=1.0))
-    assert np.allclose(np.ptp(painted.mesh.vertices, axis=0), (0.1, 0.2, 0.5), atol=1e-6)
-    assert trimesh.Trimesh(painted.mesh.vertices, painted.mesh.faces).volume > 0.0
-
-
-def test_a_mesh_that_went_away_is_one_clear_error(tmp_path: Path) -> None:
-    rig = load_rig(str(_rig(tmp_path, "  head: {file: gone.stl}\n")))
-    with pytest.raises(SetupError, match=r"meshes\.head\.file: .*gone\.stl.*correct the path"):
-        description_of(rig)
-    # A recorded run is shown without it.
-    assert shape_of(rig, without_lost_meshes=True) == shape_of(replace(rig, meshes={}))
-
-
-def test_the_page_may_name_meshes_in_its_folder_only(tmp_path: Path) -> None:
-    folder = AllowedFolder(tmp_path)
-    with pytest.raises(ConfigError, match="only files in"):
-        folder.check_changes({"meshes.head.file": "/etc/passwd"})
-    with pytest.raises(ConfigError, match="only files in"):
-        folder.check_changes({"meshes": {"head": {"file": "/etc/passwd"}}})
-
-
 # ---- Masses of a rig: torques of its weight, and a neck that does not sag
 
 
@@ -302,7 +221,7 @@ def heavy(name: str, mass: MassParams = REAL) -> Rig:
 
 
 def mujoco_loads_nm(rig: Rig, angles: Mapping[str, float]) -> dict[str, float]:
-    description = description_of(rig, looks=False)
+    description = description_of(rig)
     model, data = _in_pose(mjcf(description, looks=False), description, angles)
     found = dict.fromkeys(rig.joints, 0.0)
     for joint in description.joints:

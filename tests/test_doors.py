@@ -537,7 +537,7 @@ def test_the_command_lists_doors_and_names_a_missing_one() -> None:
     assert invoked("door").out.count("\n") == len(SHIPPED[DOOR])
     missed = invoked("door", "wyomin")
     assert missed.code == 2
-    assert "no door is called 'wyomin': did you mean 'wyoming'?" in missed.err
+    assert "no door 'wyomin'; did you mean 'wyoming'?" in missed.err
 
 
 def test_a_ninth_neighbour_is_refused_until_another_leaves() -> None:

@@ -14,10 +14,8 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.robot.cli import emulate as command
 from gazerig.robot.cli.emulate import app
 from gazerig.sim_mock.device_spec import line_of
-from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 
 ROOT = Path(__file__).parents[1]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTTIN)
@@ -50,18 +48,6 @@ def connect(path, baud=1_000_000):
     return port
 
 
-STS_PING, STS_PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
-
-
-def asked(path, data, length, baud=1_000_000):
-    """Send bytes to a path and give what is answered."""
-    port = connect(path, baud)
-    port.write(data)
-    answer = port.read_until(length, port.now_s() + 1.0)
-    port.closePort()
-    return answer
-
-
 def ping(port, servo_id):
     """Return a servo's model number and firmware, None without an answer."""
     line = Transactions(port, DYNAMIXEL)
@@ -90,31 +76,6 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
     port.closePort()
     assert emulator.end() == 0
     assert not os.path.lexists(link)
-
-
-MIXED = {
-    "": line_of("1:sts3215", 1_000_000),
-    "eyes": line_of("1-2:xl330-m077", 57_600),
-}
-
-
-def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monkeypatch):
-    monkeypatch.setattr(command, "emulated_lines", lambda rig: MIXED)
-    link = tmp_path / "head"
-    emulator = Emulator("desk", "--link", str(link))
-    assert emulator.ready == {"bus": "", "path": str(link), "baud": 1_000_000}
-    assert emulator.hear() == {"bus": "eyes", "path": f"{link}-eyes", "baud": 57_600}
-    assert asked(link, STS_PING, 6) == STS_PONG
-    port = connect(f"{link}-eyes", 57_600)
-    assert ping(port, 2).model_number == 1190
-    port.closePort()
-    assert emulator.type("eyes: lose 2 count 1")["bus"] == "eyes"
-    assert json.loads(emulator.type("eyes:status")["ok"])["faults"] == ["lose 2"]
-    assert [servo["model"] for servo in json.loads(emulator.type("status")["ok"])["servos"]] == [
-        "sts3215"
-    ]
-    assert emulator.end() == 0
-    assert not os.path.lexists(link) and not os.path.lexists(f"{link}-eyes")
 
 
 @pytest.mark.parametrize(
@@ -151,13 +112,3 @@ def test_servos_that_cannot_be_are_refused(text, says):
     with pytest.raises(SetupError) as error:
         line_of(text, 1_000_000)
     assert says in str(error.value)
-
-
-def test_the_models_decide_the_kind_of_line():
-    line = line_of("3:STS3215@7,253:sts3215-12v", 500_000)
-    assert isinstance(line, FeetechLine) and line.baud == 500_000
-    assert [(s.id, s.model, s.start_steps) for s in line.servos] == [
-        (3, "sts3215", 7),
-        (253, "sts3215-12v", 2048),
-    ]
-    assert isinstance(line_of("1:xl330-m077", 57_600), DynamixelLine)

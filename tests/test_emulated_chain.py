@@ -52,15 +52,6 @@ def test_a_torn_instruction_is_forgotten_after_the_gap(make):
     assert len(bench.chain.receive(ping[5:])) == make.pong
 
 
-def test_a_damaged_instruction_is_met_with_silence_and_the_next_is_heard(make):
-    ping = make.instruction(1, PING)
-    for at in range(2, len(ping)):
-        bench = bench_of(make, (0, 1))
-        assert bench.chain.receive(ping[:at] + bytes([ping[at] ^ 1]) + ping[at + 1 :]) == b"", at
-        bench.now_s = 0.01
-        assert pings(bench, 1)
-
-
 # --- groups
 
 

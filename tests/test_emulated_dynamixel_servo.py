@@ -30,12 +30,6 @@ class Bench:
         return self.servo.advance(ms, ms)
 
 
-def test_homing_offset_shifts_the_present_position():
-    bench = Bench("xl330-m288", 700)
-    bench.put(20, 100)
-    assert bench.get(132) == 800
-
-
 @pytest.mark.parametrize(
     ("mode", "goal", "at"), [(3, 1000, 1000), (4, -5000, -5000), (5, 3000, 2048), (1, 3000, 2048)]
 )
@@ -44,20 +38,6 @@ def test_it_moves_in_the_modes_with_a_position(mode, goal, at):
     assert (bench.put(11, mode), bench.put(64, 1), bench.put(116, goal)) == (0, 0, 0)
     bench.at(4000)
     assert bench.get(132) == pytest.approx(at, abs=12)
-
-
-def test_live_registers_tell_the_motion():
-    bench = Bench("xl330-m077", 1000)
-    bench.put(112, 100)
-    assert (bench.put(64, 1), bench.put(116, 2000)) == (0, 0)
-    bench.at(200)
-    assert bench.get(128) == pytest.approx(100, abs=25)
-    assert (bench.get(122), bench.get(132) > 1200) == (1, True)
-    assert (bench.get(144), bench.get(146)) == (50, 30)
-    assert bench.get(120) == 200
-    bench.at(9000)
-    assert bench.get(132) == pytest.approx(2000, abs=12)
-    assert bench.get(122) == 0
 
 
 # --- protections against load, heat and voltage

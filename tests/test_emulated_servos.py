@@ -40,23 +40,9 @@ def test_only_a_client_at_the_servos_baud_rate_is_heard(make):
     assert [len(bench.ask(ALL, PING, baud=baud)) for baud in (115_200, BAUD)] == [1, 0]
 
 
-def test_what_cannot_be_built(make):
-    with pytest.raises(ValueError, match=f"baud 1234: {make.model} supports [0-9]+, "):
-        make(baud=1234)
-
-
 @pytest.fixture
 def bench(make):
     return make()
-
-
-def test_the_return_delay_stands_in_front_of_the_answer(bench):
-    [reply] = bench.chain.exchange(bench.instruction(1, PING))
-    assert reply.delay_s == pytest.approx(500e-6)
-    assert reply.end == len(bench.instruction(1, PING))
-    bench.put("return_delay_time", 10)
-    [reply] = bench.chain.exchange(bench.instruction(1, PING))
-    assert reply.delay_s == pytest.approx(20e-6)
 
 
 # --- restarts

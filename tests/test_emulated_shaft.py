@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.drivers.dynamixel.control_table import MODELS
-from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Motor, Physics
+from gazerig.sim_mock.smart_servo.physics import Loop, Motor, Physics
 from gazerig.sim_mock.smart_servo.shaft import Shaft
 
 P, D = 800 / 128 / 885, 800 / 16 / 885
@@ -42,27 +42,6 @@ def run(made: Shaft, ms: int) -> list[float]:
 # --- the profile
 
 
-@pytest.mark.parametrize(
-    ("cruise", "ramp", "ms"),
-    [
-        (0.0, 0.5, 1),  # no velocity: the acceleration does not count
-        (2.0, 0.0, 500),
-        (2.0, 0.01, 700),  # a trapezoid: 1000 / 2 + 2 / 0.01
-        (50.0, 0.01, 633),  # a triangle: 2 * sqrt(1000 / 0.01)
-    ],
-)
-def test_the_shapes_of_the_manual(cruise, ramp, ms):
-    made = shaft()
-    made.lead_to(1000.0, cruise, ramp)
-    path = [0.0]
-    while made.led:
-        path += made.lead(1)
-    assert path[-1] == 1000.0 and made.r_v == 0.0
-    assert len(path) - 1 == pytest.approx(ms, abs=2)
-    if cruise:
-        assert max(np.diff(path)) <= cruise + 1e-9
-
-
 FLOATS = st.floats(-5000, 5000).map(lambda steps: round(steps, 3))  # goals are whole steps
 
 
@@ -85,14 +64,6 @@ def test_a_new_goal_starts_from_the_present_speed_and_keeps_to_the_limits(
 
 
 # --- gains and limits
-
-
-@pytest.mark.parametrize("model", ["xl330-m077", "xl430-w250"])
-def test_full_pwm_reaches_the_no_load_speed_of_the_data_sheet(model):
-    made = shaft(model)
-    made.lead_to(1e6, 0.0, 0.0)
-    run(made, 1500)
-    assert 1000.0 * made.v == pytest.approx(MODELS[model].no_load_steps_s, rel=1e-3)
 
 
 @pytest.mark.parametrize("gain", [1.0, 4.0])
@@ -144,14 +115,6 @@ def test_without_torque_friction_takes_the_speed_and_never_adds_any():
         speeds.append(made.v)
     assert speeds == sorted(speeds, reverse=True)
     assert speeds[0] > 10 and speeds[-1] == 0.0 and made.effort == 0.0
-
-
-def test_a_load_below_friction_is_held_without_torque_and_a_larger_one_falls_to_the_stop():
-    held = shaft(loop=DISABLED, weight_nm=0.006)
-    falls = shaft(loop=DISABLED, weight_nm=0.02, stop_high_steps=500.0)
-    assert run(held, 1000)[-1] == 0.0
-    assert run(falls, 1000)[-1] == 500.0
-    assert falls.quiet and falls.v == 0.0
 
 
 def test_stops_are_never_passed_and_a_stalled_motor_draws_its_stall_current():

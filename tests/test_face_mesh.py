@@ -1,7 +1,6 @@
 """Dense meshes: values from their points, the networks' files, and the percept."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from importlib.util import find_spec
 from math import degrees, pi, radians, sin
 from pathlib import Path
@@ -13,7 +12,6 @@ from seeing.material import portrait
 from test_face_pose import CAMERA, angle_between, turned
 from test_gaze_at_head import AT_EYES, standing
 
-from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, Detections, FaceMesh
 from gazerig.drivers.vision.body_detector import BodyDetector
 from gazerig.drivers.vision.face.mesh import MeshNetworks
@@ -164,13 +162,6 @@ def test_the_percept_tells_gaze_lids_and_speech_and_a_blink_takes_no_look_away()
 # ---- the networks -------------------------------------------------------------------------
 
 
-def test_an_altered_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
-    (tmp_path / "face_landmark.tflite").write_bytes(b"no network")
-    with pytest.raises(ModelFileError, match=r"face_landmark\.tflite is damaged or another"):
-        MeshNetworks()
-
-
 @pytest.fixture
 def folder(monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return the folder of models, that of the package."""
@@ -178,24 +169,6 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Path:
     data = Path(_PACKAGE.origin).parent / "data"
     monkeypatch.setenv(FOLDER_VARIABLE, str(data))
     return data
-
-
-@NEEDS_NETWORKS
-@pytest.mark.parametrize("name", ["astronaut", "hopper"])
-def test_photographed_people_look_at_the_camera(name: str, folder: Path) -> None:
-    shown = portrait(name)
-    lens = replace(CAMERA, fx_px=900.0, fy_px=900.0)
-    lens = replace(
-        lens, cx_px=float(shown.landmarks_px[2, 0]), cy_px=float(shown.landmarks_px[2, 1])
-    )
-    mesh = MeshNetworks().mesh(shown.image, shown.landmarks_px)
-    assert mesh is not None and mesh.certainty > 0.9
-    reading = read_mesh(mesh, lens)
-    assert reading is not None and reading.gaze_camera is not None
-    ahead = np.array(reading.R_camera_face)[:, 0]
-    for direction in (np.array(reading.gaze_camera), ahead):
-        assert degrees(np.arccos(-direction[2])) < 15.0
-    assert 0.6 < present(present(reading.signs).eye_opening) < 1.7
 
 
 @NEEDS_NETWORKS

@@ -4,7 +4,6 @@ import threading
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import accumulate
-from math import radians
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ import pytest
 from fakes.films import write_film
 
 from gazerig.drivers.camera.film import Film
-from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.errors import CameraError
 
 LENGTH, RATE_HZ = 20, 10.0
@@ -87,12 +85,6 @@ def test_a_film_is_turned_as_its_container_says(tmp_path: Path, rotation: int) -
     assert red.index(True) == -rotation // 90 % 4 and sum(red) == 1
 
 
-def test_a_lens_on_its_side_is_the_same_lens() -> None:
-    field = radians(69.0)
-    tall, wide = (intrinsics_of_view(field, *size) for size in ((480, 640), (640, 480)))
-    assert tall.fx_px == wide.fx_px == tall.fy_px
-
-
 @pytest.fixture(scope="module")
 def film_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_film(tmp_path_factory.mktemp("films") / "film.avi", LENGTH, RATE_HZ, grey=10)
@@ -101,19 +93,6 @@ def film_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def shade(picture: np.ndarray) -> int:
     """Return the number of the film's picture, from 0."""
     return round(float(picture.mean()) / 10)
-
-
-def test_film_repeats_and_counts_on(film_file: Path) -> None:
-    film = Film(film_file)
-    film.open()
-    for number in range(1, 2 * LENGTH + 2):
-        assert film.due_s == pytest.approx((number - 1) / RATE_HZ)
-        shot = film.next_shot()
-        assert (shot.number, shade(shot.image)) == (number, (number - 1) % LENGTH)
-    film.close()
-    film.close()
-    with pytest.raises(CameraError, match="not open"):
-        film.next_shot()
 
 
 @pytest.mark.parametrize(
@@ -180,13 +159,6 @@ def test_damaged_pictures_are_skipped_and_told_once(tmp_path: Path) -> None:
         film.next_shot()
     (line,) = film.events()
     assert "damaged" in line and "skipped" in line
-
-
-def test_picture_cut_short(tmp_path: Path) -> None:
-    noise = np.random.default_rng(0).integers(0, 256, (60, 60, 3), np.uint8)
-    content = cv2.imencode(".png", noise)[1].tobytes()
-    (tmp_path / "cut.png").write_bytes(content[:40])
-    assert "damaged" in refusal(tmp_path / "cut.png")
 
 
 # ---- real time --------------------------------------------------------------------------

@@ -76,17 +76,6 @@ def test_interest_falls_while_attended_and_recovers_otherwise() -> None:
     assert interest(model, seen, -1, 31.5) == [1.0, 1.0]
 
 
-def test_interest_outlives_an_absence() -> None:
-    model = Habituation(PARAMS, NO_STAYS)
-    seen, nobody = bodies("face", (1, 0, 0)), bodies("")
-    interest(model, seen, -1, 0.0)
-    interest(model, seen, 1, 5.0)
-    interest(model, nobody, -1, 5.4)
-    assert interest(model, seen, -1, 5.5) == pytest.approx([0.5])
-    model.reset(6.0)
-    assert interest(model, seen, -1, 6.0) == [1.0]
-
-
 def test_a_rule_keeps_its_floor_of_interest() -> None:
     """A second of looking, at a body of half the weight, is a lead of two."""
     model = Habituation(HabituationParams(rule_floor=0.6, decay_rate_1_s=0.3), NO_STAYS)
@@ -123,23 +112,6 @@ def test_a_single_still_face_is_never_left() -> None:
     assert {(t.id, t.kind, t.salience, t.shift) for t in targets} == {(1, "face", 0.5, 1)}
 
 
-def test_a_still_thing_beside_a_face_does_not_profit_from_boredom() -> None:
-    assert shares(watch(bodies("face thing", (1, 0, 0), (0.7, 0.3, 0)), 60.0)) == {1: 1.0}
-
-
-def test_two_faces_share_the_gaze_without_flicker() -> None:
-    targets = watch(bodies("face face", (1, 0.3, 0), (1, -0.3, 0)), 120.0)
-    share, stays = shares(targets), stays_s(targets)[1:]  # without the first look
-    assert min(share.values()) > 0.4 and set(share) == {1, 2}
-    assert len(stays) > 20 and min(stays) > 1.0 and max(stays) < 6.0
-    assert {t.salience for t in targets} == {0.5}  # the rule's constant, whoever is looked at
-
-
-def test_without_habituation_two_faces_do_not_share() -> None:
-    two = bodies("face face", (1, 0.3, 0), (1, -0.3, 0))
-    assert shares(watch(two, 30.0, habituation="none"))[2] > 0.95
-
-
 @pytest.mark.parametrize(
     "away_m", [(1.5, 1.0), (0.8, 3.0, 3.0, 3.0), (1.0, 1.0, 2.0, 2.0, 3.0, 4.0)]
 )
@@ -155,18 +127,3 @@ def test_nobody_of_many_waits_for_long_and_no_look_is_a_glance(n: int) -> None:
     targets = watch(arc(*[1.5] * n), 90.0)
     assert max(waits_s(targets, n)) < 15.0 and min(shares(targets).values()) > 0.75 / n
     assert min(stays_s(targets)[n:]) > 1.0
-
-
-def test_who_comes_later_gets_as_much_and_who_was_alone_is_not_forgotten() -> None:
-    """The second minute counts: three have been there for one, three more come."""
-    targets = watch(arc(*[1.5] * 3), 60.0, arc(*[1.5] * 6))
-    after = targets[30 * 60 :]
-    assert shares(after) == pytest.approx(dict.fromkeys(range(1, 7), 1 / 6), abs=0.04)
-    assert max(waits_s(after, 6)) < 15.0
-
-
-def test_the_gaze_leaves_a_hand_that_waves_on_and_on_but_not_before_the_face_is_stronger() -> None:
-    targets = watch(bodies("face hand", (1, 0, 0), (0.9, 0.4, 0), speed=0.6), 60.0)
-    share, stays = shares(targets), stays_s(targets)
-    assert share[1] > 0.1 and share[2] > 0.3
-    assert min(stays) >= 0.3 - 1e-9

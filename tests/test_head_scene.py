@@ -137,12 +137,12 @@ def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer) -> None:
 
 def _in_world(view: HeadView, link: str) -> transforms.SE3:
     """Return the pose of a link in the scene, through its frames."""
-    path = view.links[link].frame.name
+    path = view.links[link].name
     found = transforms.SE3.identity()
     for one in view.links.values():
-        if path == one.frame.name or path.startswith(one.frame.name + "/"):
-            turn = transforms.SO3(np.array(one.frame.wxyz))
+        if path == one.name or path.startswith(one.name + "/"):
+            turn = transforms.SO3(np.array(one.wxyz))
             found = found @ transforms.SE3.from_rotation_and_translation(
-                turn, np.array(one.frame.position)
+                turn, np.array(one.position)
             )
     return found

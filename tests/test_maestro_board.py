@@ -22,14 +22,6 @@ def rates(places):
 # --- bytes
 
 
-def test_set_target_and_get_position(world):
-    assert [world.ask(bytes((byte,))) for byte in bytes.fromhex("84 00 70 2E 90")] == [b""] * 5
-    assert world.ask("00") == (6000).to_bytes(2, "little") == b"\x70\x17"
-    # The answer is whole bytes, not seven bits each.
-    assert world.ask(target(0, 4095) + b"\x90\x00") == b"\xff\x0f"
-    assert world.errors() == 0
-
-
 def test_with_a_crc_only_checked_commands_count():
     def check(packet):
         return packet + bytes((crc7(packet),))
@@ -54,12 +46,6 @@ def test_bytes_without_sense_are_protocol_errors_and_end_all_pulses(world, wrong
 
 
 # --- motion
-
-
-def test_the_speed_of_the_guide_takes_100_ms_from_1000_to_1350_us(world):
-    world.ask(target(5, 4000) + bytes.fromhex("87 05 0C 01") + target(5, 5400))
-    places = [world.after(0.01).position(5) for _ in range(11)]
-    assert places == [min(4000 + 140 * n, 5400) for n in range(1, 12)]
 
 
 def test_with_both_limits_it_is_a_trapezoid_that_ends_on_the_target(world):
@@ -122,13 +108,6 @@ def test_a_brown_out_is_deafness_then_a_board_as_switched_on(world):
     assert world.positions() == [0] * 12
     world.ask(target(0, 7000) + target(0, 4000))
     assert world.position() == 4000
-
-
-def test_errors_at_will_are_bits_of_the_register_and_end_all_pulses(world):
-    for bit in range(9):
-        world.ask(target(0, 6000))
-        world.do(f"error {bit}")
-        assert (world.errors(), world.position()) == (1 << bit, 0)
 
 
 @given(

@@ -1,17 +1,15 @@
 """gazerig new: what it asks, what it writes, and that every rig it writes runs."""
 
 import itertools
-import time
 from pathlib import Path
 
 import pytest
+import typer
 from command_line import invoked, typed
 
 from gazerig.config.schema import load_rig
 from gazerig.config.shipped_files import SHIPPED
-from gazerig.robot.cli import new as command
-from gazerig.robot.cli.new_rig import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
-from gazerig.robot.cli.terminal import LineWriter
+from gazerig.robot.cli.new import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
 
 TEMPLATES = {
     "minimal": ("--board", "dynamixel", "--joints", "eyes", "--camera", "webcam"),
@@ -25,7 +23,6 @@ TEMPLATES = {
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(command, "_plugged_in", lambda board: "")
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
@@ -70,7 +67,8 @@ def test_on_a_terminal_it_asks_again_until_an_answer_is_one(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     answers = iter(["9", "maestro", "", "oak", "far", "5", "70"])
-    monkeypatch.setattr("builtins.input", lambda prompt: next(answers))
+    asking = f"{typer.prompt.__module__}.visible_prompt_func"
+    monkeypatch.setattr(asking, lambda prompt: next(answers))
     monkeypatch.setattr("sys.stdin", type("Tty", (), {"isatty": lambda self: True})())
     assert typed("new", "a.yaml") == 0
     rig = load_rig("a.yaml")
@@ -85,24 +83,6 @@ def test_on_a_terminal_it_asks_again_until_an_answer_is_one(
         "gazerig calibrate a.yaml",
         "gazerig run a.yaml --oak",
     ]
-
-
-def test_a_question_is_complete_before_its_prompt(monkeypatch: pytest.MonkeyPatch) -> None:
-    written: list[str] = []
-
-    def write_slowly(writer: LineWriter, text: str) -> None:
-        time.sleep(0.02)
-        written.append(text)
-
-    def answer(prompt: str) -> str:
-        assert "the distance between the eyes" in written[-1]
-        return ""
-
-    tty = type("Tty", (), {"isatty": lambda self: True, "fileno": lambda self: 2})()
-    for name, value in (("sys.stderr", tty), ("sys.stdin", tty), ("builtins.input", answer)):
-        monkeypatch.setattr(name, value)
-    monkeypatch.setattr(LineWriter, "_write", write_slowly)
-    assert typed("new", "a.yaml", *TEMPLATES["minimal"]) == 0 and written
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,6 @@
 """A camera upside down, on its side, mirrored, of any and of changing size: the same directions."""
 
-import pickle
 from collections.abc import Iterator
-from dataclasses import replace
 from math import radians
 
 import cv2
@@ -11,16 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
+from gazerig.drivers.camera.orientation import FrameOrientation
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fault, project, rays
 from gazerig.robot.perception.frame_locator import FrameLocator
-from gazerig.robot.run.camera_factory import frame_orientation
 
 ALL = [FrameOrientation(r, m) for r in (0, 90, 180, 270) for m in (False, True)]
 NAMES = [f"{o.rotation}{' mirrored' if o.mirrored else ''}" for o in ALL]
@@ -115,15 +111,6 @@ def test_a_lens_of_another_shape_is_reported_once_and_the_gaze_goes_on() -> None
     assert len(look(1280, 720)) == 1  # another size that does not fit
 
 
-def test_the_rig_says_how_frames_are_turned() -> None:
-    rig = load_rig("desk")
-    assert frame_orientation(rig.camera) == AS_DELIVERED
-    turned = frame_orientation(replace(rig.camera, rotation=180, mirrored=True))
-    assert turned == FrameOrientation(180, True)
-    assert turned.turned_by(270) == FrameOrientation(90, True)
-    assert pickle.loads(pickle.dumps(turned)) == turned  # it goes to the camera's process
-
-
 # ---- The lens model: pixels to directions and back, other sizes of picture, and what perception
 
 
@@ -160,12 +147,6 @@ def test_what_is_behind_the_camera_has_no_pixel() -> None:
 def test_distortion_that_is_none_is_refused(distortion: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="five finite numbers"):
         Intrinsics(1.0, 1.0, 0.0, 0.0, distortion)  # type: ignore[arg-type]
-
-
-def test_a_picture_of_half_the_size_shows_the_same_directions() -> None:
-    half = BENT.scaled(0.5, 0.5)
-    # The middle of a block of 2 x 2 pixels becomes the middle of one pixel.
-    assert rays([(100.0, 60.0)], half)[0] == pytest.approx(rays([(200.5, 120.5)], BENT)[0])
 
 
 def test_a_measured_lens_serves_every_picture_of_its_shape() -> None:

@@ -51,7 +51,7 @@ def test_the_page_comes_with_its_stop_button(near: Rig) -> None:
     assert headers["X-Frame-Options"] == "DENY"
     assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
     status, headers, text = near.get("/rig/stop.js")
-    assert status == 200 and "text/javascript" in headers["Content-Type"] and "STOP" in text
+    assert status == 200 and "javascript" in headers["Content-Type"] and "STOP" in text
 
 
 def test_the_view_is_viser_in_a_frame_of_this_page_alone(near: Rig) -> None:
@@ -130,10 +130,10 @@ def test_control_is_renewed_while_the_browser_in_control_is_there(near: Rig) -> 
 def test_the_view_changes_for_the_browser_that_asks(near: Rig) -> None:
     with near.knock(SOCKET, Cookie=near.named("ana")) as end:
         you = json.loads(end.recv(timeout=PATIENCE_S))["ok"]["you"]
-        said = answer_to(end, do="show_view", layers=["ghost"], look_from="from above")
+        said = answer_to(end, do="show_view", layers=["sight"], look_from="from above")
         assert "ok" in said
         (view, browser) = near.views[-1]
-        assert (view.layers, view.look_from, browser) == (("ghost",), "from above", you)
+        assert (view.layers, view.look_from, browser) == (("sight",), "from above", you)
         refused = answer_to(end, do="show_view", layers=["bones"])["refused"]
         assert "bones" in refused and len(near.views) == 1
 

@@ -1,9 +1,7 @@
 """Palms of the nearest person: searched now and then, located by their size, and called hands."""
 
-import pickle
 import sys
 from dataclasses import replace
-from math import radians
 from pathlib import Path
 
 import cv2
@@ -13,8 +11,6 @@ from present import present
 from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at
 from test_perception import seen as percept_at
 
-from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
 from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection
 from gazerig.drivers.vision.face.params import FaceDetectorParams
@@ -24,7 +20,6 @@ from gazerig.drivers.vision.palms import PalmDetector
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
 
 MODELS = Path(sys.prefix) / "models"
@@ -84,14 +79,6 @@ def test_palms_are_found_where_they_are_and_as_large_as_if_they_faced_the_camera
     assert second.size_px == pytest.approx(40.0, abs=0.1)
 
 
-@pytest.mark.parametrize("palm", [(200.0, 300.0, 200.0, 260.0, 10.0, 0.4),
-                                  (200.0, np.nan, 200.0, 260.0, 10.0, 0.9)])  # fmt: skip
-def test_what_is_unsure_or_no_place_is_no_palm(
-    palm: tuple[float, float, float, float, float, float],
-) -> None:
-    assert searched(palm) == ()
-
-
 def test_palms_are_searched_so_often_and_while_the_person_is_there() -> None:
     network = Seen()
     detector = PalmDetector(FaceDetectorParams(hands_hz=5.0), network)
@@ -105,17 +92,6 @@ def test_palms_are_searched_so_often_and_while_the_person_is_there() -> None:
 class OneFace:
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         return (FACE,)
-
-
-def test_frames_carry_palms_between_processes() -> None:
-    palms = PalmDetector(FaceDetectorParams(), Seen((200.0, 300.0, 200.0, 260.0, 10.0, 0.8)))
-    frames = FrameAnalyzer(
-        BodyDetector(OneFace(), None, palms), None, FrameLocator(None, radians(69.0))
-    )
-    found, later = (frames.analyze(Shot(0.03 * i, 1 + i, FRAME)) for i in (0, 1))
-    assert pickle.loads(pickle.dumps(found.palms)) == found.palms and later.palms is None
-    (palm,) = present(present(found.located).palms)
-    assert palm.kind == "hand" and present(later.located).palms is None
 
 
 # ---- what perception makes of them ---------------------------------------------------------
@@ -149,14 +125,6 @@ def hands(*palms: DetectedPalm, frames: int = 30, depth_m: float | None = None) 
 def places(percept: Percept) -> list[Vec3]:
     rows = zip(percept.bodies.kinds, percept.bodies.p_world_m.tolist(), strict=True)
     return [(p[0], p[1], p[2]) for kind, p in rows if kind == "hand"]
-
-
-def test_a_hand_that_is_held_still_is_one_hand_where_its_size_puts_it() -> None:
-    seen = hands(palm_at(P_PALM))
-    assert len({percept.bodies.ids for percept in seen}) == 1
-    for percept in seen:
-        (place,) = places(percept)
-        assert place == pytest.approx((1.1, -0.35, -0.2), abs=0.02)  # x ahead, y left, z up
 
 
 def test_a_palm_is_no_farther_than_its_person_unless_it_is_measured() -> None:

@@ -1,13 +1,11 @@
 """Rules name persons by what they do: in the YAML, from frame to frame, and in a scene of three."""
 
-from functools import cache
 from math import pi, sin
 from pathlib import Path
 
 import numpy as np
 import pytest
 from attention_scene import attention, looking
-from msgspec import structs
 
 from gazerig.config.faults import ConfigError
 from gazerig.config.schema import load_rules
@@ -37,34 +35,6 @@ def percept(
         Face(id, p, EYE, R, (p,) * 8, 0.9, looks_at_head=id in looks) for id, p in faces.items()
     )
     return Percept(t_s, Bodies(ids, kinds, places, v, np.zeros((n, 3)), np.full(n, 0.1)), seen)
-
-
-@cache
-def equal_people(speaks: int | None) -> tuple[dict[int, float], list[float]]:
-    """Return the share of looks at three equal people, and the lengths of stays."""
-    model = attention(stays=np.random.default_rng(0))
-    places = {5: (1.0, 0.4, 0.0), 6: (1.077, 0.0, 0.0), 7: (1.0, -0.4, 0.0)}
-    looks: list[int] = []
-    for k in range(240 * 20):
-        seen = percept(0.05 * k, places, (5, 6, 7))
-        faces = tuple(structs.replace(face, speaks=face.id == speaks) for face in seen.faces)
-        looks.append(model.choose(structs.replace(seen, faces=faces), looking(), 0.05 * k).id)
-    edges = np.flatnonzero(np.diff(looks))
-    return {id: looks.count(id) / len(looks) for id in places}, (0.05 * np.diff(edges)).tolist()
-
-
-def test_who_speaks_gets_most_looks_and_nobody_is_left_out() -> None:
-    mute, _ = equal_people(None)
-    assert all(0.2 < share < 0.5 for share in mute.values())
-    spoken, _ = equal_people(6)
-    assert 0.8 < spoken[6] < 0.95 and min(spoken.values()) > 0.02
-
-
-def test_stays_with_one_of_several_people_have_a_long_tail() -> None:
-    _, stays = equal_people(None)
-    assert np.std(stays) / np.mean(stays) > 0.4
-    assert max(stays) > 2.5 * np.median(stays)
-    assert max(stays) < 15.0
 
 
 def test_the_nearest_is_the_nearest_until_another_is_clearly_so() -> None:
@@ -114,14 +84,6 @@ def test_a_hand_that_swings_to_both_sides_waves_for_the_nearest_face(
     assert persons.ids_with_trait("waving") == frozenset()
 
 
-def test_a_hand_that_moves_to_one_side_does_not_wave() -> None:
-    persons = Persons()
-    for k in range(60):
-        y = -0.8 + 0.5 * k / 30
-        persons.update(percept(k / 30, {2: RIGHT}, (), (1.0, y, 0.0), 0.5), EYE)
-    assert persons.ids_with_trait("waving") == frozenset()
-
-
 @pytest.mark.parametrize(
     ("look_at", "says"),
     [("person:wawing", 'persons: "person:nearest", "person:waving", "person:looking", "person:newest"'),
@@ -139,7 +101,7 @@ def test_a_wrong_word_is_refused_with_the_right_ones(
     assert says in str(refused.value)
 
 
-def shares(look_at: str, numbers: tuple[int, int, int], *, waves: bool = True) -> list[float]:
+def shares(look_at: str, numbers: tuple[int, int, int]) -> list[float]:
     """Return how much of the time each of three people is looked at by a rule.
 
     The first is the nearest, the second came last and waves, the third looks at the head.
@@ -150,7 +112,7 @@ def shares(look_at: str, numbers: tuple[int, int, int], *, waves: bool = True) -
         t_s = k / 30
         here = {id: p for id, p in people.items() if p != RIGHT or t_s > 5.0}
         phase = 2 * pi * 1.5 * t_s
-        hand = (1.0, -0.65 + 0.11 * sin(phase), 0.0) if waves else None
+        hand = (1.0, -0.65 + 0.11 * sin(phase), 0.0)
         seen = percept(t_s, here, numbers[2:], hand, 2 * pi * 0.165 * np.cos(phase))
         target = model.choose(seen, looking(), t_s + 0.05)
         if t_s >= 7.0:
@@ -166,10 +128,6 @@ def test_e78_a_rule_finds_its_person_whatever_their_number(
     trait: str, person: int, numbers: tuple[int, int, int]
 ) -> None:
     assert shares(f"person:{trait}", numbers)[person] > 0.9
-
-
-def test_e78_where_nobody_does_it_all_are_looked_at() -> None:
-    assert min(shares("person:waving", (4, 9, 2), waves=False)) > 0.15
 
 
 def test_a_gesture_of_such_a_rule_is_for_the_named_alone() -> None:

@@ -98,7 +98,7 @@ def test_a_name_nobody_brings_is_refused_with_those_there_are(folder):
     install(folder, "p", {CAMERA: {"fish": "fish_eye:Fish"}}, {"fish_eye": "class Fish: pass"})
     with pytest.raises(
         PluginError,
-        match="^no camera is called 'fisch': did you mean 'fish'. there is webcam, oak, fish$",
+        match="^no camera 'fisch'; did you mean 'fish'. available: webcam, oak, fish$",
     ):
         plugins.find(CAMERA, "fisch")
 

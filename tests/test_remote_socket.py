@@ -288,7 +288,7 @@ def line_of(end: socket.socket) -> dict[str, Any]:
         (b'{"do": "get", "prefix": NaN}\n', "not a line of JSON"),
         (b"\xff\xfe\n", "not a line of JSON"),
         (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
-        (b'{"do": "dance"}\n', "unknown request; available: hello, status, "),
+        (b'{"do": "dance"}\n', "no request 'dance'; available: hello, status, "),
         (b'{"do": "save", "path": "my.yaml"}\n', "absolute path"),
         (b'{"do": "tune", "changes": [["a", 1]]}\n', "requests set and say"),
     ],

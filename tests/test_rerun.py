@@ -33,7 +33,7 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.run_info import RunEnd
-from gazerig.robot.recording.run_writer import RunWriter
+from gazerig.robot.recording.writer import RunWriter
 from gazerig.robot.run.assemble import Assembly
 from gazerig.robot.run.resimulate import rerun
 

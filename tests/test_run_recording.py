@@ -4,7 +4,6 @@ import base64
 import json
 import os
 import signal
-import socket
 import subprocess
 import time
 from collections import Counter
@@ -14,7 +13,6 @@ from functools import partial
 from itertools import islice
 from math import inf, nan
 from pathlib import Path
-from random import Random
 from typing import Any
 
 import cv2
@@ -39,11 +37,11 @@ from gazerig.robot.loop.tick import MeasuredJoints, TorqueEnabled
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.robot.model.control_source import ControlState, TrackState
 from gazerig.robot.recording import run_format as fmt
-from gazerig.robot.recording import writer_process as writer
+from gazerig.robot.recording import writer
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import FramePicker, Recorder
 from gazerig.robot.recording.run_info import PROFILE, RunEnd, RunInfo, as_text, read_text
-from gazerig.robot.recording.run_writer import RunWriter
+from gazerig.robot.recording.writer import RunWriter
 from gazerig.robot.run.assemble import Assembly, Substitutes
 
 
@@ -77,7 +75,7 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
         assert summary is not None and summary.statistics is not None
         assert {s.name for s in summary.schemas.values()} >= {
             "foxglove.CompressedImage", "foxglove.FrameTransforms", "foxglove.JointStates",
-            "foxglove.Log", "foxglove.SceneUpdate", "gazerig.Tick",
+            "foxglove.Log", "gazerig.Tick",
         }  # fmt: skip
         assert all(s.encoding == "jsonschema" for s in summary.schemas.values())
         assert all(chunk.compression == "zstd" for chunk in summary.chunk_indexes)
@@ -105,7 +103,7 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
     states = {one["name"]: one["position"] for one in seen[fmt.JOINT_STATES]["joints"]}
     assert tuple(states) == GAZE_JOINTS
     frames = {one["child_frame_id"] for one in seen[fmt.TRANSFORMS]["transforms"]}
-    assert frames == {"head", "left_eye", "right_eye"}
+    assert frames == {"head", "left_eye", "right_eye", "gaze_point"}
 
 
 def sent_to_viewers(recorded: Recorded, topic: str) -> list[tuple[Tick, dict[str, Any]]]:
@@ -135,6 +133,9 @@ def test_a_viewer_sees_head_and_eyes_as_they_stand_in_space(recorded: Recorded) 
             quaternion = [one["rotation"][axis] for axis in "xyzw"]
             ahead[name] = Rotation.from_quat(quaternion).apply((1.0, 0.0, 0.0))
         pose = tick.pose
+        assert vector(frames["gaze_point"]["translation"]) == pytest.approx(
+            tick.gaze.gaze_point_world_m
+        )
         assert ahead["head"] == pytest.approx(np.array(pose.R_world_head)[:, 0])
         for left, name in ((True, "left_eye"), (False, "right_eye")):
             assert ahead[name] == pytest.approx(line_of_sight(pose, left))
@@ -311,8 +312,8 @@ def writing(path: Path) -> tuple[Recorder, Assembly, Any]:
     recorder.open()
     made = assembly(recorder)
     made.robot.start(made.clock)
-    assert recorder._link is not None and recorder._link._process is not None
-    return recorder, made, recorder._link._process
+    assert recorder._link is not None
+    return recorder, made, recorder._link.process
 
 
 def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) -> None:
@@ -332,7 +333,7 @@ def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) ->
 def test_what_the_queue_cannot_hold_is_lost_and_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gazerig.robot.recording.writer_client.QUEUE_BYTES", 150_000)
+    monkeypatch.setattr("gazerig.robot.recording.recorder.QUEUE_BYTES", 150_000)
     path = tmp_path / "lost.mcap"
     recorder, made, process = writing(path)
     process.send_signal(19)
@@ -371,8 +372,8 @@ def rig(path: Path) -> None:
     info = RunInfo("desk", "robot", "a: 1", 0, 1.0 / TICK_S, datetime(2026, 1, 31, tzinfo=UTC))
     recorder = Recorder(path, info)
     recorder.open()
-    assert recorder._link is not None and recorder._link._process is not None
-    print(recorder._link._process.pid, flush=True)
+    assert recorder._link is not None
+    print(recorder._link.process.pid, flush=True)
     made = simulated(substitutes=Substitutes(body=recorder.wrap_body))
     made.robot.start(made.clock)
     wall = RealClock()
@@ -428,27 +429,7 @@ def test_a_killed_rig_leaves_a_recording(tmp_path: Path, both: bool) -> None:
     assert recording.info.rig == "desk" and recording.end.stopped_by == ""
 
 
-# --- The process that writes a recording, piece by piece: parts, the disk, its socket
-
-
-def noise_file(path: Path) -> bytes:
-    """Write a recording of noise; return its bytes."""
-    noise = Random(1)
-    made = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), info_for())
-    for n in range(40):
-        made.add(fmt.DESCRIPTION, 0.1 * n, {"data": noise.randbytes(300).hex()})
-    made.close(RunEnd("seconds"))
-    assert made.failed == ""
-    return path.read_bytes()
-
-
-def test_what_the_system_takes_in_parts_is_written_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    whole, write = noise_file(tmp_path / "whole"), os.write
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "write", lambda fd, data: write(fd, bytes(data[:100])))
-        assert noise_file(tmp_path / "parts") == whole
+# --- The process that writes a recording
 
 
 def test_what_is_written_is_put_on_the_disk_every_second(
@@ -463,26 +444,15 @@ def test_what_is_written_is_put_on_the_disk_every_second(
             yield None
 
     made = RunWriter(os.open(tmp_path / "r", os.O_WRONLY | os.O_CREAT), info_for())
-    ours, theirs = socket.socketpair()
-    with ours, theirs:
-        writer._write(nothing_for(5.05), made, theirs, clock)
+    writer.write(nothing_for(5.05), made, clock)
     made.close(RunEnd())
     assert np.diff([0.0, *at_s]).max() < 1.2 and at_s[-1] > 5.0  # the last one at the end
 
 
-@pytest.fixture
-def line() -> Iterator[tuple[socket.socket, socket.socket]]:
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    ours.setblocking(False)
-    with ours, theirs:
-        yield ours, theirs
-
-
-def test_a_writer_whose_program_has_died_ends_although_a_fork_holds_its_socket(
-    line: tuple[socket.socket, socket.socket],
-) -> None:
-    ours, theirs = line
-    ours.send(writer.LAST + writer.END + b"first")
-    found = list(islice(writer._messages(theirs, os.getpid()), 3))  # our parent is another one
-    assert [(one.kind, one.body) for one in found if one] == [(writer.END, b"first")]
-    assert len(found) == 1
+def test_a_writer_whose_program_has_died_ends_although_a_fork_holds_its_pipe() -> None:
+    theirs, ours = os.pipe()
+    os.write(ours, writer.PREFIX.pack(writer.END, 5, 0) + b"first")
+    found = list(islice(writer.receive(theirs, os.getpid()), 3))  # our parent is another one
+    assert found == [(writer.END, b"first", b"")]
+    os.close(ours)
+    os.close(theirs)

@@ -20,7 +20,6 @@ from gazerig.gaze.scanpath.scanpath import (
     Walk,
     markov_walk,
     normalise,
-    steps_and_dwells,
 )
 from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Target
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
@@ -63,21 +62,6 @@ PERCEPT = Percept(0.0, Bodies(), (FACE,))
 TARGET = Target(FACE.p_world_m, (0, 0, 0), 0.0, "face", 3, 0.5, True, None, 1, "face 3")
 
 
-def test_e37_face_time_share() -> None:
-    walk, dt = walker(2), 0.02
-    time = dict.fromkeys(PARTS, 0.0)
-    for k in range(180_000):
-        part = walk.wander(TARGET, PERCEPT, k * dt, settled=True).part
-        time[present(part)] += dt
-    expected = {
-        "DN": 0.0654, "FL": 0.1146, "LE": 0.0580, "M": 0.1077,
-        "N": 0.2012, "FR": 0.1073, "RE": 0.2892, "UP": 0.0566,
-    }  # fmt: skip
-    total = sum(time.values())
-    for part, share in expected.items():
-        assert time[part] / total == pytest.approx(share, abs=0.03), part
-
-
 def test_e40_dwell_times() -> None:
     walk = markov_walk(PRINTED, WALK, np.random.default_rng(3))
     for part in range(8):
@@ -102,30 +86,11 @@ def test_walk_waits_for_arrival_and_starts_at_the_right_side() -> None:
         assert walk.wander(TARGET, PERCEPT, k * 0.1, settled=False).part == "FR"
 
 
-def test_shift_counts_up_with_every_new_part_only() -> None:
-    walk, last, part = walker(7), None, None
-    for k in range(4000):
-        now = walk.wander(TARGET, PERCEPT, k * 0.01, settled=True)
-        if last is not None:
-            assert now.shift - last == (now.part != part)
-        last, part = now.shift, now.part
-    assert last is not None and last > 60
-
-
 def test_last_known_parts_serve_while_the_face_is_out_of_sight() -> None:
     walk = walker(8)
     seen = walk.wander(TARGET, PERCEPT, 0.0, settled=False)
     unseen = walk.wander(TARGET, Percept(0.1), 0.1, settled=False)
     assert unseen.p_world_m == seen.p_world_m
-
-
-def test_other_targets_pass_through_and_a_new_face_starts_anew() -> None:
-    walk = walker(9)
-    for k in range(300):
-        walk.wander(TARGET, PERCEPT, k * 0.01, settled=True)
-    hand = structs.replace(TARGET, kind="hand", id=9)
-    assert walk.wander(hand, PERCEPT, 3.1, settled=True).part is None
-    assert walk.wander(TARGET, PERCEPT, 3.2, settled=True).part == "FR"
 
 
 def test_wrong_shapes_are_named() -> None:
@@ -247,26 +212,6 @@ def test_a_known_walk_is_recovered(smoothing: str) -> None:
     )
 
 
-def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
-    wanted, held, cells = normalise(WALK.matrix), 0, 0
-    dwells_held = 0
-    for seed in range(18):
-        fitted = fit_walk(walked(600, seed), "none", dice())
-        for row, truth in zip(fitted.matrix, wanted, strict=True):
-            for cell, p in zip(row, truth, strict=True):
-                if p > 0.0:
-                    held += cell.low <= p <= cell.high
-                    cells += 1
-                else:
-                    assert cell.value == 0.0 and cell.low == 0.0 and cell.high > 0.0
-        dwells_held += sum(
-            mean.low <= truth <= mean.high
-            for mean, truth in zip(fitted.dwell_mean_s, WALK.dwell_mean_s, strict=True)
-        )
-    assert 0.90 < held / cells < 0.98
-    assert 0.80 < dwells_held / (18 * 8) < 0.98  # skewed laws: the bootstrap is known to fall short
-
-
 def test_counts_are_of_neighbours_on_the_face_only() -> None:
     looks = [
         look
@@ -289,11 +234,6 @@ def test_counts_are_of_neighbours_on_the_face_only() -> None:
     assert fitted.matrix[0][3].value == pytest.approx(0.125)
     assert "M" in fitted.pooled_parts and "LE" not in fitted.pooled_parts
     assert fitted.dwell_mean_s[PARTS.index("M")].value == pytest.approx(0.2)
-
-
-def test_same_dice_give_the_same_fit() -> None:
-    looks = walked(200)
-    assert fit_walk(looks, "laplace", dice()) == fit_walk(looks, "laplace", dice())
 
 
 def test_what_cannot_be_trusted_is_refused() -> None:
@@ -345,19 +285,6 @@ def face_at(away_m: float, speaks: bool = False) -> Face:
     return Face(3, centre, (0.0, 0.0, 0.0), R, parts, 0.9, speaks=speaks)
 
 
-def test_the_average_observer_looks_at_the_eyes_most() -> None:
-    share = visited(face_at(0.8))
-    assert 0.40 < share["LE"] + share["RE"] < 0.50
-    assert 0.18 < share["N"] < 0.27 and 0.07 < share["M"] < 0.14
-    never = np.array(WALK.matrix) == 0.0
-    assert (np.array(PEOPLE.matrix)[never] == 0.0).all(), "shifts of the paper and no others"
-
-
-def test_speech_draws_looks_to_the_mouth() -> None:
-    quiet, loud = visited(face_at(0.8)), visited(face_at(0.8, speaks=True))
-    assert 1.8 < loud["M"] / quiet["M"] < 3.0
-
-
 def test_a_spot_of_ones_own_draws_looks() -> None:
     high, low = (visited(face_at(0.8), ScanpathParams(spot_height_mm=mm)) for mm in (20.0, -30.0))
     assert high["LE"] + high["RE"] > low["LE"] + low["RE"] + 0.1
@@ -368,18 +295,3 @@ def test_parts_of_a_far_face_that_are_close_together_are_one_look() -> None:
     far = visited(face_at(2.2))
     assert far["M"] < 0.06 < visited(face_at(0.8))["M"], "a degree below the nose"
     assert len({part for part, share in visited(face_at(9.0)).items() if share > 0.0}) == 1
-
-
-def test_rests_of_the_average_observer_are_as_different_as_peoples() -> None:
-    steps, dwells = steps_and_dwells(ScanpathParams(), PEOPLE)
-    share, rng = (
-        np.linalg.matrix_power(0.5 * (steps + np.eye(8)), 4096)[0],
-        np.random.default_rng(3),
-    )
-    parts = rng.choice(8, 20_000, p=share / share.sum())
-    rests = np.array([dwells[part](rng) for part in parts])
-    assert 0.5 < rests.std() / rests.mean() < 0.62
-    assert 0.07 < (rests > 0.5).mean() < 0.14
-    eyes = np.isin(parts, [PEOPLE.order.index(part) for part in ("LE", "RE")])
-    assert 0.003 < (rests[eyes] > 1.0).mean() < 0.04
-    assert 2.0 < 1.0 / (rests.mean() + 0.036) < 3.0

@@ -15,7 +15,6 @@ from gazerig.gaze.scanpath.scanpath import (
     Scanpath,
     ScanpathParams,
     Walk,
-    markov_walk,
     merge_refixations,
     normalise,
     row_sums_note,
@@ -41,9 +40,6 @@ def target_of(face: Face, at_s: float = 0.0) -> Target:
 FACE = face_at((1.0, 0.3, 0.4))
 PERCEPT = Percept(0.0, faces=(FACE,))
 TARGET = target_of(FACE)
-
-
-PRINTED = ScanpathParams(law="literal")
 
 
 def looks_of(params: ScanpathParams, seconds: float, dt: float, seed: int = 1) -> list[Target]:
@@ -72,16 +68,6 @@ def test_e41_simple_model() -> None:
     assert {look.centre_world_m for look in looks} == {FACE.p_world_m}
 
 
-def test_e41_simple_model_waits_for_arrival_and_may_be_slower() -> None:
-    params = ScanpathParams(model="simple", rate_scale=0.5)
-    path = Scanpath(params, WALK, np.random.default_rng(1))
-    for k in range(100):
-        assert path.wander(TARGET, PERCEPT, k * 0.1, settled=False).part == "N"
-    assert path.wander(TARGET, PERCEPT, 10.0, settled=True).part == "N"
-    assert path.wander(TARGET, PERCEPT, 10.91, settled=True).part == "N"
-    assert path.wander(TARGET, PERCEPT, 10.92, settled=True).part == "RE"
-
-
 def test_e42_random_baseline() -> None:
     from scipy import stats
 
@@ -103,21 +89,6 @@ def test_e42_random_baseline() -> None:
     assert {look.part for look in looks} == {None}
     far = norm(sub(FACE.p_world_m, HEAD))
     assert all(norm(point) == pytest.approx(far) for point in points)
-
-
-def test_e42_random_gaze_keeps_its_angles_between_jumps_while_the_face_moves() -> None:
-    path = Scanpath(ScanpathParams(model="random"), WALK, np.random.default_rng(2))
-    seen: dict[int, list[tuple[float, float]]] = {}
-    for k in range(2000):
-        face = face_at((1.0, 0.4 * np.sin(0.01 * k), 0.3))
-        look = path.wander(target_of(face), Percept(0.01 * k, faces=(face,)), 0.01 * k, True, HEAD)
-        R_world_head = rotation((*yaw_pitch(sub(face.p_world_m, HEAD)), 0.0))
-        in_head = yaw_pitch(seen_from(R_world_head, sub(look.p_world_m, HEAD)))
-        seen.setdefault(look.shift, []).append(in_head)
-        assert look.centre_world_m == face.p_world_m
-    assert len(seen) > 8
-    for angles in seen.values():
-        assert np.ptp(angles, axis=0).max() < 1e-9
 
 
 def test_e43_face_tracking_stays_at_the_centre_of_a_moving_face() -> None:
@@ -150,12 +121,6 @@ def test_every_model_passes_other_targets_on_and_gives_the_head_the_centre(model
     assert path.wander(unseen, PERCEPT, 0.2, True, HEAD) == unseen
 
 
-@pytest.mark.parametrize("model", ["markov", "simple", "face_tracking", "random"])
-def test_every_model_repeats_itself_with_the_same_dice(model: Any) -> None:
-    params = ScanpathParams(model=model)
-    assert looks_of(params, 10.0, 0.02, seed=5) == looks_of(params, 10.0, 0.02, seed=5)
-
-
 # ---- readings of the measured walk ----------------------------------------------------
 
 
@@ -166,17 +131,6 @@ def test_whole_visit_merges_refixations() -> None:
     # Proportions between the other parts stay: from N, M to RE as .1 to .3.
     n, m, re = (WALK.order.index(part) for part in ("N", "M", "RE"))
     assert merged[n, re] == pytest.approx(3.0 * merged[n, m])
-
-
-def test_whole_visit_shares_of_steps() -> None:
-    walk = markov_walk(ScanpathParams(), WALK, np.random.default_rng(8))
-    parts = [0]
-    for _ in range(50_000):
-        parts.append(walk.next_part(parts[-1]))
-    assert (np.diff(parts) != 0).all()
-    share = np.bincount(parts, minlength=8) / len(parts)
-    wanted = (0.0727, 0.0648, 0.0912, 0.1119, 0.1896, 0.1019, 0.2748, 0.0931)
-    assert share == pytest.approx(wanted, abs=0.008)
 
 
 def test_a_walk_goes_on_when_its_tempo_is_changed_and_another_model_begins_anew() -> None:
@@ -190,12 +144,6 @@ def test_a_walk_goes_on_when_its_tempo_is_changed_and_another_model_begins_anew(
     path.retune(ScanpathParams(model="simple"), WALK)
     simple = path.wander(TARGET, PERCEPT, 4.0, True, HEAD)
     assert (simple.part, simple.shift) == ("N", before.shift + 1)
-
-
-def test_refixations_give_a_human_rate_of_gaze_shifts() -> None:
-    looks = looks_of(PRINTED, 450.0, 0.003)
-    shifts = sum(a.shift != b.shift for a, b in zip(looks, looks[1:], strict=False)) / 450.0
-    assert shifts == pytest.approx(3.68, abs=0.2)
 
 
 def test_row_sums_are_reported_as_printed() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gazerig.robot.cli.terminal import complete_suggestions, suggest_for_rig
+from gazerig.robot.cli.terminal import clear_errors, complete_suggestions
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")
 
@@ -20,6 +20,6 @@ pytestmark = pytest.mark.usefixtures("simulated_wires")
     ],
 )  # fmt: skip
 def test_a_suggestion_names_rig_and_port(said: str, wanted: str) -> None:
-    with suggest_for_rig("my rig.yaml", "/dev/ttyACM3", mock=False):
+    with clear_errors("my rig.yaml", "/dev/ttyACM3"):
         assert complete_suggestions(said) == wanted == complete_suggestions(wanted)
     assert complete_suggestions(said) == said

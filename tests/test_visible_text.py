@@ -9,7 +9,7 @@ from command_line import typed
 from rich.console import Console as RichConsole
 
 from gazerig.drivers.process.visible_text import VisibleStream, visible
-from gazerig.robot.cli.console import Console
+from gazerig.robot.cli.progress import Console
 from gazerig.robot.cli.terminal import run_app
 
 START = "from gazerig.robot.cli.entry_point import main; main()"

@@ -9,7 +9,7 @@ from expressive_rig import started
 from fakes.runs import ticks
 from typer.testing import CliRunner
 
-from gazerig.robot.cli.tune import app
+from gazerig.robot.cli.ctl import app
 from gazerig.robot.loop.command_handler import CommandHandler
 from gazerig.robot.loop.track_choices import TrackInfo
 from gazerig.robot.model.commands import Command

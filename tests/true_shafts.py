@@ -6,23 +6,18 @@ current loop, and the millisecond at which a goal arrives, are below that and no
 Hobby servos hear a pulse every 20 ms and are emulated in steps of 10: there it is 20 and 20 ms.
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-import gazerig.robot.run.assemble as assembling
-import gazerig.robot.run.run_bus as run_bus
 from gazerig.config.schema import Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.robot.loop.body import Body
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.types import JointAngles
-from gazerig.robot.run.assemble import Assembly, assemble
 from gazerig.robot.run.bus_wiring import rig_bus
-from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_description import sag_compensation
 from gazerig.robot.run.rig_limits import limits, park_rad
 from gazerig.robot.run.run_bus import emulated_lines, servo_index
@@ -35,14 +30,8 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 MS_S = 0.001
 SPEED_MS, ACCEL_MS = 5, 10
 PULSE_MS = 20
-GROUPS = {"eye": "eyes", "lid": "lids", "neck": "neck"}
 STOP_DEG = 4.0
 """Emulated mechanical stops lie so far beyond a joint's range (robot/run/run_bus.py)."""
-
-
-def group_of(joint: str) -> str:
-    """Return the group of a joint: eyes, lids or neck."""
-    return next(group for part, group in GROUPS.items() if part in joint)
 
 
 class Shafts(SimulatedClock):
@@ -139,15 +128,6 @@ class Judge:
             )
             self.worst[name] = self.worst[name].joined(now)
 
-    def by_group(self) -> dict[str, tuple[float, float, float, int]]:
-        """Return beyond_deg, speed / limit, accel / limit and stops, by groups of joints."""
-        found: dict[str, tuple[float, float, float, int]] = {}
-        for i, name in enumerate(self.rig.names):
-            one, before = self.worst[name], found.get(group_of(name), (-180.0, 0.0, 0.0, 0))
-            now = (one.beyond_deg, one.speed_deg_s / self.top[i], one.accel_deg_s2 / self.most[i])
-            found[group_of(name)] = (*map(max, before[:3], now), before[3] + one.stops)
-        return found
-
 
 def fastest(angles: NDArray[np.float64], over_ms: int) -> NDArray[np.float64]:
     """Return the highest speed of each column over n rows, one a millisecond."""
@@ -158,77 +138,6 @@ def hardest(angles: NDArray[np.float64], over_ms: int) -> NDArray[np.float64]:
     """Return the highest change of the mean speed of n rows to the next n."""
     way = angles[2 * over_ms :] - 2.0 * angles[over_ms:-over_ms] + angles[: -2 * over_ms]
     return np.abs(way).max(axis=0) / (over_ms * MS_S) ** 2
-
-
-@contextmanager
-def looked_at(rig: Rig, choice: RunOptions) -> Iterator[tuple[Assembly, Shafts]]:
-    """Assemble a rig whose true shafts are looked at."""
-    shafts = Shafts(rig)
-    was = assembling.SimulatedClock, run_bus.build
-
-    def built(line: object, now_s: Callable[[], float]) -> Device:
-        device = build(line, now_s)  # type: ignore[arg-type]
-        name = next(n for n in lines if n not in shafts.devices and lines[n] == line)
-        shafts.devices[name] = device
-        return device
-
-    lines = emulated_lines(rig)
-    assembling.SimulatedClock, run_bus.build = (lambda: shafts), built  # type: ignore
-    try:
-        made = assemble(rig, choice)
-    finally:
-        assembling.SimulatedClock, run_bus.build = was  # type: ignore[misc]
-    try:
-        yield made, shafts
-    finally:
-        made.close()
-
-
-Late = Callable[[int], int]
-"""Gives, for a tick, how many slots after it are missed."""
-
-
-def on_time(tick: int) -> int:
-    """Miss no slot."""
-    return 0
-
-
-def sometimes_late(seed: int, share: float, longest_slots: int) -> Late:
-    """Return a pattern of missed slots: mostly a few, now and then up to the longest."""
-    rng = np.random.default_rng(seed)
-
-    def late(tick: int) -> int:
-        if rng.random() >= share:
-            return 0
-        return int(np.ceil(longest_slots ** rng.random()))
-
-    return late
-
-
-def run(
-    made: Assembly,
-    shafts: Shafts,
-    judge: Judge,
-    seconds: float,
-    late: Late = on_time,
-    before_tick: Callable[[Assembly, float], None] = lambda made, t_s: None,
-) -> int:
-    """Start a robot and run it; returns the number of ticks."""
-    made.robot.start(shafts)
-    period, t_s = 1.0 / made.loop.rate_hz, shafts.now_s()
-    began_s, slot, ticks = t_s, 0, 0
-    while t_s < began_s + seconds:
-        slot += 1 + late(ticks)
-        last_s = t_s
-        shafts.sleep_until(began_s + slot * period)
-        t_s = shafts.now_s()
-        before_tick(made, t_s)
-        made.robot.tick(t_s, t_s - last_s)
-        ticks += 1
-        if len(shafts.angles_rad) > 4000:
-            judge.take(shafts)
-    judge.take(shafts)
-    return ticks
 
 
 class Bench:

@@ -1,6 +1,6 @@
 """Draw the pictures of docs/start.md: mechanisms with their ids, wiring, and what to measure.
 
-What stands in them is the program's: joints and ids from gazerig.robot.cli.new_rig, whose file a
+What stands in them is the program's: joints and ids from gazerig.robot.cli.new, whose file a
 reader writes with ``gazerig new``.
 """
 
@@ -16,7 +16,7 @@ from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.patches import Arc, Circle, Ellipse, FancyBboxPatch, Rectangle, Wedge  # noqa: E402
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.robot.cli.new_rig import MECHANISMS  # noqa: E402
+from gazerig.robot.cli.new import MECHANISMS  # noqa: E402
 from gazerig.robot.description.parts import EYE_RADIUS  # noqa: E402
 
 HERE = Path(__file__).parent

@@ -46,7 +46,7 @@ def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Impor
         SetupError: the file is invalid or has no animation.
     """
     file = GltfFile(path, data)
-    links = {link.joint.name: link for link in description_of(rig, looks=False).links if link.joint}
+    links = {link.joint.name: link for link in description_of(rig).links if link.joint}
     series: dict[str, Series] = {}
     notes: list[str] = []
     ignored: dict[str, None] = {}

@@ -13,10 +13,9 @@ from gazerig.config.load import shipped_path
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.robot.cli import run_options as options
-from gazerig.robot.cli.browser import is_desktop_here, open_page
-from gazerig.robot.cli.examples import complete_shipped
-from gazerig.robot.cli.progress_bar import progress_bar
+from gazerig.robot.cli.options import complete_shipped, run_option
+from gazerig.robot.cli.progress import progress_bar
+from gazerig.robot.cli.run import is_desktop_here, open_page
 from gazerig.robot.cli.terminal import clear_errors, record_signals, say
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.run.options import parse_camera, parse_host_port
@@ -66,12 +65,12 @@ def run(
     data: Annotated[
         Path | None, typer.Option(help="Folder of the data; default: NAME-data, after the file.")
     ] = None,
-    mock: options.Mock = False,
-    port: options.Port = None,
-    camera: options.Camera = None,
-    oak: options.Oak = False,
-    page: options.Page = "127.0.0.1:8090",
-    no_browser: options.NoBrowser = False,
+    mock: Annotated[bool, run_option("mock")] = False,
+    port: Annotated[str | None, run_option("port")] = None,
+    camera: Annotated[str | None, run_option("camera")] = None,
+    oak: Annotated[bool, run_option("oak")] = False,
+    page: Annotated[str, run_option("page")] = "127.0.0.1:8090",
+    no_browser: Annotated[bool, run_option("no_browser")] = False,
     simulate: Annotated[
         int, typer.Option(metavar="N", min=0, help="Simulate N participants instead; 0: none.")
     ] = 0,
@@ -101,7 +100,7 @@ def run(
             journal = Journal(folder.participant(participant))
             stack.callback(journal.close)
             if shown.on == "film":
-                with progress_bar(remaining=True) as steps:
+                with progress_bar() as steps:
                     made = films(found, folder.path / "films", steps)
             else:
                 seen = parse_camera(camera)

@@ -17,7 +17,7 @@ from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.track.track import POSE_CHANNELS
 from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.gaze.types import Floats
-from gazerig.params import Bounds
+from gazerig.params import Bounds, unknown_text
 
 HOLD_S = 0.5
 """A level that was not set for this time returns to 0, as its program may have ended."""
@@ -106,8 +106,8 @@ class Animation:
         """Raise ValueError for an unknown expression or level; the message lists the known ones."""
         known = self._tables.expressions if kind == "expression" else self._tables.levels
         if name not in known and (kind, name) != ("expression", NEUTRAL):
-            listed = ", ".join(known) or f"none: add a table {kind}s to the rig"
-            raise ValueError(f"no {kind} {name!r}; available: {listed}")
+            remedy = f"none: add a table {kind}s to the rig"
+            raise ValueError(unknown_text(kind, name, known, remedy))
 
     def express(self, name: str, strength: float = 1.0) -> None:
         """Move to an expression, from the next step on.

@@ -11,7 +11,7 @@ import typer
 
 from gazerig.drivers.sound.params import KINDS
 from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
-from gazerig.robot.cli.look_and_stop import PidOption
+from gazerig.robot.cli.options import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import NO_TRACK, Express, Play, Say, SetLevel

@@ -34,10 +34,10 @@ def describe(
     with clear_errors(rig):
         from gazerig.config.schema import load_rig
         from gazerig.robot.description.files import FORMATS, description_files, file_name
-        from gazerig.robot.run.rig_description import description_of, mesh_faults
+        from gazerig.robot.run.rig_description import description_of
         from gazerig.robot.run.servo_drives import servo_drives
 
-        loaded = load_rig(rig, further=[mesh_faults])
+        loaded = load_rig(rig)
         description = description_of(loaded).with_drives(servo_drives(loaded))
         asked = dict(zip(FORMATS, (mjcf, urdf, glb), strict=True))
         wanted = [name for name, one in asked.items() if one] or list(FORMATS)
@@ -52,28 +52,17 @@ def describe(
             make_folder(path)
         for path, data in paths.items():
             write_file(path, data, force)
-        for line in _file_lines(folder, files):
-            say(line)
+        for path in paths:
+            hint = _HINTS.get("scene" if path.stem.startswith("scene") else path.suffix)
+            if hint is not None:
+                say(f"{path}: {hint.format(path)}")
+        say(f"{folder / 'meshes'}: {sum('/' in name for name in files)} files")
 
 
-def _file_lines(folder: Path, files: dict[str, bytes]) -> list[str]:
-    """Return a list of the written files, with a hint how to open each."""
-    lines = []
-    for name, data in files.items():
-        if "/" not in name:
-            hint = _OPENED.get(Path(name).suffix, "")
-            if name.startswith("scene"):
-                hint = f"the same on a table: python -m mujoco.viewer --mjcf={folder / name}"
-            lines.append(f"{folder / name}: {len(data) / 1000:.0f} kB; {hint}")
-    meshes = [data for name, data in files.items() if "/" in name]
-    if meshes:
-        size = sum(map(len, meshes)) / 1e6
-        lines.append(f"{folder / 'meshes'}: {len(meshes)} files, {size:.1f} MB")
-    return lines
-
-
-_OPENED = {
+_HINTS = {
     ".xml": "a separate MuJoCo model, to be added to a world",
+    "scene": "the same on a table: python -m mujoco.viewer --mjcf={}",
     ".urdf": "for RViz, Foxglove and other simulators",
     ".glb": "for browsers and Blender",
 }
+"""How to open each file, by its ending."""

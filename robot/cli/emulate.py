@@ -14,10 +14,10 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
 from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.params import choices_of
-from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.options import RigCommand
 from gazerig.robot.cli.terminal import clear_errors, complete_rig
 from gazerig.robot.run.run_bus import emulated_lines
-from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE, line_of
+from gazerig.sim_mock.device_spec import EXAMPLE, line_of
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.pty.server import ServerSettings, run
@@ -77,18 +77,6 @@ def emulate(
     wire_time: Annotated[
         bool, typer.Option("--wire-time", help="Simulate the time of bytes on the line.")
     ] = False,
-    firmware: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            max=255,
-            help=f"Firmware version of all servos (default {DEFAULT_FIRMWARE}); for STS servos "
-            "the number after 3.",
-        ),
-    ] = None,
-    crc: Annotated[
-        bool, typer.Option("--crc", help="With --maestro: it requires a CRC after every command.")
-    ] = False,
     until_eof: Annotated[
         bool, typer.Option("--until-eof", help="Stop at the end of standard input.")
     ] = False,
@@ -109,12 +97,12 @@ def emulate(
             if maestro not in _CHANNELS:
                 sizes = ", ".join(map(str, _CHANNELS))
                 raise SetupError(f"--maestro {maestro}: a board has {sizes} channels")
-            devices = {"": MaestroLine(maestro, crc)}
+            devices = {"": MaestroLine(maestro)}
         elif pca9685 is not None:
             devices = {"": _parse_boards(pca9685)}
         else:
             devices = emulated_lines(load_rig(rig or ""))
-        devices = {name: _changed(device, firmware, baud) for name, device in devices.items()}
+        devices = {name: _at_rate(device, baud) for name, device in devices.items()}
         several = len(devices) > 1
         if baud is not None and several:
             raise SetupError("--baud: the buses of this rig have their own rates; see its file")
@@ -143,18 +131,15 @@ def _parse_boards(text: str) -> Pca9685Line:
         ) from None
 
 
-def _changed(device: Emulated, firmware: int | None, baud: int | None) -> Emulated:
-    """Return smart servos with another firmware and baud rate; None keeps their own."""
-    if not isinstance(device, DynamixelLine | FeetechLine):
+def _at_rate(device: Emulated, baud: int | None) -> Emulated:
+    """Return smart servos with another baud rate; None keeps their own."""
+    if baud is None or not isinstance(device, DynamixelLine | FeetechLine):
         return device
     known = _BAUDS[device.kind]
-    if baud is not None and baud not in known:
+    if baud not in known:
         rates = ", ".join(map(str, known))
         raise SetupError(f"--baud {baud}: servos of this kind know {rates}")
-    if firmware is not None:
-        servos = tuple(servo._replace(firmware=firmware) for servo in device.servos)
-        device = replace(device, servos=servos)
-    return device if baud is None else replace(device, baud=baud)
+    return replace(device, baud=baud)
 
 
 def _print_answer(line: str) -> None:

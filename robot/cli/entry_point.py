@@ -1,18 +1,9 @@
-"""Entry point of ``gazerig``; commands to a running rig do not load the rest of the program.
-
-Loading all commands takes more than a second, which is too long for ``gazerig stop``.
-"""
+"""Entry point of ``gazerig``: interrupts and standard files, before anything is loaded."""
 
 import os
 import signal
 import sys
-from collections.abc import Mapping, Sequence
 from types import FrameType
-
-QUICK = frozenset(("ctl", "stop"))
-"""The commands of gazerig.robot.cli.tune."""
-_ELSEWHERE = {"--help", "--debug"}
-"""Options that need the whole program."""
 
 
 def main() -> None:
@@ -23,15 +14,9 @@ def main() -> None:
         signal.signal(signal.SIGINT, _exit_interrupted)
     hold_standard_files()
     try:
-        if is_quick(sys.argv[1:], os.environ):
-            from gazerig.robot.cli.terminal import run_app
-            from gazerig.robot.cli.tune import app
+        from gazerig.robot.cli.main import main as run_command_line
 
-            run_app(app, sys.argv[1:], "try with --debug")
-        else:
-            from gazerig.robot.cli.main import main as whole
-
-            whole()
+        run_command_line()
     finally:  # all output is written: an interrupt has no effect any more
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
@@ -58,17 +43,3 @@ def hold_standard_files() -> None:
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, nowhere)
-
-
-def is_quick(arguments: Sequence[str], environ: Mapping[str, str]) -> bool:
-    """Return whether cli/tune.py alone can run the command, or complete it for a shell.
-
-    arguments: arguments after ``gazerig``
-    """
-    if environ.get("_GAZERIG_COMPLETE", "").startswith("complete"):
-        typed = environ.get("COMP_WORDS") or environ.get("_TYPER_COMPLETE_ARGS", "")
-        begun = typed.split()[1:]
-        # While the command's name is being typed, the completion needs the names of all commands.
-        named = len(begun) > 1 or typed.endswith(" ")
-        return named and begun[:1] != [] and begun[0] in QUICK
-    return bool(arguments) and arguments[0] in QUICK and not _ELSEWHERE & set(arguments)

@@ -5,63 +5,36 @@ Only the module of the typed command is imported. Without arguments, next steps 
 
 import logging
 import sys
-from collections import UserDict
-from collections.abc import Iterable, Mapping
-from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 import gazerig
 from gazerig.drivers.plugins import COMMAND, SHIPPED, find
-from gazerig.robot.cli.command_list import (
-    CommandEntry,
-    package_commands,
-    shipped_commands,
-    sort_by_panel,
-)
-from gazerig.robot.cli.examples import add_examples, core_examples
+from gazerig.robot.cli.command_list import Commands
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, clear_errors, run_app
 
-if TYPE_CHECKING:
-    from gazerig.drivers.serial.list_ports import SerialPort
+NEXT_STEPS = """\
+gazerig makes an animatronic head look at people. What next?
 
+Without hardware:
+  gazerig run --mock                    a head looks at a visitor, in your browser
+  gazerig report --scene face-to-face   compare that gaze with people's, in one HTML file
+  gazerig new my.yaml                   your own rig file, from four questions
 
-class CommandsByName(UserDict[str, Any]):
-    """Commands by name, each imported on access.
+With a servo adapter (docs/start.md lists suitable ones):
+  gazerig scan                          which servos answer; changes nothing
+  gazerig check my.yaml                 check your file
+  gazerig doctor my.yaml                check port and servos against it; every fault has a remedy
+  gazerig run my.yaml --oak             go
 
-    data: commands imported so far; for the others only name, summary and panel are known
-    """
+While a rig runs:
+  gazerig ctl get                       all parameters, and which are not saved yet
+  gazerig stop                          torque off immediately
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._imported: set[str] = set()
-        self.entries: dict[str, CommandEntry] = {}
-        self._add(shipped_commands())
-
-    def add_packages(self) -> None:
-        """Add the commands of installed packages; existing names are not replaced."""
-        self._add(package_commands())
-
-    def _add(self, entries: Mapping[str, CommandEntry]) -> None:
-        self.entries = {**entries, **self.entries}
-        for name, entry in entries.items():
-            listed = TyperCommand(name, help=entry.summary, rich_help_panel=entry.panel)
-            self.data.setdefault(name, listed)
-
-    def __getitem__(self, name: str) -> Any:
-        """Return a complete command; raise KeyError if the name is unknown."""
-        if name in self.data and name not in self._imported:
-            app = typer.Typer()
-            app.add_typer(import_module(self.entries[name].module).app)
-            add_examples(app, {**core_examples(), **self.entries[name].examples})
-            command: Any = typer.main.get_group(app).commands[name]
-            command.rich_help_panel = self.entries[name].panel
-            self.data[name] = command
-            self._imported.add(name)
-        return self.data[name]
+All commands: gazerig --help    one of them, with examples: gazerig run --help
+"""
 
 
 class CommandGroup(TyperGroup):
@@ -69,21 +42,24 @@ class CommandGroup(TyperGroup):
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        self.commands = self._every = CommandsByName()
+        self.commands = self._every = Commands()
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands, in the order of the help."""
         self._every.add_packages()
-        return sort_by_panel(self._every.entries)
+        return self._every.names()
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command with the data for a list, None if the name is unknown."""
-        if cmd_name not in self._every.data:
+        if cmd_name not in self._every.entries:
             self._every.add_packages()
-        if cmd_name not in self._every.data and cmd_name in SHIPPED[COMMAND]:
+        entry = self._every.entries.get(cmd_name)
+        if entry is not None:
+            return TyperCommand(cmd_name, help=entry.summary, rich_help_panel=entry.panel)
+        if cmd_name in SHIPPED[COMMAND]:
             with clear_errors():
                 find(COMMAND, cmd_name).load()  # its feature is missing: one line
-        return self._every.data.get(cmd_name)
+        return None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name and the complete command at the start of the arguments, and the rest."""
@@ -119,10 +95,7 @@ def begin(
 ) -> None:
     """Make an animatronic head look at people as people look at each other."""
     if context.invoked_subcommand is None:
-        from gazerig.drivers.serial.list_ports import serial_ports
-        from gazerig.robot.net.client import connect_to_all
-
-        print(next_steps(serial_ports(), rig_files(), bool(connect_to_all())))
+        print(NEXT_STEPS, end="")
 
 
 def main() -> None:
@@ -132,72 +105,3 @@ def main() -> None:
         arguments = [word for word in arguments if word != "--debug"]
         logging.getLogger(DEBUG_LOGGER).setLevel(logging.DEBUG)
     run_app(app, arguments, "repeat it with --debug and report the output")
-
-
-def rig_files() -> list[Path]:
-    """Return the YAML files of this folder that look like rigs."""
-    return [path for path in Path(".").glob("*.yaml") if _looks_like_a_rig(path)]
-
-
-def _looks_like_a_rig(path: Path) -> bool:
-    from gazerig.drivers.files.file_input import read_limited
-
-    try:
-        return b"joints:" in read_limited(path, 1_000_000)
-    except OSError:
-        return False
-
-
-_BEGIN = (
-    ("gazerig run --mock", "see a head look at a visitor in your browser; no hardware needed"),
-    ("gazerig report --scene face-to-face", "compare that gaze with people's, in one HTML file"),
-    ("gazerig new my.yaml", "your own rig file, from four questions"),
-)
-
-
-def next_steps(ports: "Iterable[SerialPort]", rigs: Iterable[Path], running: bool) -> str:
-    """Return the useful next steps, as lines.
-
-    ports: serial ports of this computer; rigs: rig files in this folder
-    running: whether a rig is running on this computer
-    """
-    usb = [port for port in ports if port.usb]
-    own = next(iter(sorted(rigs)), None)
-    lines = ["gazerig makes an animatronic head look at people. What next?", ""]
-    if running:
-        lines += _block(
-            "A rig is running here:",
-            (
-                ("gazerig ctl get", "all parameters, and which are not saved yet"),
-                ("gazerig ctl set gaze.blink... VALUE", "change one; gazerig ctl save saves it"),
-                ("gazerig stop", "torque off immediately"),
-            ),
-        )
-    lines += _block("Without hardware:", _BEGIN)
-    if usb and own is None:
-        lines += _block(
-            f"A servo adapter is plugged in ({usb[0].by_id or usb[0].device}):",
-            ((f"gazerig scan --port {usb[0].device}", "which servos answer; changes nothing"),),
-        )
-    elif own is not None:
-        lines += _block(
-            f"With your rig {own}:",
-            (
-                (f"gazerig check {own}", "check the file"),
-                (
-                    f"gazerig doctor {own}",
-                    "check port and servos against it; every fault has a remedy",
-                ),
-                (f"gazerig run {own} --oak", "go"),
-            ),
-        )
-    else:
-        lines += ["No USB serial adapter is plugged in; docs/start.md lists suitable ones.", ""]
-    lines.append("All commands: gazerig --help    one of them, with examples: gazerig run --help")
-    return "\n".join(lines)
-
-
-def _block(title: str, commands: Iterable[tuple[str, str]]) -> list[str]:
-    rows = tuple(commands)
-    width = max(len(command) for command, _ in rows)
-    return [title, *(f"  {command:{width}}  {what}" for command, what in rows), ""]

@@ -1,6 +1,5 @@
 """Commands under models: a list of model files, and their download."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +9,8 @@ from rich.table import Table
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.vision.model_download import fetch
 from gazerig.drivers.vision.model_files import MODEL_FILES, models_folder
-from gazerig.robot.cli.console import Console
-from gazerig.robot.cli.progress_bar import progress_bar
+from gazerig.params import unknown_text
+from gazerig.robot.cli.progress import Console, progress_bar
 from gazerig.robot.cli.terminal import clear_errors
 
 app = typer.Typer()
@@ -26,14 +25,9 @@ _NAMES = list(dict.fromkeys(file.name for file in MODEL_FILES))
 
 
 @models.command("list")
-def list_models(
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-) -> None:
+def list_models() -> None:
     """List model files: what each is for, its licence, and whether it is here."""
     rows = [file._asdict() | {"state": file.state()} for file in MODEL_FILES]
-    if as_json:
-        print(json.dumps({"folder": str(models_folder()), "models": rows}))
-        return
     table = Table("name", "file", "purpose", "licence", "MB", "state")
     for row in rows:
         size = f"{row['size_bytes'] / 1e6:.1f}"
@@ -64,10 +58,10 @@ def fetch_models(
     """Download model files, verify them and put them into the folder of models."""
     with clear_errors():
         if unknown := sorted({*(names or ())} - {*_NAMES}):
-            raise SetupError(f"unknown model {unknown[0]!r}; available: {', '.join(_NAMES)}")
+            raise SetupError(unknown_text("model", unknown[0], _NAMES))
         wanted = [file for file in MODEL_FILES if not names or file.name in names]
         failed = []
-        with progress_bar(remaining=True) as progress:
+        with progress_bar() as progress:
             for address in dict.fromkeys(file.address for file in wanted):
                 some = [file for file in wanted if file.address == address]
                 try:

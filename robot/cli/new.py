@@ -1,33 +1,115 @@
-"""Command new: a new rig from a few answers."""
+"""Command new: a new rig's file from a few answers, the shortest working one."""
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
-from typing import Annotated
+from typing import Annotated, Literal, NamedTuple
 
+import msgspec
 import typer
+from msgspec import Struct
 
 from gazerig.config.faults import ConfigError
+from gazerig.config.save_text import format_value
 from gazerig.drivers.errors import SetupError, install_command
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.cli.new_rig import (
-    BOARDS,
-    CAMERAS,
-    MECHANISMS,
-    NewRig,
-    joints_of,
-    rig_text,
-    usual_port,
-)
-from gazerig.robot.cli.terminal import ForceOption, clear_errors, finish_lines, say
+from gazerig.robot.cli.check import good_text
+from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
 
 app = typer.Typer()
 
 _EYES_MM = 62.0
 _BOARD, _JOINTS, _CAMERA = "none", "eyes-lids", "webcam"
 """Defaults if there is no option and nobody can be asked."""
+
+
+class _Drive(Struct, frozen=True):
+    """Servo of a joint, as parts of the joint's line."""
+
+    model: str
+    limits: str
+    more: str
+
+
+class _Board(Struct, frozen=True):
+    """Board of servos.
+
+    port: its usual port; first_id: usual first id of its servos; tilt_deg: limit of an eye's tilt
+    eye, lid, neck: drives of the joints; gaze: settings for servos slower than the fastest ones
+    """
+
+    summary: str
+    port: str
+    kind: str
+    first_id: int
+    id_comment: str
+    tilt_deg: int
+    eye: _Drive
+    lid: _Drive
+    neck: _Drive
+    gaze: tuple[str, ...]
+
+
+class Mechanism(Struct, frozen=True):
+    """A common mechanism: its description, and its joints, one servo each."""
+
+    summary: str
+    joints: tuple[str, ...]
+
+
+class _Joint(Struct, frozen=True):
+    """Usual joint: its drive and range; of a lid also the angles shut and open.
+
+    mirrored: whether its servo is mounted mirrored to that on the left
+    """
+
+    drive: Literal["eye", "lid", "neck"] = "neck"
+    low_deg: int = -30
+    high_deg: int = 30
+    ends_deg: tuple[int, int] = (0, 0)
+    mirrored: bool = False
+
+
+class _Tables(Struct, frozen=True):
+    boards: dict[str, _Board]
+    cameras: dict[str, str]
+    mechanisms: dict[str, Mechanism]
+    joints: dict[str, _Joint]
+
+
+_TABLES = msgspec.json.decode(Path(__file__).with_name("new_rigs.json").read_bytes(), type=_Tables)
+BOARDS = {name: board.summary for name, board in _TABLES.boards.items()}
+"""Boards of servos, with their descriptions."""
+CAMERAS = _TABLES.cameras
+"""Cameras, with their descriptions."""
+MECHANISMS = _TABLES.mechanisms
+"""Mechanisms by the name for ``gazerig new --joints``, which also accepts names of joints."""
+_NECKLESS_GAZE = "idle: {reach_deg: 28}"
+"""Idle gaze without a neck goes no farther than the eyes alone can turn."""
+
+
+class NewRig(NamedTuple):
+    """The rig to write.
+
+    board, camera: keys of BOARDS and CAMERAS
+    joints: names, in the order of their ids
+    eyes_mm: distance between the eye centres
+    port: serial port or I2C bus; empty: the usual one of the board
+    """
+
+    name: str
+    board: str
+    joints: tuple[str, ...]
+    camera: str
+    eyes_mm: float = 62.0
+    port: str = ""
+
+    @property
+    def has_neck(self) -> bool:
+        """Return whether a neck turns the head."""
+        return any(name.startswith("neck_") for name in self.joints)
 
 
 @app.command()
@@ -52,9 +134,7 @@ def new(
         float | None,
         typer.Option(min=10, max=500, help=f"Distance between the eye centres: {_EYES_MM:g}."),
     ] = None,
-    port: Annotated[
-        str | None, typer.Option(help="Port of the board; default: the adaptor plugged in.")
-    ] = None,
+    port: Annotated[str, typer.Option(help="Port of the board; default: its usual one.")] = "",
     force: ForceOption = False,
 ) -> None:
     """Write a new rig's YAML from a few answers, check it, and print the next command."""
@@ -62,27 +142,22 @@ def new(
         if file.suffix not in (".yaml", ".yml"):
             raise SetupError(f"{file}: a rig's file ends in .yaml: gazerig new {file.stem}.yaml")
         refuse_existing(file, force=force)
-        asked = Questions(sys.stdin.isatty())
-        chosen = asked.ask_choice("Which board drives the servos?", "board", board, BOARDS, _BOARD)
         mechanisms = {name: one.summary for name, one in MECHANISMS.items()}
-        wanted = asked.ask_choice(
+        chosen = _choose("Which board drives the servos?", "board", board, BOARDS, _BOARD)
+        wanted = _choose(
             "Which joints do the servos move? (a mechanism, or names of joints: eyes_pan,eyes_tilt,jaw)",
             "joints", joints, mechanisms, _JOINTS, others=True,
         )  # fmt: skip
-        seen = asked.ask_choice(
-            "Which camera does the head use?", "camera", camera, CAMERAS, _CAMERA
-        )
-        distance = asked.ask_number(
-            "What is the distance between the eyes, in mm?", "eyes-mm", eyes_mm, _EYES_MM
-        )
-        rig = NewRig(
-            file.stem, chosen, joints_of(wanted), seen, distance, port or _plugged_in(chosen)
-        )
-        from gazerig.robot.cli.rig_check import check_line
+        seen = _choose("Which camera does the head use?", "camera", camera, CAMERAS, _CAMERA)
+        if eyes_mm is None and sys.stdin.isatty():
+            question = "What is the distance between the eyes, in mm?"
+            eyes_mm = typer.prompt(question, f"{_EYES_MM:g}", value_proc=_read_length, err=True)
+        rig = NewRig(file.stem, chosen, joints_of(wanted), seen, eyes_mm or _EYES_MM, port)
+        from gazerig.config.schema import load_rig
 
         write_file(file, rig_text(rig), force)
         try:
-            say(check_line(str(file)))
+            say(good_text(str(file), load_rig(str(file))))
         except ConfigError:  # an invalid file is deleted
             file.unlink()
             raise
@@ -90,70 +165,51 @@ def new(
             print(line)
 
 
-class Questions:
-    """Questions on the terminal for missing options; without a terminal, defaults are used.
+def _choose(
+    question: str, option: str, given: str | None, choices: Mapping[str, str], usual: str,
+    others: bool = False,
+) -> str:  # fmt: skip
+    """Return a choice: the value of an option, an answer by name or number, or the default.
 
-    terminal: whether a person can answer
+    Args:
+        question: Its text.
+        option: The option that answers it.
+        given: The value of that option.
+        choices: Choices with their descriptions.
+        usual: Default, chosen with Enter and if nobody can answer.
+        others: Whether names of joints are valid too.
+
+    Raises:
+        SetupError: the option's value is invalid, or there is no answer.
     """
-
-    def __init__(self, terminal: bool) -> None:
-        self._terminal = terminal
-
-    def ask_choice(
-        self, question: str, option: str, given: str | None, choices: Mapping[str, str],
-        usual: str, others: bool = False,
-    ) -> str:  # fmt: skip
-        """Return a choice, given by its name or its number.
-
-        Args:
-            question: Its text.
-            option: The option that answers it.
-            given: The value of that option.
-            choices: Choices with their descriptions.
-            usual: Default, chosen with Enter.
-            others: Whether other answers are valid too.
-
-        Raises:
-            SetupError: the option's value is invalid, or there is no answer.
-        """
-        names = list(choices)
-        if given is not None:
-            if given in choices or (others and given):
-                return given
+    names = list(choices)
+    if given is not None:
+        if given not in choices and not (others and given):
             raise SetupError(f"--{option} {given}: expected {', '.join(names)}")
-        if not self._terminal:
-            say(f"{option}: {usual} ({choices[usual]}); choices for --{option}: {', '.join(names)}")
-            return usual
-        say(question)
-        for number, (name, what) in enumerate(choices.items(), 1):
-            say(f"  {number}  {name:10} {what}")
-        while True:
-            answer = _missing_answer(f"1 to {len(names)}", str(names.index(usual) + 1), option)
-            if answer.isdecimal() and 0 < int(answer) <= len(names):
-                return names[int(answer) - 1]
-            if answer in choices or (others and "_" in answer):
-                return answer
-            say(f"{answer!r} is not a choice: give a number from 1 to {len(names)}, or a name")
+        return given
+    if not sys.stdin.isatty():
+        say(f"{option}: {usual} ({choices[usual]}); choices for --{option}: {', '.join(names)}")
+        return usual
 
-    def ask_number(self, question: str, option: str, given: float | None, usual: float) -> float:
-        """Return a length in mm.
+    def read(answer: str) -> str:
+        if answer.isdecimal() and 0 < int(answer) <= len(names):
+            return names[int(answer) - 1]
+        if answer in choices or (others and "_" in answer):
+            return answer
+        raise typer.BadParameter(f"{answer!r} is not a choice: give a number or a name")
 
-        Raises:
-            SetupError: there is no answer.
-        """
-        if given is not None:
-            return given
-        if not self._terminal:
-            return usual
-        say(question)
-        while True:
-            answer = _missing_answer("10 to 500", f"{usual:g}", option)
-            try:
-                if 10.0 <= (value := float(answer)) <= 500.0:
-                    return value
-            except ValueError:
-                pass
-            say(f"{answer!r} is not a length from 10 to 500 mm")
+    lines = (f"  {number}  {name:10} {choices[name]}" for number, name in enumerate(names, 1))
+    text = "\n".join((question, *lines, "choice"))
+    return str(typer.prompt(text, str(names.index(usual) + 1), value_proc=read, err=True))
+
+
+def _read_length(answer: str) -> float:
+    try:
+        if 10.0 <= (value := float(answer)) <= 500.0:
+            return value
+    except ValueError:
+        pass
+    raise typer.BadParameter(f"{answer!r} is not a length from 10 to 500 mm")
 
 
 def next_steps(rig: NewRig, file: str) -> Iterable[str]:
@@ -176,19 +232,71 @@ def next_steps(rig: NewRig, file: str) -> Iterable[str]:
         yield f"an OAK-D needs one more package: {install_command('oak')}"
 
 
-def _plugged_in(board: str) -> str:
-    """Return the port of the only USB serial adaptor if the board uses one, otherwise ""."""
-    if not usual_port(board).startswith("/dev/tty") or board == "none":
-        return ""
-    from gazerig.drivers.serial.list_ports import serial_ports
+def rig_text(new: NewRig) -> str:
+    """Return the YAML of a rig.
 
-    usb = [port for port in serial_ports() if port.usb]
-    return (usb[0].by_id or usb[0].device) if len(usb) == 1 else ""
+    Raises:
+        KeyError: there is no such board or camera.
+    """
+    return "".join(f"{line}\n" for line in _lines(new, _TABLES.boards[new.board]))
 
 
-def _missing_answer(what: str, usual: str, option: str) -> str:
-    finish_lines()
-    try:
-        return input(f"{what} [{usual}]: ").strip() or usual
-    except EOFError:
-        raise SetupError(f"no answer: use the option --{option}") from None
+def joints_of(text: str) -> tuple[str, ...]:
+    """Return the joints of a mechanism's name, or of joint names separated by commas."""
+    if text in MECHANISMS:
+        return MECHANISMS[text].joints
+    return tuple(name for word in text.split(",") if (name := word.strip()))
+
+
+def _lines(new: NewRig, board: _Board) -> Iterator[str]:
+    usual = {name: _TABLES.joints.get(name, _Joint()) for name in new.joints}
+    there = "no board yet: only with --mock" if new.board == "none" else "`gazerig scan` lists it"
+    yield f"# A head of {len(new.joints)} servos. The shipped rig desk.yaml explains the keys."
+    yield f"name: {format_value(new.name)}"
+    yield "profile: robot"
+    port = format_value(new.port or board.port)
+    yield f"bus: {{kind: {board.kind}, port: {port}}}  # port: {there}"
+    yield "# Measure in mm: the eyes' centres ahead of and above the neck's pitch axis (or the table)."
+    height, ahead, above = (70, 38, 55) if new.has_neck else (0, 0, 90)
+    yield "geometry:"
+    yield (
+        f"  {{pitch_axis_height_mm: {height}, eyes_ahead_mm: {ahead}, eyes_above_mm: {above}, "
+        f"interocular_mm: {new.eyes_mm:g}}}"
+    )
+    yield f"joints:  # id: {board.id_comment}; `gazerig calibrate` measures zero, sign and range of each"
+    for number, (name, joint) in enumerate(usual.items(), board.first_id):
+        drive: _Drive = getattr(board, joint.drive)
+        low, high = joint.low_deg, joint.high_deg
+        if name.endswith("_tilt"):
+            low, high = -board.tilt_deg, board.tilt_deg
+        sign = "sign: -1, " if joint.mirrored else ""
+        yield (
+            f"  {name}: {{id: {number}, model: {drive.model}, min_deg: {low}, max_deg: {high}, "
+            f"{drive.limits}, {sign}{drive.more}}}"
+        )
+    lids = {name: joint.ends_deg for name, joint in usual.items() if joint.drive == "lid"}
+    if lids:
+        yield "lid_joints:  # each lid shut and fully open"
+        for name, (shut, wide) in lids.items():
+            yield f"  {name.removesuffix('_lid').removesuffix('_upper')}_deg: [{shut}, {wide}]"
+    park = ["neck_pitch: -12"] if "neck_pitch" in usual else []
+    park += [f"{name}: {shut}" for name, (shut, _) in lids.items()]
+    if park:
+        yield f"park_deg: {{{', '.join(park)}}}"
+    yield from _camera_lines(new)
+    gaze = [*board.gaze, *([] if "neck_yaw" in usual else [_NECKLESS_GAZE])]
+    if gaze:
+        yield "gaze:  # differences from a head with a neck and fast servos"
+        yield from (f"  {line}" for line in gaze)
+
+
+def _camera_lines(new: NewRig) -> Iterator[str]:
+    """Return the mount of the camera: on the head if a neck turns it, otherwise next to it."""
+    if new.camera == "none":
+        return
+    mount, place, origin = "base", "[10, 0, 140]", "the point on the table below the eyes"
+    if new.has_neck:
+        mount, place, origin = "head", "[20, 0, 45]", "the point between the eyes"
+    field = 69 if new.camera == "oak" else 60
+    yield f"# position_mm: the lens ahead, left and above of {origin}."
+    yield f"camera: {{mount: {mount}, position_mm: {place}, horizontal_field_deg: {field}}}"

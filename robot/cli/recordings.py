@@ -1,28 +1,19 @@
 """Commands rerun and export, for recorded runs."""
 
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.progress import Progress
 from rich.table import Table
 
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.robot.cli.console import Console
-from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.terminal import (
-    FAULT,
-    ForceOption,
-    clear_errors,
-    complete_rig,
-    say,
-)
+from gazerig.robot.cli.options import RigCommand
+from gazerig.robot.cli.progress import Console, progress_bar
+from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, complete_rig, say
 
 if TYPE_CHECKING:
-    from gazerig.robot.loop.loop import Tick
+    from gazerig.robot.loop.tick import Tick
     from gazerig.robot.run.resimulate import Resimulation
 
 app = typer.Typer(add_completion=False)
@@ -30,6 +21,7 @@ app = typer.Typer(add_completion=False)
 Recording = Annotated[
     Path, typer.Argument(metavar="FILE", help="A recording of gazerig run --record.")
 ]
+_EVENTS = ("saccade", "fixation", "pursuit", "blink")
 
 
 @app.command(cls=RigCommand)
@@ -48,8 +40,25 @@ def rerun(
 ) -> None:
     """Run a recording's input through the present models: same input, same bytes."""
     with clear_errors():
-        well = _rerun(file, rig, character, joints)
-    if not well:
+        from gazerig.robot.recording.read import RunRecording, report_bad_contents
+        from gazerig.robot.run import resimulate
+
+        recording = RunRecording(file)
+        with report_bad_contents(file), progress_bar() as tell:
+            on_tick = _progress(tell, "running again", recording.duration_s)
+            result = resimulate.rerun(
+                recording, rig=rig, character=character, joints=joints, on_tick=on_tick
+            )
+        for line in result.notes:
+            say(line)
+        say(agreement_text(result))
+        table = Table("", "recorded", "run again", title=f"{file.name} run again")
+        for name, was, now in compare_figures(result.recorded_figures, result.rerun_figures):
+            table.add_row(name, was, now, style=None if was == now else "bold")
+        Console().print(table)
+    # Results must be identical only if joints are replayed and nothing else has changed.
+    is_changed = rig is not None or character is not None or result.joints != "recorded"
+    if not (result.is_same or is_changed):
         raise typer.Exit(FAULT)
 
 
@@ -73,57 +82,21 @@ def export(
         recording = RunRecording(file)
         stem = out or file.with_suffix("")
         refuse_existing(*csv_files(stem), force=force)
-        _warn(recording.note)
-        with report_bad_contents(file):
-            with _progress("reading", recording.duration_s) as read:
-                trace = collect_gaze_angles(_with_progress(recording.ticks(), read))
+        if recording.note:
+            say(recording.note)
+        with report_bad_contents(file), progress_bar() as tell:
+            on_tick = _progress(tell, "reading", recording.duration_s)
+            trace = collect_gaze_angles(_watch(recording.ticks(), on_tick))
             labels = label_samples(trace)
             stretches = find_intervals(trace, labels)
         say("\n".join(map(str, write_csv(trace, labels, stretches, stem, force))))
-        found = {kind: sum(s.event == kind for s in stretches) for kind in _EVENTS}
+        counts = (f"{sum(s.event == kind for s in stretches)} {kind}s" for kind in _EVENTS)
         say(
-            f"{len(trace.time_s)} samples in {trace.time_s[-1]:.1f} s, "
-            + ", ".join(f"{n} {kind}s" for kind, n in found.items())
-            + f"; labels are the plan's, {1e3 * labels.lag_s:.0f} ms later, as the eyes follow it"
+            f"{len(trace.time_s)} samples in {trace.time_s[-1]:.1f} s, {', '.join(counts)}; labels "
+            f"are the plan's, {1e3 * labels.lag_s:.0f} ms later, as the eyes follow it"
         )
         if trace.estimated:
             say(f"{', '.join(trace.estimated)}: {ESTIMATED}")
-
-
-_EVENTS = ("saccade", "fixation", "pursuit", "blink")
-
-
-def _rerun(file: Path, rig: str | None, character: str | None, joints: str | None) -> bool:
-    """Run a recording again and print the result; return False if it differs unexpectedly.
-
-    Results must be identical only if joints are replayed and nothing else has changed.
-    """
-    from gazerig.robot.recording.read import RunRecording, report_bad_contents
-    from gazerig.robot.run import resimulate
-
-    recording = RunRecording(file)
-    with report_bad_contents(file), _progress("running again", recording.duration_s) as read:
-        count, start_s = 0, 0.0
-
-        def on_tick(tick: "Tick") -> None:
-            nonlocal count, start_s
-            start_s = tick.t_s if count == 0 else start_s
-            count += 1
-            if count % 100 == 0:
-                read(tick.t_s - start_s)
-
-        result = resimulate.rerun(
-            recording, rig=rig, character=character, joints=joints, on_tick=on_tick
-        )
-    for line in result.notes:
-        say(line)
-    say(agreement_text(result))
-    table = Table("", "recorded", "run again", title=f"{file.name} run again")
-    for name, was, now in compare_figures(result.recorded_figures, result.rerun_figures):
-        table.add_row(name, was, now, style=None if was == now else "bold")
-    Console().print(table)
-    changed = rig is not None or character is not None
-    return result.is_same or result.joints != "recorded" or changed
 
 
 def agreement_text(result: "Resimulation") -> str:
@@ -141,45 +114,43 @@ def agreement_text(result: "Resimulation") -> str:
 
 
 def compare_figures(
-    was: Mapping[str, object], now: Mapping[str, object], within: str = ""
+    was: Mapping[str, object], now: Mapping[str, object]
 ) -> Iterator[tuple[str, str, str]]:
     """Return the figures of two runs side by side: name and both values as text."""
-    for name in dict.fromkeys((*was, *now)):
-        one, other = was.get(name), now.get(name)
-        if isinstance(one, Mapping) or isinstance(other, Mapping):
-            inner = [value if isinstance(value, Mapping) else {} for value in (one, other)]
-            yield from compare_figures(inner[0], inner[1], f"{within}{name} ".replace("_", " "))
-        else:
-            yield f"{within}{name}".replace("_", " "), _value_text(one), _value_text(other)
+    both = _flat_figures(was), _flat_figures(now)
+    for name in both[0] | both[1]:
+        yield name, both[0].get(name, "-"), both[1].get(name, "-")
 
 
-def _warn(note: str) -> None:
-    if note:
-        say(note)
+def _flat_figures(figures: Mapping[str, object], within: str = "") -> dict[str, str]:
+    """Return figures and figures of figures by name as text."""
+    found: dict[str, str] = {}
+    for key, value in figures.items():
+        name = within + key.replace("_", " ")
+        if isinstance(value, Mapping):
+            found |= _flat_figures(value, f"{name} ")
+        elif isinstance(value, list | tuple):
+            found[name] = f"{len(value)} of them"
+        elif value is not None:
+            found[name] = f"{value:.4g}" if isinstance(value, float) else str(value)
+    return found
 
 
-def _value_text(value: object) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, list | tuple):
-        return f"{len(value)} of them"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def _progress(
+    tell: Callable[[str, float], None], text: str, total_s: float
+) -> Callable[["Tick"], None]:
+    """Return a function that shows the progress of a run's ticks."""
+    start_s: list[float] = []
+
+    def on_tick(tick: "Tick") -> None:
+        if not start_s:
+            start_s.append(tick.t_s)
+        tell(text, min(1.0, (tick.t_s - start_s[0]) / total_s) if total_s else 1.0)
+
+    return on_tick
 
 
-def _with_progress(ticks: Iterable["Tick"], read: Callable[[float], None]) -> Iterator["Tick"]:
-    """Yield ticks and show the progress."""
-    start_s = None
-    for number, tick in enumerate(ticks):
-        start_s = tick.t_s if start_s is None else start_s
-        if number % 100 == 0:
-            read(tick.t_s - start_s)
+def _watch(ticks: Iterable["Tick"], on_tick: Callable[["Tick"], None]) -> Iterator["Tick"]:
+    for tick in ticks:
+        on_tick(tick)
         yield tick
-
-
-@contextmanager
-def _progress(text: str, total_s: float) -> Iterator[Callable[[float], None]]:
-    """Draw a progress bar on a terminal; elsewhere nothing."""
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
-        task = bar.add_task(text, total=total_s)
-        yield lambda at_s: bar.update(task, completed=at_s)

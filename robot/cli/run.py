@@ -1,21 +1,21 @@
 """The command run."""
 
+import contextlib
 import json
+import os
 import sys
+import threading
+import webbrowser
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.cli import run_options as options
-from gazerig.robot.cli.browser import is_desktop_here, open_page
-from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.options import RigCommand, add_run_options
 from gazerig.robot.cli.terminal import (
     FAULT,
-    RigArgument,
     clear_errors,
     exit_on_signals,
     record_signals,
@@ -27,70 +27,33 @@ from gazerig.robot.loop.joint_faults import fault_text
 from gazerig.robot.run.computer import level_text
 from gazerig.robot.run.options import RunOptions, parse_camera
 
-if TYPE_CHECKING:
-    pass
-
 app = typer.Typer()
+DEFAULT_PAGE = "127.0.0.1:8080"
 
 
 @app.command(cls=RigCommand)
-def run(
-    rig: RigArgument = "desk",
-    name: options.Name = None,
-    mock: options.Mock = False,
-    port: options.Port = None,
-    scene: options.Scene = None,
-    world: options.World = None,
-    no_pictures: options.NoPictures = False,
-    video: options.Video = None,
-    camera: options.Camera = None,
-    oak: options.Oak = False,
-    replay: options.Replay = None,
-    record_camera: options.RecordCamera = None,
-    pixels: options.Pixels = False,
-    seconds: options.Seconds = None,
-    seed: options.Seed = 0,
-    fast: options.Fast = False,
-    bus: options.Bus = None,
-    rate: options.Rate = None,
-    computer: options.Computer = None,
-    profile: options.Profile = None,
-    character: options.Character = None,
-    rules: options.Rules = None,
-    behaviour: options.Behaviour = None,
-    conversation: options.Conversation = None,
-    scanpath: options.Scanpath = None,
-    saccade: options.Saccade = None,
-    page: options.Page = "127.0.0.1:8080",
-    no_page: options.NoPage = False,
-    token_file: options.TokenFile = None,
-    no_browser: options.NoBrowser = False,
-    verbose: options.Verbose = False,
-    record: options.Record = None,
-    record_pictures: options.RecordPictures = 2.0,
-    force: options.Force = False,
-    recover: options.Recover = False,
-    summary: options.Summary = None,
-) -> None:
+@add_run_options
+def run(**given: Any) -> None:
     """Run the head: gazerig run --mock, then open the page at the printed address."""
-    asked = RunOptions(**locals())  # every option is a field of the same name
-    asked = replace(asked, camera=parse_camera(camera))
-    with clear_errors(rig, port, mock):
-        if port is not None and not mock:
+    given["page"] = given["page"] or DEFAULT_PAGE
+    asked = RunOptions(**{**given, "camera": parse_camera(given["camera"])})
+    port, summary = asked.port, asked.summary
+    with clear_errors(asked.rig, port, asked.mock):
+        if port is not None and not asked.mock:
             from gazerig.drivers.serial.list_ports import check_exists
 
             for one in port.split(","):
                 check_exists(one.rpartition("=")[2])
         asked = asked.check_and_complete()
-        refuse_existing(*asked.output_files, force=force)
-        shows = status if not fast and sys.stderr.isatty() else None
+        refuse_existing(*asked.output_files, force=asked.force)
+        shows = status if not asked.fast and sys.stderr.isatty() else None
         if shows is not None:
             shows("loading: a few seconds ...")
         # Vision and emulator are large; `check` and `--help` do not import them.
         from gazerig.robot.run import session
 
-        browse = open_page if not no_browser and is_desktop_here() else None
-        opening = StartLine("" if fast else start_text(asked))
+        browse = open_page if not asked.no_browser and is_desktop_here() else None
+        opening = StartLine("" if asked.fast else start_text(asked))
         with exit_on_signals():
             composed = session.compose(asked)
         with record_signals() as stopped:
@@ -103,7 +66,7 @@ def run(
             if summary == "-":
                 print(text, end="")
             else:
-                write_file(Path(summary), text, force)
+                write_file(Path(summary), text, asked.force)
     if report_faults(figures, say) or "not_written" in figures:
         raise typer.Exit(FAULT)
 
@@ -157,3 +120,32 @@ def report_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> boo
         say(f"the run had faults: {'; '.join(held)}{busy if share >= BUSY_SHARE else ''}")
     failed = str(figures["stopped_by"]).startswith("fault") or "torque_off_unconfirmed" in figures
     return bool(held) or failed
+
+
+def has_desktop(environ: Mapping[str, str], terminal: bool) -> bool:
+    """Return whether a browser can be opened on the user's desktop.
+
+    Args:
+        environ: Environment variables.
+        terminal: Whether standard output is a terminal; otherwise a program has started this one.
+    """
+    if not terminal or environ.get("CI"):
+        return False
+    if environ.get("SSH_CONNECTION") or environ.get("SSH_TTY"):
+        return False  # it would open on the remote computer, which has no user
+    return bool(environ.get("DISPLAY") or environ.get("WAYLAND_DISPLAY"))
+
+
+def is_desktop_here() -> bool:
+    """Return ``has_desktop`` for this process."""
+    return has_desktop(os.environ, sys.stdout is not None and sys.stdout.isatty())
+
+
+def open_page(url: str) -> None:
+    """Open an address in the user's browser, without waiting; a failure has no effect."""
+    threading.Thread(target=_open, args=(url,), name="browser", daemon=True).start()
+
+
+def _open(url: str) -> None:
+    with contextlib.suppress(webbrowser.Error, OSError):
+        webbrowser.open(url)

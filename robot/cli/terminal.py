@@ -9,7 +9,6 @@ that reports a fault does not have them; without them a suggested command would 
 
 import atexit
 import contextlib
-import errno
 import logging
 import os
 import re
@@ -21,10 +20,9 @@ import stat
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from time import perf_counter
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, NamedTuple, NoReturn
 
 import typer
 
@@ -40,10 +38,7 @@ _OF_REPORTS = ("jinja2", "scipy")
 _MOST = 500
 """Lines that may wait; further lines are dropped."""
 _RETRY_S = 0.2
-_LOOK_S = 0.5
 UNREAD = "standard error, whose reader has closed it"
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors that may end: a disk may have space again later."""
 
 
 class LineWriter:
@@ -56,125 +51,76 @@ class LineWriter:
         self._fd = fd
         self._most = most
         self._queue = WorkQueue("line writer")
-        self._status: str | None = None
-        self._status_waits = False
-        self._gone = False
-        self._unread: str | None = None
-        self._look_s = 0.0
         self.dropped = 0
 
     def line(self, text: str) -> None:
         """Write a line, including its line end, without waiting."""
-        if self._gone or len(self._queue) >= self._most:
+        if len(self._queue) >= self._most:
             self.dropped += 1
-            return
-        # The text of the status line is older than this line.
-        self._status = None
-        self._queue.add(lambda: self._write(text))
+        else:
+            self._queue.add(lambda: self._write(text))
 
     def status(self, text: str) -> None:
-        """Write a status line, unless a newer text replaces it first; does not wait."""
-        if self._gone:
-            return
-        self._status = text
-        if not self._status_waits:
-            self._status_waits = True
-            self._queue.add(self._write_status)
+        """Write a status line, unless other lines wait."""
+        if not len(self._queue):
+            self._queue.add(lambda: self._write(text))
 
     def lost_reader(self) -> str | None:
         """Return a message if the reader has closed the pipe, otherwise None."""
-        now_s = perf_counter()
-        if self._unread is None and now_s - self._look_s > _LOOK_S:
-            self._look_s = now_s
-            if self._reader_gone():
-                self._unread = UNREAD
-        return self._unread
+        poll = select.poll()
+        poll.register(self._fd, 0)
+        is_pipe = stat.S_ISFIFO(os.fstat(self._fd).st_mode)
+        return UNREAD if is_pipe and any(e & select.POLLERR for _, e in poll.poll(0)) else None
 
     def flush(self, timeout_s: float) -> bool:
         """Wait until everything is written, at most this long; return whether it is."""
-        return self._gone or self._queue.wait_idle(timeout_s)
-
-    def _reader_gone(self) -> bool:
-        """Return whether a pipe has lost its reader, which only the next write would detect."""
-        try:
-            if not stat.S_ISFIFO(os.fstat(self._fd).st_mode):
-                return False
-            poll = select.poll()
-            poll.register(self._fd, 0)
-            return any(events & select.POLLERR for _, events in poll.poll(0))
-        except OSError:
-            return False
-
-    def _write_status(self) -> None:
-        self._status_waits = False
-        text, self._status = self._status, None
-        if text is not None:
-            self._write(text)
+        return self._queue.wait_idle(timeout_s)
 
     def _write(self, text: str) -> None:
         data = text.encode(errors="replace")
-        while data and not self._gone:
+        while data:
             try:
                 data = data[os.write(self._fd, data) :]
             except BlockingIOError:  # another process has made it non-blocking
                 with contextlib.suppress(OSError, ValueError):
                     select.select([], [self._fd], [], _RETRY_S)
-            except OSError as error:
-                # Without a reader, all further lines are lost. SIGHUP reports a closed terminal.
-                self._gone = error.errno not in _FULL
-                if error.errno == errno.EPIPE:
-                    self._unread = UNREAD
-                break
-        self.dropped += bool(data)
+            except OSError:  # no reader, or a full disk, which may have space again later
+                self.dropped += 1
+                return
 
 
 _SUGGESTED = re.compile(
-    r"\bgazerig (?P<command>doctor|setup|calibrate|scan|run(?= --recover))\b"
-    r"(?P<words>(?: --fix\b| --recover\b| --joint \w+| --kind \w+)*)"
+    r"\bgazerig (doctor|setup|calibrate|scan|run(?= --recover))\b"
+    r"((?: --fix\b| --recover\b| --joint \w+| --kind \w+)*)"
 )
-_given: list[Mapping[str, object]] = [{}]
-"""Parameters of the current command (last item). Shared by all threads, as monitor threads also
-write messages.
-"""
 
 
-@contextlib.contextmanager
-def suggest_for_rig(rig: str | None, port: str | None, mock: bool) -> Iterator[None]:
-    """Make messages within the block suggest commands for this rig and port.
+class _Arguments(NamedTuple):
+    """Rig and port of the current command, for the commands that its messages suggest."""
 
-    A block without a rig uses the parameters of the enclosing block.
-    """
-    _given.append({"rig": rig, "port": port, "mock": mock} if rig is not None else _given[-1])
-    try:
-        yield
-    finally:
-        _given.pop()
+    rig: str = ""
+    port: str | None = None
+    mock: bool = False
 
 
-def suggest_doctor(text: str) -> str:
-    """Return a servo fault with the command that finds its cause, unless one is suggested."""
-    given = _given[-1]
-    reaches = isinstance(given.get("rig"), str) and given.get("mock") is not True
-    return f"{text}; gazerig doctor finds the cause" if reaches and "gazerig " not in text else text
+_arguments = _Arguments()
+"""Shared by all threads, as monitor threads also write messages."""
 
 
 def complete_suggestions(text: str) -> str:
     """Return a message whose suggested commands use the rig and port of the current command."""
-    known = _given[-1]
-    if "gazerig " not in text or not isinstance(known.get("rig"), str):
+    rig, port, mock = shlex.quote(_arguments.rig), _arguments.port, _arguments.mock
+    if not _arguments.rig:
         return text
 
-    def whole(found: re.Match[str]) -> str:
-        if text[found.end() :].startswith((f" {shlex.quote(str(known['rig']))}", " --port ")):
+    def complete(found: re.Match[str]) -> str:
+        if text[found.end() :].startswith((f" {rig}", " --port ")):
             return found[0]  # it already has these arguments
-        port, mock = known.get("port"), known.get("mock") is True
-        more = f" --port {shlex.quote(str(port))}" if isinstance(port, str) else ""
-        more += " --mock" if mock else ""
-        scans = found["command"] == "scan" and not mock
-        named = "" if scans else f" {shlex.quote(str(known['rig']))}"
-        return f"gazerig {found['command']}{named}{found['words']}{more}"
+        named = "" if found[1] == "scan" and not mock else f" {rig}"
+        more = (f" --port {shlex.quote(port)}" if port else "") + (" --mock" if mock else "")
+        return f"gazerig {found[1]}{named}{found[2]}{more}"
 
-    return _SUGGESTED.sub(whole, text)
+    return _SUGGESTED.sub(complete, text)
 
 
 BAD_INPUT = 2
@@ -222,40 +168,36 @@ def clear_errors(
 
     rig, port, mock: arguments of the command, for suggested commands
     """
-    with suggest_for_rig(rig, port, mock), _report_errors():
-        yield
-
-
-@contextlib.contextmanager
-def _report_errors() -> Iterator[None]:
+    global _arguments
+    outer = _arguments
+    if rig is not None:
+        _arguments = _Arguments(rig, port, mock)
     try:
         yield
-    except (ConfigError, SetupError) as error:
-        _show_origin()
-        say(suggest_doctor(str(error)) if isinstance(error, ServoMissing) else str(error))
-        raise typer.Exit(BAD_INPUT) from None
-    except DriverError as error:
-        _show_origin()
-        say(suggest_doctor(str(error)) if isinstance(error, ServoFault) else str(error))
-        raise typer.Exit(FAULT) from None
+    except (ConfigError, SetupError, DriverError) as error:
+        text = str(error)
+        is_servo = isinstance(error, ServoMissing | ServoFault)
+        if is_servo and _arguments.rig and not _arguments.mock and "gazerig " not in text:
+            text = f"{text}; gazerig doctor finds the cause"
+        _exit(text, BAD_INPUT if isinstance(error, ConfigError | SetupError) else FAULT)
     except ModuleNotFoundError as error:
         if error.name not in _OF_REPORTS:
             raise
-        _show_origin()
-        say(extra_hint(error.name, "report", error))
-        raise typer.Exit(BAD_INPUT) from None
+        _exit(extra_hint(error.name, "report", error), BAD_INPUT)
     except BrokenPipeError:
         raise  # for run_app: standard output was closed
     except OSError as error:
-        _show_origin()
-        say(f"{error.filename or 'file'}: {error.strerror or error}")
-        raise typer.Exit(BAD_INPUT) from None
+        _exit(f"{error.filename or 'file'}: {error.strerror or error}", BAD_INPUT)
+    finally:
+        _arguments = outer
 
 
-def _show_origin() -> None:
-    """With --debug, show the traceback of the current error."""
+def _exit(text: str, code: int) -> NoReturn:
+    """Print a message, with --debug after the traceback of the current error, and exit."""
     if logging.getLogger(DEBUG_LOGGER).isEnabledFor(logging.DEBUG):
         say(traceback.format_exc().rstrip("\n"))
+    say(text)
+    raise typer.Exit(code) from None
 
 
 def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str) -> NoReturn:
@@ -269,7 +211,7 @@ def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str
     threading.excepthook, before = _report_thread_error, threading.excepthook
     streams = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = (None if s is None else VisibleStream(s) for s in streams)
-    code: str | int | None = None
+    code: str | int | None = FAULT
     try:
         try:
             if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
@@ -278,37 +220,28 @@ def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str
         finally:
             if sys.stdout is not None:
                 sys.stdout.flush()
-    except SystemExit as end:
-        code = end.code
+    except (KeyboardInterrupt, SystemExit) as end:
+        code = end.code if isinstance(end, SystemExit) else INTERRUPTED
         if code == INTERRUPTED:
             say("interrupted")
         elif isinstance(end.__context__, BrokenPipeError):  # typer exits without a message
-            say(_UNREAD)
-            _drop_stdout()
-    except KeyboardInterrupt:
-        say("interrupted")
-        code = INTERRUPTED
+            _drop_stdout(end.__context__)
     except OSError as error:
-        if not isinstance(error, BrokenPipeError):
-            say(f"standard output: {error.strerror or error}")
-        else:
-            say(_UNREAD)
-        code = FAULT
-        _drop_stdout()
+        _drop_stdout(error)
     except Exception as error:
         if logging.getLogger(DEBUG_LOGGER).isEnabledFor(logging.DEBUG):
             say(traceback.format_exc().rstrip("\n"))
         what = " ".join(str(error).split()) or "no words"
         say(f"unexpected: {type(error).__name__}: {what}; {again}")
-        code = FAULT
     finally:
         threading.excepthook = before
         sys.stdout, sys.stderr = streams
     sys.exit(code)
 
 
-def _drop_stdout() -> None:
-    """Discard unprinted output, which would fail again at exit."""
+def _drop_stdout(error: OSError) -> None:
+    """Report lost output, and discard the rest, which would fail again at exit."""
+    say(_UNREAD if isinstance(error, BrokenPipeError) else f"standard output: {error.strerror}")
     with contextlib.suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

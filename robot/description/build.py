@@ -90,7 +90,6 @@ class RigShape(NamedTuple):
 
     lids: angles of the lid joints shut and open
     image_px: width and height of the camera's frames
-    meshes: names of links, and the user's own looks of them
     """
 
     name: str
@@ -101,17 +100,11 @@ class RigShape(NamedTuple):
     camera: CameraParams
     mass: MassParams = MassParams()
     image_px: tuple[int, int] = (640, 480)
-    meshes: tuple[tuple[str, Visual], ...] = ()
 
 
 def describe(rig: RigShape) -> Description:
-    """Return the description of a rig; the user's own looks do not change masses and collisions."""
-    built, own = _Builder(rig).description(), dict(rig.meshes)
-    links = (
-        link._replace(visuals=(own[link.name],)) if link.name in own else link
-        for link in built.links
-    )
-    return built._replace(links=tuple(links))
+    """Return the description of a rig."""
+    return _Builder(rig).description()
 
 
 def rig_mass_faults(rig: RigShape) -> Iterator[tuple[str, str]]:

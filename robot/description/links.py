@@ -6,7 +6,6 @@ are parallel to it while every joint is at 0.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from gazerig.gaze.angles import add, compose, rotate, turn_about
@@ -41,22 +40,15 @@ class Ellipsoid(NamedTuple):
     half_m: Vec3
 
 
-@dataclass(frozen=True, eq=False)
-class OwnMesh:
-    """The user's own mesh, in metres."""
-
-    painted: Painted
-
-
 class Visual(NamedTuple):
     """Visible shape of a link; the name is unique in the description.
 
-    shape: name of a stored shape, or the user's own mesh
+    shape: name of a stored shape
     scale: factor of its size, or one for each axis; a negative one mirrors it
     """
 
     name: str
-    shape: str | OwnMesh
+    shape: str
     finish: Finish = "plastic"
     p_m: Vec3 = ORIGIN
     R: Mat3 = IDENTITY
@@ -64,8 +56,6 @@ class Visual(NamedTuple):
 
     def painted(self) -> Painted:
         """Return its mesh, in metres."""
-        if isinstance(self.shape, OwnMesh):
-            return self.shape.painted
         return move_mesh(stored_shape(self.shape), scale=self.scale)
 
 

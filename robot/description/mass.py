@@ -11,6 +11,7 @@ import numpy as np
 from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.description.links import ORIGIN, Description, Inertia, Link, Visual
+from gazerig.robot.description.mesh import stored_shell
 from gazerig.robot.description.parts import MIDDLE, HeadMeasures
 from gazerig.robot.model.weight import MassParams
 
@@ -25,43 +26,6 @@ _FARTHEST = 2.0
 """Largest distance of a centre of mass from the head's middle, in distances between the eyes."""
 _CONTENT_HALF: Vec3 = (1.5, 1.1, 0.6)
 """Half axes of a head's contents (servos, frame, counterweight), in distances between the eyes."""
-# fmt: off
-_SHELLS: dict[str, tuple[float, ...]] = {
-    "skull": (47.15, -0.831, 0.0, 0.110, 65.81, 72.79, 54.48, 0.0, 8.78, 0.0),
-    "upper_lid": (
-        5.597414718302458, 0.3395310289236136, -1.6854745020226395e-06, 0.52706062858029,
-        2.4644923121741233, 1.4415620606338968, 2.8167452316134662,
-        6.1912980975475235e-06, 0.3838717928321496, 6.822040067578836e-06,
-    ),
-    "lower_lid": (
-        5.535733644653229, 0.335675177788879, 3.237347479623953e-07, -0.5329468791568047,
-        2.416523280923074, 1.4108556037100175, 2.7728786820774114,
-        -9.284339860683027e-07, -0.37247313412177463, 1.4134006783231593e-05,
-    ),
-    "jaw": (
-        3.2096232274322554, -0.02946125197536431, -4.8187510442486433e-05, -1.3573469669493914,
-        0.3780980113446686, 0.2876907857700745, 0.36723922569244616,
-        -9.794030661389545e-05, -0.06584911743707507, -0.00011073203571927051,
-    ),
-    "brow": (
-        0.2728615986476984, 0.13652300741508008, 0.4882072755658346, 0.6417407973683329,
-        0.009507683226817895, 0.0013691344540548954, 0.01007395756492994,
-        0.0028471382651842994, -7.182368496499894e-05, 0.0002976965711361344,
-    ),
-    "eye": (
-        21.11150263212341, 0.0, 0.0, 0.0, 14.074335088082274, 14.074335088082274, 14.074335088082274,
-        0.0, 0.0, 0.0,
-    ),
-    "gimbal": (
-        3.1667253948185117, 0.0, 0.0, 0.0, 1.5833626974092558, 1.5833626974092558,
-        3.1667253948185117, 0.0, 0.0, 0.0,
-    ),
-}
-# fmt: on
-"""Thin shells of printed PLA or PETG with the usual fraction of air (1050 kg/m3), scaled to eyes
-1 m apart; lids, eyes and the rings that carry eyes (15 % of their mass) to a radius of 1 m. Mass,
-centre, and xx, yy, zz, xy, xz, yz of the tensor. Skull and eyes are 1.6 mm thick, lids 1.2, others
-2."""
 
 
 def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[Inertia]) -> Inertia:
@@ -147,7 +111,7 @@ def shell(name: str, unit_m: float) -> Inertia:
         name: name of the shell.
         unit_m: the distance between the eyes, or the radius of a lid or an ear.
     """
-    mass, x, y, z, xx, yy, zz, xy, xz, yz = _SHELLS[name]
+    mass, x, y, z, xx, yy, zz, xy, xz, yz = stored_shell(name)
     tensor = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))) * unit_m**4
     return Inertia(mass * unit_m**2, scale((x, y, z), unit_m), tensor)
 

@@ -8,6 +8,11 @@ Parts of the rig's head are in distances between the eyes; eye, lids and ear hav
 neck radius and length 1, the bust height 1. People, gloves and shoes are in metres, hands have the
 radius 1. Segments of bodies are those of an adult of 1.72 m, in metres; shirts and necks are grey.
 The faces of a shape are pairs that form quadrangles.
+
+NAME/shell describes a thin shell of printed PLA or PETG with usual air (1050 kg/m3),
+scaled to eyes 1 m apart; lids, eyes and the rings that carry eyes (15 % of their mass) to a radius
+of 1 m: mass, centre, and xx, yy, zz, xy, xz, yz of the tensor. Skull and eyes are 1.6 mm thick,
+lids 1.2, others 2.
 """
 
 from collections.abc import Sequence
@@ -19,6 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats, Vec3
+
+_SHAPES = Path(__file__).with_name("shapes.npz")
 
 
 class Mesh(NamedTuple):
@@ -42,12 +49,19 @@ class Painted(NamedTuple):
 @cache
 def stored_shape(name: str) -> Painted:
     """Return a shape of the file *shapes.npz*; do not change its arrays."""
-    with np.load(Path(__file__).with_name("shapes.npz")) as arrays:
+    with np.load(_SHAPES) as arrays:
         vertices, colours, normals = (
             arrays[f"{name}/{key}"].astype(float) for key in ("vertices", "colours", "normals")
         )
         faces = arrays[f"{name}/faces"].astype(np.uint32)
     return Painted(Mesh(vertices, faces), colours, normals)
+
+
+@cache
+def stored_shell(name: str) -> tuple[float, ...]:
+    """Return the inertia of a thin shell of the file *shapes.npz*."""
+    with np.load(_SHAPES) as arrays:
+        return tuple(arrays[f"{name}/shell"].tolist())
 
 
 def smooth_normals(mesh: Mesh) -> Floats:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.links import OwnMesh, Visual
+from gazerig.robot.description.links import Visual
 from gazerig.robot.description.texture import add_texture
 
 
@@ -28,7 +28,7 @@ def mesh_files(visual: Visual) -> dict[str, bytes]:
 
 # A world is built once for its physics and once for its images.
 @lru_cache(maxsize=64)
-def _written(shape: str | OwnMesh, scale: float | tuple[float, float, float]) -> tuple[str, bytes]:
+def _written(shape: str, scale: float | tuple[float, float, float]) -> tuple[str, bytes]:
     """Return the points and faces of a shape as text, and its colours as a PNG."""
     painted = Visual("", shape, scale=scale).painted()
     (vertices, faces), _, normals = painted

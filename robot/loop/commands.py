@@ -14,6 +14,7 @@ from gazerig.gaze.attention.startle import FLINCH, Startle
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
+from gazerig.params import unknown_text
 from gazerig.robot.loop.client_control import ClientControl
 from gazerig.robot.loop.conversation import Conversation
 from gazerig.robot.loop.reachability import jog_reply, look_reply
@@ -189,16 +190,14 @@ class CommandExecutor:
             case Ask(menu, choice):
                 menus = self.menus()
                 if menu not in menus:
-                    raise ValueError(f"no menu {menu!r}; available: {', '.join(menus)}")
+                    raise ValueError(unknown_text("menu", menu, menus))
                 if choice not in menus[menu]:
-                    raise ValueError(f"no {menu} {choice!r}; available: {', '.join(menus[menu])}")
+                    raise ValueError(unknown_text(menu, choice, menus[menu]))
             case Jog(angles_rad):
                 names = robot.body.names
                 for name, _ in angles_rad:
                     if name not in names:
-                        raise ValueError(
-                            f"this rig has no joint {name!r}; available: {', '.join(names)}"
-                        )
+                        raise ValueError(unknown_text("joint", name, names))
             case Express(name):
                 robot.animation.require("expression", name)
             case SetLevel(name):
@@ -360,12 +359,12 @@ class CommandExecutor:
             ValueError: No visible person has that number; the message lists the visible people.
         """
         percept = self._robot.newest.percept if self._robot.newest is not None else None
-        for face in percept.faces if percept is not None else ():
+        faces = percept.faces if percept is not None else ()
+        for face in faces:
             if face.id == number and percept is not None:
                 return face, percept.captured_s
-        numbers = ", ".join(str(face.id) for face in percept.faces) if percept is not None else ""
-        visible = f"visible: {numbers}" if numbers else "nobody is visible"
-        raise ValueError(f"person {number} is not visible; {visible}")
+        visible = [str(face.id) for face in faces]
+        raise ValueError(unknown_text("visible person", str(number), visible, "nobody"))
 
     def _jog(self, command: Jog, t_s: float) -> CommandReply:
         """Move the given joints and hold the others; without any, free the joints."""

@@ -13,6 +13,7 @@ from gazerig.gaze.track.animation import NO_TABLES, FaceTables
 from gazerig.gaze.track.track import MAX_DURATION_S, Track
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.track.track_player import BLEND_IN_S, SPEECH, TrackPlayer, Voice
+from gazerig.params import unknown_text
 from gazerig.robot.model.commands import EndTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
@@ -149,7 +150,7 @@ class TrackChoices:
         name = command.track
         track_or_fault = command.definition or self._tracks.get(name)
         if track_or_fault is None:
-            raise ValueError(f"no track {name!r}; available: {', '.join(self.names)}")
+            raise ValueError(unknown_text("track", name, self.names))
         if isinstance(track_or_fault, str):
             raise ValueError(f"{name}: {track_or_fault}")
         key = name, command.speed, tuple(limits)
@@ -325,8 +326,7 @@ def _start_s(command: Play | Speak, motion: TrackMotion) -> float:
     start_s, name, cues = command.from_s, command.track, motion.track.cues
     if isinstance(start_s, str):
         if start_s not in cues:
-            known = ", ".join(cues) or "none"
-            raise ValueError(f"{name} has no cue {start_s!r}; available: {known}")
+            raise ValueError(f"{name} has {unknown_text('cue', start_s, cues)}")
         start_s = cues[start_s]
     if start_s > motion.length_s:
         raise ValueError(f"{name} lasts {motion.length_s:.2f} s: from_s must be less")

@@ -13,6 +13,7 @@ import msgspec
 from msgspec import Meta, Struct, structs
 
 from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED, Track
+from gazerig.params import unknown_text
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """Value of a key in a rig's YAML."""
@@ -493,7 +494,7 @@ class Fault(Request, frozen=True):
     text: str
 
 
-Layer = Literal["ghost", "sight"]
+Layer = Literal["sight"]
 Viewpoint = Literal["face", "both", "over its shoulder", "from above"]
 
 
@@ -501,8 +502,7 @@ class ShowView(Request, frozen=True):
     """Choose what the page's view of the head shows; the page does it, not the rig.
 
     Attributes:
-        layers: Layers for all browsers, None for no change: ghost of the desired pose, lines of
-            sight.
+        layers: Layers for all browsers, None for no change: lines of sight.
         look_from: Viewpoint of this browser, None for no change.
     """
 
@@ -536,7 +536,8 @@ def read_request(data: object) -> Request:
     except msgspec.ValidationError as error:
         kind = REQUESTS.get(str(data.get("do"))) if isinstance(data, dict) else None
         if kind is None:
-            raise ValueError(f"unknown request; available: {', '.join(REQUESTS)}") from None
+            name = str(data.get("do", "")) if isinstance(data, dict) else ""
+            raise ValueError(unknown_text("request", name, REQUESTS)) from None
         raise ValueError(f"{error}; {_fields_text(kind)}") from None
     if isinstance(request, Tune | Speak):
         raise ValueError("this is done by the requests set and say, which check it")

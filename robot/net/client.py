@@ -10,6 +10,7 @@ with RobotClient.connect() as rig:
     rig.save("/home/me/my.yaml")
 """
 
+import contextlib
 import json
 import os
 import threading
@@ -129,7 +130,7 @@ class ControlHeartbeat:
         self._thread.join(timeout=2.0)
 
     def _beat(self) -> None:
-        try:
+        with contextlib.suppress(OSError, EOFError, MalformedMessage):  # closed by either side
             while not self._over.is_set():
                 self._wire.write(self._request, HEARTBEAT_S)
                 match self._wire.read(10.0, 10.0):
@@ -137,8 +138,6 @@ class ControlHeartbeat:
                         self._over.wait(_EVERY_S)
                     case _:  # another client is in control, or none
                         return
-        except (OSError, EOFError, MalformedMessage):
-            return  # closed by either side
 
 
 class RobotClient:
@@ -178,14 +177,15 @@ class RobotClient:
             return found[0]
         for other in found:
             other.close()
-        asked = "" if which is None else f" {_choice_text(which)}"
-        there = _names(connect_to_all())
+        kind = "of process" if str(which).isdecimal() else "named"
+        asked = "" if which is None else f" {kind} {which}"
+        running = _names_of_all()
         if not found:
             raise NoRobotError(
-                f"no rig{asked} is running: {there or 'start one with gazerig run ...'}"
+                f"no rig{asked} is running: {running or 'start one with gazerig run ...'}"
             )
         raise NoRobotError(
-            f"{len(found)} rigs{asked} are running: {there}; choose one with --rig NAME or --pid N"
+            f"{len(found)} rigs{asked} are running: {running}; choose one with --rig NAME or --pid N"
         )
 
     def __enter__(self) -> "RobotClient":
@@ -340,18 +340,15 @@ class RobotClient:
         command = set_client(command, self.who)
         if isinstance(command, LookAt) and command.p_world_m is None and not self._talks:
             self._end_heartbeat()
-        reply = self._command(command)
+        reply, renews = self._command(command), False
         if isinstance(command, Talk):
             # After idle the heartbeat ends by itself, unless the client controls the gaze too.
-            self._talks = command.state != "idle" and not command.stay
-            if not self._talks or self._dial is None:
-                return reply
-        elif not isinstance(command, ControlCommand) or not reply.control_number:
-            return reply
-        elif (command.stay and not self._talks) or self._dial is None:
-            self._end_heartbeat()
-            return reply
-        if not self.in_control:
+            renews = self._talks = command.state != "idle" and not command.stay
+        elif isinstance(command, ControlCommand) and reply.control_number:
+            renews = self._talks or not command.stay
+            if not renews:
+                self._end_heartbeat()
+        if renews and self._dial is not None and not self.in_control:
             self._end_heartbeat()
             try:
                 self._heartbeat = ControlHeartbeat(self._dial, self.who)
@@ -425,22 +422,19 @@ def connect_to_all(which: int | str | None = None, who: str = "") -> list[RobotC
         which: Process id or name of the rig; None: all.
         who: As in ``RobotClient.connect``.
     """
-    if isinstance(which, str) and not which.isdecimal():
-        return _select_by_name(connect_to_all(who=who), which)
-    pid = None if which is None else int(which)
     uid = os.getuid()
     place = socket_folder(os.environ, uid)
     if not is_private(place, uid):  # any user may have put a socket there
         return []
     found: list[RobotClient] = []
-    for path, number in find_sockets(place).items():
-        if pid is None or number == pid:
-            try:
-                found.append(
-                    RobotClient(_connect_wire(path), number, who, partial(_connect_wire, path))
-                )
-            except OSError:  # killed: the next rig that starts removes it
-                continue
+    for path, pid in find_sockets(place).items():
+        dial = partial(_connect_wire, path)
+        with contextlib.suppress(OSError):  # killed: the next rig that starts removes it
+            rig = RobotClient(dial(), pid, who, dial)
+            if which is None or _is_chosen(rig, str(which)):
+                found.append(rig)
+            else:
+                rig.close()
     return found
 
 
@@ -449,35 +443,25 @@ def _connect_wire(path: Path) -> Wire:
     return Wire(connect_to_socket(path, CONNECT_S), ANSWER_BYTES)
 
 
+def _is_chosen(rig: RobotClient, which: str) -> bool:
+    """Return whether a rig has this process id or name."""
+    if which.isdecimal():
+        return rig.pid == int(which)
+    try:
+        return rig.name == which
+    except DriverError:  # it is ending or hangs
+        return False
+
+
 def rig_name(rig: str) -> str:
     """Return the name of an unnamed rig: that of its file."""
     return Path(rig).stem
 
 
-def _choice_text(which: int | str) -> str:
-    """Return a chosen process or name as text."""
-    return f"of process {which}" if str(which).isdecimal() else f"named {which}"
-
-
-def _select_by_name(rigs: list[RobotClient], name: str) -> list[RobotClient]:
-    """Return the rigs of a name, and close the other connections."""
-    found = []
-    for rig in rigs:
-        try:
-            named = rig.name == name
-        except DriverError:  # it is ending or hangs
-            named = False
-        if named:
-            found.append(rig)
-        else:
-            rig.close()
-    return found
-
-
-def _names(rigs: list[RobotClient]) -> str:
-    """Return the names and processes of rigs as text, and close the connections."""
+def _names_of_all() -> str:
+    """Return the names and processes of all rigs that run as text."""
     names = []
-    for rig in rigs:
+    for rig in connect_to_all():
         with rig:
             try:
                 names.append(f"{rig.name} (process {rig.pid})")

@@ -1,16 +1,16 @@
 """Inputs of a running rig except the page: requests of programs, and edits of its files.
 
-A rig that is being calibrated accepts only stops: ``StopOnlyServer``.
+A rig that is being calibrated accepts only stops.
 
 Files that users edit are watched. Editors overwrite a file, write it in two steps, rename a new
 file over it, or delete it for a moment. New content is therefore accepted when two checks in a row
 found the same, and a missing file when it is missing for several checks.
 """
 
-import contextlib
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
@@ -24,11 +24,11 @@ from gazerig.robot.loop.command_handler import (
 )
 from gazerig.robot.loop.loop import Robot
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.reply import CommandTaker
 from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
 from gazerig.robot.net.socket_server import RemoteServer
 
 EVERY_S = 0.5
+_CALIBRATED = "it is being calibrated"
 _LARGEST = 10_000_000  # bytes; no rig is as large, so more counts as missing
 _LOOKS = 2
 """Checks in a row that must find the same content before it is read."""
@@ -44,22 +44,12 @@ def read_content(path: Path) -> bytes:
         return b""
 
 
-class WatchedFile:
-    """Detects when a file has new content that no longer changes; b"" is that of no file."""
+class _Watched(NamedTuple):
+    """A file: the content that was read, the content at the last check, and its checks in a row."""
 
-    def __init__(self, content: bytes) -> None:
-        self._known = self._last = content
-        self._looks = 0
-
-    def update(self, content: bytes) -> bool:
-        """Add a content of the file; return whether the file, new or missing, should be read."""
-        self._looks = self._looks + 1 if content == self._last else 1
-        self._last = content
-        enough = _LOOKS if content.endswith(b"\n") else _LOOKS_CUT
-        if content == self._known or self._looks < enough:
-            return False
-        self._known = content
-        return True
+    known: bytes
+    last: bytes
+    looks: int = 0
 
 
 class FileWatch:
@@ -79,7 +69,7 @@ class FileWatch:
         self._files = files
         self._changed = changed
         self._lock = threading.Lock()
-        self._watched: dict[Path, WatchedFile] = {}
+        self._watched: dict[Path, _Watched] = {}
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="file watch", daemon=True)
 
@@ -102,22 +92,24 @@ class FileWatch:
         """
         same = path.resolve()
         with self._lock:
-            known = [one for one in self._watched if one.resolve() == same]
-            for watched in known or [path]:
-                self._watched[watched] = WatchedFile(read_content(watched))
+            for known in [one for one in self._watched if one.resolve() == same] or [path]:
+                content = read_content(known)
+                self._watched[known] = _Watched(content, content)
 
     def look(self) -> None:
         """Check all files once and report those that are new or stay missing."""
+        new = []
         with self._lock:
-            files = dict.fromkeys(self._files())
-            self._watched = {
-                path: self._watched.get(path) or WatchedFile(read_content(path)) for path in files
-            }
-            new = [
-                path
-                for path, watched in self._watched.items()
-                if watched.update(read_content(path))
-            ]
+            before, self._watched = self._watched, {}
+            for path in self._files():
+                content = read_content(path)
+                known, last, looks = before.get(path, _Watched(content, content))
+                looks = looks + 1 if content == last else 1
+                enough = _LOOKS if content.endswith(b"\n") else _LOOKS_CUT
+                if content != known and looks >= enough:
+                    known = content
+                    new.append(path)
+                self._watched[path] = _Watched(known, content, looks)
         # Not under the lock: the receiver may wait for a thread that saves.
         for path in new:
             self._changed(path)
@@ -132,7 +124,7 @@ class LiveServer:
 
     Args:
         robot: Executes commands.
-        tuning: Parameters and their files.
+        tuning: Parameters and their files; None: only stop and resume are accepted.
         clock: Clock of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         say: Prints a line on the terminal.
@@ -149,7 +141,7 @@ class LiveServer:
     def __init__(
         self,
         robot: Robot,
-        tuning: ParamAccess,
+        tuning: ParamAccess | None,
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
@@ -158,23 +150,25 @@ class LiveServer:
         paths: PathGuard | None = None,
         voice: Speaker | None = None,
     ) -> None:
-        self._tuning = tuning
-        self._say = say
-        self._pulse = LoopMonitor(clock)
-        self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
-        self._watch = FileWatch(self._files, self._read_again)
-        handler = CommandHandler(
-            robot.command, tuning, self._watch.saved, voice=voice, menus=robot.menus,
-            tracks=robot.tracks,
-        )  # fmt: skip
-        self._server = RemoteServer(
-            RequestHandler(handler, self._pulse, about, fault, changing), say
-        )
+        self._say, self._tuning = say, tuning
+        pulse = LoopMonitor(clock)
+        self._watch = FileWatch(tuning.files if tuning is not None else tuple, self._read_again)
+        if tuning is None:
+            handler = CommandHandler(
+                accept_only_stops(robot.command, _CALIBRATED), None,
+                fixed=f"{_CALIBRATED}: its parameters are fixed",
+            )  # fmt: skip
+        else:
+            handler = CommandHandler(
+                robot.command, tuning, self._watch.saved, voice=voice, menus=robot.menus,
+                tracks=robot.tracks,
+            )  # fmt: skip
+        self._server = RemoteServer(RequestHandler(handler, pulse, about, fault, changing), say)
         # Apart from programs of this computer, so that neither uses up the other's time.
         self._page_server = RemoteServer(
-            RequestHandler(handler, self._pulse, about, fault, changing, paths), say
+            RequestHandler(handler, pulse, about, fault, changing, paths), say
         )
-        self.serve, self.update = self._page_server.serve, self._pulse.update
+        self.serve, self.update = self._page_server.serve, pulse.update
 
     def open(self) -> None:
         """Listen to other programs and watch the files; print a line if listening fails."""
@@ -190,18 +184,9 @@ class LiveServer:
         self._page_server.close()
         self._server.close()
 
-    def _files(self) -> tuple[Path, ...]:
-        """Return the files in use; if the present ones cannot be determined, the previous ones."""
-        version, files = self._in_use
-        now = self._tuning.version
-        if now != version:
-            with contextlib.suppress(*REFUSALS):
-                files = self._tuning.files()
-            self._in_use = now, files
-        return files
-
     def _read_again(self, path: Path) -> None:
         """Apply an edited file, or report all of its errors."""
+        assert self._tuning is not None, "without parameters no file is watched"
         try:
             notes = self._tuning.reload(path)
         except REFUSALS as error:
@@ -211,46 +196,3 @@ class LiveServer:
             self._say("\n".join([f"{path} was edited: its values are applied", *notes]))
         else:
             self._say(f"{path} was written again without changes")
-
-
-_CALIBRATED = "it is being calibrated"
-
-
-class StopOnlyServer:
-    """Server that executes stop and resume, and refuses all other commands.
-
-    Args:
-        command: Queues a command for the next tick.
-        clock: Clock of the loop.
-        about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
-        say: Prints a line on the terminal.
-
-    Attributes:
-        serve: Answers the page's process over a connection.
-        update: Stores the newest tick, for the loop.
-    """
-
-    def __init__(
-        self,
-        command: CommandTaker,
-        clock: Clock,
-        about: Mapping[str, object],
-        say: Callable[[str], None],
-    ) -> None:
-        self._say = say
-        pulse = LoopMonitor(clock)
-        only = accept_only_stops(command, _CALIBRATED)
-        handler = CommandHandler(only, None, fixed=f"{_CALIBRATED}: its parameters are fixed")
-        self._server = RemoteServer(RequestHandler(handler, pulse, about), say)
-        self.serve, self.update = self._server.serve, pulse.update
-
-    def open(self) -> None:
-        """Listen to other programs; print a line if that fails."""
-        try:
-            self._server.open()
-        except SetupError as error:  # the head runs without remote control
-            self._say(f"gazerig stop cannot find this rig: {error}")
-
-    def close(self) -> None:
-        """Close all connections."""
-        self._server.close()

@@ -35,21 +35,16 @@ Basis = Literal["measured", "partly estimated", "estimated"]
 ESTIMATED = "estimated from commands and known servo speeds, not measured"
 
 MOVEMENTS = ("", "fixation", "saccade", "pursuit")
-"""Movements of the eyes; "" if none of these: they were moved by hand, had no torque, or were at
-their limit while the head carried them to the target."""
+"""Movements of the eyes; "" if none of these: they were moved by hand or had no torque."""
 
 _CODE = {"fixate": 1, "saccade": 2, "pursue": 3}
 _ARRIVED_RAD = 0.009  # half a degree: a new target within this distance needs no saccade
-_NECK_AXES = ("neck_yaw", "neck_pitch", "neck_roll")
-_LIDS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
-_NECK = frozenset(_NECK_AXES)
+NECK_AXES = ("neck_yaw", "neck_pitch", "neck_roll")
+LID_JOINTS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
+_NECK = frozenset(NECK_AXES)
 _BOTH = _NECK | {"eyes_pan", "eyes_tilt"}
 _LEFT = _BOTH | {"left_eye_pan", "left_eye_tilt"}
 _RIGHT = _BOTH | {"right_eye_pan", "right_eye_tilt"}
-_JOINTS_OF = {
-    "left": _LEFT, "right": _RIGHT, "cyclopean": _LEFT | _RIGHT, "head": _NECK,
-    "lids": frozenset(_LIDS),
-}  # fmt: skip
 _LOST: Angles2 = (nan, nan)
 
 
@@ -76,7 +71,8 @@ class GazeAngles(NamedTuple):
         time_s: (n,) Time since the first tick.
         left_deg, right_deg, cyclopean_deg: (n, 2) x and y at the servos' positions, NaN if lost.
         head_deg: (n, 3) Yaw + left, pitch + up, roll + right ear down, NaN without such a joint.
-        lids, lower_lids: (n, 2) Left and right, 0 shut .. 1 open, NaN without such a joint.
+        lids: (n, 4) Upper left and right, lower left and right, 0 shut .. 1 open, NaN without such
+            a joint.
         planned_deg: (n, 2) Desired cyclopean x and y.
         movement: (n,) Planned movement as an index in MOVEMENTS.
         blink: (n,) Whether a blink was planned.
@@ -97,7 +93,6 @@ class GazeAngles(NamedTuple):
     blink: NDArray[np.bool_]
     looked_at: Ints
     names: tuple[GazeTarget, ...]
-    lower_lids: Floats
     joints: tuple[str, ...]
     estimated: tuple[str, ...]
 
@@ -105,10 +100,6 @@ class GazeAngles(NamedTuple):
     def rate_hz(self) -> float:
         """Return the median rate of the ticks."""
         return 1.0 / float(np.median(np.diff(self.time_s)))
-
-    def basis(self, of: str) -> Basis:
-        """Return whether "left", "right" or "cyclopean" gaze, "head" or "lids" are measured."""
-        return basis_of(self.joints, self.estimated, _JOINTS_OF[of].__contains__)
 
 
 def gaze_in_space(pose: GazeState) -> GazeDirections:
@@ -151,7 +142,7 @@ class GazeAnglesBuilder:
         pose, missing = tick.pose, tick.joints.missing
         left, right, cyclopean = gaze_in_space(pose)
         planned = _degrees(sub(tick.gaze.gaze_point_world_m, pose.p_world_head_m))
-        lids = (pose.lid_left, pose.lid_right, pose.lower_left, pose.lower_right)
+        lids = [pose.lid_left, pose.lid_right, pose.lower_left, pose.lower_right]
         head = tuple(map(degrees, head_in_space(pose)))
         self._joints = tick.guard_result.joints
         self._estimated.update(dict.fromkeys(tick.estimated_joints))
@@ -160,8 +151,7 @@ class GazeAnglesBuilder:
             cyclopean = _LOST if lost_left or lost_right else cyclopean
             left, right = _LOST if lost_left else left, _LOST if lost_right else right
             head = (nan, nan, nan) if not _NECK.isdisjoint(missing) else head
-            lost_lids = [nan if n in missing else o for n, o in zip(_LIDS, lids, strict=True)]
-            lids = (lost_lids[0], lost_lids[1], lost_lids[2], lost_lids[3])
+            lids = [nan if n in missing else o for n, o in zip(LID_JOINTS, lids, strict=True)]
         time_s = tick.t_s - self._start_s
         self._angles.extend((time_s, *left, *right, *cyclopean, *head, *lids, *planned))
         for command in tick.commands:
@@ -186,13 +176,13 @@ class GazeAnglesBuilder:
         codes = np.array(self._codes, np.int64).reshape(-1, 3)
         if len(a) < 2 or self._start_s is None:
             raise ValueError("fewer than two ticks: there is nothing to export")
-        for column, joint in enumerate((*_NECK_AXES, *_LIDS), start=7):
+        for column, joint in enumerate((*NECK_AXES, *LID_JOINTS), start=7):
             if joint not in self._joints:
                 a[:, column] = nan
         return GazeAngles(
-            self._start_s, a[:, 0], a[:, 1:3], a[:, 3:5], a[:, 5:7], a[:, 7:10], a[:, 10:12],
+            self._start_s, a[:, 0], a[:, 1:3], a[:, 3:5], a[:, 5:7], a[:, 7:10], a[:, 10:14],
             a[:, 14:16], codes[:, 0], codes[:, 1] > 0, codes[:, 2], tuple(self._numbers),
-            a[:, 12:14], self._joints, tuple(self._estimated),
+            self._joints, tuple(self._estimated),
         )  # fmt: skip
 
     def _number(self, tick: Tick) -> int:
@@ -228,11 +218,6 @@ LONGEST_LAG_S = 0.1
 SHORTEST_PURSUIT_S = 0.1
 """A target's velocity fluctuates about the motion threshold; a shorter pursuit is part of the
 movements around it."""
-
-# The head carries eyes at their limit if the gaze, over this time, moves faster than this, farther
-# than this from the planned direction. No eye's limit is smaller than the fourth; beyond the last
-# the eyes are always behind.
-_CARRIED_S, _CARRIED_DEG_S, _CARRIED_DEG, _LEAST_LIMIT_DEG, _FAR_DEG = 0.1, 3.0, 2.0, 8.0, 10.0
 
 _LAGS_S = np.arange(0.0, LONGEST_LAG_S, 0.001)
 _FIXATION, _SACCADE, _PURSUIT = 1, 2, 3
@@ -290,35 +275,7 @@ def label_samples(trace: GazeAngles) -> Labels:
             after = out[last + 1] if last + 1 < len(out) else 0
             if wanted == _PURSUIT or (before == other and after == other):
                 out[first : last + 1] = other
-    carried = (out == _FIXATION) & _is_carried(trace, source)
-    for first, last in _value_runs(carried.astype(np.int64)):
-        if carried[first] and time_s[last] - time_s[first] >= SHORTEST_PURSUIT_S:
-            out[first : last + 1] = 0
     return Labels(lag_s, out, trace.blink[source], trace.looked_at[source])
-
-
-def _is_carried(trace: GazeAngles, source: Ints) -> NDArray[np.bool_]:
-    """Return where the head carries the gaze to the plan, with the eyes at their limit.
-
-    The limit is the largest angle of the eyes in the head in the run.
-
-    source: sample of the plan that each measured sample follows
-    """
-    t, seen = trace.time_s, trace.cyclopean_deg
-    before = np.searchsorted(t, t - 0.5 * _CARRIED_S)
-    after = np.minimum(np.searchsorted(t, t + 0.5 * _CARRIED_S), len(t) - 1)
-    shrink = np.cos(np.radians(seen[:, 1]))
-
-    def size_deg(way: Floats) -> Floats:
-        return np.hypot(way[:, 0] * shrink, way[:, 1])
-
-    moves = size_deg(seen[after] - seen[before]) > _CARRIED_DEG_S * (t[after] - t[before])
-    aside = np.abs(seen - trace.head_deg[:, :2])
-    most = np.max(np.where(np.isfinite(aside), aside, 0.0), axis=0)
-    limited = (aside > np.maximum(most - _CARRIED_DEG, _LEAST_LIMIT_DEG)).any(axis=1)
-    off_deg = size_deg(trace.planned_deg[source] - seen)
-    carried: NDArray[np.bool_] = (limited & (off_deg > _CARRIED_DEG)) | (off_deg > _FAR_DEG)
-    return moves & carried
 
 
 def estimate_lag(trace: GazeAngles) -> float:

@@ -4,8 +4,6 @@ import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
-from io import BytesIO
 from math import isfinite
 from pathlib import Path
 
@@ -13,7 +11,7 @@ import msgspec
 import zstandard
 from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Channel, Chunk, Footer, Header, McapRecord, Message, Metadata
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 from msgspec import UNSET, structs
 
 from gazerig.drivers.errors import DriverError, SetupError
@@ -28,9 +26,7 @@ from gazerig.robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, r
 _CURE = "make one with gazerig run --record"
 _CAMERA = "gazerig-camera-"
 _RUN = PROFILE.rstrip("0123456789")
-_LARGEST_CHUNK = 64 << 20
-"""Limit of a compressed or decompressed chunk; the writer's chunks have about 1 MB."""
-_LARGEST = _LARGEST_CHUNK + 1000  # bytes of a record; more is damage
+_LARGEST = 64 << 20  # bytes of a record; the writer's have about 1 MB, more is damage
 _LONGEST_GAP_S = 3600.0  # between two ticks; more is damage
 DAMAGE = (
     McapError, KeyError, TypeError, ValueError, IndexError, struct.error, zlib.error, zstandard.ZstdError,
@@ -47,35 +43,6 @@ class _Exact(msgspec.Struct):
 
 _ticks = msgspec.json.Decoder(TickRecord, dec_hook=to_array)
 _exact = msgspec.json.Decoder(_Exact)
-
-
-class BadChunk(McapError):
-    """A chunk that does not match its header."""
-
-
-def decompress_chunk(chunk: Chunk) -> Chunk:
-    """Return a chunk with its records decompressed.
-
-    Raises:
-        BadChunk: The chunk is too large, does not match its header or uses another compression.
-        zstandard.ZstdError: The chunk is damaged.
-    """
-    size = chunk.uncompressed_size
-    if size > _LARGEST_CHUNK:
-        raise BadChunk(f"a chunk of {size / 1e6:.0f} MB")
-    data = chunk.data
-    if chunk.compression == "zstd":
-        # At most one byte more than the size: a few bytes can expand to gigabytes.
-        decompressor = zstandard.ZstdDecompressor(max_window_size=_LARGEST_CHUNK)
-        with decompressor.stream_reader(BytesIO(data), read_across_frames=True) as reader:
-            data = reader.read(size + 1)
-    elif chunk.compression:
-        raise BadChunk("a chunk compressed by another program")
-    if len(data) != size:
-        raise BadChunk("a chunk whose size differs from its header")
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-        raise BadChunk("a chunk with a wrong checksum")
-    return replace(chunk, compression="", data=data)
 
 
 class BadRecording(SetupError):
@@ -104,17 +71,17 @@ class RunRecording:
         self.end = RunEnd()
         info: RunInfo | None = None
         times_ns: list[int] = []
-        for record in self._records(validate=True):
+        for record in self._records(emit_chunks=True):
             match record:
                 case Header():
                     self._check_profile(record.profile)
                 case Chunk():
                     times_ns += (record.message_start_time, record.message_end_time)
                 case Metadata(name=fmt.RUN):
-                    with _damage_errors(self.path):
+                    with report_bad_contents(self.path):
                         info = read_text(record.metadata, RunInfo)
                 case Metadata(name=fmt.END):
-                    with _damage_errors(self.path):
+                    with report_bad_contents(self.path):
                         self.end = read_text(record.metadata, RunEnd)
                 case Footer():
                     self.whole = True
@@ -150,7 +117,7 @@ class RunRecording:
         percept: Percept | None = None
         before_s: float | None = None
         for data in self._tick_messages():
-            with _damage_errors(self.path):
+            with report_bad_contents(self.path):
                 exact = _exact.decode(data).exact
                 record = decode(exact, TickRecord) if exact else _ticks.decode(data)
                 if record.percept is not UNSET:
@@ -167,32 +134,25 @@ class RunRecording:
 
     def _tick_messages(self) -> Iterator[bytes]:
         """Return the ticks in the order of the file."""
-        topics: dict[int, str] = {}
-        for record in self._records(validate=False):
-            if not isinstance(record, Chunk):
-                continue
-            with _damage_errors(self.path):
-                inside = breakup_chunk(decompress_chunk(record))
-                topics |= {one.id: one.topic for one in inside if isinstance(one, Channel)}
-                ticks = [
-                    one.data
-                    for one in inside
-                    if isinstance(one, Message) and topics[one.channel_id] == fmt.TICK
-                ]
-            yield from ticks
+        ticks: set[int] = set()
+        for record in self._records(emit_chunks=False):
+            if isinstance(record, Channel) and record.topic == fmt.TICK:
+                ticks.add(record.id)
+            elif isinstance(record, Message) and record.channel_id in ticks:
+                yield record.data
 
-    def _records(self, validate: bool) -> Iterator[McapRecord]:
+    def _records(self, emit_chunks: bool) -> Iterator[McapRecord]:
         """Return the complete records; in a file that was not closed, those before its end.
 
         Args:
-            validate: Compare the whole file with its checksum.
+            emit_chunks: Return chunks as they are, without their records.
         """
-        with open_mcap(self.path, BadRecording, _CURE) as file, _damage_errors(self.path):
+        with open_mcap(self.path, BadRecording, _CURE) as file, report_bad_contents(self.path):
             file.seek(-len(MAGIC), 2)
             closed = file.read() == MAGIC and file.tell() > len(MAGIC)
             file.seek(0)
             reader = StreamReader(
-                file, emit_chunks=True, validate_crcs=validate, record_size_limit=_LARGEST
+                file, emit_chunks=emit_chunks, validate_crcs=True, record_size_limit=_LARGEST
             )
             try:
                 yield from reader.records
@@ -222,7 +182,7 @@ class RunRecording:
 
 @contextmanager
 def report_bad_contents(path: Path) -> Iterator[None]:
-    """Convert errors caused by impossible contents of a recording to one line.
+    """Convert errors caused by damaged or impossible contents of a recording to one line.
 
     Use it around code that processes a recording: a well-formed file may contain impossible
     values.
@@ -235,17 +195,5 @@ def report_bad_contents(path: Path) -> Iterator[None]:
     except DriverError:
         raise
     except DAMAGE as error:
-        what = f"{type(error).__name__}: {' '.join(str(error).split())[:80]}"
-        raise BadRecording(f"{path} contains impossible values ({what}): record again") from error
-
-
-@contextmanager
-def _damage_errors(path: Path) -> Iterator[None]:
-    """Convert errors of a damaged file to one line."""
-    try:
-        yield
-    except BadRecording:
-        raise
-    except DAMAGE as error:
-        what = " ".join(str(error).split())[:80]
-        raise BadRecording(f"{path} is damaged ({what}): copy it again") from None
+        what = " ".join(str(error).split())[:80] or type(error).__name__
+        raise BadRecording(f"{path} is damaged ({what}): copy it again, or record again") from error

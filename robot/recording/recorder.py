@@ -1,33 +1,126 @@
 """Recorder of a run that never makes the control loop wait.
 
-A separate process writes the file (gazerig.robot.recording.writer_process). The loop sends it
-ticks in batches and continues immediately. The process outlives this program until it has
-closed the file.
+A separate process writes the file (gazerig.robot.recording.writer). A thread sends it the ticks
+of the loop in batches. The process outlives this program until it has closed the file.
 """
 
 import os
 import secrets
+import select
 import shutil
+import subprocess
 from collections import deque
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
+import msgspec
+
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.drivers.process.passed_image import copy_image
+from gazerig.drivers.process import child_process
+from gazerig.drivers.process.work_queue import WorkQueue
 from gazerig.drivers.types import BusHealth, Detections
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.tick import BodyRecord, MeasuredJoints, Tick
 from gazerig.robot.loop.tick_stream import LIVE_S, SIMULATED_S, TickBatch, TickStream, encode
-from gazerig.robot.recording import writer_process as writer
-from gazerig.robot.recording.joint_recorder import JointRecorder
+from gazerig.robot.recording import writer
+from gazerig.robot.recording.body_playback import JointRecorder
 from gazerig.robot.recording.run_format import Health
 from gazerig.robot.recording.run_info import RunEnd, RunInfo
-from gazerig.robot.recording.writer_client import WriterClient
 
+QUEUE_BYTES = 64_000_000
+"""Limit of the queue: some minutes of a run; frames get half of it, half a minute of a webcam's."""
+_DIED = "its writer has died"
+_TIMEOUT_S = 15.0
 _HEALTH_S = 1.0
 _EARLY_S = 1e-3  # a frame may be this early, as times are rounded
+
+
+class WriterLink:
+    """The process that writes a recording, and the queue of its messages.
+
+    A thread sends the messages, so that no call waits for the process.
+
+    Args:
+        file_fd: Descriptor of the file to write to.
+        patient: Whether to wait for a slow writer.
+
+    Attributes:
+        process: The process.
+        failed: Reason why nothing more is written, or "".
+        closed: Report of the closed file, None before.
+    """
+
+    def __init__(self, file_fd: int, patient: bool) -> None:
+        self._patient = patient
+        self._queue = WorkQueue("recording")
+        self._posted_bytes = self._sent_bytes = 0
+        self.failed = ""
+        self.closed: writer.Report | None = None
+        self.process = child_process.start(
+            writer.__name__,
+            str(file_fd),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            pass_fds=(file_fd,),
+        )
+        assert self.process.stdin is not None and self.process.stdout is not None
+        self._input, self._output = self.process.stdin, self.process.stdout
+
+    def post(self, kind: bytes, body: bytes, pixels: bytes = b"") -> bool:
+        """Queue a message; return False if it is lost.
+
+        Each message wakes the writer, which takes the loop longer than creating the message. So one
+        large message is better than several small ones.
+        """
+        most = QUEUE_BYTES // 2 if kind == writer.FRAME else QUEUE_BYTES
+        if self.failed or self._posted_bytes - self._sent_bytes > most:
+            return False
+        self._posted_bytes += len(body) + len(pixels)
+        self._queue.add(lambda: self._send(kind, body, pixels))
+        if self._patient:
+            self.drain()
+        return True
+
+    def drain(self) -> None:
+        """Wait until the writer has accepted everything, with a timeout."""
+        if not self.failed and not self._queue.wait_idle(_TIMEOUT_S):
+            self.failed = "its writer does not respond"
+
+    def listen(self, timeout_s: float = 0.0) -> None:
+        """Receive a report of the writer, if there is one."""
+        if self.closed is not None or not select.select([self._output], [], [], timeout_s)[0]:
+            return
+        line = self._output.readline()
+        report = msgspec.json.decode(line, type=writer.Report) if line else writer.Report(_DIED)
+        if report.failed:
+            self.failed = self.failed or report.failed
+        else:
+            self.closed = report
+
+    def close(self) -> None:
+        """End the recording, and wait until the writer has closed the file."""
+        self.drain()
+        if not self.failed:
+            self._input.close()
+            self.listen(_TIMEOUT_S)
+        if self.closed is None:
+            self.failed = self.failed or "its writer does not end"
+            self.process.kill()
+        self.process.wait()
+        self._output.close()
+
+    def _send(self, kind: bytes, body: bytes, pixels: bytes) -> None:
+        """Send a message; called by the queue's thread."""
+        try:
+            for part in (writer.PREFIX.pack(kind, len(body), len(pixels)), body, pixels):
+                self._input.write(part)
+            self._input.flush()
+        except (OSError, ValueError):  # it has ended: listen gets its reason
+            return
+        self._sent_bytes += len(body) + len(pixels)
 
 
 class FramePicker:
@@ -52,9 +145,8 @@ class FramePicker:
         if found.image is None:  # checked last, as reading the image may copy it
             return False
         # A late frame does not delay those that follow.
-        late_s = found.captured_s - self._due_s
-        began_s = self._due_s if late_s < self._every_s else found.captured_s
-        self._due_s = began_s + self._every_s
+        keeps_pace = found.captured_s - self._due_s < self._every_s
+        self._due_s = (self._due_s if keeps_pace else found.captured_s) + self._every_s
         return True
 
 
@@ -87,7 +179,8 @@ class Recorder:
         self._info, self._urdf = info, urdf
         self._health: Callable[[], BusHealth] = lambda: BusHealth(0, 0, {})
         self._over = over
-        self._link = WriterClient(patient)
+        self._patient = patient
+        self._link: WriterLink | None = None
         self._frames = FramePicker(info.pictures_hz)
         self._body_records: list[BodyRecord] = []
         self._messages: deque[str] = deque()
@@ -97,7 +190,7 @@ class Recorder:
         self._seconds: float | None = None
         self._checked_s = -inf
         self._temporary: Path | None = None
-        self._opened = self._failure_reported = False
+        self._failure_reported = False
         self.lost = 0
 
     def open(self) -> None:
@@ -118,9 +211,8 @@ class Recorder:
             raise SetupError(
                 f"cannot write {path} ({error.strerror}): choose a folder with write permission"
             ) from None
-        self._opened = True
         try:
-            self._link.open(file_fd)
+            self._link = WriterLink(file_fd, self._patient)
         finally:
             os.close(file_fd)
         self._link.post(writer.BEGIN, encode((self._info, self._urdf)))
@@ -167,7 +259,7 @@ class Recorder:
         self.stream.append(tick, dt_s, before)
         if self._frames.is_due(tick.detections):
             self._post_frame(tick.detections)
-        if tick.t_s - self._checked_s >= _HEALTH_S:
+        if self._link is not None and tick.t_s - self._checked_s >= _HEALTH_S:
             self._checked_s = tick.t_s
             self.stream.flush()
             sent, received, errors = self._health()
@@ -177,7 +269,7 @@ class Recorder:
 
     def _take(self, batch: TickBatch) -> bool:
         """Send ticks to the writer; return False if they are lost."""
-        if not self._link.alive or self._link.failed:
+        if self._link is None or self._link.failed:
             return True  # the failure is reported; no remaining receiver could miss a percept
         if self._link.post(writer.TICKS, batch.data):
             return True
@@ -187,20 +279,15 @@ class Recorder:
     def _post_frame(self, found: Detections | None) -> None:
         """Send the frame to the writer, after the ticks before it."""
         self.stream.flush()
-        if found is None or found.image is None or self._link.failed:
-            return
-        try:
-            image = copy_image(found.image)
-        except OSError:  # no memory or no file descriptor: the run has priority
-            return
-        about = encode((found.captured_s, image.shape, image.dtype))
-        self._link.post_image(about, image.fd, found.image.nbytes)
+        if self._link is not None and found is not None and found.image is not None:
+            frame = encode(writer.Frame(found.captured_s, found.image.shape))
+            self._link.post(writer.FRAME, frame, found.image.tobytes())
 
     def events(self) -> tuple[str, ...]:
         """Return once that the recording, or another receiver of its ticks, has stopped."""
         if self._messages:
             return (self._messages.popleft(),)
-        if self._failure_reported or not self._link.failed:
+        if self._failure_reported or self._link is None or not self._link.failed:
             return ()
         self._failure_reported = True
         return (f"recording stopped ({self._link.failed}); the run continues without it",)
@@ -216,27 +303,28 @@ class Recorder:
             tx_sha256: Hash of all bytes sent on an emulated bus.
         """
         self.stream.flush()
-        self._link.drain()  # makes room for the record of the end
-        end = RunEnd(stopped_by, self.lost, self._seconds, tx_sha256 or "")
-        self._link.post(writer.END, encode(end))
-        self._link.close()
-        if self._last_s is None:
+        if self._link is not None:
+            self._link.drain()  # makes room for the record of the end
+            end = RunEnd(stopped_by, self.lost, self._seconds, tx_sha256 or "")
+            self._link.post(writer.END, encode(end))
+            self._link.close()
+        if self._link is None or self._last_s is None:
             if self._temporary is not None:
                 self._temporary.unlink(missing_ok=True)
                 return f"nothing was recorded: {self._path} is unchanged"
             # Otherwise it belongs to another program, or is a device.
-            if self._opened and self._target.is_file():
+            if self._link is not None and self._target.is_file():
                 self._target.unlink()
             return f"nothing was recorded: {self._path} was not created"
-        done = self._link.done
-        if done is None:
+        closed = self._link.closed
+        if closed is None:
             return f"recording in {self._path} is incomplete: {self._link.failed}"
-        frames = f", {done.frames} frames" if done.frames else ""
+        frames = f", {closed.frames} frames" if closed.frames else ""
         lost = f"; {self.lost} ticks were not recorded" if self.lost else ""
-        size_mb = done.size / 1e6
-        return f"{done.ticks} ticks{frames} ({size_mb:.1f} MB) recorded in {self._path}{lost}"
+        size_mb = self._path.stat().st_size / 1e6
+        return f"{closed.ticks} ticks{frames} ({size_mb:.1f} MB) recorded in {self._path}{lost}"
 
     @property
     def unwritten(self) -> Path | None:
         """Return the incomplete file, None if the recording is complete."""
-        return self._path if self._opened and self._link.failed else None
+        return self._path if self._link is not None and self._link.failed else None

@@ -1,19 +1,26 @@
 """Topics and schemas of a recorded run: JSON with schemas in MCAP (mcap.dev/spec).
 
 /rig/tick contains everything, exactly. The other topics repeat parts of it in formats that viewers
-can draw (Foxglove documentation, message schemas).
+can draw, named as in Foxglove's message schemas. Quaternions are x, y, z, w. Frames: world at the
+neck base, head between the eyes, left_eye and right_eye with x along the line of sight, and
+gaze_point.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
+from msgspec import Struct
 
+from gazerig.gaze.angles import compose, rotation
+from gazerig.gaze.types import GazeState, Vec3
 from gazerig.robot.loop.tick import TickRecord
-from gazerig.robot.recording import viewer_messages as viewers
+from gazerig.robot.model.frames import quaternion
+from gazerig.robot.model.types import JointState
 
 TICK, HEALTH = "/rig/tick", "/rig/health"
 FRAME, LOG = "/camera/picture", "/log"
-JOINT_STATES, TRANSFORMS, SCENE = "/joint_states", "/tf", "/scene"
+JOINT_STATES, TRANSFORMS = "/joint_states", "/tf"
 DESCRIPTION = "/robot_description"
 """URDF of the rig, once at the start: viewers draw it and turn its joints."""
 
@@ -23,7 +30,7 @@ RUN, END = "gazerig.run", "gazerig.end"
 Schema = dict[str, Any]
 
 
-class Health(msgspec.Struct, frozen=True):
+class Health(Struct, frozen=True):
     """The bus's counts since it was opened.
 
     Attributes:
@@ -37,17 +44,123 @@ class Health(msgspec.Struct, frozen=True):
     lost_ticks: int
 
 
+class Time(Struct, frozen=True):
+    """A time since 1970."""
+
+    sec: int
+    nsec: int
+
+
+class Xyz(Struct, frozen=True):
+    """A vector."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Quaternion(Struct, frozen=True):
+    """A rotation."""
+
+    x: float
+    y: float
+    z: float
+    w: float
+
+
+class CompressedImage(Struct, frozen=True):
+    """A JPEG, and its exposure in the rig's own time."""
+
+    timestamp: Time
+    captured_s: float
+    data: bytes
+    frame_id: str = "camera"
+    format: str = "jpeg"
+
+
+class Log(Struct, frozen=True):
+    """A text; level 2 is information."""
+
+    timestamp: Time
+    message: str
+    level: int = 2
+    name: str = "gazerig"
+    file: str = ""
+    line: int = 0
+
+
+class Text(Struct, frozen=True):
+    """A text as in ROS."""
+
+    data: str
+
+
+class SingleJoint(Struct, frozen=True):
+    """A measured joint, rad and rad/s."""
+
+    name: str
+    position: float
+    velocity: float
+
+
+class JointStates(Struct, frozen=True):
+    """All measured joints."""
+
+    timestamp: Time
+    joints: list[SingleJoint]
+
+
+class FrameTransform(Struct, frozen=True):
+    """The pose of a frame."""
+
+    timestamp: Time
+    parent_frame_id: str
+    child_frame_id: str
+    translation: Xyz
+    rotation: Quaternion
+
+
+class FrameTransforms(Struct, frozen=True):
+    """The poses of frames."""
+
+    transforms: list[FrameTransform]
+
+
 TYPES: dict[str, tuple[str, type]] = {
     TICK: ("gazerig.Tick", TickRecord),
     HEALTH: ("gazerig.Health", Health),
-    LOG: ("foxglove.Log", viewers.Log),
-    FRAME: ("foxglove.CompressedImage", viewers.CompressedImage),
-    JOINT_STATES: ("foxglove.JointStates", viewers.JointStates),
-    TRANSFORMS: ("foxglove.FrameTransforms", viewers.FrameTransforms),
-    SCENE: ("foxglove.SceneUpdate", viewers.SceneUpdate),
-    DESCRIPTION: ("std_msgs/String", viewers.Text),
+    LOG: ("foxglove.Log", Log),
+    FRAME: ("foxglove.CompressedImage", CompressedImage),
+    JOINT_STATES: ("foxglove.JointStates", JointStates),
+    TRANSFORMS: ("foxglove.FrameTransforms", FrameTransforms),
+    DESCRIPTION: ("std_msgs/String", Text),
 }
 """Topic -> name and type of its messages."""
+
+
+def joint_states(names: Sequence[str], joints: JointState, at: Time) -> JointStates:
+    """Return measured joints."""
+    rows = zip(names, joints.position_rad, joints.velocity_rad_s, strict=True)
+    return JointStates(at, [SingleJoint(*row) for row in rows])
+
+
+def transforms(pose: GazeState, gaze_point_m: Vec3, at: Time) -> FrameTransforms:
+    """Return the measured poses of head and eyes, and the planned gaze point."""
+    left, right = (
+        compose(pose.R_world_head, rotation((*angles, 0.0)))
+        for angles in (pose.eye_left_rad, pose.eye_right_rad)
+    )
+    frames = (
+        ("head", pose.p_world_head_m, pose.R_world_head),
+        ("left_eye", pose.p_world_eye_left_m, left),
+        ("right_eye", pose.p_world_eye_right_m, right),
+        ("gaze_point", gaze_point_m, rotation((0.0, 0.0, 0.0))),
+    )
+    found = []
+    for name, p, R in frames:
+        w, x, y, z = quaternion(R)
+        found.append(FrameTransform(at, "world", name, Xyz(*p), Quaternion(x, y, z, w)))
+    return FrameTransforms(found)
 
 
 _NUMBER: Schema = {"type": "number"}

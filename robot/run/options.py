@@ -3,8 +3,10 @@
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated, NamedTuple
 
 from gazerig.drivers.errors import SetupError
+from gazerig.params import unknown_text
 from gazerig.robot.dashboard.door.token_file import read_token
 from gazerig.robot.run.computer import LEVELS, LoadLevel
 
@@ -14,74 +16,66 @@ BUSES = ("emulated", "ideal")
 """Replacements of the servos: byte-true emulators, or servos without bytes."""
 
 
-@dataclass(frozen=True)
-class RunOptions:
-    """Options of a run: rig, scene, observers and outputs; None if not given.
+class Option(NamedTuple):
+    """Description of a field of ``RunOptions``, which is also an option of ``gazerig run``.
 
-    Attributes:
-        mock: emulated servos instead of the rig's.
-        fast: simulated time.
-        seed: Seed of all random generators.
-        scene, video, camera, oak, replay, world: source of the view; one of them; a camera is the
-            number of a webcam or the name of another package's camera.
-        world: a world with physics, by name or path; its camera's images are rendered and analysed
-            by the real detectors.
-        no_pictures: a world is not rendered: detections are computed, as for a scene.
-        pixels: the scene is drawn and analysed by the real detectors.
-        scanpath, saccade: models instead of the rig's; rules: a rule set instead of the rig's.
-        port: serial port instead of the rig's.
-        rig, character, profile: names or paths; name: name of this head for other programs.
-        behaviour, conversation: initial choices.
-        seconds: duration of the run.
-        page: HOST:PORT of the live page; no_page: without it; token_file: file with its token, None
-            for a new token.
-        record: file to record to; record_pictures: camera frames per second in it.
-        force: overwrite older files.
-        recover: move joints that are far outside their ranges inside, instead of refusing to start.
-        no_browser: leave opening the page to the user.
-        verbose: also print details.
-        summary: file of the figures, "-" for standard output.
-        bus: replacement of the servos, "emulated" (byte-true, the default) or "ideal" (a lag).
-        rate: rate of the loop, Hz, instead of the rig's.
-        computer: power of the computer, a level of ``gazerig.robot.run.computer``.
+    help: its meaning
+    value: name of its value in the help, "" for its type
+    low, high: range of a number
+    name: name of the option, "" for that of the field
+    is_shown: whether the help of the command lists it
     """
 
-    mock: bool = False
-    fast: bool = False
-    seed: int = 0
-    scene: str | None = None
-    video: Path | None = None
-    camera: int | str | None = None
-    oak: bool = False
-    replay: Path | None = None
-    record_camera: Path | None = None
-    world: str | None = None
-    no_pictures: bool = False
-    pixels: bool = False
-    scanpath: str | None = None
-    saccade: str | None = None
-    rules: str | None = None
-    port: str | None = None
+    help: str
+    value: str = ""
+    low: float | None = None
+    high: float | None = None
+    name: str = ""
+    is_shown: bool = True
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of a run: rig, scene, observers and outputs; None if not given."""
+
+    # fmt: off
+    mock: Annotated[bool, Option("Emulated servos instead of the rig's.")] = False
+    fast: Annotated[bool, Option("Simulated time, as fast as possible; needs --mock.")] = False
+    seed: Annotated[int, Option("Seed of all random numbers.", "N", 0)] = 0
+    scene: Annotated[str | None, Option("Simulated people; with --mock: visitor.", "NAME|FILE")] = None
+    world: Annotated[str | None, Option("World with physics: living-room, boxing ...", "NAME|FILE")] = None
+    camera: Annotated[int | str | None, Option("Webcam N, or the camera NAME of a package.", "N|NAME")] = None
+    oak: Annotated[bool, Option("OAK-D camera.")] = False
+    video: Annotated[Path | None, Option("Film or image, in a loop.", "FILE")] = None
+    replay: Annotated[Path | None, Option("Recording of --record-camera, in a loop.", "FILE", name="camera-recording")] = None
+    record_camera: Annotated[Path | None, Option("Record every frame of the camera: FILE.mcap.", "FILE")] = None
+    pixels: Annotated[bool, Option("Draw the scene, and detect faces and motion in it.", is_shown=False)] = False
+    no_pictures: Annotated[bool, Option("Compute what the camera of a world sees, without pictures.", is_shown=False)] = False
     rig: str = "desk"
-    character: str | None = None
-    profile: str | None = None
-    behaviour: str | None = None
-    conversation: str | None = None
-    seconds: float | None = None
-    page: str | None = None
-    no_page: bool = False
-    token_file: Path | None = None
-    record: Path | None = None
-    record_pictures: float = 2.0
-    force: bool = False
-    recover: bool = False
-    no_browser: bool = False
-    verbose: bool = False
-    summary: str | None = None
-    bus: str | None = None
-    name: str | None = None
-    rate: float | None = None
-    computer: str | None = None
+    name: Annotated[str | None, Option("Name of this head for gazerig ctl --rig.", "NAME")] = None
+    port: Annotated[str | None, Option("Serial port instead of the rig's.", "PORT")] = None
+    bus: Annotated[str | None, Option("Substitute for servos: emulated or ideal.", "NAME")] = None
+    rate: Annotated[float | None, Option("Rate of the loop instead of the rig's.", "HZ", 20.0, 1000.0, is_shown=False)] = None
+    computer: Annotated[str | None, Option("Power of this computer: full, small, busy or least.", "LEVEL", is_shown=False)] = None
+    seconds: Annotated[float | None, Option("Stop after S seconds.", "S", 0.0)] = None
+    recover: Annotated[bool, Option("Move joints far outside their ranges inside, slowly.")] = False
+    character: Annotated[str | None, Option("Character instead of the rig's, or none.", "NAME|FILE")] = None
+    profile: Annotated[str | None, Option("Style of gaze: robot, mitake, nakamoto.", "NAME|FILE")] = None
+    rules: Annotated[str | None, Option("Rules instead of the rig's: boxing ...", "NAME|FILE")] = None
+    scanpath: Annotated[str | None, Option("Face scanpath: markov, simple, face_tracking, random.", "NAME", is_shown=False)] = None
+    saccade: Annotated[str | None, Option("Saccades: human, min_jerk, literal_frame.", "NAME", is_shown=False)] = None
+    behaviour: Annotated[str | None, Option("Initial behaviour, one of the rules.", "NAME", is_shown=False)] = None
+    conversation: Annotated[str | None, Option("Initial state of a conversation: talk, listen, think.", "NAME", is_shown=False)] = None
+    page: Annotated[str | None, Option("Address of the live page; 0.0.0.0:8080 serves others.", "HOST:PORT")] = None
+    token_file: Annotated[Path | None, Option("File with the page's token; created if missing.", "FILE", is_shown=False)] = None
+    no_page: Annotated[bool, Option("Do not serve the live page.")] = False
+    no_browser: Annotated[bool, Option("Do not open the page in a browser.")] = False
+    record: Annotated[Path | None, Option("Record every tick: FILE.mcap.", "FILE")] = None
+    record_pictures: Annotated[float, Option("Camera frames per second in the recording.", "HZ", 0.0, 60.0, is_shown=False)] = 2.0
+    summary: Annotated[str | None, Option("Write figures as JSON; - prints them.", "FILE")] = None
+    force: Annotated[bool, Option("Overwrite existing files.")] = False
+    verbose: Annotated[bool, Option("Also print details.", is_shown=False)] = False
+    # fmt: on
 
     @property
     def camera_source(self) -> str | None:
@@ -180,7 +174,7 @@ class RunOptions:
             SetupError: the level is unknown.
         """
         if self.computer is not None and self.computer not in LEVELS:
-            raise SetupError(f"--computer {self.computer}: unknown; available: {', '.join(LEVELS)}")
+            raise SetupError(unknown_text("--computer", self.computer, LEVELS))
         return None if self.computer is None else LEVELS[self.computer]
 
     def _refuse_bus(self) -> None:
@@ -188,7 +182,7 @@ class RunOptions:
         if self.bus is None:
             return
         if self.bus not in BUSES:
-            raise SetupError(f"--bus {self.bus}: unknown; available: {', '.join(BUSES)}")
+            raise SetupError(unknown_text("--bus", self.bus, BUSES))
         if self.port is not None:
             raise SetupError(
                 f"--bus {self.bus} and --port exclude each other: servos at a port are real"

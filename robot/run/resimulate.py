@@ -23,7 +23,7 @@ from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.loop import LoopCount, Tick
 from gazerig.robot.loop.tick import MeasuredJoints, TickRecord
 from gazerig.robot.model.frames import CameraMount
-from gazerig.robot.recording.playback_devices import NoCamera, PlaybackBody, PlaybackPerception
+from gazerig.robot.recording.body_playback import NoCamera, PlaybackBody, PlaybackPerception
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.run.assemble import Substitutes, assemble
 from gazerig.robot.run.options import RunOptions

@@ -1,45 +1,22 @@
-"""Description of a rig from its YAML, with the user's own meshes."""
-
-from collections.abc import Iterable
-from dataclasses import replace
+"""Description of a rig from its YAML."""
 
 from gazerig.config.rig import Rig
-from gazerig.config.schema import unknown_text
-from gazerig.drivers.errors import SetupError
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import Description
-from gazerig.robot.description.own_meshes import own_visual
 from gazerig.robot.description.statics import NECK_JOINTS, Statics, moving_bodies
 from gazerig.robot.loop.sag import SagCompensation
 from gazerig.robot.model.types import order_joints
 from gazerig.robot.run.rig_limits import lid_ends
 
 
-def description_of(rig: Rig, *, looks: bool = True) -> Description:
-    """Return the links, joints, shapes and looks of a rig.
-
-    Args:
-        rig: the rig.
-        looks: Whether to read the meshes of its own.
-
-    Raises:
-        SetupError: one of its meshes cannot be used.
-    """
-    return describe(shape_of(rig if looks else replace(rig, meshes={})))
+def description_of(rig: Rig) -> Description:
+    """Return the links, joints, shapes and looks of a rig."""
+    return describe(shape_of(rig))
 
 
-def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
-    """Return the shape from which a rig's description is built.
-
-    Args:
-        rig: the rig.
-        without_lost_meshes: Whether to omit unusable meshes, as those of a recorded rig may be
-            missing.
-
-    Raises:
-        SetupError: a mesh of its own cannot be used.
-    """
-    shape = RigShape(
+def shape_of(rig: Rig) -> RigShape:
+    """Return the shape from which a rig's description is built."""
+    return RigShape(
         rig.name,
         rig.geometry,
         rig.joints,
@@ -48,20 +25,6 @@ def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
         rig.camera,
         rig.mass,
         (rig.webcam.width_px, rig.webcam.height_px),
-    )
-    if not rig.meshes:
-        return shape
-    faults = dict(mesh_faults(rig))
-    if faults and not without_lost_meshes:
-        key, fault = next(iter(faults.items()))
-        raise SetupError(f"{key}: {fault}")
-    lost = {key.split(".")[1] for key in faults}
-    return shape._replace(
-        meshes=tuple(
-            (name, own_visual(name, params))
-            for name, params in rig.meshes.items()
-            if name not in lost
-        )
     )
 
 
@@ -74,7 +37,7 @@ def statics_of(rig: Rig, *, of_neck: bool = False) -> Statics:
     """
     joints = {n: one for n, one in rig.joints.items() if not of_neck or n in NECK_JOINTS}
     pairs = [one for one in rig.couplings.values() if {*one.joints} <= {*joints}]
-    return Statics(moving_bodies(description_of(rig, looks=False), joints), joints, pairs)
+    return Statics(moving_bodies(description_of(rig), joints), joints, pairs)
 
 
 def sag_compensation(rig: Rig) -> SagCompensation | None:
@@ -82,19 +45,3 @@ def sag_compensation(rig: Rig) -> SagCompensation | None:
     if not any(name in rig.joints for name in NECK_JOINTS):
         return None
     return SagCompensation(statics_of(rig, of_neck=True), order_joints(rig.joints))
-
-
-def mesh_faults(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find meshes of a rig that cannot be shown: their key in its file, and the fault."""
-    if not rig.meshes:
-        return
-    made = describe(shape_of(replace(rig, meshes={})))
-    links = [link.name for link in made.links]
-    for name, params in rig.meshes.items():
-        if name not in links:
-            yield f"meshes.{name}", unknown_text("link", name, links)
-            continue
-        try:
-            own_visual(name, params)
-        except SetupError as error:
-            yield f"meshes.{name}.file", str(error)

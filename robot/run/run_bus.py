@@ -125,7 +125,7 @@ def servo_index(rig: Rig, joint: str) -> int:
 def _emulated_line(rig: Rig, name: str) -> Emulated:
     config, joints = rig.bus_named(name), joints_on(rig, name)
     if config.kind in CHAINS:
-        weights = joint_weights(description_of(rig, looks=False), rig.joints)
+        weights = joint_weights(description_of(rig), rig.joints)
         specs = tuple(_emulated_servo(rig, one, weights[one]) for one in joints)
         return CHAINS[config.kind](specs, config.section.baud)
     if config.kind in BOARDS:

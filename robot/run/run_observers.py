@@ -24,7 +24,7 @@ from gazerig.robot.loop.timing import LoopTiming, busy_text
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.scene import has_opponent
 from gazerig.robot.net.client import rig_name
-from gazerig.robot.net.live_server import LiveServer, StopOnlyServer
+from gazerig.robot.net.live_server import LiveServer
 from gazerig.robot.net.topics import JointInfo, RigInfo, RunState
 from gazerig.robot.run.assemble import Assembly
 from gazerig.robot.run.camera_factory import scene_start_s
@@ -84,11 +84,9 @@ class RunObservers:
         self._tuning, self._recorder = tuning, recorder
         name = options.name or rig_name(options.rig)
         about = {"rig": options.rig, "name": name, "pid": os.getpid()}
-        self._server: LiveServer | StopOnlyServer | None = None
+        self._server: LiveServer | None = None
         doors: tuple[str, ...] = ()
-        if tuning is None and not options.fast:
-            self._server = StopOnlyServer(assembly.robot.command, assembly.clock, about, say)
-        elif tuning is not None and not options.fast:
+        if not options.fast:
             self._server = LiveServer(
                 assembly.robot,
                 tuning,
@@ -97,10 +95,10 @@ class RunObservers:
                 say,
                 assembly.inject_fault,
                 lambda: {"page": self._page.url() if self._page is not None else None},
-                tuning.confined,
+                tuning.confined if tuning is not None else None,
                 voice,
             )
-            doors = assembly.live_params.rig.doors
+            doors = assembly.live_params.rig.doors if tuning is not None else ()
         self._doors = DoorProcesses(doors, os.getpid(), say)
         address = options.page_address
         self._page = self._make_page(address, options.page_token) if address is not None else None

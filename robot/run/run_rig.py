@@ -11,10 +11,9 @@ from gazerig.drivers.errors import SetupError
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
-from gazerig.params import choices_of
+from gazerig.params import choices_of, unknown_text
 from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.rig_description import mesh_faults
 from gazerig.robot.run.scene_files import load_scene
 from gazerig.robot.run.surroundings import surroundings
 from gazerig.sim_mock.scenes.scene import Scene
@@ -30,7 +29,7 @@ def run_rig(options: RunOptions) -> Rig:
         SetupError: an option names an unknown model.
     """
     names = (options.rig, options.character, options.profile)
-    return with_options(load_rig(*names, further=[mesh_faults]), options)
+    return with_options(load_rig(*names), options)
 
 
 def with_options(rig: Rig, options: RunOptions) -> Rig:
@@ -61,7 +60,7 @@ def _with_choice(params: P, key: str, value: str, option: str) -> P:
     """Replace one key that has choices by an option of the command line."""
     choices = choices_of(type(params), key)
     if value not in choices:
-        raise SetupError(f"{option} {value}: unknown; available: {', '.join(choices)}")
+        raise SetupError(unknown_text(option, value, choices))
     return replace(params, **{key: value})  # type: ignore[arg-type]
 
 

@@ -119,7 +119,7 @@ def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> Compose
         from gazerig.robot.run.rig_description import description_of  # with meshes
 
         info = run_info(rig, options)
-        shown = urdf(description_of(rig, looks=False), looks=False).xml
+        shown = urdf(description_of(rig), looks=False).xml
         recorder = Recorder(options.record, info, options.force, options.fast, shown)
         substitutes = substitutes._replace(body=recorder.wrap_body)
     assembly = assemble(rig, options, substitutes)

@@ -126,7 +126,7 @@ def bench_tick() -> None:
 
 
 def bench_bus() -> None:
-    """A cycle of nine servos, beside clients of others and the least that a client can do."""
+    """A cycle of nine servos, beside clients of others."""
     from bus_clients import CLIENTS, IDS, served
 
     for kind, clients in CLIENTS.items():
@@ -140,7 +140,7 @@ def bench_bus() -> None:
                 name: stack.enter_context(served(kind, open_)) for name, open_ in clients.items()
             }
             figures = in_turns({name: partial(spent, name, cycles[name]) for name in cycles})
-            show(figures, f"us of processor a cycle ({kind})", "bare")
+            show(figures, f"us of processor a cycle ({kind})", "rustypot")
         print(f"  lost values: {lost}")
 
 
@@ -160,19 +160,15 @@ def bench_start() -> None:
 
 
 def bench_camera() -> None:
-    """Search for faces and motion in a picture, beside OpenCV's; seeing and choosing a tick."""
+    """Search for faces and motion in a picture, beside OpenCV's dense flow."""
     import cv2
-    from fakes.runs import play
     from seeing.material import background, eyes_at, paste, portrait
 
-    from gazerig.config.schema import load_rig
     from gazerig.drivers.camera.source import Shot
     from gazerig.drivers.vision.face.detector import face_detector
     from gazerig.drivers.vision.face.params import FaceDetectorParams
     from gazerig.drivers.vision.motion.params import MotionParams
     from gazerig.robot.perception.motion_source import MotionSource
-    from gazerig.robot.run.assemble import assemble
-    from gazerig.robot.run.options import RunOptions
 
     cv2.setNumThreads(1)
     picture = background(640, 480).copy()
@@ -200,27 +196,6 @@ def bench_camera() -> None:
     }  # fmt: skip
     figures = in_turns({name: partial(timed, work, 20) for name, work in works.items()})
     show(figures, "us of processor a picture, 640x480", peer)
-    made = assemble(load_rig("desk"), RunOptions(True, True, 0, "visitor", bus="ideal"))
-    spent: dict[str, list[float]] = {"camera": [], "see": [], "choose": []}
-
-    def follow(name: str, owner: Any, verb: str) -> None:
-        call = getattr(owner, verb)
-
-        def measured(*given: Any) -> Any:
-            began_s = time.thread_time()
-            result = call(*given)
-            spent[name].append(time.thread_time() - began_s)
-            return result
-
-        setattr(owner, verb, measured)
-
-    robot: Any = made.robot
-    for name, owner, verb in (("camera", robot.camera, "latest"), ("see", robot.perception, "see"),
-                              ("choose", robot.attention, "choose")):  # fmt: skip
-        follow(name, owner, verb)
-    whole_us = timed(lambda: play(made, 20.0)) / 4000
-    rows = {name: 1e6 * sum(times) / 4000 for name, times in spent.items()}
-    show({**rows, "whole tick": whole_us}, "us of processor a tick", "whole tick")
 
 
 def cases() -> Iterator[tuple[str, Callable[[], None]]]:

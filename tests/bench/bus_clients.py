@@ -1,12 +1,9 @@
-"""Clients on one bus of nine emulated servos: ours, a bare one, and those that others wrote.
+"""Clients on one bus of nine emulated servos: ours, and those that others wrote.
 
 Each opens a path and yields a cycle: read all servos, write one goal to each, return how many
-values came. The bare one does the least with the same checks: what is lost against it is ours.
+values came.
 """
 
-import os
-import select
-import struct
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -16,9 +13,7 @@ from typing import Literal
 
 from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler, PortHandler
 from fakes.pty_bus import PtyBus
-from fastcrc.crc16 import umts
 from rustypot import Sts3215PyController, Xl330PyController
-from serial import Serial
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.feetech.family import FEETECH
@@ -74,63 +69,6 @@ def ours(kind: str, path: str) -> Iterator[Cycle]:
 
 
 @contextmanager
-def bare_dynamixel(path: str) -> Iterator[Cycle]:
-    """Select and read, goals and request in one write, every CRC checked."""
-    request, count = DYNAMIXEL.request(IDS, 126, 10, is_fast=True), len(IDS)
-    goals = struct.Struct("<4sBHBHH" + "BI" * count)
-    layout = struct.Struct("<8s" + "BBhiiH" * count)
-    row = [number for servo_id in IDS for number in (servo_id, 0)]
-    ends = [8 + 14 * (k + 1) - 2 for k in range(count)]
-    parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
-    with Serial(path, BAUD, timeout=0) as serial:
-
-        def cycle(k: int) -> int:
-            row[1::2] = [2048 + k % 8] * count
-            packet = goals.pack(b"\xff\xff\xfd\x00", 254, 7 + 5 * count, 0x83, 116, 4, *row)
-            os.write(serial.fileno(), packet + struct.pack("<H", umts(packet)) + request)
-            raw = _gather(serial.fileno(), layout.size)
-            if len(raw) < layout.size:
-                return 0
-            values, crc = layout.unpack(raw), 0
-            for part, sent in zip(parts, values[6::6], strict=True):
-                crc = umts(raw[part], crc)
-                if crc != sent:
-                    return 0
-            return count if values[2::6] == IDS and not any(values[1::6]) else 0
-
-        yield cycle
-
-
-@contextmanager
-def bare_feetech(path: str) -> Iterator[Cycle]:
-    """Select and read, goals and request in one write, every checksum checked."""
-    request, count = FEETECH.request(IDS, 56, 15), len(IDS)
-    goals = struct.Struct("<5B" + "BHHH" * count)
-    row = [number for servo_id in IDS for number in (servo_id, 0, 0, 500)]
-    with Serial(path, BAUD, timeout=0) as serial:
-
-        def cycle(k: int) -> int:
-            row[1::4] = [2048 + k % 8] * count
-            body = goals.pack(254, 4 + 7 * count, 0x83, 42, 6, *row)
-            packet = b"\xff\xff" + body + bytes((~sum(body) & 255,))
-            os.write(serial.fileno(), packet + request)
-            raw = _gather(serial.fileno(), 21 * count)
-            answers = [raw[at : at + 21] for at in range(0, len(raw), 21)]
-            whole = (len(one) == 21 and sum(one[2:]) & 255 == 255 and not one[4] for one in answers)
-            return sum(whole)
-
-        yield cycle
-
-
-def _gather(fd: int, length: int) -> bytes:
-    """Return this many bytes, or those that came in time."""
-    got = b""
-    while len(got) < length and select.select((fd,), (), (), WAIT_S)[0]:
-        got += os.read(fd, length - len(got))
-    return got
-
-
-@contextmanager
 def robotis(path: str) -> Iterator[Cycle]:
     """ROBOTIS' SDK: fast sync read of 10 bytes, sync write."""
     port, packets = PortHandler(path), PacketHandler(2.0)
@@ -180,13 +118,11 @@ def rustypot(kind: str, path: str) -> Iterator[Cycle]:
 CLIENTS: dict[str, dict[str, Open]] = {
     "dynamixel": {
         "ours": partial(ours, "dynamixel"),
-        "bare": bare_dynamixel,
         "rustypot": partial(rustypot, "dynamixel"),
         "ROBOTIS' SDK": robotis,
     },
     "feetech": {
         "ours": partial(ours, "feetech"),
-        "bare": bare_feetech,
         "rustypot": partial(rustypot, "feetech"),
     },
 }

@@ -106,12 +106,3 @@ def test_frames_analysed_too_slowly_are_told_with_the_slowest_stage() -> None:
         "6 of 30 frames a second are analysed; one takes 167 ms (motion 100 ms), and the camera "
         "delivers one every 33 ms: lower motion.work_px, or set motion.enabled: false",
     )
-
-
-@pytest.mark.parametrize("deg", [90, 180, 270])
-def test_a_turned_film_is_turned_upright_and_is_another_scene(deg):
-    told, found = looked([turned(room(), deg)] * 40, turns_film=True)
-    ((t_s, line),) = told
-    assert t_s < 5.0 and line.startswith(f"the film is turned by {deg} deg")
-    assert found.image is not None and np.array_equal(found.image, room())
-    assert len(found.faces) == 2 and found.conditions == () and found.scene >= 1

@@ -141,16 +141,6 @@ def test_nonsense_is_refused_before_the_torque_is_on(joint, angle, says) -> None
 # --- hobby servos and rigs of several kinds
 
 
-def test_monitor_shows_every_kind_in_one_table(rigs: dict[str, str]) -> None:
-    done = invoked("monitor", rigs["mixed"], "--mock", "--once")
-    assert done.code == 0, done.err
-    rows = {line.split()[0]: line.split() for line in done.out.splitlines()[1:9]}
-    assert rows["eyes_pan"][1:] == ["0", "-", "-", "none", "-", "-", "-", "-", "off", "-"]
-    assert rows["neck_yaw"][1] == "neck:7" and rows["neck_yaw"][-1] == "none"
-    assert rows["neck_pitch"][1] == "tilt:1" and "us/step" in done.out
-    assert "estimated from the pulse" in done.out
-
-
 def test_on_real_wires_hobby_servos_are_asked_for_first(rigs: dict[str, str]) -> None:
     rig = rigs["mixed"]
     with served(rig) as buses:
@@ -228,28 +218,6 @@ def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig: Path, tmp_pa
     assert "joints.left_eye_pan.zero_step" in done.err
 
 
-def test_what_makes_no_calibration_is_refused_and_the_rest_is_kept(
-    rig: Path, tmp_path: Path
-) -> None:
-    answers = answers_in(tmp_path, "", "", "", "turn 300", "", "turn -600", "", "turn 300", "", "y")
-    words = ("--joint", "left_eye_pan", "--joint", "neck_yaw", "--mock", "--answers", answers)
-    done = calibrate(str(rig), *words)
-    assert done.code == 1
-    assert "refused: left_eye_pan: only 0.0 deg are between the two ends" in done.err
-    assert "not calibrated: left_eye_pan" in done.err
-    assert load_rig(str(rig)).joints["neck_yaw"].zero_step == pytest.approx(1911, abs=8)
-
-
-def test_a_shipped_rig_is_copied_not_written(tmp_path: Path) -> None:
-    refused = calibrate("desk", "--mock")
-    assert refused.code == 2 and "desk.yaml" in refused.err
-    out = tmp_path / "copy.yaml"
-    answers = answers_in(tmp_path, "turn 300", "", "turn -600", "", "turn 300", "")
-    words = ("--joint", "neck_roll", "--answers", answers, "--yes", "--mock", "--out", str(out))
-    calibrated("desk", *words)
-    assert load_rig(str(out)).joints["neck_roll"].max_deg > 10.0
-
-
 @pytest.mark.parametrize(
     ("kind", "words", "says"),
     [
@@ -290,12 +258,3 @@ def test_ctrl_c_while_calibrating_lets_go_and_writes_nothing(rigs: dict[str, str
         assert process.returncode == 1
         assert all(one["target"] == 0 for one in json.loads(buses.command("status"))["servos"])
         assert rig.read_bytes() == before
-
-
-# --- a camera
-
-
-def test_a_simulated_lens_is_measured_and_shown() -> None:
-    done = calibrated("camera", "--mock", "--what", "lens", "--dry-run")
-    assert "camera.lens.focal_px" in done.out + done.err
-    assert "reprojection error 0." in done.out + done.err

@@ -66,14 +66,6 @@ def test_left_is_the_owners_left_and_up_is_up_whatever_the_face_does() -> None:
     assert z == pytest.approx(0.205) and abs(y) == pytest.approx(0.005)
 
 
-def test_back_and_skip_take_a_choice_back() -> None:
-    state = after("left", "enter", "back", "skip")
-    assert state.changed_places() == {} and state.places_mm["N"] == (0.0, 0.0, 0.0)
-    state = after("left", "enter", "back", "left", "enter")
-    assert state.changed_places() == {"face_parts_mm.N": (0.0, 10.0, 0.0)}
-    assert after("back").part == "N"
-
-
 # --- A gaze steered over a face: the nearest one, the eyes on the point, and what is refused
 
 
@@ -96,13 +88,6 @@ def chosen(made: FaceSteering, t_s: float, *faces: Face, captured_s: float | Non
 
 
 # --- whom it looks at
-
-
-def test_of_several_faces_the_nearest_and_then_the_same() -> None:
-    made = steering()
-    assert chosen(made, 0.0, face(1, 1.2), face(2, 0.8)).id == 2
-    assert chosen(made, 0.1, face(1, 0.6), face(2, 0.8)).id == 2
-    assert chosen(made, 0.2, face(1, 0.6)).id == 1
 
 
 def test_the_part_goes_with_the_face_and_the_head_with_its_centre() -> None:

@@ -338,15 +338,3 @@ def test_whoever_ends_it_gets_a_limp_servo(why: str) -> None:
     with pytest.raises(CalibrationStopped):
         bench.measure()
     assert bench.pulse() == 0
-
-
-def test_a_board_that_falls_silent_or_is_not_there_is_named() -> None:
-    bench = LinkageBench("eyes_pan", "1500")
-    bench.hobby.begin()
-    bench.port.faults.command("lose all")
-    with pytest.raises(BusLost, match="does not answer"):
-        bench.hobby.move_to(1600.0)
-    silent = LinkageBench("eyes_pan")
-    silent.port.faults.command("lose all")
-    with pytest.raises(ServoMissing):
-        silent.hobby.begin()

@@ -119,15 +119,6 @@ def test_no_goal_is_faster_than_asked_nor_outside_the_range(
     bench.control.stop()
 
 
-def test_out_of_range_is_held_back_at_the_limit_and_says_so(bench: Bench) -> None:
-    moved = bench.control.pose({"left_eye_pan": 50.0})
-    part = moved.joints["left_eye_pan"]
-    assert not moved.arrived and moved.end_reason == "held back"
-    assert part.desired == pytest.approx(50.0) and part.commanded == pytest.approx(35.0)
-    assert part.reasons == ("out of range",)
-    assert "commanded 35.0 (out of range)" in str(part)
-
-
 @pytest.mark.parametrize(
     ("fault", "after_s", "reason", "end_reason"),
     [
@@ -156,14 +147,3 @@ def test_a_stop_ends_the_way_and_parking_goes_on(bench: Bench, desk_rig: Rig) ->
     assert moved.end_reason == "SIGINT" and moved.seconds < 0.1
     assert bench.control.park(desk_rig.park_deg).arrived
     assert bench.where()["neck_pitch"] == pytest.approx(-12.0, abs=2.0)
-
-
-def test_several_joints_arrive_together(bench: Bench) -> None:
-    moved = bench.control.pose({"neck_yaw": 10.0, "left_eye_pan": -20.0, "neck_roll": 5.0})
-    assert moved.arrived
-    where = bench.where()
-    assert where["neck_yaw"] == pytest.approx(10.0, abs=2.0)
-    assert where["left_eye_pan"] == pytest.approx(-20.0, abs=2.0)
-    halfway = bench.steps[len(bench.steps) // 3]
-    i, j = GAZE_JOINTS.index("left_eye_pan"), GAZE_JOINTS.index("neck_yaw")
-    assert halfway.desired_rad[i] < radians(6.0) and halfway.desired_rad[j] > radians(-12.0)

@@ -127,20 +127,6 @@ def test_the_doctor_offers_a_spare_and_adopts_it_with_fix(
         assert [one[:2] for one in writes] == [(1, "id"), (7, "baud_rate")]
 
 
-@every
-def test_setup_offers_a_spare_in_the_chain(tmp_path: Path, name: str, writes: list[Write]) -> None:
-    with chain_of(tmp_path, name) as chain:
-        chain.renew(chain.setups[6])
-        writes.clear()
-        # Whichever joint is asked for; "no" leaves it as it is.
-        assert "done: 0 of 9" in chain.run("setup", answers="\nn\n" + "s\n" * 8)[1]
-        assert not writes
-        code, out = chain.run("setup", answers="\ny\n")
-        assert code == 0 and "done: 9 of 9" in out, out
-        assert f"so it is for {YAW}" in out and chain.places() == chain.whole
-        assert [one[:2] for one in writes] == [(1, "id"), (7, "baud_rate")]
-
-
 @commands
 @every
 def test_an_adoption_interrupted_between_id_and_rate_is_finished_by_a_second_run(

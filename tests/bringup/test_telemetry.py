@@ -37,7 +37,6 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0, sign=-1, ratio=2.0, zero_step=2000)
-GET_POSITION = 0x90
 WRITES = {
     "dynamixel": (7, {0x03, 0x04, 0x05, 0x06, 0x08, 0x10, 0x20, 0x83, 0x93}),
     "feetech": (4, {0x03, 0x04, 0x05, 0x06, 0x08, 0x83}),
@@ -146,16 +145,6 @@ def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees(maker_rig
     assert seen.torque and not seen.measured
     untold = (seen.goal_deg, seen.velocity_deg_s, seen.load, seen.temperature_c, seen.voltage_v)
     assert untold == (None,) * 5
-
-
-def test_a_board_is_asked_for_pulses_alone_and_keeps_its_errors(maker_rig: Rig) -> None:
-    bench = Bench(maker_rig)
-    bench.command("error 4")
-    bench.sent[""].clear()
-    for _ in range(3):
-        assert bench.monitor.sample().unanswered == 0
-    assert {packet[0] for packet in bench.sent[""]} == {GET_POSITION}
-    assert cast(Any, bench.devices[""]).errors == 1 << 4
 
 
 # --- A track that is recorded by hand: torque off, and the head's motion becomes its keys

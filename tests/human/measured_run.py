@@ -5,11 +5,11 @@ columns, in memory, once for each process. ``tests/human/row_*.py`` measure on i
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
-from math import nan
-from typing import Any, cast
+from dataclasses import dataclass, replace
+from math import inf, nan
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pytest
@@ -85,6 +85,11 @@ class MeasuredRun:
     angles: GazeAngles
     trace: GazeTrace
 
+    @property
+    def period_s(self) -> float:
+        """Return the time from tick to tick."""
+        return float(np.median(np.diff(self.t_s)))
+
     def truth_deg(self, name: str) -> np.ndarray:
         """Return the direction of something in the scene from the head, (n, 2)."""
         x, y, z = (self.truth[name] - self.head_m).T
@@ -93,15 +98,14 @@ class MeasuredRun:
     def later(self, begin_s: float) -> "MeasuredRun":
         """Return the run with the columns from a time on."""
         first = int(np.searchsorted(self.t_s, begin_s))
-        columns = {name: value[first:] for name, value in vars(self).items() if name in _COLUMNS}
+        arrays = [(k, v) for k, v in vars(self).items() if isinstance(v, np.ndarray)]
+        columns: dict[str, Any] = {name: value[first:] for name, value in arrays}
         truth = {name: place[first:] for name, place in self.truth.items()}
         return replace(self, truth=truth, **columns)
 
 
-_COLUMNS = {field.name for field in fields(MeasuredRun)} - {"truth", "angles", "trace"}
-
-Runner = Callable[..., MeasuredRun]
-"""``measured_run``, which rows get as an argument."""
+Figures = dict[str, Any]
+"""What a row measures, by name."""
 
 _kept: dict[str, MeasuredRun] = {}
 
@@ -134,6 +138,29 @@ def measured_run(
         with _scenes(scene):
             _kept[key] = _run(name, profile, seed, seconds, overrides or {}, options)
     return _kept[key].later(begin_s) if begin_s else _kept[key]
+
+
+class Runs(NamedTuple):
+    """The seconds and the seeds of the runs that a row measures."""
+
+    seconds: float
+    seeds: range
+
+    def __call__(
+        self, scene: str | Scene, least_s: float = 0.0, most_s: float = inf, **options: Any
+    ) -> list[MeasuredRun]:
+        """Return a run for each seed; options are those of ``measured_run``."""
+        seconds = min(max(self.seconds, least_s), most_s)
+        return [measured_run(scene, seed=seed, seconds=seconds, **options) for seed in self.seeds]
+
+    def one(self, scene: str | Scene, number: int) -> MeasuredRun:
+        """Return the run of one of the seeds."""
+        return measured_run(scene, seed=self.seeds[number], seconds=self.seconds)
+
+    @property
+    def first(self) -> "Runs":
+        """Return the runs of the first seed alone."""
+        return self._replace(seeds=self.seeds[:1])
 
 
 def half_rate_run(scene: str, profile: str, seconds: float) -> MeasuredRun:

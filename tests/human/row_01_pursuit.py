@@ -4,11 +4,10 @@ From picture to joints: tracker, prediction, pursuit, byte-true servos. The gaze
 of the face, so that its following and not its wandering is measured; saccades are left out.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 from human.swinging_face import SwingingFace
 
 from gazerig.robot.model.commands import Value
@@ -43,34 +42,37 @@ class Following(NamedTuple):
 def smooth(run: MeasuredRun) -> np.ndarray:
     """Return which ticks are neither in a saccade nor just before or after one, (n,)."""
     jumps = run.phase == "saccade"
-    rate_hz = 1.0 / float(np.median(np.diff(run.t_s)))
+    rate_hz = 1.0 / run.period_s
     before, after = (round(s * rate_hz) for s in _AROUND_S)
     near = np.convolve(jumps, np.ones(before + after + 1))[before : before + len(jumps)]
     return np.asarray(near < 0.5)
 
 
-def following(run: Runner, hz: float, seconds: float, seed: int) -> Following:
-    """Return how a face that swings at a frequency is followed."""
-    lasts_s = min(seconds, max(_SETTLED_S + 8.0 / hz, 16.0) if hz > 0.15 else 26.0)
-    seen = run(SwingingFace(hz), seed=seed, seconds=lasts_s, overrides=ON_ONE_POINT)
+def following(runs: Runs, hz: float) -> list[Following]:
+    """Return for each seed how a face that swings at a frequency is followed."""
+    most_s = max(_SETTLED_S + 8.0 / hz, 16.0) if hz > 0.15 else 26.0
+    scene = SwingingFace(hz)
+    return [_followed(one, hz) for one in runs(scene, most_s=most_s, overrides=ON_ONE_POINT)]
+
+
+def _followed(seen: MeasuredRun, hz: float) -> Following:
     t, kept = seen.t_s, smooth(seen) & (seen.t_s > _SETTLED_S)
     gaze, face = seen.gaze_deg[:, 0], seen.truth_deg("face 0")[:, 0]
     response = phasor(t, np.gradient(gaze, t), hz, kept) / phasor(t, np.gradient(face, t), hz, kept)
     step = round(_SPEED_OVER_S / float(np.median(np.diff(t))))
     speed = np.abs(gaze[step:] - gaze[:-step]) / (t[step:] - t[:-step])
     calm = np.convolve(~kept, np.ones(step + 1))[step : len(kept)] < 0.5
-    return Following(abs(response), float(speed[calm].max()))
+    return Following(abs(response), speed[calm].max())
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return gains by frequency, the mean over all seeds, and the highest speed."""
-    rows = {hz: [following(run, hz, seconds, seed) for seed in seeds] for hz in _NAMED}
-    out = {
-        f"gain at {name} Hz": float(np.mean([row.gain for row in rows[hz]]))
-        for hz, name in _NAMED.items()
+    rows = {hz: following(runs, hz) for hz in _NAMED}
+    out: Figures = {
+        f"gain at {name} Hz": np.mean([row.gain for row in rows[hz]]) for hz, name in _NAMED.items()
     }
     every = [row for each in rows.values() for row in each]
-    every += [following(run, hz, seconds, seeds[0]) for hz in _BETWEEN]
+    every += [following(runs.first, hz)[0] for hz in _BETWEEN]
     out["largest gain, .1 to 2 Hz"] = max(row.gain for row in every)
     out["fastest smooth gaze, deg/s"] = max(row.fastest_deg_s for row in every)
     return out

@@ -4,10 +4,8 @@ The visitor waves 1.5 times a second by +-9.4 deg, for 3.5 s in each round of 44
 what begins to move, and back at the face: repeated motion is soon known (Neo & Chua 2006).
 """
 
-from collections.abc import Sequence
-
 import numpy as np
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 
 WANTED = {
     "waves that get a glance, %": (70.0, 100.0),
@@ -22,11 +20,10 @@ _ROUND_S, _SINKS_S = 44.0, 0.5
 _KNOWN_S = 1.5
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return glances, looks and shares of the time over all seeds."""
     looks, late, sinking, hands, faces = [], [], [], 0, 0
-    for seed in seeds:
-        seen = run("visitor", seed=seed, seconds=max(seconds, 22.0))
+    for seen in runs("visitor", least_s=22.0):
         on = np.char.startswith(seen.target_name.astype(str), "hand")
         for start_s in np.arange(WAVE_S[0], seen.t_s[-1] - 4.0, _ROUND_S):
             end_s = start_s + WAVE_S[1] - WAVE_S[0]
@@ -36,22 +33,22 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         hands += int(on.sum())
         faces += int((seen.part != "").sum())
     return {
-        "waves that get a glance, %": 100.0 * float((np.array(looks) > 0.1).mean()),
+        "waves that get a glance, %": 100.0 * (np.array(looks) > 0.1).mean(),
         "longest look at a waving hand, s": max(looks),
-        "wave after 1.5 s on the hand, %": 100.0 * float(np.mean(late)),
-        "targets that are a sinking hand, %": 100.0 * float(np.mean(sinking)),
+        "wave after 1.5 s on the hand, %": 100.0 * np.mean(late),
+        "targets that are a sinking hand, %": 100.0 * np.mean(sinking),
         "visitor, hands with a face in view, %": 100.0 * hands / max(1, hands + faces),
     }
 
 
 def _share(seen: MeasuredRun, on: np.ndarray, start_s: float, end_s: float) -> float:
     """Return the share of a time on the hand."""
-    return float(on[(seen.t_s > start_s) & (seen.t_s < end_s)].mean())
+    return on[(seen.t_s > start_s) & (seen.t_s < end_s)].mean()
 
 
 def _longest_s(seen: MeasuredRun, on: np.ndarray, start_s: float, end_s: float) -> float:
     """Return the longest uninterrupted time on the hand."""
     there = on & (seen.t_s > start_s) & (seen.t_s < end_s)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], there.astype(int), [0]))))
-    lengths = (edges[1::2] - edges[::2]) * float(np.median(np.diff(seen.t_s)))
-    return float(lengths.max(initial=0.0))
+    lengths = (edges[1::2] - edges[::2]) * seen.period_s
+    return lengths.max(initial=0.0)

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 
 from gazerig.config.schema import load_rig, load_walk
 from gazerig.gaze.scanpath.scanpath import steps_and_dwells
@@ -82,13 +82,13 @@ def beyond_the_law(rests_s: np.ndarray, parts: Sequence[str]) -> float:
     law = (np.ceil(law / TICK_S) + 1.0) * TICK_S
     slots = np.arange(0.0, 3.0, SLOT_S) - 0.5 * TICK_S
     shares = [np.histogram(each, slots)[0] / len(each) for each in (rests_s, law)]
-    return float((shares[0] - shares[1]).max())
+    return (shares[0] - shares[1]).max()
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures over all seeds."""
-    runs = [run(SCENE, seed=seed, seconds=seconds) for seed in seeds]
-    every = [visit for one in runs for visit in visits(one)]
+    every_run = runs(SCENE)
+    every = [visit for one in every_run for visit in visits(one)]
     rests, lasting = (np.array([getattr(v, f) for v in every]) for f in ("rest_s", "seconds"))
     names = [visit.part for visit in every]
     parts = np.array([part[0] if part in ("LE", "RE", "FL", "FR") else part for part in names])
@@ -97,22 +97,22 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     table = np.array([TABLE_S[part] for part in seen])
     mean = np.array([lasting[parts == part].mean() for part in seen])
     weight = np.array([(parts == part).mean() for part in seen])
-    ratio = float((weight * mean).sum() / (weight * table).sum())
-    sds = [float(rests[parts == part].std()) for part in seen]
+    ratio = (weight * mean).sum() / (weight * table).sum()
+    sds = [rests[parts == part].std() for part in seen]
     return {
         "largest slot of 10 ms beyond the law, %": 100.0 * beyond_the_law(rests, names),
-        "rests below 150 ms, %": 100.0 * float((rests < 0.15 - 1e-6).mean()),
+        "rests below 150 ms, %": 100.0 * (rests < 0.15 - 1e-6).mean(),
         "mean visit over the table's, same for all parts": ratio,
-        "mean visits off that multiple, mean over parts, s": float(
-            (weight * np.abs(mean - ratio * table)).sum()
-        ),
+        "mean visits off that multiple, mean over parts, s": (
+            weight * np.abs(mean - ratio * table)
+        ).sum(),
         "rests, smallest SD of a part, s": min(sds),
         "rests, largest SD of a part, s": max(sds),
-        "rests, SD over mean": float(rests.std() / rests.mean()),
-        "rests above 0.5 s, %": 100.0 * float((rests > 0.5).mean()),
-        "rests above 1 s on an eye, %": 100.0 * float((rests[parts == "E"] > 1.0).mean()),
-        "saccades, 1/s": float(
-            sum(one.saccades[-1] - one.saccades[0] for one in runs)
-            / sum(one.t_s[-1] - one.t_s[0] for one in runs)
+        "rests, SD over mean": (rests.std() / rests.mean()),
+        "rests above 0.5 s, %": 100.0 * (rests > 0.5).mean(),
+        "rests above 1 s on an eye, %": 100.0 * (rests[parts == "E"] > 1.0).mean(),
+        "saccades, 1/s": (
+            sum(one.saccades[-1] - one.saccades[0] for one in every_run)
+            / sum(one.t_s[-1] - one.t_s[0] for one in every_run)
         ),
     }

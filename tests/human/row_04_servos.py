@@ -5,10 +5,8 @@ Hobby servos get a pulse every 20 ms and follow it with a lag of their own of 30
 speed: they do not overshoot, but their time cannot be that of the command.
 """
 
-from collections.abc import Sequence
-
 from human.eye_steps import EYES, steps
-from human.measured_run import Runner
+from human.measured_run import Figures, Runs
 
 SIZES_DEG = (5.0, 7.5, 10.0, 15.0, 20.0)
 
@@ -25,19 +23,19 @@ WANTED = {
 }
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the worst of each rig; nothing of it is random."""
-    figures: dict[str, float] = {}
+    figures: Figures = {}
     for name in EYES:
         every = list(steps(name, SIZES_DEG))
         figures |= {
             f"{name}, largest overshoot, %": 100.0
-            * max(float(one.done_deg.max()) / one.size_deg - 1.0 for one in every),
+            * max(one.done_deg.max() / one.size_deg - 1.0 for one in every),
             f"{name}, longest 10-90 % time over the command's": max(
                 one.rise_ms(one.done_deg) / one.rise_ms(one.asked_deg) for one in every
             ),
             f"{name}, fastest over its cap of speed": max(
-                float(one.speed_deg_s.max()) / one.most_deg_s for one in every
+                one.speed_deg_s.max() / one.most_deg_s for one in every
             ),
         }
     return figures

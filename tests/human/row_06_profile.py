@@ -4,12 +4,10 @@ On the rig ``desk``: single ones of 1 to 30 deg on the true shaft of an eye, and
 shipped scenes as the report finds them.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 from human.eye_steps import steps
-from human.measured_run import Runner
+from human.measured_run import Figures, Runs
 
 pytest.importorskip("gazerig.features.lab")  # its measures
 from gazerig.features.lab.analysis import human_norms as people  # noqa: E402
@@ -42,23 +40,19 @@ def peak_time(size_deg: float) -> float:
     return float(np.mean([one.timing()[2] for one in steps("desk", near)]))
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures; those of single saccades are not random."""
-    single = np.array(
-        [(float(one.done_deg[-1]), *one.timing()) for one in steps("desk", SIZES_DEG)]
-    )
-    scenes = np.vstack(
-        [saccade_table(run(s, seed=n, seconds=seconds).trace) for s in SCENES for n in seeds]
-    )
+    single = np.array([(one.done_deg[-1], *one.timing()) for one in steps("desk", SIZES_DEG)])
+    scenes = np.vstack([saccade_table(one.trace) for scene in SCENES for one in runs(scene)])
     fast, long = inside(single)
     scene_fast, _ = inside(scenes)
     small, large = single[single[:, 0] <= 10.5], single[single[:, 0] >= 17.5]
     return {
-        "1-30 deg, inside both bands, share": float(np.mean(fast & long)),
-        "scenes, peak inside its band, share": float(np.mean(scene_fast)),
-        "time of the peak less people's, up to 10 deg, median": float(
-            np.median(small[:, 3] - people.acceleration_share(small[:, 0]))
+        "1-30 deg, inside both bands, share": np.mean(fast & long),
+        "scenes, peak inside its band, share": np.mean(scene_fast),
+        "time of the peak less people's, up to 10 deg, median": np.median(
+            small[:, 3] - people.acceleration_share(small[:, 0])
         ),
-        "time of the peak, 18-30 deg": float(np.median(large[:, 3])),
+        "time of the peak, 18-30 deg": np.median(large[:, 3]),
         **{f"time of the peak, {size:g} deg": peak_time(size) for size in (10.0, 20.0)},
     }

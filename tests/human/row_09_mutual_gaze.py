@@ -1,10 +1,10 @@
 """Mutual gaze without a conversation: bouts of some 3.3 s, entries where the gaze comes from."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 
 from gazerig.gaze.scanpath.scanpath import ENTRY_PARTS
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
@@ -48,21 +48,21 @@ def _part_deg(run: MeasuredRun, at: int, part: str) -> np.ndarray:
     return np.degrees(np.array([-left, up]) / distance_m)
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures over all seeds."""
-    runs = [run(SCENE, seed=seed, seconds=seconds) for seed in seeds]
-    every = [(one, *stay) for one in runs for stay in stays(one)]
+    all_runs = runs(SCENE)
+    every = [(one, *stay) for one in all_runs for stay in stays(one)]
     bouts = np.array([seconds for _, on, seconds, _ in every if on])
     away = np.array([seconds for _, on, seconds, _ in every if not on])
     entries = [(one, begin) for one, on, _, begin in every if on]
     return {
-        "median bout, s": float(np.median(bouts)),
-        "spread of bouts, SD of the logarithm": float(np.log(bouts).std()),
-        "longest bout, s": float(bouts.max()),
-        "median look away, s": float(np.median(away)),
-        "time on the face, %": 100.0 * float(np.mean([(one.part != "").mean() for one in runs])),
+        "median bout, s": np.median(bouts),
+        "spread of bouts, SD of the logarithm": np.log(bouts).std(),
+        "longest bout, s": bouts.max(),
+        "median look away, s": np.median(away),
+        "time on the face, %": 100.0 * np.mean([(one.part != "").mean() for one in all_runs]),
         "entries at the nearest of eyes and nose, %": 100.0
-        * float(np.mean([one.part[begin] in nearest(one, begin) for one, begin in entries])),
+        * np.mean([one.part[begin] in nearest(one, begin) for one, begin in entries]),
         "entries at the paper's first part, %": 100.0
-        * float(np.mean([one.part[begin] == "FR" for one, begin in entries])),
+        * np.mean([one.part[begin] == "FR" for one, begin in entries]),
     }

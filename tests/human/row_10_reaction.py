@@ -1,12 +1,11 @@
 """Reaction: from a hand that appears next to a face to the measured start of the gaze to it."""
 
-from collections.abc import Sequence
 from math import pi, sin
 from typing import NamedTuple
 
 import numpy as np
 from fakes.scenes import EmptyScene
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 
 from gazerig.gaze.types import Vec3
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing, min_jerk
@@ -96,14 +95,12 @@ def reaction_ms(run: MeasuredRun, hand: int, share: float) -> float | None:
     return 1e3 * float(run.t_s[first + onset] - run.t_s[first])
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return medians and shares over all hands and seeds."""
-    seconds = max(seconds, _LEAST_S)
     found: dict[bool, list[float]] = {False: [], True: []}
     count = {False: 0, True: 0}
-    for seed in seeds:
-        made = run(Appearing(), seed=seed, seconds=seconds)
-        for number, hand in enumerate(appearances(seconds - 0.5)):
+    for made in runs(Appearing(), least_s=_LEAST_S):
+        for number, hand in enumerate(appearances(max(runs.seconds, _LEAST_S) - 0.5)):
             count[hand.near] += 1
             each = reaction_ms(made, number, 0.5 if hand.near else 0.8)  # a near one goes on
             if each is not None:
@@ -112,13 +109,10 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     both = np.concatenate((still, near))
     return {
         "appears: answered, %": 100.0 * len(still) / max(1, count[False]),
-        "appears: median, ms": float(np.median(still)),
-        "appears: between 150 and 250 ms, %": 100.0
-        * float(((still >= 150) & (still <= 250)).mean()),
-        "appears: logarithms' standard deviation": float(
-            np.log(still[still > 0.0]).std()  # a shift may begin there as a hand appears
-        ),
+        "appears: median, ms": np.median(still),
+        "appears: between 150 and 250 ms, %": 100.0 * ((still >= 150) & (still <= 250)).mean(),
+        "appears: logarithms' standard deviation": np.log(still[still > 0.0]).std(),
         "comes nearer fast: answered, %": 100.0 * len(near) / max(1, count[True]),
-        "comes nearer fast: median, ms": float(np.median(near)),
-        "express (below 120 ms), %": 100.0 * float((both < _EXPRESS_MS).mean()),
+        "comes nearer fast: median, ms": np.median(near),
+        "express (below 120 ms), %": 100.0 * (both < _EXPRESS_MS).mean(),
     }

@@ -1,9 +1,7 @@
 """After a saccade, nothing comes sooner than 100 ms: the planned saccades of the shipped scenes."""
 
-from collections.abc import Sequence
-
 import numpy as np
-from human.measured_run import Runner
+from human.measured_run import Figures, Runs
 
 SCENES = ("visitor", "face-to-face")
 WANTED = {"shortest pause after a landing, ms": (95.0, 1e6)}
@@ -18,8 +16,8 @@ def pauses_ms(flight: np.ndarray, t_s: np.ndarray) -> np.ndarray:
     return 1e3 * (t_s[begins[following[known]]] - t_s[ends[known]])
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figure over all seeds."""
-    runs = [run(scene, seed=n, seconds=seconds) for scene in SCENES for n in seeds]
-    pauses = np.concatenate([pauses_ms(one.phase == "saccade", one.t_s) for one in runs])
-    return {"shortest pause after a landing, ms": float(pauses.min())}
+    every = [one for scene in SCENES for one in runs(scene)]
+    pauses = np.concatenate([pauses_ms(one.phase == "saccade", one.t_s) for one in every])
+    return {"shortest pause after a landing, ms": pauses.min()}

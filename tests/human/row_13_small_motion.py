@@ -6,10 +6,8 @@ expressive) it is five steps and twice the play; hobby servos (maker) move for n
 and stop as much short, so nothing moves there.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
-from human.measured_run import BEGIN_S, Runner
+from human.measured_run import BEGIN_S, Figures, Runs
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.model.commands import Value
@@ -30,30 +28,25 @@ WANTED = {
 }
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures over all seeds."""
     sizes, off, lasted_s = [], [], 0.0
-    for seed in seeds:
-        one = run(SCENE, seed=seed, seconds=seconds, begin_s=BEGIN_S, overrides=ONE_POINT)
+    for one in runs(SCENE, begin_s=BEGIN_S, overrides=ONE_POINT):
         after = one.t_s > one.t_s[0] + 1.0
         flight = (one.phase == "saccade") & after
         begins = np.flatnonzero(flight[1:] & ~flight[:-1]) + 1
         ends = np.flatnonzero(~flight[1:] & flight[:-1]) + 1
         for begin, end in zip(begins, ends, strict=False):
             if end + 10 < len(one.t_s):
-                sizes.append(
-                    float(np.linalg.norm(one.gaze_deg[end + 10] - one.gaze_deg[begin - 1]))
-                )
+                sizes.append(np.linalg.norm(one.gaze_deg[end + 10] - one.gaze_deg[begin - 1]))
         off.append(np.linalg.norm(one.gaze_deg - one.target_deg, axis=1)[after])
-        lasted_s += float(one.t_s[-1] - one.t_s[0]) - 1.0
+        lasted_s += (one.t_s[-1] - one.t_s[0]) - 1.0
     small = np.array(sizes)
     return {
         "re-fixations a second": len(small) / lasted_s,
-        "size measured, median, deg": float(np.median(small)),
-        "size measured, 5th percentile, deg": float(np.percentile(small, 5)),
-        "size measured, 95th percentile, deg": float(np.percentile(small, 95)),
-        "farthest from the middle, 95th percentile, deg": float(
-            np.percentile(np.concatenate(off), 95)
-        ),
-        "hobby servos, re-fixations": float(load_rig("maker").gaze.oculomotor.refixations),
+        "size measured, median, deg": np.median(small),
+        "size measured, 5th percentile, deg": np.percentile(small, 5),
+        "size measured, 95th percentile, deg": np.percentile(small, 95),
+        "farthest from the middle, 95th percentile, deg": np.percentile(np.concatenate(off), 95),
+        "hobby servos, re-fixations": load_rig("maker").gaze.oculomotor.refixations,
     }

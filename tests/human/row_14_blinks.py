@@ -9,7 +9,7 @@ the rates: three standard deviations of a count in three minutes. Half of all bl
 from collections.abc import Sequence
 
 import numpy as np
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 
 _FULL = 0.95
 _SMALL_DEG = (2.0, 4.5)
@@ -26,13 +26,11 @@ WANTED = {
 }
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures of a still person (at rest) and of a talking one."""
-    seconds = max(seconds, _LEAST_S / len(seeds))
-    rest = [run("visitor", seed=seed, seconds=seconds) for seed in seeds]
-    talk = [
-        run("face-to-face", seed=seed, seconds=seconds, conversation="listen") for seed in seeds
-    ]
+    least_s = _LEAST_S / len(runs.seeds)
+    rest = runs("visitor", least_s)
+    talk = runs("face-to-face", least_s, conversation="listen")
     every = [*rest, *talk]
     onsets = [onset for one in every for onset in _planned(one.blinks)]
     together = sum(
@@ -44,7 +42,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "in conversation, 1/min": _per_min(talk),
         "in the tick of a saccade, %": 100.0 * together / max(1, len(onsets)),
         "begin within 100 ms of a saccade of 2-4.5 deg, over chance": _with_small(every),
-        "incomplete, %": 100.0 * float((depths < _FULL).mean()),
+        "incomplete, %": 100.0 * (depths < _FULL).mean(),
     }
 
 

@@ -6,10 +6,38 @@ Seen from where the head points, 0.77 of what exceeds 17.9 deg is the head's (St
 """
 
 from collections.abc import Sequence
+from math import cos, radians, sin
 
 import numpy as np
-from human.lights import Lights
-from human.measured_run import BEGIN_S, MeasuredRun, Runner
+from fakes.scenes import EmptyScene
+from human.measured_run import BEGIN_S, Figures, MeasuredRun, Runs
+
+from gazerig.gaze.types import Vec3
+from gazerig.robot.model.commands import Value
+from gazerig.sim_mock.scenes.scene import Thing
+
+EYES_M: Vec3 = (0.04, 0.0, 0.13)
+
+
+def at_yaw(yaw_deg: float) -> Vec3:
+    """Return a place 1.5 m from the eyes."""
+    x, y, z = EYES_M
+    return (x + 1.5 * cos(radians(yaw_deg)), y + 1.5 * sin(radians(yaw_deg)), z)
+
+
+class Lights(EmptyScene):
+    """Things that are there for equal times, one after the other."""
+
+    def __init__(self, name: str, yaws_deg: Sequence[float], each_s: float) -> None:
+        self.name, self.round_s = name, each_s * len(yaws_deg)
+        self._yaws_deg, self._each_s = yaws_deg, each_s
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        """Return the lit one."""
+        number = int(t_s / self._each_s)
+        yaw_deg = self._yaws_deg[number % len(self._yaws_deg)]
+        return (Thing(number, "light", at_yaw(yaw_deg), 0.05),)
+
 
 _YAWS = (0, 25, 0, -35, -25, 45, 30, -20, -55, -45, 0, 14, 5, -30, 55, 40, -40, -10, 20, 50)
 _EACH_S = 2.5
@@ -31,9 +59,14 @@ WANTED = {
 SCENE = Lights("lights", _YAWS, _EACH_S)
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return slopes, the head's motion within the range, and the roll."""
-    rows = np.concatenate([_shifts(_of(run, seed, seconds)) for seed in seeds])
+    overrides: dict[str, Value] = {
+        "gaze.top_down.rules.wait.look_at": "light",
+        "camera.horizontal_field_deg": 140.0,  # so that far ones are seen
+    }
+    found = runs(SCENE, begin_s=BEGIN_S, overrides=overrides)
+    rows = np.concatenate([_shifts(one) for one in found])
     arc, turned, homeward, aside, roll = rows.T
     beyond = arc > _FREE_DEG + _MARGIN_DEG
     within = np.abs(turned[arc < _FREE_DEG - _MARGIN_DEG])
@@ -46,23 +79,10 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "homeward: degrees of head a degree beyond the eye-only range": _slope(
             rows[beyond & (homeward == 1.0)]
         ),
-        "within the range: head, deg, at most": float(within.max()) if len(within) else np.nan,
-        "roll with targets 20 deg or more aside, deg, median": float(np.median(inclined)),
-        "roll to the side of the target, %": 100.0 * float((inclined > 0.0).mean()),
+        "within the range: head, deg, at most": within.max() if len(within) else np.nan,
+        "roll with targets 20 deg or more aside, deg, median": np.median(inclined),
+        "roll to the side of the target, %": 100.0 * (inclined > 0.0).mean(),
     }
-
-
-def _of(run: Runner, seed: int, seconds: float) -> MeasuredRun:
-    return run(
-        SCENE,
-        seed=seed,
-        seconds=seconds,
-        begin_s=BEGIN_S,
-        overrides={
-            "gaze.top_down.rules.wait.look_at": "light",
-            "camera.horizontal_field_deg": 140.0,  # so that far ones are seen
-        },
-    )
 
 
 def _slope(rows: np.ndarray) -> float:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from fakes.scenes import EmptyScene
-from human.measured_run import BEGIN_S, MeasuredRun, Runner
+from human.measured_run import BEGIN_S, Figures, MeasuredRun, Runs
 from human.spells import spells
 
 from gazerig.gaze.types import Vec3
@@ -53,10 +53,9 @@ class Room(EmptyScene):
 EMPTY, FURNISHED = Room("empty-room", ()), Room("room-with-things", _PLACES)
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures of a room with nothing in it and of one with three things."""
-    empty = [run(EMPTY, seed=seed, seconds=max(seconds, _SEEN_S)) for seed in seeds]
-    full = [run(FURNISHED, seed=seed, seconds=seconds) for seed in seeds]
+    empty, full = runs(EMPTY, _SEEN_S), runs(FURNISHED)
     sizes = np.array([s.amplitude_deg for one in empty for s in _later(one)])
     level = np.abs(np.concatenate([one.gaze_deg[:, 1] for one in empty])) <= 25.0
     turns = [_turns_s(one) for one in empty]
@@ -66,25 +65,24 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "empty room, blinks/min": 60.0
         * sum(len(one.trace.blinks) for one in empty)
         / sum(one.trace.seconds for one in empty),
-        "empty room, saccades below 15 deg, %": 100.0 * float((sizes < 15.0).mean()),
-        "empty room, gaze within 25 deg of the horizon, %": 100.0 * float(level.mean()),
+        "empty room, saccades below 15 deg, %": 100.0 * (sizes < 15.0).mean(),
+        "empty room, gaze within 25 deg of the horizon, %": 100.0 * level.mean(),
         "empty room, turns of the head above 10 deg, 1/min": 60.0
         * sum(map(len, turns))
-        / sum(float(np.ptp(one.t_s)) for one in empty),
+        / sum(np.ptp(one.t_s) for one in empty),
         "empty room, longest time without, s": max(
-            float(np.diff([0.0, *each, one.t_s[-1]]).max())
-            for each, one in zip(turns, empty, strict=True)
+            np.diff([0.0, *each, one.t_s[-1]]).max() for each, one in zip(turns, empty, strict=True)
         ),
         "empty room, seen in 20 s, least, deg": min(map(_seen_deg, empty)),
         "room with things, saccades/s": _rate(full),
-        "room with things, gaze on them, %": float(on.sum()),
-        "room with things, least looked at of them, %": float(on.min()),
+        "room with things, gaze on them, %": on.sum(),
+        "room with things, least looked at of them, %": on.min(),
     }
 
 
 def _turns_s(one: MeasuredRun) -> list[float]:
     """Return the times of the head's turns from rest to rest above 10 deg."""
-    ticks = round(_OVER_S / float(np.median(np.diff(one.t_s))))
+    ticks = round(_OVER_S / one.period_s)
     moved = np.linalg.norm(one.head_deg[ticks:, :2] - one.head_deg[:-ticks, :2], axis=1)
     return [
         float(one.t_s[begin])
@@ -113,4 +111,4 @@ def _rate(runs: Sequence[MeasuredRun]) -> float:
 def _on(runs: Sequence[MeasuredRun], name: str) -> float:
     """Return the share of time on a thing in percent."""
     off = np.concatenate([one.gaze_deg - one.truth_deg(name) for one in runs])
-    return 100.0 * float((np.hypot(*off.T) <= _ON_DEG).mean())
+    return 100.0 * (np.hypot(*off.T) <= _ON_DEG).mean()

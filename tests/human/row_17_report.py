@@ -4,10 +4,8 @@ A measure with too few events is neither inside nor outside; nor is one that is 
 than chance may have done.
 """
 
-from collections.abc import Callable, Sequence
-
 import pytest
-from human.measured_run import MeasuredRun
+from human.measured_run import Figures, Runs
 
 pytest.importorskip("gazerig.features.lab")  # its measures
 
@@ -17,13 +15,11 @@ SCENES = ("visitor", "face-to-face")
 WANTED = {f"{scene}, outside, most of all seeds": (0.0, 2.0) for scene in SCENES}
 
 
-def measure(
-    run: Callable[..., MeasuredRun], seconds: float, seeds: Sequence[int]
-) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return how many measures are outside."""
-    figures: dict[str, float] = {}
+    figures: Figures = {}
     for scene in SCENES:
-        runs = [judge_run(run(scene, seed=seed, seconds=seconds).trace) for seed in seeds]
-        outside = [sum(one.verdict == "outside" for one in measures) for measures in runs]
+        judged = [judge_run(one.trace) for one in runs(scene)]
+        outside = [sum(one.verdict == "outside" for one in measures) for measures in judged]
         figures[f"{scene}, outside, most of all seeds"] = max(outside)
     return figures

@@ -4,10 +4,8 @@ A person who sits still. People sway by 0.2 to 1.5 deg; servos sway quietly if t
 more than a step of the encoder in a tick.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
-from human.measured_run import BEGIN_S, MeasuredRun, Runner
+from human.measured_run import BEGIN_S, Figures, MeasuredRun, Runs
 from human.row_13_small_motion import ONE_POINT, SCENE
 
 _RESTS_S, _WINDOW_S = 2.0, 10.0
@@ -23,15 +21,14 @@ WANTED = {
 }
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures over all seeds, those of the plan without saccades."""
-    still = {"overrides": ONE_POINT, "begin_s": BEGIN_S}
-    runs = [run(SCENE, seed=n, seconds=seconds, **still) for n in seeds]
-    rests = [rest for one in runs for axis in (0, 2) for rest in unmoved_s(one, axis)]
-    lasted_s = sum(float(np.ptp(one.t_s)) for one in runs)
-    goals = np.concatenate([np.abs(np.diff(one.head_goal_deg, axis=0)) for one in runs])
-    off = np.concatenate([_off(one) for one in runs])
-    deviations = np.median([window for one in runs for window in _deviations(one)], axis=0)
+    every = runs(SCENE, begin_s=BEGIN_S, overrides=ONE_POINT)
+    rests = [rest for one in every for axis in (0, 2) for rest in unmoved_s(one, axis)]
+    lasted_s = sum(np.ptp(one.t_s) for one in every)
+    goals = np.concatenate([np.abs(np.diff(one.head_goal_deg, axis=0)) for one in every])
+    off = np.concatenate([_off(one) for one in every])
+    deviations = np.median([window for one in every for window in _deviations(one)], axis=0)
     return {
         "yaw or roll without a step for 2 s or longer, % of time": 50.0
         * sum(rest for rest in rests if rest >= _RESTS_S)
@@ -40,14 +37,14 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         **{
             f"{axis}: standard deviation, deg": s for axis, s in zip(_AXES, deviations, strict=True)
         },
-        "largest step of a goal in a tick, encoder steps": float(goals.max() / _STEP_DEG),
-        "gaze off the plan, 95th percentile, deg": float(np.percentile(off, 95)),
+        "largest step of a goal in a tick, encoder steps": (goals.max() / _STEP_DEG),
+        "gaze off the plan, 95th percentile, deg": np.percentile(off, 95),
     }
 
 
 def _deviations(one: MeasuredRun) -> np.ndarray:
     """Return the standard deviations in windows of 10 s, (n, 3): few have a recentring."""
-    ticks = round(_WINDOW_S / float(np.median(np.diff(one.t_s))))
+    ticks = round(_WINDOW_S / one.period_s)
     starts = range(0, len(one.t_s) - ticks, ticks)
     return np.array([one.head_deg[k : k + ticks].std(axis=0) for k in starts])
 

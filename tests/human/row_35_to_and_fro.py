@@ -5,11 +5,10 @@ gaze is behind, and catch-up saccades close the gap (Robinson, Gordon & Gordon 1
 al. 2002). Smooth gaze only, and not the .4 s about a reversal.
 """
 
-from collections.abc import Sequence
 from math import asin, pi, sin
 
 import numpy as np
-from human.measured_run import Runner
+from human.measured_run import Figures, Runs
 from human.row_01_pursuit import ON_ONE_POINT, smooth
 from human.swinging_face import SwingingFace
 
@@ -40,13 +39,12 @@ class ToAndFro(SwingingFace):
         return super().people(quarter)
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return gains by speed, the phase lead and the saccades, over all seeds."""
     gains, leads, rate = {}, [], []
     for speed in _SPEEDS_DEG_S:
         scene, found = ToAndFro(speed), []
-        for seed in seeds:
-            one = run(scene, seed=seed, seconds=min(seconds, 60.0), overrides=ON_ONE_POINT)
+        for one in runs(scene, most_s=60.0, overrides=ON_ONE_POINT):
             face, gaze = one.truth_deg("face 0")[:, 0], one.gaze_deg[:, 0]
             v_face, v_gaze = np.gradient(face, one.t_s), np.gradient(gaze, one.t_s)
             left = np.sign(v_face)
@@ -55,16 +53,16 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
                 > 0.0
             )
             kept = smooth(one) & (one.t_s > _SETTLED_S) & ~near
-            found.append(float((v_gaze[kept] * left[kept]).mean() / np.abs(v_face[kept]).mean()))
+            found.append((v_gaze[kept] * left[kept]).mean() / np.abs(v_face[kept]).mean())
             if speed >= 20.0:
                 leads.append(((gaze - face) * left)[kept])
                 late = one.t_s > _SETTLED_S
                 rate.append(np.ptp(one.saccades[late]) / np.ptp(one.t_s[late]))
-        gains[f"{speed:g} deg/s: gain"] = float(np.mean(found))
+        gains[f"{speed:g} deg/s: gain"] = np.mean(found)
     lead = np.concatenate(leads)
     return {
         **gains,
-        "20 and 30 deg/s: gaze ahead of the face, % of time": 100.0 * float((lead > 0.0).mean()),
-        "20 and 30 deg/s: median lead, deg": float(np.median(lead)),
-        "20 and 30 deg/s: catch-up saccades a second": float(np.mean(rate)),
+        "20 and 30 deg/s: gaze ahead of the face, % of time": 100.0 * (lead > 0.0).mean(),
+        "20 and 30 deg/s: median lead, deg": np.median(lead),
+        "20 and 30 deg/s: catch-up saccades a second": np.mean(rate),
     }

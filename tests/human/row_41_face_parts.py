@@ -5,12 +5,11 @@ back; speech draws them to the mouth (Buchan et al. 2007). Everyone has a place 
 the brows to the mouth, that stays for months (Peterson & Eckstein 2013; Mehoudar et al. 2014).
 """
 
-from collections.abc import Sequence
 from math import atan2, hypot, pi, sin
 
 import numpy as np
 from fakes.scenes import EmptyScene
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 from human.row_03_rests import SCENE, visits
 
 from gazerig.gaze.types import Vec3
@@ -48,30 +47,26 @@ class Talker(EmptyScene):
 TALKER = Talker()
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures over all seeds."""
-    runs = [run(SCENE, seed=seed, seconds=seconds) for seed in seeds]
-    parts = np.array([visit.part for one in runs for visit in visits(one)])
-    talk = [run(TALKER, seed=seed, seconds=seconds) for seed in seeds]
+    parts = np.array([visit.part for one in runs(SCENE) for visit in visits(one)])
+    talk = runs(TALKER)
     loud, quiet = (np.concatenate([_looks(one, spoken) for one in talk]) for spoken in (1, 0))
     bold, shy = (
-        [
-            _height_mm(run(SCENE, seed=seed, seconds=min(seconds, 120.0), character=name))
-            for seed in seeds
-        ]
+        [_height_mm(one) for one in runs(SCENE, most_s=120.0, character=name)]
         for name in ("bold", "shy")
     )
     eyes = np.isin(parts, ("LE", "RE"))
     return {
-        "looks at the eyes, %": 100.0 * float(eyes.mean()),
-        "right eye over left": float((parts == "RE").sum() / max(1, (parts == "LE").sum())),
+        "looks at the eyes, %": 100.0 * eyes.mean(),
+        "right eye over left": ((parts == "RE").sum() / max(1, (parts == "LE").sum())),
         "looks at chin, sides and forehead, %": 100.0
-        * float(np.isin(parts, ("DN", "FL", "FR", "UP")).mean()),
-        "looks at the mouth, of a speaker over others": float(
+        * np.isin(parts, ("DN", "FL", "FR", "UP")).mean(),
+        "looks at the mouth, of a speaker over others": (
             (loud == "M").mean() / max(1e-9, (quiet == "M").mean())
         ),
-        "looks at the eyes of a speaker, %": 100.0 * float(np.isin(loud, ("LE", "RE")).mean()),
-        "bold above shy, mm": float(np.mean(bold) - np.mean(shy)),
+        "looks at the eyes of a speaker, %": 100.0 * np.isin(loud, ("LE", "RE")).mean(),
+        "bold above shy, mm": (np.mean(bold) - np.mean(shy)),
     }
 
 

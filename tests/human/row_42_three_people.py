@@ -5,11 +5,10 @@ The person looked at is the one listened to in 88 % of the time, and the one spo
 Kendrick 2015). All of a turn counts, with its beginning, and with speakers out of view.
 """
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 from human.row_45_talk import faces_deg
 from human.spells import apart_deg, spells
 
@@ -35,40 +34,40 @@ WANTED = {
 _FACE_M, _SHORTEST_S, _NEVER_S = 0.15, 0.1, 9.9
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures over all seeds."""
-    lasts_s = max(seconds, 128.0)  # two rounds, as long stays are rare
-    runs = {name: [run(name, seed=seed, seconds=lasts_s) for seed in seeds] for name in SCENES}
+    # Two rounds, as long stays are rare.
+    found = {name: runs(name, least_s=128.0) for name in SCENES}
     on, delays = dict[str, float](), list[float]()
-    for name, each in runs.items():
+    for name, each in found.items():
         speakers = [_speaker(one, name) for one in each]
         seen = [
             looked_at(one)[who >= 0] == who[who >= 0]
             for one, who in zip(each, speakers, strict=True)
         ]
-        on[f"{name}: on the speaker, % of whole turns"] = 100.0 * float(np.concatenate(seen).mean())
+        on[f"{name}: on the speaker, % of whole turns"] = 100.0 * np.concatenate(seen).mean()
         if len(SCENES[name]) > 1:
             delays += [
                 d for one, who in zip(each, speakers, strict=True) for d in _delays(one, who)
             ]
-    several = [looked_at(one) for one in runs["three-people"]]
+    several = [looked_at(one) for one in found["three-people"]]
     stays = np.array(
         [
             s
-            for one, who in zip(runs["three-people"], several, strict=True)
+            for one, who in zip(found["three-people"], several, strict=True)
             for s in _stays(one, who)
         ]
     )
     counts = np.sum([np.bincount(who[who >= 0], minlength=3) for who in several], axis=0)
     return on | {
         "own speech at a table: on the addressee, % of the time on faces": 100.0
-        * float(np.concatenate([_on_addressee(one) for one in runs["table"]]).mean()),
-        "from the beginning of a turn to its speaker, median s": float(np.median(delays)),
-        "the same, of turns with the gaze elsewhere": float(np.median([d for d in delays if d])),
-        "stays, SD over mean": float(stays.std() / stays.mean()),
-        "stays above 4 s, %": 100.0 * float((stays > 4.0).mean()),
-        "longest stay, s": float(stays.max()),
-        "least looked at, % of the time on faces": 100.0 * float(counts.min() / counts.sum()),
+        * np.concatenate([_on_addressee(one) for one in found["table"]]).mean(),
+        "from the beginning of a turn to its speaker, median s": np.median(delays),
+        "the same, of turns with the gaze elsewhere": np.median([d for d in delays if d]),
+        "stays, SD over mean": (stays.std() / stays.mean()),
+        "stays above 4 s, %": 100.0 * (stays > 4.0).mean(),
+        "longest stay, s": stays.max(),
+        "least looked at, % of the time on faces": 100.0 * (counts.min() / counts.sum()),
     }
 
 

@@ -4,10 +4,8 @@ People turn the head for what they go on looking at; the eyes are rarely more th
 axis (Stahl 1999). All of the time counts, from the first tick, also with a speaker out of view.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 from human.spells import spells
 
 SCENES = {
@@ -20,17 +18,17 @@ WANTED = {f"{who}, beyond 15 deg, % of the time": (0.0, 10.0) for who in SCENES}
 _CORNER_DEG, _LONGEST_S = 15.0, 128.0
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return shares over all seeds, and the longest time without a break."""
-    figures: dict[str, float] = {}
+    figures: Figures = {}
     for who, scenes in SCENES.items():
-        runs = [run(s, seed=n, seconds=min(seconds, _LONGEST_S)) for s in scenes for n in seeds]
-        figures[f"{who}, beyond 15 deg, % of the time"] = 100.0 * float(
-            np.concatenate([aside(one) for one in runs]).mean()
+        off = [one for scene in scenes for one in runs(scene, most_s=_LONGEST_S)]
+        figures[f"{who}, beyond 15 deg, % of the time"] = (
+            100.0 * np.concatenate([aside(one) for one in off]).mean()
         )
         figures[f"{who}, longest unbroken time, s"] = max(
-            float(one.t_s[end - 1] - one.t_s[begin])
-            for one in runs
+            (one.t_s[end - 1] - one.t_s[begin])
+            for one in off
             for begin, end in spells(aside(one)) or [(0, 1)]
         )
     return figures

@@ -8,12 +8,12 @@ A rest tells little of the next one, also while somebody comes, stays and goes: 
 by about .1 in people.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from math import atan2, copysign, cos, inf, pi, radians, sin
 
 import numpy as np
 from fakes.scenes import EmptyScene
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs, measured_run
 from human.spells import apart_deg, spells
 from human.swinging_face import HEAD_M
 
@@ -66,27 +66,27 @@ class Arrivals(EmptyScene):
         return ()
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the share in time and the medians, over several places, a seed for each scene."""
-    numbers = range(_SCENES)
-    runs = [_run(run, n) for n in numbers]
-    found = [each for n, one in zip(numbers, runs, strict=True) for each in arrivals(one, n)]
+    scenes = [Arrivals(number) for number in range(_SCENES)]
+    every = [
+        measured_run(scene, seed=n, seconds=scene.came_s(_VISITS - 1) + _STAYS_S)
+        for n, scene in enumerate(scenes)
+    ]
+    found = [
+        each for scene, one in zip(scenes, every, strict=True) for each in arrivals(one, scene)
+    ]
     taken_s = np.array([s for _, s in found])
     first = np.array([at_start for at_start, _ in found])
     return {
-        "head within 7 deg in 2 s, % of arrivals": 100.0 * float((taken_s <= _IN_TIME_S).mean()),
-        "there at the start: median, s": float(np.median(taken_s[first])),
-        "coming or returning: median, s": float(np.median(taken_s[~first])),
+        "head within 7 deg in 2 s, % of arrivals": 100.0 * (taken_s <= _IN_TIME_S).mean(),
+        "there at the start: median, s": np.median(taken_s[first]),
+        "coming or returning: median, s": np.median(taken_s[~first]),
         "number of arrivals": len(found),
-        "correlation of neighbouring rests": float(
-            np.corrcoef(np.concatenate([_neighbours(one) for one in runs]).T)[0, 1]
-        ),
+        "correlation of neighbouring rests": np.corrcoef(
+            np.concatenate([_neighbours(one) for one in every]).T
+        )[0, 1],
     }
-
-
-def _run(run: Runner, number: int) -> MeasuredRun:
-    scene = Arrivals(number)
-    return run(scene, seed=number, seconds=scene.came_s(_VISITS - 1) + _STAYS_S)
 
 
 def _neighbours(one: MeasuredRun) -> np.ndarray:
@@ -95,12 +95,11 @@ def _neighbours(one: MeasuredRun) -> np.ndarray:
     return np.column_stack((rests_s[:-1], rests_s[1:]))
 
 
-def arrivals(one: MeasuredRun, number: int) -> Iterator[tuple[bool, float]]:
+def arrivals(one: MeasuredRun, scene: Arrivals) -> Iterator[tuple[bool, float]]:
     """Yield whether the person was there at the start, and the time that the head has taken."""
-    scene = Arrivals(number)
     head, face = one.head_deg[:, :2], one.truth_deg("face 0")
     seen = (np.abs(face - head) < _FIELD_DEG).all(axis=1)
-    kept = round(_KEPT_S / float(np.median(np.diff(one.t_s))))
+    kept = round(_KEPT_S / one.period_s)
     near = [begin for begin, end in spells(apart_deg(head, face) < _NEAR_DEG) if end - begin > kept]
     for visit in range(_VISITS):
         came_s = scene.came_s(visit)

@@ -6,13 +6,73 @@ al. 2014); more than 70 % of long utterances begin averted (Kendon 1967). Measur
 time of each reported state; with two people, now and then another is answered than has spoken.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from math import atan2, hypot, pi, sin
 
 import numpy as np
-from human.measured_run import MeasuredRun, Runner
+from fakes.scenes import EmptyScene
+from human.measured_run import Figures, MeasuredRun, Runs
 from human.spells import apart_deg, spells
-from human.talk import Talk
+from human.swinging_face import HEAD_M
 from scipy.signal import find_peaks
+
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.scenes.scene import ScenePerson
+from gazerig.sim_mock.scenes.script import AgentAct
+
+_FIRST_S, _THINKS_S, _CYCLES = 2.0, 0.8, 60
+_LEAST_S, _MOST_S, _CHARACTERS_PER_S = 3.0, 9.0, 15
+_PLACES: dict[int, tuple[Vec3, ...]] = {
+    1: ((1.15, 0.02, 0.24),),
+    2: ((1.2, 0.30, 0.22), (1.25, -0.34, 0.26)),
+}
+
+
+class Talk(EmptyScene):
+    """The head listens, thinks and speaks; people look at it, and speak while it listens.
+
+    Two answers of three go to the person who has not spoken, if there are two, one of them without
+    a thought. Half of the speeches have a text, half a planned length.
+    """
+
+    round_s = 3600.0
+
+    def __init__(self, people: int, number: int) -> None:
+        self.name, self._places = f"talk of {people}, {number}", _PLACES[people]
+        rng, t_s, partner, acts = np.random.default_rng(number), _FIRST_S, 0, list[AgentAct]()
+        for cycle in range(_CYCLES):
+            hears_s, speaks_s = rng.uniform(_LEAST_S, _MOST_S, 2).tolist()
+            answered = (partner + (cycle % 3 > 0)) % people
+            acts.append(AgentAct(t_s, "listening", str(partner)))
+            t_s += hears_s
+            if people == 1 or cycle % 3 < 2:
+                acts.append(AgentAct(t_s, "thinking", str(answered)))
+                t_s += _THINKS_S
+            text = "x" * round(_CHARACTERS_PER_S * speaks_s) if cycle % 2 else ""
+            acts.append(AgentAct(t_s, "speaking", str(answered), None if text else speaks_s, text))
+            t_s, partner = t_s + speaks_s, answered
+        self.agent = tuple(acts)
+
+    def face(self, name: str, t_s: float) -> Vec3:
+        """Return a person's face."""
+        x, y, z = self._places[int(name)]
+        return x, y + 0.008 * sin(2.0 * pi * 0.17 * t_s + int(name)), z
+
+    def partner(self, t_s: float, state: str = "") -> int:
+        """Return the partner at a time, in a state or in any; -1 for none."""
+        acts = [act for act in self.agent if act.at_s <= t_s]
+        return int(acts[-1].person) if acts and state in ("", acts[-1].state) else -1
+
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+        """Return the people."""
+        heard, found = self.partner(t_s, "listening"), []
+        for number in range(len(self._places)):
+            face = self.face(str(number), t_s)
+            x, y, z = (a - b for a, b in zip(HEAD_M, face, strict=True))
+            way = atan2(y, x), atan2(z, hypot(x, y))
+            found.append(ScenePerson(face, way, None, number == heard))
+        return tuple(found)
+
 
 _ROLES = {"speaking": ((8.6, 17.7), (0.21, 0.52)), "listening": ((1.0, 5.4), (0.01, 0.08))}
 _PEOPLE = {1: "one person", 2: "two people"}
@@ -41,29 +101,26 @@ _KEPT_S = 0.3
 _NOD_DEG, _NOD_S, _TOGETHER_S = 0.7, 0.4, 1.0
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures over all seeds."""
-    figures: dict[str, float] = {}
-    talks = {n: [Talk(n, seed) for seed in seeds] for n in _PEOPLE}
-    runs = {
-        n: [run(scene, seed=k, seconds=seconds) for scene, k in zip(talks[n], seeds, strict=True)]
-        for n in _PEOPLE
-    }
+    figures: Figures = {}
+    talks = {n: [Talk(n, seed) for seed in runs.seeds] for n in _PEOPLE}
+    seen = {n: [runs.one(scene, k) for k, scene in enumerate(talks[n])] for n in _PEOPLE}
     for people, who in _PEOPLE.items():
         for role in _ROLES:
-            counts, away_s, all_s = np.sum([_looks(one, role) for one in runs[people]], axis=0)
+            counts, away_s, all_s = np.sum([_looks(one, role) for one in seen[people]], axis=0)
             figures[f"{who}, {role}: looks away a minute"] = 60.0 * counts / all_s
             figures[f"{who}, {role}: share averted"] = away_s / all_s
-    every = [one for each in runs.values() for one in each]
-    off = [(one.gaze_deg - one.truth_deg("face 0"))[one.turn == "speaking"] for one in runs[1]]
+    every = [one for each in seen.values() for one in each]
+    off = [(one.gaze_deg - one.truth_deg("face 0"))[one.turn == "speaking"] for one in seen[1]]
     aside, up = np.mean([each.std(axis=0) for each in off], axis=0)
     inside = np.sum([_saccades_inside(one) for one in every], axis=0)
     ways = np.array([way for one in every for way in _thoughts(one)])
     # Of two people the head also turns to the other one meanwhile.
-    gaze, head = np.concatenate([_shifts(one) for one in runs[1]]).transpose(1, 0, 2)
+    gaze, head = np.concatenate([_shifts(one) for one in seen[1]]).transpose(1, 0, 2)
     others = [
         found
-        for scene, one in zip(talks[2], runs[2], strict=True)
+        for scene, one in zip(talks[2], seen[2], strict=True)
         for found in _answers_to_another(scene, one)
     ]
     speeds = {role: np.concatenate([_head_speed(one, role) for one in every]) for role in _ROLES}
@@ -71,15 +128,15 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "speaking: SD of the gaze aside, deg": aside,
         "speaking: SD of the gaze up and down, deg": up,
         "saccades a second in looks away above .8 s": inside[0] / inside[1],
-        "thinking looks that go up, share": float((ways[:, 1] > np.abs(ways[:, 0])).mean()),
+        "thinking looks that go up, share": (ways[:, 1] > np.abs(ways[:, 0])).mean(),
         "head's share of speakers' and thinkers' looks away": (gaze * head).sum()
         / (gaze * gaze).sum(),
         "thoughts of an answer to another: looks away lost": sum(
             not averted for state, averted in others if state == "thinking"
         ),
         "answers to another": len(others),
-        "speech to another that begins averted, share": float(
-            np.mean([averted for state, averted in others if state == "speaking"])
+        "speech to another that begins averted, share": np.mean(
+            [averted for state, averted in others if state == "speaking"]
         ),
         "speed of the head, speaking over listening": speeds["speaking"].mean()
         / speeds["listening"].mean(),
@@ -160,14 +217,14 @@ def _answers_to_another(scene: Talk, one: MeasuredRun) -> Iterator[tuple[str, bo
 
 def _head_speed(one: MeasuredRun, role: str) -> np.ndarray:
     """Return the head's speed in a role over a tenth of a second, all axes, deg/s."""
-    ticks = round(_SPEED_OVER_S / float(np.median(np.diff(one.t_s))))
+    ticks = round(_SPEED_OVER_S / one.period_s)
     moved = np.linalg.norm(one.head_deg[ticks:] - one.head_deg[:-ticks], axis=1)
     return np.asarray(moved[one.turn[ticks:] == role] / _SPEED_OVER_S)
 
 
 def _nods(one: MeasuredRun) -> int:
     """Return the number of short dips of the head while it listens; those of a second are one."""
-    rate_hz = 1.0 / float(np.median(np.diff(one.t_s)))
+    rate_hz = 1.0 / one.period_s
     dips, _ = find_peaks(-one.head_deg[:, 1], prominence=_NOD_DEG, width=(None, _NOD_S * rate_hz))
     heard = dips[one.turn[dips] == "listening"]
     return int((np.diff(heard, prepend=-rate_hz * 9.0) > _TOGETHER_S * rate_hz).sum())

@@ -9,7 +9,7 @@ from math import atan2, hypot, radians
 
 import numpy as np
 from fakes.scenes import EmptyScene
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 from human.spells import apart_deg
 from human.swinging_face import HEAD_M
 
@@ -58,14 +58,12 @@ def side(number: int) -> int:
     return -1 if number % 2 else 1
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the shares over all turns and seeds."""
-    lasts_s = max(seconds, _FIRST_S + _EVERY_S * _LEAST_LOOKS + 1.0)
+    least_s = _FIRST_S + _EVERY_S * _LEAST_LOOKS + 1.0
     looks = {
         furnished: [
-            look
-            for seed in seeds
-            for look in followed(run(Turning(furnished), seed=seed, seconds=lasts_s), furnished)
+            look for one in runs(Turning(furnished), least_s) for look in followed(one, furnished)
         ]
         for furnished in (True, False)
     }
@@ -73,7 +71,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     return {
         "a thing is there: followed in 1 s, %": 100.0 * share(looks[True]),
         "nothing is there: followed in 1 s, %": 100.0 * share(looks[False]),
-        "back on the face in 3 s, %": 100.0 * float(np.mean(back)) if back else np.nan,
+        "back on the face in 3 s, %": 100.0 * np.mean(back) if back else np.nan,
         "looks": sum(len(each) for each in looks.values()),
     }
 

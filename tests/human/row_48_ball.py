@@ -4,11 +4,9 @@ Fast approach makes people blink before contact (Holmes & Spence 2004 review def
 startle turns the head away. A ball is held 3 m away and thrown five times at 6 m/s.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from fakes.scenes import EmptyScene
-from human.measured_run import MeasuredRun, Runner
+from human.measured_run import Figures, MeasuredRun, Runs
 from human.swinging_face import HEAD_M
 
 from gazerig.sim_mock.scenes.scene import Thing
@@ -44,12 +42,12 @@ class Balls(EmptyScene):
         return (Thing(int(number), "ball", (x, y, z), 0.06),)
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the shares over all throws and seeds."""
     lasts_s = _FIRST_S + _EVERY_S * (_THROWS - 1) + 3.0
     ahead = {"gaze.idle.explores": False}  # it sees the balls
-    runs = [run(Balls(), seed=seed, seconds=lasts_s, overrides=ahead) for seed in seeds]
-    found = np.array([answer(one, n) for one in runs for n in range(_THROWS)])
+    thrown = runs(Balls(), lasts_s, lasts_s, overrides=ahead)
+    found = np.array([answer(one, n) for one in thrown for n in range(_THROWS)])
     blinked, withdrawn = 100.0 * found.mean(axis=0)
     return {
         "balls with a blink, .25 s before to .1 s after, %": blinked,

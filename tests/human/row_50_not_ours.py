@@ -5,10 +5,8 @@ followed fast and the first seconds. Smooth motion above its threshold looks lik
 bystander takes it for these.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
-from human.measured_run import Runner
+from human.measured_run import Figures, Runs
 from human.saccade_judges import exported, marks, pymovements_saccades
 
 WANTED = {
@@ -17,12 +15,12 @@ WANTED = {
 }
 
 
-def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+def measure(runs: Runs) -> Figures:
     """Return the figures over all seeds."""
-    files = [exported(run("visitor", seed=seed, seconds=seconds)) for seed in seeds]
+    files = [exported(one) for one in runs("visitor")]
     found = [marks(file, pymovements_saccades(file)) for file in files]
     ours, theirs = map(np.concatenate, zip(*found, strict=True))
     return {
-        "the judge's saccades that are not ours, %": 100.0 * float((~theirs).mean()),
-        "our saccades that the judge finds, %": 100.0 * float(ours.mean()),
+        "the judge's saccades that are not ours, %": 100.0 * (~theirs).mean(),
+        "our saccades that the judge finds, %": 100.0 * ours.mean(),
     }

@@ -21,12 +21,11 @@ from gazerig.features.lab.analysis import human_norms as human
 from gazerig.features.lab.analysis.blink_finder import BlinkEvent, find_blinks
 from gazerig.features.lab.analysis.event_detector import (
     CommandedSaccade,
-    FixationEvent,
     SaccadeEvent,
     find_saccades,
 )
 from gazerig.features.lab.analysis.human_norms import BY_KEY
-from gazerig.features.lab.report import face, saccades
+from gazerig.features.lab.report import face
 from gazerig.features.lab.report.gaze_trace import ROW, GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.measures import judge_run
 from gazerig.features.lab.report.statistics import (
@@ -41,7 +40,6 @@ from gazerig.gaze.oculomotor.saccade import SaccadeModel as Jumps
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.types import PARTS, Vec3
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 EMPTY = GazeTrace(np.zeros(0, ROW))
@@ -145,25 +143,6 @@ def test_people_are_as_published() -> None:
     assert human.mean_head_deg([20.0, 40.0, 80.0]) == pytest.approx([1.6, 17.0, 47.8], abs=0.1)
 
 
-def fixed(parts: list[int]) -> GazeTrace:
-    """Make a run that looks at one part after the other."""
-    every = tuple(
-        FixationEvent(n * 0.3, 0.3, PARTS[part], True, True) for n, part in enumerate(parts)
-    )
-    return replace(EMPTY, fixations=every)
-
-
-def test_a_walk_drawn_from_the_matrix_passes_and_its_reverse_does_not() -> None:
-    dice, steps = np.random.default_rng(5), human.visit_matrix(human.transition_matrix())
-    parts = [0]
-    for _ in range(600):
-        parts.append(int(dice.choice(8, p=steps[parts[-1]])))
-    forth, back = verdicts(fixed(parts)), verdicts(fixed(parts[::-1]))
-    assert forth["transitions"].verdict == "pass" and forth["never_taken"].value == 0.0
-    assert back["never_taken"].verdict == "outside"
-    assert back["transitions"].value > 1.5 * forth["transitions"].value
-
-
 def test_servos_without_bytes_are_not_judged(walking: GazeTrace) -> None:
     """Their lag makes most small saccades too long; what the models choose is judged."""
     seen = {result.band.key: result for result in judge_run(replace(walking, ideal_servos=True))}
@@ -198,16 +177,6 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
     assert {row["key"] for row in numbers} == {result.band.key for result in one.results}
     for result in one.results:
         assert result.band.title in page and result.band.source in " ".join(page.split())
-
-
-def test_the_command_takes_a_file_or_a_scene() -> None:
-    for words, text in (
-        ((), "report takes either"),
-        (("x.mcap", "--scene", "visitor"), "report takes either"),
-        (("--scene", "nowhere", "--seconds", "5"), "unknown; scenes"),
-    ):
-        done = invoked("report", *words)
-        assert done.code == 2 and text in done.err and done.err.count("\n") == 1
 
 
 # --- Files that a report reads and writes: nothing of the user's is lost
@@ -353,42 +322,3 @@ def test_what_is_not_measured_or_stopped_and_a_gap_make_no_events(ticks: list[Ti
         builder.update(structs.replace(tick, stopped="somebody did"))
     run = builder.trace()
     assert len(run.rows) == 4010 and not run.saccades and not run.fixations
-
-
-# --- Measures of landings, rests, gains and blinks, from synthetic traces
-
-
-def flown(jumps: list[tuple[float, float, float]]) -> GazeTrace:
-    """Make a run of planned saccades to a goal at 12 deg, onset in s, from and to in deg of yaw."""
-    t = np.arange(0.0, 3.0, 0.005)
-    rows = np.zeros(len(t), ROW)
-    rows["t"], rows["target"][:, 0] = t, 12.0
-    gaze, events = np.full(len(t), jumps[0][1]), []
-    for onset, start, end in jumps:
-        s = np.clip((t - onset) / 0.05, 0.0, 1.0)
-        gaze += (end - start) * s * s * (3.0 - 2.0 * s)
-        rows["phase"][(t >= onset) & (t < onset + 0.05)] = 1.0
-        size = abs(end - start)
-        events.append(
-            SaccadeEvent(onset, 0.05, size, 300.0, 0.4, CommandedSaccade(onset, 0.05, size, 300.0))
-        )
-    rows["gaze"][:, 0] = gaze
-    return GazeTrace(rows, tuple(events))
-
-
-def test_a_landing_is_short_and_corrected() -> None:
-    short = saccades.landing_errors(flown([(0.5, 0.0, 11.0), (0.7, 11.0, 12.0)]))
-    assert short[0] == pytest.approx((11.0 / 12.0, 1.0), abs=0.01) and len(short) == 1
-    late = saccades.landing_errors(flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)]))
-    assert late[0, 1] == 0.0
-
-
-def test_density_keeps_the_time_and_lies_where_it_was_looked() -> None:
-    """Figures 8 and 9 of Nakamoto & Tsuruno: a look at the right eye, and one beside the face."""
-    y_m, z_m = PARTS_FACE_M["RE"][1:]
-    density = face.gaze_density(np.array([[y_m, z_m, 2.0], [5.0, 5.0, 9.0]]))
-    row, column = np.unravel_index(int(density.argmax()), density.shape)
-    places_y_m, places_z_m = face.GRID_M
-    assert places_z_m[row] == pytest.approx(z_m, abs=0.005)
-    assert places_y_m[column] == pytest.approx(y_m, abs=0.005)
-    assert density == pytest.approx(2.0 * face.gaze_density(np.array([[y_m, z_m, 1.0]])))

@@ -19,7 +19,7 @@ from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.sweep.points import Point, check_points, grid
 from gazerig.features.lab.sweep.runs import Row, open_executor, run_all, run_row, table_text
-from gazerig.robot.cli.tune import read_value
+from gazerig.robot.cli.ctl import read_value
 from gazerig.robot.run.options import RunOptions
 
 EYES_ALONE = "gaze.head.eye_only_range_deg"

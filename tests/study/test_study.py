@@ -125,14 +125,6 @@ def test_pages_do_not_distinguish_conditions(study: Path, journal: Journal) -> N
     assert session.page_json()["debriefing"] == ("It was the difference.",)
 
 
-def test_a_film_that_is_cut_short_starts_again(study: Path, journal: Journal) -> None:
-    session = session_of(study, journal)
-    session.handle(PageEvent(session.page, "consent"))
-    session.handle(PageEvent(session.page, "begin"))
-    session.handle(PageEvent(session.page, "seen"))  # it was not even fetched
-    assert session.place.step == "ready"
-
-
 def test_an_incomplete_last_line_is_dropped(tmp_path: Path, study: Path) -> None:
     journal = Journal(tmp_path / "data")
     session_of(study, journal)

@@ -47,14 +47,6 @@ def test_a_users_world_carries_the_head_at_its_site(mujoco: Any, tmp_path: Path)
     assert data.body("rig_neck_pitch_link").xpos == pytest.approx((1.0, 2.0, 3.07))
 
 
-def test_a_rig_knows_where_its_neck_base_stands(tmp_path: Path) -> None:
-    """A site may be turned."""
-    sites = '<site name="gazerig" pos="1 2 3" euler="0 0 90"/>'
-    first = model_with("desk", _world_file(tmp_path, sites)).rig
-    assert first.p_world_base_m == pytest.approx((1.0, 2.0, 3.0))
-    assert [*first.R_world_base[0], *first.R_world_base[1]] == pytest.approx([0, -1, 0, 1, 0, 0])
-
-
 def test_a_users_world_without_a_place_for_the_head_is_refused(tmp_path: Path) -> None:
     """The message has the file and the line to add."""
     path = _world_file(tmp_path, '<geom size="1"/>')

@@ -13,7 +13,7 @@ from gazerig.drivers.types import ImageArray
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.features.world.gl_context import import_mujoco
-from gazerig.gaze.angles import compose, rotate, rotation, sub, yaw_pitch
+from gazerig.gaze.angles import compose, rotation, yaw_pitch
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.description.links import IDENTITY, ORIGIN
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
@@ -103,30 +103,6 @@ def test_a_point_lands_where_the_programs_own_lens_says(
     assert np.abs(landed(seen, pixels) - pixels).max() < 0.5
 
 
-def test_what_is_beside_the_picture_is_left_out_and_nothing_else() -> None:
-    mujoco = import_mujoco()
-    from gazerig.features.world.renderer import Renderer, RendererParams
-
-    rng = np.random.default_rng(5)
-    xml = "".join(
-        f'<body name="b{i}" pos="{x} {y} {z}"><geom type="sphere" size="{r}" rgba="1 1 1 1"/></body>'
-        for i, (x, y, z, r) in enumerate(rng.uniform((-2, -2, -2, 0.01), (3, 2, 2, 0.3), (60, 4)))
-    )
-    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{xml}</worldbody></mujoco>")
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    renderer = Renderer(model, *SIZE, RendererParams(shadow_px=0, samples=0))
-    for R, p_m in POSES:
-        seen = renderer.render(data, LENS, R, p_m)
-        model.geom_rbound[:] = 99.0  # as if everything reached into the picture
-        everything = renderer.render(data, LENS, R, p_m)
-        model.geom_rbound[:] = model.geom_size[:, 0]
-        assert seen.any()
-        assert (seen == everything).all()
-    assert (model.geom_group == 0).all()
-    renderer.close()
-
-
 def test_the_head_that_carries_the_camera_does_not_see_itself() -> None:
     mujoco = import_mujoco()
     from gazerig.features.world.renderer import Renderer, RendererParams
@@ -144,24 +120,6 @@ def test_the_head_that_carries_the_camera_does_not_see_itself() -> None:
         renderer.close()
     with pytest.raises(ValueError, match="no body 'skull'"):
         Renderer(model, *SIZE, params, ["skull"])
-
-
-def test_places_of_a_camera_are_as_from_where_its_rig_stands(balls: Balls) -> None:
-    """A rig at another place and turned round has the view of a camera at that place."""
-    R, p_m = POSES[0]
-    turned: Mat3 = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    back: Mat3 = ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    stands_m: Vec3 = (1.0, 2.0, -0.5)
-    elsewhere = Balls(R_world_base=turned, p_world_base_m=stands_m)
-    try:
-        seen = elsewhere.picture.draw(
-            PinholeView(0.0, LENS, SIZE, compose(back, R), rotate(back, sub(p_m, stands_m)))
-        )
-    finally:
-        elsewhere.picture.close()
-    here = balls.picture.draw(PinholeView(0.0, LENS, SIZE, R, p_m))
-    assert here.max() > 200
-    assert np.abs(seen.astype(int) - here.astype(int)).max() <= 8
 
 
 # --- The default detector finds the faces of a world's people

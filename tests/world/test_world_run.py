@@ -8,22 +8,18 @@ import numpy as np
 import pytest
 from fakes.runs import record
 from present import present
-from rendering import why_not
 
 from gazerig.config.schema import load_rig
 from gazerig.features.world.gl_context import NoRenderer
 from gazerig.features.world.opponent_motion import HOLD_S, MAX_M_S, MAX_M_S2, TAKE_S, OpponentMotion
 from gazerig.features.world.run.poses import RigInState, WorldPoses
 from gazerig.features.world.run.run_world import world_of, world_scene
-from gazerig.features.world.run.sight import ComputedCamera
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.gaze.types import Vec3
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import MoveOpponent
-from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.run.assemble import Assembly, assemble, with_options
-from gazerig.robot.run.camera_factory import frame_locator
 from gazerig.robot.run.gaze_models import rig_kinematics
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.resimulate import rerun
@@ -37,12 +33,6 @@ pytestmark = pytest.mark.usefixtures("mujoco")
 FAST = RunOptions(
     mock=True, fast=True, seed=3, world="living-room", no_pictures=True, seconds=1.0
 ).check_and_complete()
-
-
-def digest(options: RunOptions) -> object:
-    bus = simulate(load_rig("desk"), options).figures["bus"]
-    assert isinstance(bus, dict)
-    return bus["tx_sha256"]
 
 
 def test_a_head_in_a_world_finds_the_person_there() -> None:
@@ -70,20 +60,6 @@ def test_a_recorded_run_can_be_done_again_to_the_same_bytes(tmp_path: Path) -> N
     again = rerun(recording)
     assert again.is_same and again.sent_bytes_same, again.difference
     assert again.ticks == figures["ticks"]
-
-
-def test_ideal_servos_move_the_world_too() -> None:
-    """For tests above the bus; the head has its pose in the world."""
-    made = simulate(load_rig("desk"), replace(FAST, bus="ideal", seconds=4.0))
-    error = made.figures["gaze_error_deg"]
-    assert isinstance(error, dict) and error["median"] < 1.0
-
-
-def test_pictures_of_the_same_seed_give_the_same_bytes_on_one_machine() -> None:
-    if reason := why_not():
-        pytest.skip(reason)
-    seen = replace(FAST, no_pictures=False, seconds=0.2)
-    assert digest(seen) == digest(seen)
 
 
 # --- The world of the emulator's process, and the camera that looks into it from another one
@@ -128,27 +104,6 @@ def test_people_wait_until_a_client_has_spoken(host: Host) -> None:
     assert 0.0 <= host.t_s - newest.t_s <= PUBLISH_MS / 1e3 + 1e-9
     state = host.poses.state
     assert state is not None and state.t_s == pytest.approx(newest.t_s - begin_s, abs=0.002)
-
-
-def test_the_state_is_that_of_physics(host: Host) -> None:
-    host.serve(0.02, heard=True)
-    assert host.poses.newest() is not None and host.poses.state is not None
-    truly = host.served.world.joints_rad()
-    for name, at in host.served.joints().items():
-        assert host.poses.state.qpos[at] == pytest.approx(truly[name], abs=1e-3)
-
-
-def test_without_pictures_detections_begin_with_the_script(host: Host) -> None:
-    mount, rng = CameraMount(host.rig.camera), np.random.default_rng(1)
-    locate = frame_locator(host.rig.camera)
-    seen = ComputedCamera(host.world.scene, mount, 69.0, host.poses, rng, locate)
-    seen.open()
-    assert seen.latest(host.t_s) is None and seen.start_s is None
-    host.serve(0.02, heard=True)
-    seen.latest(host.t_s)
-    found = seen.latest(host.t_s + 0.2)
-    assert seen.start_s == host.poses.begin_s
-    assert found is not None and found.image is None
 
 
 # --- A boxer whose fist a person moves: limits, take-over and return, score, and a repeated run

@@ -1,22 +1,15 @@
 """Emulated servos whose mechanics are a world's: motion and registers as before, and gravity."""
 
 from dataclasses import replace
-from math import degrees, radians
+from math import radians
 from pathlib import Path
 from typing import Any
 
 import pytest
-from mixed_rig import mixed_rig
 from test_coupling import COUPLING
-from world_rigs import NOBODY, WorldBench, arm, read, write
+from world_rigs import WorldBench, arm, read, write
 
 from gazerig.config.schema import load_rig
-from gazerig.features.world.run.run_world import rig_in_world
-from gazerig.features.world.serve import SentWorld
-from gazerig.features.world.world_spec import WorldSpec
-from gazerig.robot.run.run_bus import JOINT_PLAY_DEG, emulated_lines
-from gazerig.sim_mock.pty.line import BusSettings
-from gazerig.sim_mock.pty.server import Server, ServerSettings
 
 pytestmark = pytest.mark.usefixtures("mujoco")
 STEP = 200
@@ -94,20 +87,6 @@ def test_the_neck_goes_limp_and_falls_when_its_load_is_heavier_than_friction() -
     assert servo.position_steps < held - 100 and servo.shaft.effort == 0.0
 
 
-def test_the_bus_watchdog_halts_a_servo_at_its_time_although_nobody_asks() -> None:
-    """The world brings all devices up to date."""
-    bench = _armed("desk", "neck_yaw")
-    servo, device = bench.servos["neck_yaw"], bench.devices[""]
-    write(servo, "profile_velocity", 20)
-    write(servo, "bus_watchdog", 10)
-    write(servo, "goal_position", round(servo.position_steps) + 400)
-    bench.now_s += 1.0
-    bench.world.advance(round(bench.now_s * 1000.0))
-    assert servo.memory.get("bus_watchdog") == 255
-    assert servo.position_steps < 2048 + 40
-    assert device.positions_steps()
-
-
 def test_a_world_whose_numbers_run_away_says_so(tmp_path: Path) -> None:
     """MuJoCo would reset silently, and servos would see a joint jump."""
     from gazerig.features.world.physics import WorldUnstable
@@ -170,42 +149,7 @@ def test_hobby_servos_follow_their_pulses_as_those_with_mechanics_of_their_own(n
         assert abs(servo.place_steps - 6000 - MOVE) <= 1.5 * servo.spec.dead_steps
 
 
-def test_a_hobby_servo_without_pulses_is_limp() -> None:
-    """A hand turns it and it stays; with pulses it goes back."""
-    bench = WorldBench("maker")
-    joint = bench.rig.names[0]
-    servo = bench.servos[joint]
-    assert servo.width_steps == 0
-    before = servo.place_steps
-    servo.turn(300.0)
-    bench.pass_ms(200)
-    assert servo.place_steps == pytest.approx(before + 300.0, abs=3.0)
-    bench.devices[""].channels[bench.rig.joints[joint].id].set_target(round(before))
-    bench.pass_ms(400)
-    assert abs(servo.place_steps - before) <= 30.0
-
-
 # --- Several buses and coupled servos in one world
-
-
-def test_buses_of_three_kinds_share_one_world(tmp_path: Path) -> None:
-    """A Maestro's eyes, a Dynamixel and a Feetech servo in the neck: each moves its own joint."""
-    bench = WorldBench(mixed_rig(tmp_path))
-    eyes, yaw, pitch = "eyes_pan", bench.servos["neck_yaw"], bench.servos["neck_pitch"]
-    arm(yaw)
-    arm(pitch)
-    write(yaw, "goal_position", read(yaw, "present_position") + 200)
-    write(pitch, "goal_position", round(pitch.position_steps) + 100)
-    joint = bench.rig.joints[eyes]
-    bench.devices[""].channels[joint.id].set_target(round(joint.steps(radians(12.0))))
-    before = bench.world.joints_rad()
-    bench.pass_ms(900)
-    angles = bench.world.joints_rad()
-    assert degrees(angles[eyes]) == pytest.approx(12.0, abs=1.2)
-    for name, servo in (("neck_yaw", yaw), ("neck_pitch", pitch)):
-        assert abs(angles[name] - before[name]) > radians(7.0)
-        told = bench.rig.joints[name].angle_rad(servo.position_steps)
-        assert told == pytest.approx(angles[name], abs=radians(0.5 * JOINT_PLAY_DEG) + 1e-6)
 
 
 def test_two_servos_move_two_joints_together() -> None:
@@ -281,19 +225,3 @@ def test_a_push_that_cannot_be_is_refused_with_what_would_be_right() -> None:
     ):
         with pytest.raises(ValueError, match=message):
             COMMANDS.obey(world, text)
-
-
-def test_a_server_passes_a_push_on_to_its_world_and_everything_else_to_its_servos(
-    tmp_path: Path,
-) -> None:
-    """``gazerig ctl fault`` orders both."""
-    spec = WorldSpec(NOBODY, rig_in_world(load_rig("desk"), looks=False))
-    (line,) = emulated_lines(load_rig("desk")).values()
-    around = SentWorld(spec, tmp_path)
-    server = Server(ServerSettings((BusSettings(line),), True, around), lambda text: None)
-    try:
-        assert "pushed left with 5 N" in server._obey("push head 5 left 0.1")
-        assert "NEWTONS is missing; usage: push BODY NEWTONS" in server._obey("push head")
-        assert "servo 7 is stuck" in server._obey("stick 7")
-    finally:
-        server.close()

@@ -33,7 +33,7 @@ from gazerig.features.bringup.telemetry import (
     board_reader,
     smart_servo_reader,
 )
-from gazerig.robot.cli.console import Console
+from gazerig.robot.cli.progress import Console
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, record_signals
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.joint import JointParams

@@ -25,7 +25,7 @@ from gazerig.features.bringup.manual_control import (
     park_slowly,
     refuse_angle,
 )
-from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.options import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.events import group_events

@@ -14,7 +14,7 @@ from gazerig.drivers.serial.list_ports import check_owner, serial_ports, usb_id_
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_setup import open_at
-from gazerig.robot.cli.console import Console
+from gazerig.robot.cli.progress import Console
 from gazerig.robot.cli.terminal import confirm, say, status
 from gazerig.robot.run.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
 from gazerig.robot.run.run_bus import emulated_lines

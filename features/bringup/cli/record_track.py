@@ -31,8 +31,7 @@ from gazerig.features.bringup.hand_recording import (
 )
 from gazerig.features.bringup.telemetry import Monitor
 from gazerig.gaze.track.track import MAX_DURATION_S
-from gazerig.robot.cli.look_and_stop import PidOption
-from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.options import PidOption, RigCommand
 from gazerig.robot.cli.terminal import (
     INTERRUPTED,
     ForceOption,

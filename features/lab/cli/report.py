@@ -7,9 +7,8 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.robot.cli import run_options as options
-from gazerig.robot.cli.progress_bar import Steps, progress_bar
-from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
+from gazerig.robot.cli.options import DEFAULT_RIG, RigCommand, run_option
+from gazerig.robot.cli.progress import Steps, progress_bar
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, record_signals, say
 
 if TYPE_CHECKING:
@@ -37,13 +36,13 @@ def report(
         str | None, typer.Option(help="Instead of a file: run this scene in simulated time.")
     ] = None,
     seconds: Annotated[float, typer.Option(min=5.0, help="Length of that run, s.")] = 180.0,
-    character: options.Character = None,
-    profile: options.Profile = None,
-    scanpath: options.Scanpath = None,
-    saccade: options.Saccade = None,
-    conversation: options.Conversation = None,
-    bus: options.Bus = None,
-    seed: options.Seed = 0,
+    character: Annotated[str | None, run_option("character")] = None,
+    profile: Annotated[str | None, run_option("profile")] = None,
+    scanpath: Annotated[str | None, run_option("scanpath")] = None,
+    saccade: Annotated[str | None, run_option("saccade")] = None,
+    conversation: Annotated[str | None, run_option("conversation")] = None,
+    bus: Annotated[str | None, run_option("bus")] = None,
+    seed: Annotated[int, run_option("seed")] = 0,
     out: Annotated[Path | None, typer.Option(help="HTML page to write.")] = None,
     force: ForceOption = False,
 ) -> None:

@@ -8,9 +8,9 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.cli import run_options as options
-from gazerig.robot.cli.progress_bar import progress_bar
-from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.ctl import read_value
+from gazerig.robot.cli.options import RigCommand, run_option
+from gazerig.robot.cli.progress import progress_bar
 from gazerig.robot.cli.terminal import (
     FAULT,
     INTERRUPTED,
@@ -20,7 +20,6 @@ from gazerig.robot.cli.terminal import (
     record_signals,
     say,
 )
-from gazerig.robot.cli.tune import read_value
 from gazerig.robot.run.options import DEFAULT_SCENE, RunOptions
 
 app = typer.Typer(add_completion=False)
@@ -37,7 +36,7 @@ def sweep(
             help="A key of the rig's YAML and its values: LOW:HIGH:STEPS or A,B,C. Repeatable.",
         ),
     ] = None,
-    scene: options.Scene = DEFAULT_SCENE,
+    scene: Annotated[str | None, run_option("scene")] = DEFAULT_SCENE,
     seeds: Annotated[int, typer.Option(min=1, help="Runs at each point, each with its seed.")] = 4,
     seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
     seconds: Annotated[
@@ -55,10 +54,10 @@ def sweep(
             metavar="tcp://HOST:PORT", help="Run on the workers of this Dask scheduler instead."
         ),
     ] = None,
-    bus: options.Bus = None,
-    profile: options.Profile = None,
-    character: options.Character = None,
-    conversation: options.Conversation = None,
+    bus: Annotated[str | None, run_option("bus")] = None,
+    profile: Annotated[str | None, run_option("profile")] = None,
+    character: Annotated[str | None, run_option("character")] = None,
+    conversation: Annotated[str | None, run_option("conversation")] = None,
     force: ForceOption = False,
 ) -> None:
     """Vary parameters over many simulated runs; write a table of all runs as CSV.
@@ -87,7 +86,7 @@ def sweep(
         check_points(own, points)
         runs = [(point, seed + number) for point in points for number in range(seeds)]
         with (
-            progress_bar(remaining=True) as tell,
+            progress_bar() as tell,
             record_signals() as stopped,
             open_executor(jobs, scheduler) as executor,
         ):

@@ -48,7 +48,7 @@ def _body(rig: Rig, looks: bool) -> tuple[str, Mapping[str, bytes]]:
     from gazerig.robot.description.mjcf import mjcf
     from gazerig.robot.run.rig_description import description_of
 
-    xml, assets = mjcf(description_of(rig, looks=looks), looks=looks)
+    xml, assets = mjcf(description_of(rig), looks=looks)
     return xml, assets
 
 

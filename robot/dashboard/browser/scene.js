@@ -10,10 +10,6 @@ const PICTURE = {
   gaze: "picture: where the head looks",
   faces: "picture: faces and what moves, as found",
 };
-const SCENE = {
-  ghost: "ghost of the desired pose",
-  sight: "lines of sight",
-};
 const VIEWS = ["face", "both", "over its shoulder", "from above"];
 
 export default {
@@ -26,14 +22,8 @@ export default {
       const set = (on) => { layers[layer] = on; };
       place.append(checkbox({ name, value: layers[layer] }, set).node);
     }
-    const boxes = {};
-    const send = () => order({
-      do: "show_view", layers: Object.keys(boxes).filter((layer) => boxes[layer].value),
-    });
-    for (const [layer, name] of Object.entries(SCENE)) {
-      boxes[layer] = checkbox({ name }, send);
-      place.append(boxes[layer].node);
-    }
+    const sight = (on) => order({ do: "show_view", layers: on ? ["sight"] : [] });
+    place.append(checkbox({ name: "lines of sight" }, sight).node);
   },
 };
 

@@ -20,7 +20,7 @@ export default {
       + "here: the head then looks at people as one who talks, listens or thinks."));
     let modes = null;
     onChoices(() => {
-      modes = menu("conversation", "behave as if it would");
+      modes = menu("conversation", "in a conversation");
       rows.replaceChildren(...(modes ? [modes.node] : []));
     });
     return ({ state, run }) => {

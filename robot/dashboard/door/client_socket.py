@@ -3,7 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
@@ -11,6 +11,7 @@ from gazerig.robot.dashboard.door.rig_link import BUSY
 from gazerig.robot.model.commands import COMMANDS, ORDERS, REPEATED, ControlCommand
 from gazerig.robot.model.reply import CommandReply, Progress, command_outcome
 from gazerig.robot.net.excess import STOPPED
+from gazerig.robot.net.openapi import MOST_RATE_HZ
 
 NO_OUTCOME = {name for name, kind in COMMANDS.items() if kind in REPEATED}
 CONTROLS = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))
@@ -23,10 +24,10 @@ _MOST_OPEN = 64
 """Largest number of orders of one client without an outcome."""
 
 
-class Wishes(NamedTuple):
+class Wishes(msgspec.Struct, frozen=True):
     """What a client receives besides answers: states at a rate, 0 for none, and topics."""
 
-    rate_hz: float = 0.0
+    rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=MOST_RATE_HZ)] = 0.0
     events: bool = False
     pictures: bool = False
     rig: bool = False

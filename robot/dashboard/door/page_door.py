@@ -22,7 +22,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from socket import socket
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import aiohttp
 import msgspec
@@ -39,7 +39,7 @@ from gazerig.robot.dashboard.door.client_socket import (
     Wishes,
     tag_of,
 )
-from gazerig.robot.dashboard.door.page_files import PageFiles
+from gazerig.robot.dashboard.door.page_files import add_page_files
 from gazerig.robot.dashboard.door.rig_link import BUSY, Answer, RigLink
 from gazerig.robot.dashboard.door.sockets import (
     TAKES_S,
@@ -73,10 +73,11 @@ from gazerig.robot.net.excess import (
     TokenBucket,
     find_stop,
 )
-from gazerig.robot.net.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
+from gazerig.robot.net.openapi import MOST_WAIT_S, WAIT_S, api_description
 from gazerig.robot.net.socket_io import REQUEST_BYTES, VERSION
 from gazerig.robot.net.topics import PanelContent, RigInfo, RunState, ShownPicture
 
+_T = TypeVar("_T")
 BASE = f"{API}v{VERSION}"
 MOST_CLIENTS = 32
 """Largest number of websockets; one more takes the place of the oldest of the greediest client."""
@@ -106,6 +107,19 @@ _HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
+    # Allow scripts and connections of this address only. Panels contain their own styles, and the
+    # page itself creates the camera image and the icon of the tab.
+    "Content-Security-Policy": (
+        "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+        "media-src 'self' blob:; object-src 'none'; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'none'"
+    ),
+}
+_FRAMED_HEADERS = {
+    **_HEADERS,
+    # The page itself shows the view in a frame, and no other page may.
+    "X-Frame-Options": "SAMEORIGIN",
+    "Content-Security-Policy": "frame-ancestors 'self'",
 }
 _WHERE = (
     "open the address with the token that the rig's terminal shows; "
@@ -123,6 +137,18 @@ class MessageRefused(ValueError):
     def __init__(self, text: str, status: int = 400) -> None:
         super().__init__(text)
         self.status = status
+
+
+class _Wait(msgspec.Struct):
+    """Query of a message: longest wait for its outcome, s."""
+
+    wait_s: Annotated[float, msgspec.Meta(ge=0.0, le=MOST_WAIT_S)] = WAIT_S
+
+
+class _After(msgspec.Struct):
+    """Query of a state: number of the last known event."""
+
+    after: Annotated[int, msgspec.Meta(ge=0, le=_NEWEST)] = _NEWEST
 
 
 class HeadNews(NamedTuple):
@@ -162,32 +188,16 @@ def parse_message(data: str | bytes) -> dict[str, Any]:
     return found
 
 
-def parse_number(request: web.Request, name: str, least: float, most: float, usual: float) -> float:
-    """Parse a number of a query, ``usual`` without it.
+def parse_query(request: web.Request, kind: type[_T]) -> _T:
+    """Parse the values of a query.
 
     Raises:
-        MessageRefused: it is outside the bounds.
+        MessageRefused: one is of the wrong type, or outside its bounds.
     """
-    text = request.query.get(name)
     try:
-        value = usual if text is None else float(text)
-    except ValueError:
-        value = -1.0
-    if text is not None and not least <= value <= most:
-        raise MessageRefused(f"{name}={text:.20}: a number {least:g}..{most:g}")
-    return value
-
-
-def parse_flag(request: web.Request, name: str) -> bool:
-    """Parse a flag of a query, False without it.
-
-    Raises:
-        MessageRefused: it is neither true nor false.
-    """
-    text = request.query.get(name, "false")
-    if text not in ("true", "false"):
-        raise MessageRefused(f"{name}={text:.20}: true or false")
-    return text == "true"
+        return msgspec.convert(dict(request.query), kind, strict=False)
+    except msgspec.ValidationError as error:
+        raise MessageRefused(f"query: {error}") from None
 
 
 def add_client(message: dict[str, Any], visitor: Visitor, websocket: str = "") -> dict[str, Any]:
@@ -273,9 +283,11 @@ class PageDoor:
         return self._thread.is_alive()
 
     def wanted(self) -> Wishes:
-        """Return what any client wants now; may be called from any thread."""
+        """Return whether any client wants pictures, and the rig; for any thread."""
         wishes = [client.wishes for client in tuple(self._clients)]
-        return Wishes(*(max(column) for column in zip(Wishes(), *wishes, strict=True)))
+        return Wishes(
+            pictures=any(one.pictures for one in wishes), rig=any(one.rig for one in wishes)
+        )
 
     def close(self) -> None:
         """Close all connections."""
@@ -290,7 +302,8 @@ class PageDoor:
 
     async def _serve(self) -> None:
         app = web.Application(middlewares=[self._admission_middleware()])
-        PageFiles(_HEADERS).add_to(app.router)
+        app.on_response_prepare.append(add_headers)
+        add_page_files(app.router)
         app.router.add_route("*", API + "{path:.*}", self._handle)
         app.router.add_get(VIEW, self._relay_view)
         app.router.add_get(f"{VIEW}/{{path:.*}}", self._relay_view)
@@ -302,7 +315,7 @@ class PageDoor:
         assert runner.server is not None
         self._connections = Connections(runner.server)
         async with view_client(self._inside) as client:
-            self._view = ViewProxy(client, self._connections, _HEADERS)
+            self._view = ViewProxy(client, self._connections)
             listener = await self._loop.create_server(
                 self._connections.accept, sock=self._listener, backlog=BACKLOG
             )
@@ -353,7 +366,7 @@ class PageDoor:
                 if why_not is not None and is_program:
                     return _answer({"refused": why_not.removeprefix("refused: ")}, 403)
                 if why_not is not None:
-                    return web.Response(status=403, text=f"{why_not}\n", headers=_HEADERS)
+                    return web.Response(status=403, text=f"{why_not}\n")
                 if "token" in request.query and not is_program:
                     answer = self.admission.with_cookie(request, _HEADERS)
                     if self._name_cookie not in request.cookies:
@@ -381,7 +394,7 @@ class PageDoor:
         try:
             match request.method, request.path.removeprefix(f"{BASE}/"):
                 case "GET", "state":
-                    after = int(parse_number(request, "after", 0, _NEWEST, _NEWEST))
+                    after = parse_query(request, _After).after
                     return _answer({"ok": await self._report(after)}, 200)
                 case "POST", "do":
                     return await self._post(request)
@@ -414,7 +427,7 @@ class PageDoor:
         return HeadReport(state, self._feed.events(after), self._feed.number)
 
     async def _post(self, request: web.Request) -> web.StreamResponse:
-        wait_s = parse_number(request, "wait_s", 0.0, MOST_WAIT_S, WAIT_S)
+        wait_s = parse_query(request, _Wait).wait_s
         data = b""
         async with asyncio.timeout(_READ_S):
             while len(data) <= REQUEST_BYTES and (more := await request.content.readany()):
@@ -454,23 +467,24 @@ class PageDoor:
 
     async def _ask(self, message: Mapping[str, Any], visitor: Visitor) -> Answer:
         """Answer a message, or send it to the rig, a stop before all others."""
+        tag = tag_of(message)
+        plain = {key: value for key, value in message.items() if key != "tag"}
         try:
             match message.get("do"):
                 case "stop":  # whatever else it says
                     stop = {key: message[key] for key in ("do", "why", "who")}
-                    answer = await self._rig.stop(stop) | tag_of(message)
+                    answer = await self._rig.stop(stop) | tag
                 case "state":
-                    asked = read_request(_without_tag(message))
+                    asked = read_request(plain)
                     assert isinstance(asked, State)
-                    return {"ok": await self._report(asked.after)} | tag_of(message)
+                    answer = {"ok": await self._report(asked.after)} | tag
                 case "show_view":
-                    view = msgspec.convert(_without_tag(message), ShowView)
-                    self._show_view(view, visitor.browser)
-                    return {"ok": {"notes": []}} | tag_of(message)
+                    self._show_view(msgspec.convert(plain, ShowView), visitor.browser)
+                    answer = {"ok": {"notes": []}} | tag
                 case _:
                     answer = await self._rig.ask(message)
         except ValueError as error:
-            return {"refused": str(error)} | tag_of(message)
+            answer = {"refused": str(error)} | tag
         match answer:
             case {"ok": {"reply": {"t_s": replied_s}}}:
                 self._replied_s = replied_s
@@ -483,12 +497,7 @@ class PageDoor:
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         _require_websocket(request)
-        wishes = Wishes(
-            parse_number(request, "rate_hz", 1.0, MOST_RATE_HZ, 0.0),
-            parse_flag(request, "events"),
-            parse_flag(request, "pictures"),
-            parse_flag(request, "rig"),
-        )
+        wishes = parse_query(request, Wishes)
         self._websockets += 1
         visitor = self._visitor(request)
         client = ClientSocket(wishes, visitor, f"websocket {self._websockets}")
@@ -645,11 +654,16 @@ class PageDoor:
             browser = self._visitor(request).browser
             return await self._view.relay(request, browser, self._over.wait())
         if request.path == VIEW:  # paths in the document are relative to it
-            return web.Response(status=302, headers={**_HEADERS, "Location": f"{VIEW}/"})
+            return web.Response(status=302, headers={"Location": f"{VIEW}/"})
         return await self._view.get(request)
 
     async def _not_found(self, request: web.Request) -> web.Response:
-        return web.Response(status=404, text="there is no page at this address\n", headers=_HEADERS)
+        return web.Response(status=404, text="there is no page at this address\n")
+
+
+async def add_headers(request: web.Request, response: web.StreamResponse) -> None:
+    """Add the headers of every answer."""
+    response.headers.update(_FRAMED_HEADERS if request.path.startswith(VIEW) else _HEADERS)
 
 
 def _require_websocket(request: web.Request) -> None:
@@ -662,16 +676,11 @@ def _answer(answer: Mapping[str, object], status: int) -> web.Response:
         body=msgspec.json.encode(answer),
         status=status,
         content_type="application/json",
-        headers=_HEADERS,
     )
 
 
 def _line(**message: object) -> str:
     return msgspec.json.encode(message).decode()
-
-
-def _without_tag(message: Mapping[str, object]) -> dict[str, object]:
-    return {key: value for key, value in message.items() if key != "tag"}
 
 
 def _unread_bytes(request: web.Request) -> int:

@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import functools
 import socket
-from collections.abc import Awaitable, Iterator, Mapping
+from collections.abc import Awaitable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -91,11 +91,6 @@ _TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each tab receives the whole state, which
 # Headers of a single connection, which a proxy must not forward (RFC 9110, 7.6.1).
 _ONE_LEG = {"connection", "transfer-encoding", "content-encoding", "content-length", "keep-alive"}
 _PLAIN = {"Accept-Encoding": "identity"}
-# The page itself shows it in a frame, and no other page may.
-_FRAMED = {
-    "X-Frame-Options": "SAMEORIGIN",
-    "Content-Security-Policy": "frame-ancestors 'self'",
-}
 
 
 def view_client(socket_path: Path) -> aiohttp.ClientSession:
@@ -107,14 +102,8 @@ def view_client(socket_path: Path) -> aiohttp.ClientSession:
 class ViewProxy:
     """Proxy to viser behind the door; used in the door's event loop."""
 
-    def __init__(
-        self,
-        client: aiohttp.ClientSession,
-        connections: Connections,
-        headers: Mapping[str, str],
-    ) -> None:
+    def __init__(self, client: aiohttp.ClientSession, connections: Connections) -> None:
         self._client, self._connections = client, connections
-        self._headers = {**headers, **_FRAMED}
         self._tabs = TabLimits(MOST_TABS)
         self._tab_rate = TokenBucket(_TABS_PER_S, _TABS_BURST)
 
@@ -126,14 +115,14 @@ class ViewProxy:
             status = inside.status
         if headers.get("Content-Type", "").startswith("text/html"):
             body = body.replace(_HEAD_END, _OWN_TAGS + _HEAD_END, 1)
-        return web.Response(status=status, body=body, headers={**headers, **self._headers})
+        return web.Response(status=status, body=body, headers=headers)
 
     async def relay(
         self, request: web.Request, who: str, over: Awaitable[object]
     ) -> web.StreamResponse:
         """Relay a browser's websocket to the server and back, at the speed of the slower side."""
         if not self._tab_rate.take(asyncio.get_running_loop().time()):
-            return web.Response(status=429, text="too many tabs at once\n", headers=self._headers)
+            return web.Response(status=429, text="too many tabs at once\n")
         words = request.headers.get("Sec-WebSocket-Protocol", "")
         offered = [word.strip() for word in words.split(",") if words]
         browser = web.WebSocketResponse(

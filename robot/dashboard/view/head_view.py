@@ -1,7 +1,6 @@
 """Draw the rig's head on the page as measured: the links of its description, and lines of sight."""
 
 from math import dist, radians
-from typing import NamedTuple
 
 import numpy as np
 import viser
@@ -37,13 +36,6 @@ _LIT_LOWER_LID: Mat3 = rotation((0.0, radians(12.0), 0.0))
 """Rotation of lower lids for the lighting, as if a little higher; otherwise they look tired."""
 
 
-class _Node(NamedTuple):
-    """Link in the scene: its frame, and one file for each of its materials."""
-
-    frame: viser.FrameHandle
-    looks: list[viser.GlbHandle]
-
-
 class HeadView:
     """Rig in the scene, with all parts that its joints move.
 
@@ -53,8 +45,7 @@ class HeadView:
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
         self.on_table = False
-        self.links: dict[str, _Node] = {}
-        self._paths: dict[str, str] = {}
+        self.links: dict[str, viser.FrameHandle] = {}
         self._drawn: RigShape | None = None
         self._description: Description | None = None
         self._root = scene.add_frame("/rig", show_axes=False)
@@ -81,7 +72,7 @@ class HeadView:
         for link in description.links:
             if link.joint is not None:
                 R = compose(link.R, turn_about(link.joint.axis, angles[link.joint.name]))
-                set_pose(self.links[link.name].frame, link.p_m, quaternion(R))
+                set_pose(self.links[link.name], link.p_m, quaternion(R))
         self._shade.visible = not self.on_table
         colour = _SIGHT.get(tick.gaze.phase, _SIGHT["fixate"])
         for line, p_world_m in zip(self._sights, eyes_m(head), strict=True):
@@ -95,45 +86,34 @@ class HeadView:
         self._colour = colour
 
     def _draw(self, description: Description, shape: RigShape) -> None:
-        """Draw a rig; if it has the same links, draw only those that look different."""
-        before, self._description = self._description, description
-        paths: dict[str, str] = {}  # link -> path of its node, below that of its parent
-        for link in description.links:
-            paths[link.name] = f"{paths[link.parent] if link.parent else '/rig'}/{link.name}"
-        if self._paths != paths:
-            self._paths, before = paths, None
-            self._root.remove()
-            self._root = self._scene.add_frame("/rig", show_axes=False)
-            self.links = {
-                name: _Node(self._scene.add_frame(path, show_axes=False), [])
-                for name, path in paths.items()
-            }
-            self._sights = [
-                self._scene.add_line_segments(
-                    f"{paths[f'{side}_eye']}/sight", _AHEAD, self._colour, thickness=2.0,
-                    thickness_units="screen", visible=False,
-                )
-                for side in SIDES
-            ]  # fmt: skip
+        """Draw a rig instead of the one that is drawn."""
+        self._description = description
+        self._root.remove()
+        self._root = self._scene.add_frame("/rig", show_axes=False)
+        self.links, paths = {}, dict[str | None, str]()
         at_rest = dict.fromkeys((joint.name for joint in description.joints), 0.0)
         lit = description.poses(at_rest | lid_angles(shape, (_LIT_OPEN,) * 2, (_LIT_OPEN,) * 2))
         for link in description.links:
-            node = self.links[link.name]
-            set_pose(node.frame, link.p_m, quaternion(link.R))
-            same = before is not None and before.link(link.name).visuals == link.visuals
-            if same or link.name == CAMERA:  # the camera's housing would cover the face
-                continue
-            while node.looks:
-                node.looks.pop().remove()
-            for look in link.visuals:
+            path = f"{paths.get(link.parent, '/rig')}/{link.name}"  # below that of its parent
+            paths[link.name] = path
+            frame = self.links[link.name] = self._scene.add_frame(path, show_axes=False)
+            set_pose(frame, link.p_m, quaternion(link.R))
+            moved = link.joint.name if link.joint is not None else ""
+            # The camera's housing would cover the face.
+            for look in link.visuals if link.name != CAMERA else ():
                 R_lit = compose(lit[link.name][0], look.R)
-                moved = link.joint.name if link.joint is not None else ""
                 if look.name.endswith("still_lid") or "lower_lid" in moved:
                     R_lit = _LIT_LOWER_LID
                 data = painted_glb(look.painted(), FINISHES[look.finish], np.array(R_lit))
-                handle = self._add(f"{paths[link.name]}/look_{look.name}", data)
+                handle = self._add(f"{path}/look_{look.name}", data)
                 handle.position, handle.wxyz = look.p_m, quaternion(look.R)
-                node.looks.append(handle)
+        self._sights = [
+            self._scene.add_line_segments(
+                f"{paths[f'{side}_eye']}/sight", _AHEAD, self._colour, thickness=2.0,
+                thickness_units="screen", visible=False,
+            )
+            for side in SIDES
+        ]  # fmt: skip
         self._shade.scale = _SHADE * shape.geometry.interocular_mm / 1e3
         (base, *_) = description.links
         if base.visuals:

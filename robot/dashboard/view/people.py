@@ -1,14 +1,14 @@
 """Draw what the rig has detected: people, moving bodies, and the target."""
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import viser
 
 from gazerig.gaze.types import PARTS, Face, Percept, Vec3
 from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glow_disc, painted_glb
-from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose, set_rotation
+from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose
 from gazerig.robot.description.mesh import Colour
 from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.description.people import SHIRTS, head, part_of, torso
@@ -43,18 +43,15 @@ class SeenBody(NamedTuple):
     radius_m: float
 
 
-class _Shadow:
-    """Dark spot on the floor below an object."""
+_SHADOW_M = FLOOR_M + 0.002
+"""Height of shadows, a little above the floor."""
 
-    def __init__(self, scene: viser.SceneApi, name: str, radius_m: float) -> None:
-        self._spot = _add(scene, name, painted_glb(glow_disc((20, 24, 34, 96)), FLAT))
-        self._spot.scale = radius_m
 
-    def move_below(self, p_world_m: Vec3) -> None:
-        set_pose(self._spot, (p_world_m[0], p_world_m[1], FLOOR_M + 0.002))
-
-    def remove(self) -> None:
-        self._spot.remove()
+def _add_shadow(scene: viser.SceneApi, id: int, radius_m: float) -> viser.GlbHandle:
+    """Add a dark spot on the floor."""
+    spot = _add(scene, f"/shades/{id}", painted_glb(glow_disc((20, 24, 34, 96)), FLAT))
+    spot.scale = radius_m
+    return spot
 
 
 class _PersonView:
@@ -63,7 +60,7 @@ class _PersonView:
     def __init__(self, scene: viser.SceneApi, face: Face) -> None:
         name = f"/faces/{face.id}"
         self._frame = scene.add_frame(name, show_axes=False)
-        self._shade = _Shadow(scene, f"/shades/{face.id}", 0.3)
+        self._shade = _add_shadow(scene, face.id, 0.3)
         shown, chest = _person_glb((face.id - 1) % len(SHIRTS))
         self._head = _add(scene, f"{name}/head", shown)
         self._chest = _add(scene, f"/chests/{face.id}", chest)
@@ -77,8 +74,8 @@ class _PersonView:
         from_centre_m = np.array(face.parts_world_m) - face.p_world_m
         parts_m = (from_centre_m @ np.array(face.R_world_face)).round(3)
         (ahead, _, _), (aside, _, _), _ = face.R_world_face
-        x, y, z = face.p_world_m
-        self._shade.move_below((x - _BEHIND_M * ahead, y - _BEHIND_M * aside, z))
+        x, y, _ = face.p_world_m
+        set_pose(self._shade, (x - _BEHIND_M * ahead, y - _BEHIND_M * aside, _SHADOW_M))
         set_pose(self._head, parts_m[_NOSE].tolist())
         set_pose(self._chest, face.p_world_m, rotation_to((ahead, aside, 0.0)))
         apart_m = float(np.linalg.norm(parts_m[_LEFT_EYE] - parts_m[_RIGHT_EYE]))
@@ -98,7 +95,6 @@ class _BodyView:
     def __init__(self, scene: viser.SceneApi, body: SeenBody) -> None:
         name = f"/bodies/{body.id}"
         self._frame = scene.add_frame(name, show_axes=False)
-        self.kind = body.kind
         self._shape: viser.GlbHandle | viser.IcosphereHandle
         if body.kind == "hand":
             self._shape = _add(scene, f"{name}/hand", painted_glb(part_of(0, "hand"), SKIN))
@@ -107,14 +103,13 @@ class _BodyView:
                 f"{name}/ball", radius=1.0, color=_BODY, opacity=0.85, cast_shadow=False
             )
         self._label = scene.add_label(f"{name}/label", body.kind, anchor="bottom-center")
-        self._shade = _Shadow(scene, f"/shades/{body.id}", 2.0 * body.radius_m)
+        self._shade = _add_shadow(scene, body.id, 2.0 * body.radius_m)
 
     def show(self, body: SeenBody) -> None:
         """Move the body; the palm of a hand faces the rig."""
-        x, y, z = body.p_world_m
-        set_pose(self._frame, body.p_world_m)
-        set_rotation(self._frame, rotation_to((-x, -y, 0.0)))
-        self._shade.move_below((x, y, z))
+        x, y, _ = body.p_world_m
+        set_pose(self._frame, body.p_world_m, rotation_to((-x, -y, 0.0)))
+        set_pose(self._shade, (x, y, _SHADOW_M))
         self._shape.scale = round(body.radius_m, 3)
         set_pose(self._label, (0.0, 0.0, 1.1 * body.radius_m + 0.02))
 
@@ -128,8 +123,7 @@ class PeopleView:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
-        self._faces: dict[int, _PersonView] = {}
-        self._bodies: dict[int, _BodyView] = {}
+        self._views: dict[tuple[str, int], Any] = {}  # kind and number -> view
         self._target = scene.add_frame("/target", show_axes=False)
         scene.add_icosphere("/target/point", radius=0.0055, color=_TARGET)
         self._label = scene.add_label(
@@ -139,23 +133,17 @@ class PeopleView:
     def show(self, tick: Tick, *, people: bool = True) -> None:
         """Draw the present detections and remove the others; ``people``: not only the target."""
         target_m, percept = tick.gaze.gaze_point_world_m, tick.percept if people else None
-        faces = {face.id: face for face in (percept.faces if percept is not None else ())}
-        bodies = {body.id: body for body in (seen_bodies(percept) if percept is not None else ())}
-        for gone in self._faces.keys() - faces.keys():
-            self._faces.pop(gone).remove()
-        for gone in self._bodies.keys() - bodies.keys():
-            self._bodies.pop(gone).remove()
-        for face in faces.values():
-            if face.id not in self._faces:
-                self._faces[face.id] = _PersonView(self._scene, face)
-            self._faces[face.id].show(face)
-        for body in bodies.values():
-            shown = self._bodies.get(body.id)
-            if shown is None or shown.kind != body.kind:
-                if shown is not None:
-                    shown.remove()
-                self._bodies[body.id] = _BodyView(self._scene, body)
-            self._bodies[body.id].show(body)
+        found: dict[tuple[str, int], Face | SeenBody] = {}
+        if percept is not None:
+            found = {("face", face.id): face for face in percept.faces}
+            found |= {(body.kind, body.id): body for body in seen_bodies(percept)}
+        for gone in self._views.keys() - found.keys():
+            self._views.pop(gone).remove()
+        for key, one in found.items():
+            if key not in self._views:
+                kind: Any = _PersonView if isinstance(one, Face) else _BodyView
+                self._views[key] = kind(self._scene, one)
+            self._views[key].show(one)
         set_pose(self._target, target_m)
         self._label.text = head_state(tick).gaze.target
 

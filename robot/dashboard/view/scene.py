@@ -3,8 +3,7 @@
 import viser
 
 from gazerig.robot.dashboard.door.viser_server import browser_of
-from gazerig.robot.dashboard.feed.rig_feed import ShownHead, ShownWorld
-from gazerig.robot.dashboard.view.ghost import CommandedPoseView
+from gazerig.robot.dashboard.feed.rig_feed import ShownHead, ShownRig, ShownWorld
 from gazerig.robot.dashboard.view.glb import add_lights
 from gazerig.robot.dashboard.view.head_view import HeadView
 from gazerig.robot.dashboard.view.people import PeopleView
@@ -25,9 +24,8 @@ class HeadScene:
         self._head = HeadView(server.scene)
         self._people = PeopleView(server.scene)
         self._world = WorldView(server.scene)
-        self._ghost = CommandedPoseView(server.scene)
         self._layers: tuple[Layer, ...] = ()
-        self._drawn = False
+        self._rig: ShownRig | None = None
 
     def change(self, view: ShowView, browser: str) -> None:
         """Show other layers, or another viewpoint to a browser; for any thread."""
@@ -37,16 +35,15 @@ class HeadScene:
 
     def show(self, head: ShownHead, world: ShownWorld | None) -> None:
         """Draw a tick; without a browser, only the first one."""
-        if self._drawn and not self._server.get_clients():
+        if self._rig is not None and not self._server.get_clients():
             return
-        self._drawn = True
-        layers = self._layers
         with self._server.atomic():  # browsers receive all changes of a tick together
-            self._viewpoints.fit(head)
+            if head.rig is not self._rig:
+                self._rig = head.rig
+                self._viewpoints.fit(head)
             if world is not None:
                 self._world.show(*world)
             self._head.on_table = world is not None
-            self._head.show(head, sight="sight" in layers)
+            self._head.show(head, sight="sight" in self._layers)
             # A simulated world draws its own people.
             self._people.show(head.tick, people=world is None)
-            self._ghost.show(head if "ghost" in layers else None)

@@ -27,13 +27,7 @@ def set_pose(thing: Placeable, p_m: Sequence[float], turn: Quaternion | None = N
     """Move a node, and rotate it if a rotation is given."""
     if _largest_difference(thing.position.tolist(), p_m) > _STILL_M:
         thing.position = p_m  # type: ignore[assignment]
-    if turn is not None:
-        set_rotation(thing, turn)
-
-
-def set_rotation(thing: Placeable, turn: Quaternion) -> None:
-    """Rotate a node."""
-    if _largest_difference(thing.wxyz.tolist(), turn) > _STILL:
+    if turn is not None and _largest_difference(thing.wxyz.tolist(), turn) > _STILL:
         thing.wxyz = turn  # type: ignore[assignment]
 
 

@@ -40,7 +40,7 @@ from gazerig.robot.loop.events import group_events
 from gazerig.robot.loop.loop import LoopCount, Tick
 from gazerig.robot.loop.loop import run as run_loop
 from gazerig.robot.loop.power_down import Interrupts
-from gazerig.robot.net.live_server import StopOnlyServer
+from gazerig.robot.net.live_server import LiveServer
 from gazerig.robot.run.assemble import Substitutes, assemble
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.session import prepare_shutdown
@@ -115,7 +115,7 @@ def _calibrate(
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), REST_M, "eyes_pan" not in rig.joints)
     made = assemble(exact_gaze(rig), options, Substitutes(chooser=lambda own: steering))
     about = {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"}
-    door = StopOnlyServer(made.robot.command, made.clock, about, say)
+    door = LiveServer(made.robot, None, made.clock, about, say)
     session = _CalibrationSession(steering, lines, made.clock.now_s, stopped, door)
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
@@ -150,7 +150,7 @@ class _CalibrationSession:
         lines: Lines,
         now_s: Callable[[], float],
         stopped: Callable[[], str | None],
-        door: StopOnlyServer,
+        door: LiveServer,
     ) -> None:
         self._steering, self._lines, self._now_s = steering, lines, now_s
         self._stopped, self._door = stopped, door

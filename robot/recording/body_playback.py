@@ -1,9 +1,14 @@
-"""Body, perception and camera of a recorded run: they return the recorded values in order."""
+"""Bodies that record or play back the servos' inputs to a run, and other parts of a playback.
+
+The goals at torque-on, a second reading in one tick and a refused torque also affect
+decisions. With them a recorded run can be repeated bit for bit.
+"""
 
 from collections import deque
+from collections.abc import Callable
 from typing import TypeVar
 
-from gazerig.drivers.errors import SetupError
+from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Percept
 from gazerig.robot.loop.body import Body
@@ -18,9 +23,55 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.recording.joint_recorder import ForwardingBody
 
 H = TypeVar("H", bound=BodyRecord)
+
+
+class ForwardingBody(Body):
+    """A body that forwards to the wrapped body every call that a subclass does not define."""
+
+    def __init__(self, body: Body) -> None:
+        # The initializer of Body is not called: the joints are those of the wrapped body.
+        self.bus, self.names = body.bus, body.names
+        self._body = body
+        for name, method in vars(Body).items():
+            if not name.startswith("_") and getattr(type(self), name) is method:
+                setattr(self, name, getattr(body, name))
+
+
+class JointRecorder(ForwardingBody):
+    """A body that forwards every call and records the results."""
+
+    def __init__(self, body: Body, note: Callable[[BodyRecord], None]) -> None:
+        super().__init__(body)
+        self._note = note
+
+    def start(self, clock: Clock) -> JointAngles:
+        """Start the machine and record the goals."""
+        goals = self._body.start(clock)
+        self._note(TorqueEnabled(goals))
+        return goals
+
+    def read(self, t_s: float) -> JointState:
+        """Read all joints and record them."""
+        joints = self._body.read(t_s)
+        self._note(MeasuredJoints(t_s, joints))
+        return joints
+
+    def enable_torque(self) -> JointAngles:
+        """Switch the torque on again and record the goals or the refusal.
+
+        Raises:
+            SetupError: A servo does not answer, refuses or has latched a fault.
+            BusLost: The port is gone.
+        """
+        try:
+            goals = self._body.enable_torque()
+        except (SetupError, ServoFault) as error:
+            self._note(TorqueRefused(str(error)))
+            raise
+        self._note(TorqueEnabled(goals))
+        return goals
 
 
 class PlaybackBody(ForwardingBody):
