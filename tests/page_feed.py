@@ -60,7 +60,7 @@ class PageFeed:
         self.state = STATE
         publisher = Publisher(page, self._rig, lambda: self.state, lambda line: None)
         self._stream = TickStream(_fail, 0.0)
-        self._stream.add_sink("the page", publisher.take)
+        self._stream.sinks.add("the page", publisher.take)
         self._frame = 1000
 
     def _rig(self) -> LiveRig:

@@ -8,7 +8,6 @@ from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
 from gazerig.config.rig_files import AllowedFolder
-from gazerig.robot.loop.command_handler import CommandHandler
 from gazerig.robot.model.parameter import SavedFile
 from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
 from gazerig.robot.run.param_store import ParamStore
@@ -74,8 +73,9 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     rig.write_text(Path("config/rigs/desk.yaml").read_text())
     made = simulated(str(rig))
     tuning = ParamStore(made.live_params, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
-    handler = CommandHandler(made.robot.command, tuning)
-    hear = RequestHandler(handler, LoopMonitor(made.clock), {}, paths=tuning.confined).answer
+    pulse = LoopMonitor(made.clock)
+    handler = RequestHandler(made.robot.command, pulse, {}, tuning, paths=tuning.confined)
+    hear = handler.answer
     before = sorted(os.listdir(tmp_path))
     for asked in (
         {"do": "character", "name": "/etc/shadow"},

@@ -68,7 +68,7 @@ def test_servos_get_the_limits_that_the_whole_range_needs() -> None:
     ("coupling", "said"),
     [
         (replace(COUPLING, first_ratio=5.0),
-         "the servo of neck_pitch would be at -284 steps, outside its 0..4095"),
+         "the servo of neck_pitch would be at -284, outside the servo's 0..4095 steps"),
         (replace(COUPLING, first="nek_pitch"), "no joint 'nek_pitch'; did you mean 'neck_pitch'? available: left"),
     ],
 )  # fmt: skip

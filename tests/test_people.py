@@ -279,9 +279,9 @@ def test_a_person_who_is_gone_is_reported_for_a_while_only() -> None:
 
 
 def test_what_moves_below_the_head_of_a_person_who_is_turned_away_is_theirs() -> None:
-    legs = MovingBlob(7, "thing", (0.0, 0.9, 2.0), 0.2, v_camera_m_s=(0.1, 0.0, 0.0),
+    legs = MovingBlob(7, "thing", (0.0, 0.84, 2.0), 0.2, v_camera_m_s=(0.1, 0.0, 0.0),
                       depth_known=False, depth_sd_m=1.0)  # fmt: skip
-    percept = at_30_hz(seeing(), 1, 20, people=(person_at((0.0, 0.0, 2.0)),), blobs=(legs,))
+    percept = at_30_hz(seeing(), 1, 40, people=(person_at((0.0, 0.0, 2.0)),), blobs=(legs,))
     assert percept.bodies.kinds == ("face",)
     assert percept.bodies.v_world_m_s[0, 1] == pytest.approx(-0.1, abs=0.03)  # it goes along
     assert "thing" in at_30_hz(seeing(), 1, 20, blobs=(legs,)).bodies.kinds

@@ -22,7 +22,6 @@ from fakes.runs import simulated
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.loop import client_control, stop
-from gazerig.robot.loop.command_handler import CommandHandler
 from gazerig.robot.loop.loop import Robot, Tick
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import LookAt, Value
@@ -121,8 +120,8 @@ def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
         elsewhere=lambda work, *words: work(*words),
     )
     about = {"rig": "desk", "pid": os.getpid()}
-    handler = CommandHandler(beat.robot.command, tuning, menus=beat.robot.menus)
-    requests = RequestHandler(handler, beat.pulse, about)
+    robot = beat.robot
+    requests = RequestHandler(robot.command, beat.pulse, about, tuning, menus=robot.menus)
     server = RemoteServer(requests, errors.append)
     server.open()
     with RobotClient.connect() as connected:
@@ -145,8 +144,7 @@ def open_server() -> RemoteServer:
 
 
 def beatless() -> RequestHandler:
-    handler = CommandHandler(lambda command: None, None)
-    return RequestHandler(handler, LoopMonitor(RealClock()), {"rig": "other"})
+    return RequestHandler(lambda command: None, LoopMonitor(RealClock()), {"rig": "other"})
 
 
 def test_close_removes_it_and_hangs_up(folder: Path) -> None:

@@ -50,7 +50,7 @@ class Page:
             self.page, lambda: self._rig(made), lambda: self.state, self.said.append
         )
         self.stream = TickStream(self.said.append, 0.0399)
-        self.stream.add_sink("the page", self.publisher.take)
+        self.stream.sinks.add("the page", self.publisher.take)
         self.live = RigFeed()
 
     def _rig(self, made: Assembly) -> LiveRig:

@@ -45,7 +45,7 @@ def unwanted(line: str) -> None:
 
 def test_every_tick_is_in_one_batch_with_every_field(recorded: Recorded) -> None:
     stream, sink = TickStream(unwanted), Sink()
-    stream.add_sink("test", sink.take)
+    stream.sinks.add("test", sink.take)
     for tick in recorded.ticks:
         stream.update(tick)
     stream.flush()
@@ -66,7 +66,7 @@ def test_a_percept_is_sent_again_to_who_lost_it(recorded: Recorded) -> None:
     tick = next(tick for tick in recorded.ticks if tick.percept is not None)
     for refused in ((), (1,)):
         stream, sink = TickStream(unwanted, every_s=0.0), Sink(*refused)
-        stream.add_sink("test", sink.take)
+        stream.sinks.add("test", sink.take)
         for n in range(4):
             stream.update(replace(tick, t_s=0.005 * n))
         records = [decode(batch.data, list[TickRecord])[0] for batch in sink.batches]

@@ -287,23 +287,6 @@ def test_clothes_that_are_seen_later_settle_the_number(tracker: Tracker) -> None
     assert known[0] != 1 and known[-1] == 1
 
 
-def test_two_whose_numbers_were_exchanged_while_hidden_get_them_back_by_their_clothes(
-    tracker: Tracker,
-) -> None:
-    for k in range(30):
-        both = [dressed(across(-0.3, 2.0), 3), dressed(across(0.3, 2.0), 7)]
-        tracks = tracker.step(both, CAMERA, k / 30)
-    left, right = (track.id for track in sorted(tracks, key=_y))
-    for k in range(30, 60):  # they have changed sides behind something
-        tracker.step([], CAMERA, k / 30)
-    for k in range(60, 90):
-        both = [across(-0.3, 2.0), across(0.3, 2.0)]
-        if k > 65:
-            both = [dressed(both[0], 7), dressed(both[1], 3)]
-        tracks = tracker.step(both, CAMERA, k / 30)
-    assert [track.id for track in sorted(tracks, key=_y)] == [right, left]
-
-
 def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people(tracker: Tracker) -> None:
     for k in range(12):
         up = across(0.0, 2.0)._replace(p_m=(2.0, 0.2 * k, 0.2 + 0.03 * k))

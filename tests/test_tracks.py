@@ -16,6 +16,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track, shipped_tracks
 from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.motion_keys import fit_keys, smooth
 from gazerig.gaze.track.pose_offset import PoseOffset
 from gazerig.gaze.track.track import LIMIT_SHARE, KeyFrame, Track
 from gazerig.gaze.track.track_motion import TrackMotion
@@ -24,7 +25,6 @@ from gazerig.gaze.types import Floats, GazeCommand
 from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.commands import EndTrack, Play, SyncTrack
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.motion_keys import fit_keys, smooth
 from gazerig.robot.model.reply import TrackReply
 from gazerig.robot.model.track_fit import TrackFit, TrackRefused
 from gazerig.robot.model.types import JointAngles, further_joints

@@ -10,7 +10,6 @@ from fakes.runs import ticks
 from typer.testing import CliRunner
 
 from gazerig.robot.cli.ctl import app
-from gazerig.robot.loop.command_handler import CommandHandler
 from gazerig.robot.loop.track_choices import TrackInfo
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import Ticket
@@ -26,9 +25,7 @@ class TickedRig:
         self.made, self.pulse = made, LoopMonitor(made.clock)
         self.commands: list[Command] = []
         self.handler = RequestHandler(
-            CommandHandler(self.command, None, menus=self.menus, tracks=self.tracks),
-            self.pulse,
-            {},
+            self.command, self.pulse, {}, menus=self.menus, tracks=self.tracks
         )
         self.answer: object = None
 

@@ -11,7 +11,6 @@ from msgspec import structs
 from gazerig.gaze.angles import add, direction, rotate, scale
 from gazerig.gaze.attention.conversation import MODES
 from gazerig.gaze.attention.startle import FLINCH, Startle
-from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
 from gazerig.params import unknown_text
@@ -59,10 +58,7 @@ MAX_PER_TICK = 8
 takes longest."""
 _NEAR_END_RAD = radians(0.05)
 """A slider at the end of a joint's range is rounded to a tenth of a degree."""
-_LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
-    "wink left": lambda lids, t_s: lids.wink("left", t_s),
-    "wink right": lambda lids, t_s: lids.wink("right", t_s),
-}
+_LID_COMMANDS = ("wink left", "wink right")
 
 
 class CommandQueue:
@@ -170,7 +166,7 @@ class CommandExecutor:
         menus = {
             "behaviour": _put_first(top_down.chosen_behaviour, top_down.behaviours),
             "conversation": _put_first(robot.conversation_gaze.chosen_mode, MODES),
-            "lids": tuple(_LID_COMMANDS),
+            "lids": _LID_COMMANDS,
         }
         animation = robot.animation
         if animation.expressions:
@@ -238,12 +234,10 @@ class CommandExecutor:
         match command:
             case Ask(menu, choice):
                 self._choose(menu, choice, t_s)
-            case ControlCommand():
-                reply = self._jog(command, t_s) if isinstance(command, Jog) else None
-                if isinstance(command, Look):
-                    reply = self._look(command, t_s)
-                number = self.lead.state.number * self.lead.state.active
-                return structs.replace(reply or CommandReply(), control_number=number)
+            case Jog():
+                return self._jog(command, t_s)
+            case Look():
+                return self._look(command, t_s)
             case Play() | Speak():
                 return self._play(command, t_s)
             case EndTrack():
@@ -267,9 +261,9 @@ class CommandExecutor:
                 if not self.lead.renew(who, t_s) and not talks:
                     return CommandReply(f"the head is no longer controlled by {who or 'you'}")
             case Stop():
+                self.stop.halt(command, t_s)
                 self.lead.end(f"stopped: {command.why}")
                 robot.track_choices.drop_present(t_s)
-                self.stop.halt(command, t_s)
             case Resume() if self.stop.reason:
                 goals = self.stop.resume(command, t_s)
                 if isinstance(goals, CommandReply):
@@ -312,7 +306,7 @@ class CommandExecutor:
         elif menu == "expression":
             robot.animation.express(choice)
         else:
-            _LID_COMMANDS[choice](robot.lids, t_s)
+            robot.lids.wink("left" if choice == "wink left" else "right", t_s)
 
     def _converse(self, t_s: float) -> None:
         """Let gaze and lids follow the state of conversation; when idle, the chosen mode."""
@@ -331,7 +325,8 @@ class CommandExecutor:
         target, robot = self.lead.chosen_target(None, t_s), self._robot
         if target is None:  # the gaze is free again
             return CommandReply()
-        return look_reply(target, robot.oculomotor, robot.kinematics, robot.guard.limits)
+        reply = look_reply(target, robot.oculomotor, robot.kinematics, robot.guard.limits)
+        return structs.replace(reply, control_number=self.lead.state.number)
 
     def _point(self, command: Look) -> Vec3 | None:
         """Return the point in the world to look at, None to free the gaze.
@@ -374,7 +369,9 @@ class CommandExecutor:
         self._change_control(lambda: self.lead.jog(command, self.commanded_rad, t_s))
         if command.angles_rad:
             robot.guard.start_gently()  # a slider may jump from end to end
-        return jog_reply(command, robot.body.names, robot.guard.limits)
+        number = self.lead.state.number * self.lead.state.active
+        reply = jog_reply(command, robot.body.names, robot.guard.limits)
+        return structs.replace(reply, control_number=number)
 
     def _change_control(self, change: Callable[[], None]) -> None:
         """Change the client in control; the models start slowly if they take over joints."""

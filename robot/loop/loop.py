@@ -101,9 +101,8 @@ class Robot:
         pixels: PixelToWorld,
         messages: list[str] | None = None,
     ) -> None:
-        self.body, self.kinematics, self.camera, self.perception = (
-            body, kinematics, camera, perception,
-        )  # fmt: skip
+        self.body, self.kinematics = body, kinematics
+        self.camera, self.perception = camera, perception
         self.poses, self.attention, self.conversation_gaze = poses, attention, conversation
         self.oculomotor, self.lids, self.animation = oculomotor, lids, animation
         self.track_choices, self.guard, self.tune, self.pixels = tracks, guard, tune, pixels
@@ -229,7 +228,7 @@ class Robot:
         self._executor.reset()
         self._executor.commanded_rad = goals
 
-    def tick(self, t_s: float, dt_s: float, watch: Callable[[Tick], None] | None = None) -> Tick:
+    def tick(self, t_s: float, dt_s: float, watch: Callable[[Tick], object] | None = None) -> Tick:
         """Read, perceive, choose, plan, guard, write; then reply to the commands.
 
         Args:
@@ -414,7 +413,7 @@ class TickLoop:
         clock: Clock,
         params: LoopParams,
         stop: Callable[[float], str | None],
-        watch: Callable[[Tick], None],
+        watch: Callable[[Tick], object],
     ) -> None:
         self._robot, self._clock, self._stop, self._watch = robot, clock, stop, watch
         self._period_s = 1.0 / params.rate_hz
@@ -454,7 +453,7 @@ def run(
     clock: Clock,
     params: LoopParams,
     stop: Callable[[float], str | None],
-    watch: Callable[[Tick], None],
+    watch: Callable[[Tick], object],
 ) -> LoopCount:
     """Tick until ``stop(seconds)`` returns a reason or a driver fails; see ``TickLoop``."""
     loop = TickLoop(robot, clock, params, stop, watch)

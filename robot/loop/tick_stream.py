@@ -10,7 +10,7 @@ bit.
 import re
 from collections.abc import Callable
 from math import inf
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -27,8 +27,8 @@ SIMULATED_S = 0.2
 """Time between two batches in simulated time, without viewers."""
 
 
-class Observers:
-    """The functions called with every tick; a function that raises is removed.
+class Observers(Generic[T]):
+    """Functions that are called with every value; a function that raises is removed.
 
     Args:
         report: Receives one line about each removed function.
@@ -36,20 +36,26 @@ class Observers:
 
     def __init__(self, report: Callable[[str], None]) -> None:
         self._report = report
-        self._observers: tuple[tuple[str, Callable[[Tick], object]], ...] = ()
+        self._observers: dict[str, Callable[[T], object]] = {}
 
-    def add(self, name: str, update: Callable[[Tick], object]) -> None:
+    def __bool__(self) -> bool:
+        """Return whether there is any."""
+        return bool(self._observers)
+
+    def add(self, name: str, update: Callable[[T], object]) -> None:
         """Add a function under a name for messages."""
-        self._observers = (*self._observers, (name, update))
+        self._observers = {**self._observers, name: update}
 
-    def update(self, tick: Tick) -> None:
-        """Update all observers with a tick; called by the loop."""
-        for observer in self._observers:
+    def update(self, value: T) -> list[object]:
+        """Call all functions with a value, such as a tick; return their results."""
+        results = []
+        for name, update in tuple(self._observers.items()):
             try:
-                observer[1](tick)
+                results.append(update(value))
             except Exception as error:
-                self._observers = tuple([one for one in self._observers if one is not observer])
-                self._report(failure_text(observer[0], error))
+                del self._observers[name]
+                self._report(failure_text(name, error))
+        return results
 
 
 def failure_text(name: str, error: Exception) -> str:
@@ -74,7 +80,10 @@ class TickBatch(NamedTuple):
 
 
 class TickStream:
-    """A stream of ticks to sinks in batches; used only in the loop's thread.
+    """A stream of ticks in batches; used only in the loop's thread.
+
+    Attributes:
+        sinks: Receive each batch; one returns False if it loses a batch.
 
     Args:
         report: Receives one line about each sink that fails and is removed.
@@ -82,16 +91,12 @@ class TickStream:
     """
 
     def __init__(self, report: Callable[[str], None], every_s: float = LIVE_S) -> None:
-        self._report, self._every_s = report, every_s
-        self._sinks: tuple[tuple[str, Callable[[TickBatch], bool]], ...] = ()
+        self._every_s = every_s
+        self.sinks = Observers[TickBatch](report)
         self._records: list[TickRecord] = []
         self._newest: Tick | None = None
         self._due_s = -inf
         self._percept: Percept | None | UnsetType = UNSET
-
-    def add_sink(self, name: str, take: Callable[[TickBatch], bool]) -> None:
-        """Add a sink, which returns False if it loses a batch."""
-        self._sinks = (*self._sinks, (name, take))
 
     def update(self, tick: Tick) -> None:
         """Add a tick of a run that is not recorded."""
@@ -113,16 +118,10 @@ class TickStream:
         if newest is None or not records:
             return
         self._records = []
-        if not self._sinks:
-            return
-        batch = TickBatch(encode(records), len(records), newest)
-        for sink in self._sinks:
-            try:
-                if not sink[1](batch):
-                    self._percept = UNSET  # it may have lost the present percept
-            except Exception as error:
-                self._sinks = tuple([one for one in self._sinks if one is not sink])
-                self._report(failure_text(sink[0], error))
+        if self.sinks and False in self.sinks.update(
+            TickBatch(encode(records), len(records), newest)
+        ):
+            self._percept = UNSET  # a sink may have lost the present percept
 
 
 def encode(value: object) -> bytes:

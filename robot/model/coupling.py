@@ -4,7 +4,7 @@ The joints are called first and second, the servos a and b. All angles are in ra
 servos are at their shafts, after sign, ratio and zero. The usual pair is a neck's pitch and roll.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from math import ceil, degrees, floor, radians
@@ -59,11 +59,6 @@ class CouplingParams:
         return 0.5 * (a + b) / self.first_ratio, 0.5 * (a - b) / self.second_ratio
 
 
-def joint_partners(pairs: Collection[CouplingParams]) -> dict[str, str]:
-    """Return the partner of each coupled joint."""
-    return {a: b for pair in pairs for a, b in (pair.joints, pair.joints[::-1])}
-
-
 def unreachable_text(pair: CouplingParams, joints: Mapping[str, JointParams]) -> str | None:
     """Return a text about joint angles that the servos cannot reach, None if they reach all.
 
@@ -73,15 +68,10 @@ def unreachable_text(pair: CouplingParams, joints: Mapping[str, JointParams]) ->
     """
     for at in _corners(pair, joints):
         for name, angle in zip(pair.joints, pair.servo_rad(at), strict=True):
-            facts, steps = joints[name].model_facts, joints[name].steps(angle)
-            if not facts.lowest <= steps <= facts.highest:
-                low, high, at_ = (
-                    value / facts.unit_steps for value in (facts.lowest, facts.highest, steps)
-                )
+            if fault := joints[name].position_fault(joints[name].steps(angle)):
                 return (
                     f"cannot reach {pair.first} {degrees(at[0]):g}, {pair.second} "
-                    f"{degrees(at[1]):g} deg: the servo of {name} would be at {at_:.0f} "
-                    f"{facts.unit}, outside its {low:.0f}..{high:.0f}"
+                    f"{degrees(at[1]):g} deg: the servo of {name} would be at {fault}"
                 )
     return None
 

@@ -72,7 +72,8 @@ def project(points_camera_m: ArrayLike, intrinsics: Intrinsics) -> Floats:
     i = intrinsics
     plane = p[:, :2] / z
     if i.has_distortion:
-        plane = _distort(plane, i.distortion)
+        radial, tangential = _distortion_at(plane, i.distortion)
+        plane = plane * radial + tangential
     pixels: Floats = plane * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
     return pixels
 
@@ -93,17 +94,11 @@ def _undistort(plane: Floats, distortion: Distortion) -> Floats:
 
     Points that the model of the lens cannot produce are returned unchanged.
     """
-    k1, k2, p1, p2, k3 = distortion
     found = plane
     for _ in range(_ROUNDS):
-        x, y = found[:, 0], found[:, 1]
-        r2 = x * x + y * y
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-        dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        radial, tangential = _distortion_at(found, distortion)
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            nearer = (plane - np.stack((dx, dy), axis=1)) / radial[:, None]
-        nearer = np.where(radial[:, None] > 0.0, nearer, plane)
+            nearer = np.where(radial > 0.0, (plane - tangential) / radial, plane)
         step = np.abs(nearer - found).max(initial=0.0)
         found = nearer
         if step < _LEAST_STEP:
@@ -111,17 +106,12 @@ def _undistort(plane: Floats, distortion: Distortion) -> Floats:
     return found
 
 
-def _distort(plane: Floats, distortion: Distortion) -> Floats:
-    """Distort points of the plane z = 1."""
+def _distortion_at(plane: Floats, distortion: Distortion) -> tuple[Floats, Floats]:
+    """Return the radial factors (n, 1) and tangential shifts (n, 2) at points of the plane."""
     k1, k2, p1, p2, k3 = distortion
-    x, y = plane[:, 0], plane[:, 1]
+    x, y = plane[:, :1], plane[:, 1:]
     r2 = x * x + y * y
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    moved: Floats = np.stack(
-        (
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        ),
-        axis=1,
-    )
-    return moved
+    dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+    dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    return radial, np.hstack((dx, dy))

@@ -168,15 +168,16 @@ class JointParams:
                     f"{self.min_deg} and max_deg {self.max_deg} must be within"
                 )
         for key, angle in (("min_deg", self.min_deg), ("max_deg", self.max_deg)):
-            steps = linkage.steps(radians(angle))
-            if not facts.lowest <= steps <= facts.highest:
-                low, high = facts.lowest / facts.unit_steps, facts.highest / facts.unit_steps
-                if facts.unit == "steps":
-                    at = f"is at step {steps:.0f}, outside the servo's {low:.0f}..{high:.0f}"
-                else:
-                    at = f"is at {steps / facts.unit_steps:.0f} {facts.unit}, outside the "
-                    at += f"servo's {low:.0f}..{high:.0f} {facts.unit}"
-                raise ValueError(f"{key} {angle} {at}")
+            if fault := self.position_fault(linkage.steps(radians(angle))):
+                raise ValueError(f"{key} {angle} is at {fault}")
+
+    def position_fault(self, steps: float) -> str:
+        """Return a servo position as text if the servo cannot reach it, otherwise ""."""
+        facts = self.model_facts
+        if facts.lowest <= steps <= facts.highest:
+            return ""
+        low, high, at = (x / facts.unit_steps for x in (facts.lowest, facts.highest, steps))
+        return f"{at:.0f}, outside the servo's {low:.0f}..{high:.0f} {facts.unit}"
 
     @property
     def model_facts(self) -> ServoModelInfo:

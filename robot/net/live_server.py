@@ -9,22 +9,23 @@ found the same, and a missing file when it is missing for several checks.
 
 import threading
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
-from gazerig.robot.loop.command_handler import (
+from gazerig.robot.loop.loop import Robot
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.net.request_handler import (
     REFUSALS,
-    CommandHandler,
+    LoopMonitor,
     ParamAccess,
     PathGuard,
+    RequestHandler,
     Speaker,
     accept_only_stops,
 )
-from gazerig.robot.loop.loop import Robot
-from gazerig.robot.model.clock import Clock
-from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
 from gazerig.robot.net.socket_server import RemoteServer
 
 EVERY_S = 0.5
@@ -154,20 +155,17 @@ class LiveServer:
         pulse = LoopMonitor(clock)
         self._watch = FileWatch(tuning.files if tuning is not None else tuple, self._read_again)
         if tuning is None:
-            handler = CommandHandler(
-                accept_only_stops(robot.command, _CALIBRATED), None,
-                fixed=f"{_CALIBRATED}: its parameters are fixed",
-            )  # fmt: skip
+            only = accept_only_stops(robot.command, _CALIBRATED)
+            fixed = f"{_CALIBRATED}: its parameters are fixed"
+            handler = partial(RequestHandler, only, pulse, about, fixed=fixed)
         else:
-            handler = CommandHandler(
-                robot.command, tuning, self._watch.saved, voice=voice, menus=robot.menus,
-                tracks=robot.tracks,
+            handler = partial(
+                RequestHandler, robot.command, pulse, about, tuning, saved=self._watch.saved,
+                voice=voice, menus=robot.menus, tracks=robot.tracks, fault=fault, changing=changing,
             )  # fmt: skip
-        self._server = RemoteServer(RequestHandler(handler, pulse, about, fault, changing), say)
+        self._server = RemoteServer(handler(), say)
         # Apart from programs of this computer, so that neither uses up the other's time.
-        self._page_server = RemoteServer(
-            RequestHandler(handler, pulse, about, fault, changing, paths), say
-        )
+        self._page_server = RemoteServer(handler(paths=paths), say)
         self.serve, self.update = self._page_server.serve, pulse.update
 
     def open(self) -> None:

@@ -5,29 +5,47 @@
 """
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
 
 from msgspec import structs
 
-from gazerig.robot.loop.command_handler import REFUSALS, CommandHandler, PathGuard
+from gazerig.errors import Error
 from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.head_state import HeadReport, head_state
+from gazerig.robot.loop.track_choices import TrackInfo
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import (
     Character,
+    Characters,
     ClientCommand,
     Command,
     Fault,
+    Get,
     Hello,
+    Parameters,
+    ReadMenus,
     ReadStatus,
     Request,
+    Resume,
     Revert,
+    Save,
+    Say,
+    SayPiece,
     Set,
+    Speak,
     State,
+    Stop,
+    Tracks,
+    Unsaved,
+    Value,
+    as_value,
     read_request,
     set_client,
 )
-from gazerig.robot.model.reply import Ticket
+from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
+from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.net.socket_io import VERSION
 
 _TAKEN_UP_S = 1.0
@@ -40,6 +58,86 @@ _HANGS = (
     f"the control loop has not executed it within {_TAKEN_UP_S:g} s: it hangs, "
     "starts or ends; use the emergency stop if anything moves"
 )
+
+
+REFUSALS = (ValueError, OSError, Error)
+"""Exceptions that refuse a request; the message is for the user."""
+FIXED = "these parameters cannot be changed while the rig runs"
+
+
+class ParamAccess(Protocol):
+    """The parameters of a running rig, such as ``gazerig.robot.run.param_store.ParamStore``."""
+
+    @property
+    def version(self) -> int:
+        """Return the number of changes."""
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return all parameters."""
+
+    def get(self, prefix: str) -> Mapping[str, Value]:
+        """Return the present values whose keys start with ``prefix``."""
+
+    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
+        """Apply values from the next tick on; return notes for the user."""
+
+    def unsaved(self) -> Sequence[ParamChange]:
+        """Return the present values that are not in the file."""
+
+    def save(self, path: Path | None = None) -> SavedFile:
+        """Write the present values to a file."""
+
+    def revert(self) -> tuple[str, ...]:
+        """Restore the values of the file; return notes for the user."""
+
+    def characters(self) -> Sequence[str]:
+        """Return the available characters."""
+
+    def apply_character(self, name: str) -> tuple[str, ...]:
+        """Apply another character to the rig; return notes for the user."""
+
+    def files(self) -> tuple[Path, ...]:
+        """Return the files in use: the rig's file and its overlays."""
+
+    def reload(self, path: Path) -> tuple[str, ...]:
+        """Apply the contents of a file; on errors change nothing and raise with all of them."""
+
+
+class PathGuard(Protocol):
+    """Rules for the files that a client may name (``config.rig_files.AllowedFolder``)."""
+
+    def check_file(self, given: str, kind: str = "") -> str:
+        """Return a shipped name or an absolute path; raise if it is not allowed."""
+
+    def check_changes(self, changes: Mapping[str, object]) -> None:
+        """Raise if a value names a file that is not allowed."""
+
+
+class Speaker(Protocol):
+    """The voice of a head (``gazerig.robot.run.voice.RunVoice``)."""
+
+    def prepare(self, command: Say, confined: bool = False, /) -> Speak:
+        """Return the command that says a file or a text; raise if it cannot be said.
+
+        confined: only files in the folders of sounds
+        """
+
+    def feed(self, pcm: bytes, rate_hz: int, channels: int, volume: float, /) -> float:
+        """Say a piece of a stream; return the length that has not been heard, s."""
+
+    def finish(self) -> None:
+        """Mark the end of the stream."""
+
+
+def accept_only_stops(command: CommandTaker, reason: str) -> CommandTaker:
+    """Return a taker of stop and resume; it refuses other commands with the reason."""
+
+    def take(asked: Command) -> Ticket | None:
+        if not isinstance(asked, Stop | Resume):
+            raise ValueError(f"{reason}: only stop and resume are accepted")
+        return command(asked)
+
+    return take
 
 
 class LoopMonitor:
@@ -97,10 +195,19 @@ class LoopMonitor:
 class RequestHandler:
     """Executes requests of other programs; answers {"ok": ...} or {"refused": ...}.
 
+    The live page, other programs and the command line all send the classes of
+    ``gazerig.robot.model.commands``. All methods are thread-safe.
+
     Args:
-        handler: Handles all requests except those about the loop.
+        command: Queues a command for the next tick.
         pulse: State of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
+        params: The parameters, None if they cannot be read or changed.
+        fixed: Reason why parameters cannot be changed.
+        saved: Called with each written file.
+        voice: Says sounds and texts; None if the head has no voice.
+        menus: Returns the menus.
+        tracks: Returns the available tracks.
         fault: Executes a fault command of emulated servos; None if the servos are real.
         changing: Returns the other fields of the status, e.g. {"page": address}.
         paths: Rules for the files that a client may name; None if any.
@@ -108,16 +215,24 @@ class RequestHandler:
 
     def __init__(
         self,
-        handler: CommandHandler,
+        command: CommandTaker,
         pulse: LoopMonitor,
         about: Mapping[str, object],
+        params: ParamAccess | None = None,
+        *,
+        fixed: str = FIXED,
+        saved: Callable[[Path], None] = lambda path: None,
+        voice: Speaker | None = None,
+        menus: Callable[[], Mapping[str, tuple[str, ...]]] = dict,
+        tracks: Callable[[], Sequence[TrackInfo]] = tuple,
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
         paths: PathGuard | None = None,
     ) -> None:
-        self._handler, self._pulse, self._paths = handler, pulse, paths
-        self._changing, self._fault = changing, fault
-        self._about = dict(about)
+        self._command, self._pulse, self._about = command, pulse, dict(about)
+        self._params, self._fixed, self._saved, self._paths = params, fixed, saved, paths
+        self._voice, self._menus, self._tracks = voice, menus, tracks
+        self._fault, self._changing = fault, changing
         self._unsaved = -1, 0
 
     def answer(self, message: object, peer: str = "") -> dict[str, object]:
@@ -159,7 +274,16 @@ class RequestHandler:
                 if self._fault is None:
                     raise ValueError(REAL)
                 return {"ok": self._fault(text)}
-        done = self._handler.handle(request, self._paths)
+            case ReadMenus():
+                return {"ok": self._menus()}
+            case Tracks():
+                return {"ok": self._tracks()}
+            case SayPiece():
+                return {"ok": self._say_piece(request)}
+            case Command():
+                done: object = self._command(self._speech(request))
+            case _:
+                done = self._handle_params(request)
         if isinstance(done, Ticket):
             reply = done.wait(_TAKEN_UP_S)
             if reply is None:
@@ -173,8 +297,64 @@ class RequestHandler:
             return {"ok": {"notes": done or ()}}
         return {"ok": done}
 
+    def _handle_params(self, request: Request) -> object:
+        """Return the answer to a question, or the notes for the user of a change."""
+        params, paths = self._params, self._paths
+        if params is None:
+            if isinstance(request, Get | Parameters | Unsaved | Characters):
+                return {} if isinstance(request, Get) else ()
+            raise ValueError(self._fixed)
+        match request:
+            case Parameters(prefix):
+                return [one for one in params.parameters() if one.key.startswith(prefix)]
+            case Get(prefix):
+                return params.get(prefix)
+            case Unsaved():
+                return params.unsaved()
+            case Characters():
+                return params.characters()
+            case Set(changes):
+                if paths is not None:
+                    paths.check_changes(changes)
+                return params.set({key: as_value(one) for key, one in changes.items()})
+            case Save(path):
+                if path and paths is not None:
+                    path = paths.check_file(path)
+                file = Path(path).expanduser() if path else None
+                if file is not None and not file.is_absolute():
+                    raise ValueError(f"{path}: give the absolute path; the rig has its own folder")
+                saved = params.save(file)
+                self._saved(saved.path)
+                return saved
+            case Revert():
+                return params.revert()
+            case Character(name):
+                if paths is not None and name not in params.characters():
+                    name = paths.check_file(name, "characters")
+                return params.apply_character(name)
+        raise ValueError(f"{type(request).__name__} is not available here")
+
+    def _speech(self, command: Command) -> Command:
+        """Return the command that says a file or a text; others stay unchanged."""
+        if not isinstance(command, Say):
+            return command
+        return self._require_voice().prepare(command, self._paths is not None)
+
+    def _say_piece(self, piece: SayPiece) -> float:
+        """Say a piece of a stream; return the length that has not been heard, s."""
+        voice = self._require_voice()
+        ahead_s = voice.feed(piece.pcm, piece.rate_hz, piece.channels, piece.volume)
+        if piece.last:
+            voice.finish()
+        return ahead_s
+
+    def _require_voice(self) -> Speaker:
+        if self._voice is None:
+            raise ValueError("this head has no voice")
+        return self._voice
+
     def _status(self) -> dict[str, object]:
-        params = self._handler.params
+        params = self._params
         version = params.version if params is not None else 0
         if version != self._unsaved[0]:  # count once for a program that polls
             self._unsaved = version, len(params.unsaved()) if params is not None else 0

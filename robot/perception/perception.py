@@ -131,11 +131,8 @@ class Perception:
                 track
                 for track in in_sight
                 if track.counts
-                and (
-                    track.seen_s == t_s
-                    or _in_picture(
-                        rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, detections
-                    )
+                and _in_picture(
+                    rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, detections
                 )
             ]
         )

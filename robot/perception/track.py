@@ -52,8 +52,6 @@ def looks_at_head(
 # Smallest swing of the gap that counts; changes of its direction within a window that make speech,
 # or a swing of some times that size and the start of the next within a syllable.
 _SWING_M, _TURNS, _WINDOW_S, _WIDE, _SYLLABLE_S = 0.0024, 3, 1.0, 2.0, 0.2
-# A person who was not seen for longer than this was out of sight.
-_GAP_S = 0.12
 
 
 class Speech(NamedTuple):
@@ -159,21 +157,10 @@ class KnownClothes:
 
     colours: mean colours, as in ``Clothing``
     frames: number of frames with clothes; a frame that shows a part counts as a fraction
-    confirmed: number of frames in which they matched since the person was out of sight
-    lost_sight: whether the person was out of sight and the clothes are unconfirmed since then
-    doubts: number of another person -> cost by which that person's clothes match better
     """
 
     colours: Floats | None = None
     frames: float = 0.0
-    confirmed: float = 0.0
-    lost_sight: bool = False
-    doubts: dict[int, float] = field(default_factory=dict)
-
-    def record_absence(self, unseen_s: float) -> None:
-        """Start the confirmation again if the person was out of sight, for a time in seconds."""
-        if unseen_s > _GAP_S:
-            self.confirmed, self.lost_sight = 0.0, True
 
     def learn(self, clothing: Clothing | None) -> None:
         """Learn the clothes, more slowly if less of them is visible."""

@@ -5,9 +5,8 @@ line of view than across it. All pairs of track and detection are evaluated toge
 relative to these uncertainties (data_association), and a Kalman filter of direction and range
 (kalman) updates each track with its detection.
 
-If people are confused while hidden, the colours of their clothes, learned over many frames, restore
-their numbers. People are numbered from 1; a person who returns keeps the number (identities).
-Things are numbered separately.
+People are numbered from 1; a person who returns, or appears from behind another, keeps the number
+(identities). Things are numbered separately.
 """
 
 from math import inf, radians
@@ -22,7 +21,7 @@ from gazerig.robot.perception.data_association import (
     note_covered,
     pair_costs,
 )
-from gazerig.robot.perception.identities import find_returned, resolve_identities
+from gazerig.robot.perception.identities import find_returned
 from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter
 from gazerig.robot.perception.track import (
     FACE,
@@ -97,10 +96,6 @@ class Tracker:
         pairs = assign(costs, UNPAIRED)
         for i, j in pairs:
             self._update_track(self._tracks[i], detections[j], p_world_camera_m)
-        if worn is not None:
-            given = {t.id for t in self._tracks if t.is_person and t.returned_person is None}
-            resolve_identities(self._tracks, worn, dict(pairs), detections)
-            self._free |= given - {t.id for t in self._tracks}
         taken = {j for _, j in pairs}
         renamed = {
             found.detector_id
@@ -184,10 +179,12 @@ class Tracker:
         """Give a person's new track the number of the person who has returned, or a free one."""
         if track.returned_person is not None:
             self._left.append(track.returned_person)
+        # Without clothes, one who was missed for a moment is not another who appears nearby.
+        lost_s = IN_SIGHT_S if track.clothes.frames >= _CLOTHED else FORGET_S
         gone = [
             one
             for one in self._tracks
-            if one.is_person and one is not track and one.unseen_s > IN_SIGHT_S
+            if one.is_person and one is not track and one.unseen_s > lost_s
         ]
         before, known = track.returned_person, [*self._left, *map(_person, gone)]
         recent = [one for one in known if track.at_s - one.seen_s <= _REMEMBER_PERSON_S]
@@ -227,7 +224,6 @@ class Tracker:
         correct_velocity(track, detection)
         if track.is_person:
             known.slow_to(FASTEST_M_S)
-        track.clothes.record_absence(track.unseen_s)
         track.seen_s = track.at_s
         track.frames += 1
         track.clothes.learn(detection.clothing)

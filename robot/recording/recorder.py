@@ -185,7 +185,7 @@ class Recorder:
         self._body_records: list[BodyRecord] = []
         self._messages: deque[str] = deque()
         self.stream = TickStream(self._messages.append, SIMULATED_S if patient else LIVE_S)
-        self.stream.add_sink("the recording", self._take)
+        self.stream.sinks.add("the recording", self._take)
         self._last_s: float | None = None
         self._seconds: float | None = None
         self._checked_s = -inf

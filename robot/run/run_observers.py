@@ -118,9 +118,9 @@ class RunObservers:
         self._stream = recorder.stream if recorder is not None else TickStream(say)
         self._parking = TickStream(say)
         if self._publisher is not None:
-            self._stream.add_sink("the page", self._publisher.take)
-            self._parking.add_sink("the page", self._publisher.take)
-        self._observers = Observers(say)
+            self._stream.sinks.add("the page", self._publisher.take)
+            self._parking.sinks.add("the page", self._publisher.take)
+        self._observers = Observers[Tick](say)
         self.attach(self._observers)
 
     def _make_page(self, address: tuple[str, int], token: str) -> PageProcess:
@@ -166,7 +166,7 @@ class RunObservers:
             self._scene_start_s(),
         )
 
-    def attach(self, observers: Observers) -> None:
+    def attach(self, observers: Observers[Tick]) -> None:
         """Add all of them as observers of the ticks; any that fails is dropped."""
         if self._recorder is not None:
             observers.add("the recording", self._recorder.record)

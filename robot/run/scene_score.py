@@ -19,7 +19,7 @@ from statistics import median
 from typing import Literal, NamedTuple
 
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.model.scene import BoxingEvent, ExpectedResponse
+from gazerig.sim_mock.scenes.scene import Event
 
 
 class _EventOutcome(NamedTuple):
@@ -67,7 +67,7 @@ class BehaviourScore:
 
     def __init__(
         self,
-        events: Iterable[ExpectedResponse],
+        events: Iterable[Event],
         round_s: float,
     ) -> None:
         self._events = tuple(events)
@@ -143,7 +143,7 @@ class PlannerScore:
 
     def __init__(
         self,
-        events: Iterable[BoxingEvent],
+        events: Iterable[Event],
         round_s: float,
     ) -> None:
         self._events, self._round_s = tuple(events), round_s
@@ -214,7 +214,7 @@ class PlannerScore:
         ]
 
 
-def _time(event: BoxingEvent, after_s: float) -> _Time:
+def _time(event: Event, after_s: float) -> _Time:
     due_s = event.end_s if event.due_s is None else event.due_s
     return after_s + event.start_s, after_s + event.end_s, after_s + due_s
 

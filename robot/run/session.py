@@ -202,7 +202,7 @@ class Session:
         self.stopped_by = "fault: unexpected error"
         self._count = LoopCount(0, 0, self.stopped_by)
         self._unreleased: tuple[str, ...] = ()
-        observers = Observers(self._say)
+        observers = Observers[Tick](self._say)
         if self._summary is not None:
             observers.add("the summary", self._summary.update)
         observers.add("the watch for faults", self._faults.update)

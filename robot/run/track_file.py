@@ -17,9 +17,9 @@ from gazerig.config.shipped_files import is_path
 from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
+from gazerig.gaze.track.motion_keys import GRID_S, fit_keys, resample, smooth
 from gazerig.gaze.track.track import EYE_CHANNELS, HEAD_CHANNELS, LID_CHANNELS, Track
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.motion_keys import GRID_S, fit_keys, resample, smooth
 from gazerig.robot.model.reply import TrackReply
 from gazerig.robot.model.track_fit import TrackFit, TrackRefused, channel_of_joint
 from gazerig.robot.run.rig_limits import face_tables, lid_spans, limits

@@ -10,9 +10,9 @@ from gazerig.config.schema import load_rig
 from gazerig.features.bringup.cli.prompts import (
     split_words,
 )
-from gazerig.robot.loop.command_handler import accept_only_stops
 from gazerig.robot.model.commands import Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
+from gazerig.robot.net.request_handler import accept_only_stops
 
 
 def run(*words: str) -> Invoked:

@@ -7,7 +7,7 @@ const LEVELS = { ok: "ok", limited: "near", hold: "hold", torque_off: "alarm", s
 const OLD_S = 0.15; // age of a servo's last answer
 const OLD_FRAME_S = 0.5; // the guard stops the neck at three times that age
 const HARD_LOAD = 0.9, LATE_SHARE = 0.5;
-const QUIET = ["torque off", "limp, as idle"];
+const QUIET = "torque off";
 const SERVO_NOTE = "amber: the guard slows the joint down; red: the joint is stopped, or the servo is "
   + "silent or at fault. silent: ticks without an answer. no feedback: the servo reports neither "
   + "position nor load; a joint that jams or a rod that came off is not noticed";
@@ -58,10 +58,10 @@ function servos({ joints }, { unanswered }, rig) {
 function row(name, joint, unanswered, limits) {
   const late = joint.age_s > OLD_S;
   const remark = joint.fault || (late && `silent for ${Math.min(joint.age_s, 999).toFixed(1)} s`)
-    || (joint.limited === "limp" && QUIET[1]) || (joint.torque === false && QUIET[0]) || "";
+    || (joint.torque === false && QUIET) || "";
   const title = make("th", {}, spaced(name));
   if (remark) {
-    title.append(make("div", { className: QUIET.includes(remark) ? "quiet" : "fault", textContent: remark }));
+    title.append(make("div", { className: remark === QUIET ? "quiet" : "fault", textContent: remark }));
   }
   const silent = cell(unanswered ?? "-", late ? "over" : "");
   if (joint.estimated) {

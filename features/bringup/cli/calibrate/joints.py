@@ -48,7 +48,6 @@ from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.loop.power_down import Interrupts, PowerDown
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.coupling import joint_partners
 from gazerig.robot.run.bus_wiring import release_plan
 
 
@@ -130,7 +129,8 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     for name in asked or ():
         if name not in rig.joints:
             raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
-    coupled = joint_partners(rig.couplings.values())
+    pairs = [pair.joints for pair in rig.couplings.values()]
+    coupled = dict([*pairs, *[(second, first) for first, second in pairs]])
     for name in rig.names:
         if name in coupled and (not asked or name in asked):
             text = f"{name} is moved together with {coupled[name]} by two servos: {_BY_LEVEL}"
