@@ -131,8 +131,12 @@ class Perception:
                 track
                 for track in in_sight
                 if track.counts
-                and _in_picture(
-                    rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, detections
+                and (
+                    # Seen people and hands reach out of the picture; a patch there is gone.
+                    (track.seen_s == t_s and track.detection.kind != UNNAMED)
+                    or _in_picture(
+                        rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, detections
+                    )
                 )
             ]
         )
