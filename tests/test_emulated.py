@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.model.weight import HeadMassParams, MassParams
-from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.emulated import emulated_lines
 
 
 def test_the_servos_of_a_rig_can_be_sent():

@@ -23,7 +23,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.params import Declaration, declarations
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.run.bus_wiring import bus_ports
+from gazerig.robot.run.buses import bus_ports
 
 DESK = shipped_path("rigs", "desk")
 

@@ -28,7 +28,7 @@ from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import TrackReply
 from gazerig.robot.model.track_fit import TrackFit, TrackRefused
 from gazerig.robot.model.types import JointAngles, further_joints
-from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.rig_limits import face_tables, lid_spans, limits, pose_offset
 from gazerig.robot.run.track_file import TOLERANCE_DEG
 

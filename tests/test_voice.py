@@ -123,7 +123,7 @@ def test_clients_of_the_network_may_name_sounds_of_the_folders_only(
 ) -> None:
     write_wav(tmp_path / "secret.wav", speech(0.5), RATE)
     with opened(folder, fast=True) as head:
-        voice = head._composed.voice
+        voice = head._made.voice
         assert voice.prepare(Say("short.wav"), True).sound == str(folder / "short.wav")
         for name in (str(tmp_path / "secret.wav"), "../secret.wav"):
             with pytest.raises(
@@ -146,7 +146,7 @@ def speaking(folder: Path) -> Iterator[Any]:
 
 
 def sound_s(head: Any) -> float | None:
-    player = head._composed.voice._player
+    player = head._made.voice._player
     found: float | None = player.position_s(RealClock().now_s()) if player is not None else None
     return found
 
@@ -162,7 +162,7 @@ def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder:
     with speaking(folder) as head:
         track = next(one for one in head.state.tracks if one.name == "speech")
         assert track.clock == "sound" or track.position_s < 1.0
-        pid = head._composed.voice._player.pid
+        pid = head._made.voice._player.pid
         for end in (lambda: head.play(""), lambda: head.jog("neck_yaw", 1.0), head.stop):
             end()
             wait_for(lambda: is_silent(head))
@@ -176,7 +176,7 @@ def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder:
 
 def test_a_stream_moves_the_mouth_and_a_stall_shuts_it(folder: Path) -> None:
     with opened(folder) as head:
-        voice = head._composed.voice
+        voice = head._made.voice
         voice.feed(speech(1.0), RATE, 1)
         wait_for(lambda: head.state.joints["jaw"].commanded_deg > 0.3 * JAW_DEG)
         wait_for(lambda: any("stalled" in one.text for one in head.events(0.0)))

@@ -129,7 +129,13 @@ class Perception:
         ways = [rotate_back(R, sub(track.p_world_m, p)) for track in in_sight]
         inside = _in_picture(ways, located.intrinsics, detections)
         self._tracks = tracks = tuple(
-            [track for track, here in zip(in_sight, inside, strict=True) if here and track.counts]
+            [
+                track
+                for track, here in zip(in_sight, inside, strict=True)
+                # Seen people and hands reach out of the picture; a patch there is gone.
+                if track.counts
+                and (here or (track.seen_s == t_s and track.detection.kind != UNNAMED))
+            ]
         )
         self._percept = Percept(
             t_s,
