@@ -132,7 +132,9 @@ class Perception:
             [
                 track
                 for track, here in zip(in_sight, inside, strict=True)
-                if track.counts and (here or track.seen_s == t_s)
+                # A patch as tall as a person is gone with the place of its head.
+                if track.counts
+                and (here or (track.seen_s == t_s and track.detection.upper_m is None))
             ]
         )
         self._percept = Percept(
