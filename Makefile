@@ -17,7 +17,7 @@ run: $(VENV)/.installed
 	@echo "measuring this computer for a second" >&2
 	@if [ -t 0 ]; then set -m; fi; $(BIN)/gazerig run --mock $$(if [ -d features/world ]; \
 	  then $(BIN)/python -m gazerig.features.world.run.first_world; \
-	  else $(BIN)/python -m gazerig.robot.run.computer; fi) $(OPTIONS)
+	  else $(BIN)/python -m gazerig.robot.cli.computer; fi) $(OPTIONS)
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -n auto --dist loadfile

@@ -23,7 +23,6 @@ from gazerig.gaze.attention.conversation import AversionParams, ConversationPara
 from gazerig.gaze.attention.idle import IdleParams
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.lids.blink import LidParams
-from gazerig.gaze.mouth.mouth import MouthParams
 from gazerig.gaze.oculomotor.drift import DriftLaw
 from gazerig.gaze.oculomotor.gaze_point import OculomotorParams
 from gazerig.gaze.oculomotor.head import HeadParams
@@ -128,7 +127,6 @@ class GazeConfig(PluginSections):
     head: Annotated[HeadParams, "head movements in gaze shifts"] = HeadParams()
     drift: Annotated[DriftLaw, "breathing, small random sway of a head at rest, and the motion of a speaker's"] = "people"
     lids: Annotated[LidParams, "blinks"] = LidParams()
-    mouth: Annotated[MouthParams, "motion while the head speaks"] = MouthParams()
     oculomotor: Annotated[OculomotorParams, "coordination of saccades, pursuit and head"] = OculomotorParams()
     # fmt: on
 

@@ -179,9 +179,7 @@ def connect(head: int | str | None, who: str) -> Any:
     Raises:
         gazerig.NotFound: it does not run, or several do.
     """
-    if isinstance(head, str) and not head.isdecimal():
-        return gazerig.connect(name=head, who=who)
-    return gazerig.connect(None if head is None else int(head), who=who)
+    return gazerig.connect(name=None if head is None else str(head), who=who)
 
 
 def _perform(head: Any, order: TurnOrder) -> str:

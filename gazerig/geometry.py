@@ -13,7 +13,7 @@ from gazerig.robot.loop.reachability import look_reply, reached_joints
 from gazerig.robot.model.commands import LookAt, check_command
 from gazerig.robot.model.reply import JointReply
 from gazerig.robot.model.types import JointState
-from gazerig.robot.run.gaze_models import kinematics_and_oculomotor
+from gazerig.robot.run.models import GazeModels, random_generators, rig_kinematics
 from gazerig.robot.run.rig_limits import limits
 
 
@@ -78,7 +78,8 @@ def inverse(rig: Rig | str, point_m: tuple[float, float, float]) -> JointSolutio
     except ValueError as error:
         raise Refused(str(error)) from None
     found = _load(rig)
-    kinematics, oculomotor = kinematics_and_oculomotor(found, 0)
+    models = GazeModels(found, random_generators(0))
+    kinematics, oculomotor = models.kinematics, models.oculomotor
     target = Target(point_m, (0.0, 0.0, 0.0), 0.0, "point", -1, 1.0, True, None, 1, "asked for")
     ranges = limits(found.joints)
     reply = look_reply(target, oculomotor, kinematics, ranges)
@@ -104,7 +105,7 @@ def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
         Refused: the rig has no such joint; the message lists its joints.
         ConfigError: the rig is invalid.
     """
-    kinematics, _ = kinematics_and_oculomotor(_load(rig), 0)
+    kinematics = rig_kinematics(_load(rig))
     if strange := [name for name in joints_rad if name not in kinematics.names]:
         raise Refused(unknown_text("joint", strange[0], kinematics.names))
     angles = tuple([float(joints_rad.get(name, 0.0)) for name in kinematics.names])

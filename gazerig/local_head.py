@@ -24,11 +24,8 @@ from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Command, Say, Value, set_client
 from gazerig.robot.model.reply import Progress
-from gazerig.robot.run import session
-from gazerig.robot.run.assemble import Substitutes
-from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.param_store import ParamStore
-from gazerig.robot.run.voice import RunVoice
+from gazerig.robot.run.run import Run
+from gazerig.robot.run.session import Session
 
 _LOG = logging.getLogger("gazerig")
 _ENDED = "the program"
@@ -40,22 +37,21 @@ class LocalHead(Head):
     """A head whose control loop is in this program; ``gazerig.open`` creates it.
 
     Args:
-        options: options of the run.
-        substitutes: the program's own camera, detector or attention rule.
+        rig: name or path of the rig.
+        make: puts the run together.
         say: receives one line per message; None: ``logging.getLogger("gazerig")``.
     """
 
     def __init__(
         self,
-        options: RunOptions,
-        substitutes: Substitutes,
+        rig: str,
+        make: Callable[[], Run],
         say: Callable[[str], None] | None = None,
     ) -> None:
-        self.rig = options.rig
-        self._options, self._substitutes = options, substitutes
+        self.rig, self._make = rig, make
         self._say = say if say is not None else _LOG.info
         self._feed = TickFeed()
-        self._composed: session.ComposedRun | None = None
+        self._made: Run | None = None
         self._ended = ""
 
     @property
@@ -72,27 +68,27 @@ class LocalHead(Head):
     def get(self, prefix: str = "") -> Mapping[str, Value]:
         """Return the present values of all keys of the rig that start with a prefix."""
         with _raising_refused():
-            return self._params().get(prefix)
+            return self._active_run().params.get(prefix)
 
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
         """Apply values at dotted keys from the next tick on, all of them or none."""
         with _raising_refused():
-            return self._params().set(changes)
+            return self._active_run().params.set(changes)
 
     def save(self, path: Path | str | None = None) -> Path:
         """Write the present values into the rig's file, or into another one; return its path."""
         whole = None if path is None else Path(path).expanduser().absolute()
         with _raising_refused():
-            return self._params().save(whole).path
+            return self._active_run().params.save(whole).path
 
     def revert(self) -> tuple[str, ...]:
         """Restore the values of the rig's file; return a line for each change."""
         with _raising_refused():
-            return self._params().revert()
+            return self._active_run().params.revert()
 
     def menus(self) -> Mapping[str, tuple[str, ...]]:
         """Return behaviours, conversation modes and lid states; the active one is the first."""
-        return self._active_run().assembly.robot.menus()
+        return self._active_run().robot.menus()
 
     def _progress(self) -> Progress:
         return self._feed.progress()
@@ -101,50 +97,38 @@ class LocalHead(Head):
         return self._feed.events(after)
 
     def _send(self, command: Command) -> Order:
-        robot = self._active_run().assembly.robot
+        robot = self._active_run().robot
         with _raising_refused():
             command = set_client(command, self._who)
             if isinstance(command, Say):
-                command = self._voice().prepare(command)
+                command = self._active_run().voice.prepare(command)
             ticket = robot.command(command)
         order = Order(self, lambda: ticket.wait(0.0))
         self._feed.follow(order._update_outcome)
         return order
 
-    def _active_run(self) -> session.ComposedRun:
+    def _active_run(self) -> Run:
         """Return the run."""
         if self._ended:
             raise HeadEnded(f"the head has ended: {self._ended}")
-        if self._composed is None:
+        if self._made is None:
             raise Error(f"use the head in a with block: with gazerig.open({self.rig!r}) as head:")
-        return self._composed
-
-    def _params(self) -> ParamStore:
-        """Return the parameters of the run; raises as ``_active_run`` does."""
-        tuning = self._active_run().tuning
-        assert tuning is not None, "only a run without a program has none"
-        return tuning
-
-    def _voice(self) -> RunVoice:
-        """Return the voice of the run; raises as ``_active_run`` does."""
-        voice = self._active_run().voice
-        assert voice is not None, "only a run without a program has none"
-        return voice
+        return self._made
 
     def _say_piece(
         self, piece: bytes, rate_hz: int, channels: int, volume: float, last: bool = False
     ) -> float:
         if last:
-            self._voice().finish()
+            self._active_run().voice.finish()
             return 0.0
         with _raising_refused():
-            return self._voice().feed(piece, rate_hz, channels, volume)
+            return self._active_run().voice.feed(piece, rate_hz, channels, volume)
 
-    def _compose(self) -> session.ComposedRun:
-        if self._composed is not None:
+    def _make_run(self) -> Run:
+        if self._made is not None:
             raise Error("a head can be used in one with block only: open another")
-        self._composed = session.compose(self._options, self._substitutes)
-        return self._composed
+        self._made = self._make()
+        return self._made
 
 
 class RunningHead(LocalHead):
@@ -162,11 +146,11 @@ class RunningHead(LocalHead):
 
     def __init__(
         self,
-        options: RunOptions,
-        substitutes: Substitutes,
+        rig: str,
+        make: Callable[[], Run],
         say: Callable[[str], None] | None = None,
     ) -> None:
-        super().__init__(options, substitutes, say)
+        super().__init__(rig, make, say)
         self._interrupts = Interrupts(also=self._abandonment_reason, signals=False)
         self._owner = threading.current_thread()
         self._started, self._finished = threading.Event(), threading.Event()
@@ -178,10 +162,10 @@ class RunningHead(LocalHead):
     def __enter__(self) -> Self:
         """Switch the torque on at the present joint angles; return after the first tick."""
         self._owner = threading.current_thread()
-        composed = self._compose()
+        run = self._make_run()
         # Not a daemon thread, so that the interpreter waits for parking before it exits.
         self._thread = threading.Thread(
-            target=self._run, args=(composed,), name=f"head {self.rig}", daemon=False
+            target=self._run, args=(run,), name=f"head {self.rig}", daemon=False
         )
         SIGNALS.add(self)
         try:
@@ -229,24 +213,25 @@ class RunningHead(LocalHead):
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         super()._pause(lambda: until() or not self._active_run(), seconds)
 
-    def _run(self, composed: session.ComposedRun) -> None:
+    def _run(self, run: Run) -> None:
         """Run from torque on to torque off; the target of the loop's thread."""
         ended = "fault: unexpected error"
         lines = WorkQueue("the program's say")  # which may block
         try:
-            figures = session.run(
-                composed,
+            session = Session(
+                run,
                 self._interrupts,
                 lambda line: lines.add(partial(self._say, line)),
                 watch=self._update,
                 summarised=False,
             )
+            figures = session.run()
+            lines.wait_idle(_LINES_S)
             ended = str(figures["stopped_by"])
         except BaseException as error:
             self._failure = error
             ended = f"fault: {error}"
         finally:
-            lines.wait_idle(_LINES_S)
             self._ended = ended
             self._finished.set()
             # Otherwise a worker that does not look at the head would keep the program from ending.
@@ -298,12 +283,11 @@ class SimulatedHead(LocalHead):
 
     def __enter__(self) -> Self:
         """Switch the torque on at the present joint angles; time passes only in ``step``."""
-        composed = self._compose()
+        run = self._make_run()
         stack = contextlib.ExitStack()
         with stack:
-            stack.callback(composed.assembly.close)
-            self._session = session.Session(
-                composed,
+            self._session = Session(
+                run,
                 Interrupts(signals=False),
                 self._say,
                 watch=self._feed.update,
@@ -330,7 +314,7 @@ class SimulatedHead(LocalHead):
     @property
     def time_s(self) -> float:
         """Return the simulated time."""
-        return self._active_run().assembly.clock.now_s()
+        return self._active_run().clock.now_s()
 
     def step(self, seconds: float | None = None) -> None:
         """Advance simulated time.
@@ -341,8 +325,8 @@ class SimulatedHead(LocalHead):
         Raises:
             HeadEnded: a fault has ended the head.
         """
-        made = self._active_run().assembly
-        ticks = 1 if seconds is None else round(seconds * made.loop.rate_hz)
+        rate_hz = self._active_run().loop.rate_hz
+        ticks = 1 if seconds is None else round(seconds * rate_hz)
         for _ in range(ticks):
             self._tick()
 
@@ -368,7 +352,9 @@ class SimulatedHead(LocalHead):
     ) -> Order:
         """Say the whole stream; its pieces are read first, as time does not pass meanwhile."""
         with _raising_refused():
-            speech = self._voice().prepare_stream(tuple(pieces), rate_hz, channels, self._who)
+            speech = self._active_run().voice.prepare_stream(
+                tuple(pieces), rate_hz, channels, self._who
+            )
         return self._send(speech)
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:

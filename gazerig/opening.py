@@ -10,9 +10,9 @@ from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.local_head import LocalHead, RunningHead, SimulatedHead
 from gazerig.robot.loop.chooser import Chooser
 from gazerig.robot.recording.body_playback import NoCamera
-from gazerig.robot.run.assemble import Substitutes
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.program_parts import ProgramParts
+from gazerig.robot.run.run import Run
+from gazerig.robot.run.run_rig import run_rig
 
 
 class _Options(TypedDict, total=False):
@@ -110,11 +110,14 @@ def open(
     )  # fmt: skip
     blind = own is None and not sees and not mock
     options = options.check_and_complete(blind=blind or own is not None)
-    substitutes = Substitutes(program=ProgramParts(own, detector, attention))
-    if blind:
-        substitutes = substitutes._replace(camera=lambda rigs: NoCamera())
+    view = NoCamera() if blind else own
+
+    def make() -> Run:
+        rig = run_rig(options)
+        return Run(rig, options, camera=view, detector=detector, rule=attention)
+
     kind: type[LocalHead] = SimulatedHead if fast else RunningHead
-    return kind(options, substitutes, say)
+    return kind(options.rig, make, say)
 
 
 _FOR_EVER_S = 1e9

@@ -8,7 +8,7 @@ from typing import Self
 from gazerig.errors import HeadEnded
 from gazerig.head import Head, Order
 from gazerig.robot.loop.head_state import HeadEvent, HeadState
-from gazerig.robot.model.commands import Command, Value, as_value
+from gazerig.robot.model.commands import Command, Revert, Value, as_value
 from gazerig.robot.model.reply import Progress
 from gazerig.robot.net.client import RequestRejected, RobotClient
 
@@ -66,7 +66,7 @@ class RemoteHead(Head):
 
     def revert(self) -> tuple[str, ...]:
         """Restore the values of the rig's file; return a line for each change."""
-        return self._client.revert()
+        return self._client.change(Revert())
 
     def menus(self) -> Mapping[str, tuple[str, ...]]:
         """Return behaviours, conversation modes and lid states; the active one is the first."""

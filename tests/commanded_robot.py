@@ -10,7 +10,7 @@ from fakes.runs import go, simulated
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.run import Run
 
 YAW = GAZE_JOINTS.index("neck_yaw")
 NECK = slice(YAW, YAW + 3)
@@ -20,7 +20,7 @@ NECK = slice(YAW, YAW + 3)
 class Running:
     """A simulated rig that ticks on request."""
 
-    made: Assembly
+    made: Run
     ticks: list[Tick] = field(default_factory=list)
 
     def go(self, seconds: float) -> list[Tick]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from recorded_run import Recorded
 
     from gazerig.config.schema import Rig
-    from gazerig.robot.run.assemble import Assembly
+    from gazerig.robot.run.run import Run
     from gazerig.sim_mock.device import Device
     from gazerig.sim_mock.devices import Emulated
 
@@ -72,13 +72,13 @@ def no_process_outlives_its_test() -> Iterator[None]:
 
 
 @pytest.fixture
-def started() -> Iterator["Callable[[Rig], Assembly]"]:
+def started() -> Iterator["Callable[[Rig], Run]"]:
     """Return what starts a rig before a visitor in simulated time; all are closed at the end."""
     from fakes.runs import simulated
 
     begun = []
 
-    def start(rig: "Rig") -> "Assembly":
+    def start(rig: "Rig") -> "Run":
         made = simulated(rig)
         begun.append(made)
         made.robot.start(made.clock)
@@ -113,16 +113,16 @@ def small_disk() -> Iterator[None]:
 @pytest.fixture
 def devices(monkeypatch: pytest.MonkeyPatch) -> "list[Device]":
     """Return a list that gets the emulated devices behind the runs of this test."""
-    from gazerig.robot.run import run_bus
+    from gazerig.robot.run import buses
 
     made: list[Device] = []
-    build = run_bus.build
+    build = buses.build
 
     def built(line: "Emulated", now_s: "Callable[[], float]") -> "Device":
         made.append(build(line, now_s))
         return made[-1]
 
-    monkeypatch.setattr(run_bus, "build", built)
+    monkeypatch.setattr(buses, "build", built)
     return made
 
 

@@ -12,7 +12,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.types import Floats, GazeState
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.kinematics import LIDS
-from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.rig_limits import lid_ends
 
 SHIPPED = (

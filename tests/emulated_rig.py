@@ -5,7 +5,7 @@ from math import degrees
 
 from gazerig.config.schema import Rig
 from gazerig.robot.model.clock import SimulatedClock
-from gazerig.robot.run.run_bus import emulated_lines, servo_index
+from gazerig.robot.run.emulated import emulated_lines, servo_index
 from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.in_process_port import InProcessPort
 

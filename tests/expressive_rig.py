@@ -7,7 +7,7 @@ from fakes.runs import simulated
 from gazerig.config.rig import Rig
 from gazerig.config.schema import RULES, load_rig
 from gazerig.gaze.track.animation import LevelParams
-from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.run import Run
 
 
 def expressive_rig() -> Rig:
@@ -33,7 +33,7 @@ def faults(rig: Rig) -> list[str]:
     return [f"{key}: {text}" for rule in RULES for key, text in rule(rig)]
 
 
-def started(rig: Rig | None = None) -> Assembly:
+def started(rig: Rig | None = None) -> Run:
     """Return a robot of the rig that has begun, in simulated time; close it."""
     made = simulated(rig or expressive_rig())
     made.robot.start(made.clock)

@@ -12,9 +12,9 @@ import pytest
 
 from gazerig.config.schema import Rig
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.run import assemble
+from gazerig.robot.run import run
+from gazerig.robot.run.buses import RunBus, run_bus
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.run_bus import RunBus, run_bus
 
 
 def _ideal(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
@@ -27,5 +27,5 @@ def _ideal(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
 def ideal_buses() -> Iterator[None]:
     """Have robots that are assembled meanwhile, in simulated time, on ideal servos."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(assemble, "run_bus", _ideal)
+        patch.setattr(run, "run_bus", _ideal)
         yield

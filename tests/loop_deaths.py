@@ -18,8 +18,9 @@ from feedback_rows import rows
 from gazerig.config.rig import BusConfig, Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.robot.run.bus_wiring import bus_ports, guarded_rig_bus, rig_bus, servo_configs
-from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.buses import bus_ports, guarded_rig_bus, rig_bus
+from gazerig.robot.run.emulated import emulated_lines
+from gazerig.robot.run.rig_limits import servo_configs
 from gazerig.sim_mock.pty.client import PtyBuses
 
 SLOW_DEG_S = 4.0

@@ -19,7 +19,7 @@ from gazerig.robot.loop.tick import Tick
 from gazerig.robot.loop.tick_stream import TickStream
 from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.net.topics import JointInfo, RigInfo, RunState
-from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.run import Run
 
 IN_TIME = LoopFigures(200.0, 0.0, 0.0, 0.0, 0, 0, 10.0)
 STATE = RunState("wait", "", "shy", health="bus ok", timing=IN_TIME)
@@ -28,14 +28,14 @@ GREY = np.full((400, 640, 3), (140, 120, 100), np.uint8)
 
 
 @cache
-def visit(name: str) -> tuple[Assembly, Tick]:
+def visit(name: str) -> tuple[Run, Tick]:
     """Return a rig, and its tick after 1.2 s: it looks at the mouth of a person."""
     made, ticks = simulated(name, "face-to-face", bus="ideal"), list[Tick]()
     play(made, 1.2, ticks.append)
     return made, ticks[-1]
 
 
-def info(made: Assembly) -> RigInfo:
+def info(made: Run) -> RigInfo:
     """Return what is constant of a rig with emulated servos."""
     joint = JointInfo(-0.6, 0.6, 55.0, 65.0, 4.8, 6.7, 0.5)
     names = made.shown_rig().kinematics.names

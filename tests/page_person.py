@@ -17,11 +17,11 @@ from fakes.runs import simulated
 from present import present
 from shown_page import free_port, wait_for
 
-from gazerig.robot.loop.loop import LoopCount, Tick
+from gazerig.robot.loop.loop import Tick
+from gazerig.robot.loop.tick_stream import Observers
 from gazerig.robot.model.commands import Renew
+from gazerig.robot.run.observers import RunObservers
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.param_store import ParamStore
-from gazerig.robot.run.run_observers import RunObservers
 
 YAW = GAZE_JOINTS.index("neck_yaw")
 TICK_S = 0.01
@@ -36,12 +36,13 @@ class Rig:
     def __init__(self) -> None:
         made = simulated()
         self.made, self.robot = made, made.robot
-        self.tuning = ParamStore(made.live_params, self.robot.command, "desk")
         self.said: list[str] = []
         # Not fast: the page is for real time, of which these ticks are a slow imitation.
-        options = RunOptions(page=f"127.0.0.1:{free_port()}")
-        say = self.said.append
-        self.audience = RunObservers(made, options, say, say, self.tuning)
+        made.options = RunOptions(page=f"127.0.0.1:{free_port()}")
+        self.tuning = made.params
+        self.audience = RunObservers(made, self.said.append, self.said.append)
+        self.observers = Observers[Tick](self.said.append)
+        self.audience.attach(self.observers)
         self.newest: Tick | None = None
         self.pace_s = PACE_S
         self.orders: list[Any] = []
@@ -65,7 +66,7 @@ class Rig:
             tick = self.robot.tick(clock.now_s(), TICK_S)
             self.newest = tick
             self.orders += [o for o in tick.commands if not isinstance(o, Renew)]
-            self.audience.update(tick)
+            self.observers.update(tick)
 
     def desired_deg(self) -> float:
         assert self.newest is not None
@@ -75,7 +76,7 @@ class Rig:
         self._over.set()
         self._thread.join()
         self.robot.stop()
-        self.audience.close(LoopCount(0, 0, "the end of the test"))
+        self.audience.close("the end of the test")
         self.made.close()
 
 

@@ -37,7 +37,7 @@ PICTURE = Picture(
     1, 0.0, 640, 400, (320.0, 200.0), (SeenFace((260.0, 120.0, 120.0, 150.0), (), 0.9),), (), (),
 )  # fmt: skip
 TRACKS = (
-    TrackInfo("nod", "says yes", 1.2, layers=("head",)),
+    TrackInfo("nod", "says yes", 1.2),
     TrackInfo("wave", "with a sound", 3.0, sound="/sounds/hello.wav", cues=(("hello", 1.5),)),
 )
 MENUS = {

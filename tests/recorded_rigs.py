@@ -11,12 +11,12 @@ from gazerig.robot.loop.loop import Tick
 from gazerig.robot.recording.read import RunRecording
 
 
-class Run(NamedTuple):
+class RecordedRun(NamedTuple):
     recording: RunRecording
     ticks: list[Tick]
 
 
-def recorded(path: Path, rig: Rig, seconds: float) -> Run:
+def recorded(path: Path, rig: Rig, seconds: float) -> RecordedRun:
     """Record a simulated run; give its ticks too."""
     seen = record(path, rig, seconds, replace(VISIT, rig="a rig", bus="emulated"))
-    return Run(RunRecording(path), seen)
+    return RecordedRun(RunRecording(path), seen)

@@ -16,14 +16,13 @@ from gazerig.robot.loop.loop import Tick, run
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
-from gazerig.robot.run.assemble import RIGS_OWN, Assembly, Substitutes
+from gazerig.robot.run.run import Run
 
 STARTED = datetime(2026, 1, 31, 23, 59, 59, 250_000, UTC)
 
 
-def assembly(recorder: Recorder | None = None) -> Assembly:
-    recorded = Substitutes(body=recorder.wrap_body) if recorder is not None else RIGS_OWN
-    return simulated(seed=7, substitutes=recorded)
+def assembly(recorder: Recorder | None = None) -> Run:
+    return simulated(seed=7, wrap_body=recorder.wrap_body if recorder is not None else None)
 
 
 def info_for() -> RunInfo:
@@ -54,7 +53,7 @@ class Recorded(NamedTuple):
 
 
 def record(
-    path: Path, seconds: float, at: Callable[[int, Assembly], None] = lambda n, made: None
+    path: Path, seconds: float, at: Callable[[int, Run], None] = lambda n, made: None
 ) -> Recorded:
     """Record a simulated run with a drawn picture in every tenth tick."""
     info = info_for()
@@ -73,7 +72,7 @@ def record(
     stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(made.robot, made.clock, made.loop, stop, watch)
     made.robot.stop()
-    said = recorder.close(count.stopped_by, made.sent_bytes_digest())
+    said = recorder.close(count.stopped_by, made.bus.sent_bytes_digest())
     made.close()
     assert recorder.events() == () and recorder.lost == 0
     return Recorded(path, seen, info, said, goals)
@@ -86,7 +85,7 @@ def with_picture(tick: Tick, number: int) -> Tick:
     return replace(tick, detections=Detections(tick.t_s - 0.03, number + 1, 60, 40, image=picture))
 
 
-def ordered(number: int, made: Assembly) -> None:
+def ordered(number: int, made: Run) -> None:
     """Ask for one of everything."""
     orders: dict[int, Command] = {
         50: Ask("behaviour", "guard"),

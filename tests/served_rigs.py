@@ -11,7 +11,7 @@ from mixed_rig import mixed_text
 
 from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
-from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.emulated import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
 

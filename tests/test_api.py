@@ -10,7 +10,7 @@ import pytest
 import gazerig
 from gazerig.gaze.types import GazeState, Percept, Vec3
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.run.resimulate import rerun
+from gazerig.robot.run.rerun import rerun
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

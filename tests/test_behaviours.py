@@ -11,15 +11,15 @@ import pytest
 from fakes.runs import play
 from gaze_targets import target
 from msgspec import structs
+from scene_score import BehaviourScore, PlannerScore
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
 from gazerig.gaze.types import Vec3
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.run.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.scene_files import load_scene
-from gazerig.robot.run.scene_score import BehaviourScore, PlannerScore
+from gazerig.robot.run.run import Run
+from gazerig.robot.run.surroundings import load_scene
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing, there_and_back
@@ -40,7 +40,7 @@ def tick(t_s: float, kind: str, place: Vec3) -> Tick:
 class Lived:
     """A scene as a robot lived through it: its ticks, and the scene's time of each."""
 
-    def __init__(self, made: Assembly, scene: Scene, seconds: float) -> None:
+    def __init__(self, made: Run, scene: Scene, seconds: float) -> None:
         self.score = BehaviourScore(scene.events(), scene.round_s)
         self.planner = PlannerScore(scene.events(), scene.round_s)
         self.scene_s: list[float] = []
@@ -59,12 +59,10 @@ class Lived:
         return [each for t_s, each in pairs if start_s <= t_s < end_s]
 
 
-def made_for(
-    scene: str, seed: int = 0, rate_hz: float = 200.0, substitutes: Substitutes = RIGS_OWN
-) -> Assembly:
+def made_for(scene: str, seed: int = 0, rate_hz: float = 200.0) -> Run:
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=rate_hz))
-    return assemble(rig, RunOptions(mock=True, fast=True, seed=seed, scene=scene), substitutes)
+    return Run(rig, RunOptions(mock=True, fast=True, seed=seed, scene=scene))
 
 
 @pytest.fixture(scope="module", params=[0, 7])
@@ -221,7 +219,8 @@ def test_e48_back_on_the_face_within_a_second_of_a_distraction(way_m: Vec3) -> N
         dice = np.random.default_rng(0)
         return SceneCamera(FrameParams(), scene, own._mount, own._head_pose, dice)
 
-    made = made_for("boxing", rate_hz=100.0, substitutes=Substitutes(camera=before))
+    made = made_for("boxing", rate_hz=100.0)
+    made.robot.camera = before(made.robot.camera)
     lived = Lived(made, scene, 17.0)
     figure = lived.score.figures()["return"]
     # A hand that comes down again may be no target any more when the reaction time is over.

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from math import radians
 from typing import Any, cast
 
@@ -23,9 +23,9 @@ from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.types import Detections
 from gazerig.robot.dashboard.door.page_door import HeadNews
 from gazerig.robot.model.frames import CameraMount, fixed_mount
-from gazerig.robot.run.assemble import assemble
-from gazerig.robot.run.browser_camera import SILENT_S, BrowserCamera
+from gazerig.robot.run.cameras import SILENT_S, BrowserCamera
 from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run import Run
 
 
 def jpeg(grey: int = 90, size: tuple[int, int] = (48, 64)) -> bytes:
@@ -89,7 +89,7 @@ class Browser:
 def test_the_browser_stands_in_from_its_first_frame_until_it_is_silent() -> None:
     now_s, browser, used, before, lines = [100.0], Browser(), list[Any](), list[int](), list[str]()
 
-    def make(source: Callable[[], Any], count: int) -> CameraWorker:
+    def make(pictures: JpegSlot, count: int) -> CameraWorker:
         before.append(count)
         return cast(CameraWorker, browser)
 
@@ -124,17 +124,17 @@ def test_the_browser_stands_in_from_its_first_frame_until_it_is_silent() -> None
 
 def test_an_emulated_rig_can_be_lent_a_camera_that_stands_still() -> None:
     rig = load_rig("desk")
-    made = assemble(rig, RunOptions(mock=True, scene="visitor", bus="ideal"))
+    made = Run(rig, RunOptions(mock=True, scene="visitor", bus="ideal"))
     try:
         browser, own, other = present(made.browser), made.robot.camera, cast(Any, Browser())
-        assert made.mount.on_head
+        assert made.view.mount.on_head
         browser._switch(other, "begins")
-        assert made.robot.camera is other and not made.mount.on_head
+        assert made.robot.camera is other and not made.view.mount.on_head
         still = CameraMount(fixed_mount(rig.camera, made.shown_rig().kinematics))
         level = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-        assert made.mount.pose(level, (0.0, 0.0, 9.0)) == still.pose(level, (0.0, 0.0, 0.0))
+        assert made.view.mount.pose(level, (0.0, 0.0, 9.0)) == still.pose(level, (0.0, 0.0, 0.0))
         browser._switch(None, "ends")
-        assert made.robot.camera is own and made.mount.on_head
+        assert made.robot.camera is own and made.view.mount.on_head
     finally:
         made.close()
 

@@ -8,8 +8,8 @@ from test_webcam import Capture
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.webcam import Webcam
-from gazerig.robot.run.assemble import assemble
 from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run import Run
 from gazerig.testing import CameraBench, CameraSuite
 from gazerig.testing.camera_suite import of_source
 
@@ -45,14 +45,14 @@ class TestWebcam(CameraSuite):
 class TestScene(CameraSuite):
     @pytest.fixture
     def bench(self, pixels):
-        made = assemble(
+        made = Run(
             load_rig("desk"), RunOptions(mock=True, fast=True, scene="visitor", pixels=pixels)
         )
         clock = made.clock
 
         def wait():
             clock.sleep_until(clock.now_s() + 0.01)
-            made.poses.remember(clock.now_s(), (0.0, 0.0, 0.0))
+            made.view.poses.remember(clock.now_s(), (0.0, 0.0, 0.0))
 
         wait()
         yield CameraBench(lambda: made.robot.camera, clock.now_s, wait)

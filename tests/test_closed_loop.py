@@ -16,7 +16,7 @@ from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.robot.loop.loop import Tick
 from gazerig.robot.model.commands import Value
-from gazerig.robot.run.gaze_models import kinematics_and_oculomotor
+from gazerig.robot.run.models import rig_kinematics
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 
 KEEPS_TO_THE_FACE: dict[str, Value] = {
@@ -54,7 +54,7 @@ def watched(scene: str, seconds: float) -> Seen:
     """Run a drawn scene and compare the measured gaze with the true place of the face part."""
     rig = apply_changes(load_rig("desk"), KEEPS_TO_THE_FACE)
     made = simulated(rig, scene, pixels=True)
-    kinematics, _ = kinematics_and_oculomotor(rig, 0)
+    kinematics = rig_kinematics(rig)
     assert made.scene is not None
     people = made.scene.people
     rows: list[tuple[float, ...]] = []

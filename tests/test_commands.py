@@ -15,6 +15,7 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
 from gazerig.gaze.types import PART_NAMES, Floats
 from gazerig.robot.loop.head_state import head_state
+from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import (
     AnyCommand,
@@ -38,7 +39,7 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlSource, control_sentence
 from gazerig.robot.model.reply import ARRIVED_RAD
-from gazerig.robot.run.session import shut_down
+from gazerig.robot.run.session import prepare_shutdown
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 GENTLE_RAD_S = radians(load_rig("desk").guard.soft_start_speed_deg_s)
@@ -141,7 +142,9 @@ def test_a_run_that_ends_stopped_does_not_park(running: Running) -> None:
     running.order(Stop("test"))
     running.go(0.2)
     said: list[str] = []
-    shut_down(running.made, running.count, said.append)
+    end = prepare_shutdown(running.made, said.append, Interrupts())
+    end.cause = running.count.stopped_by
+    end.shut_down()
     assert said == ["stopped by over: not parked, as it was stopped, torque off"]
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.run.computer import (
+from gazerig.robot.cli.computer import (
     ComputerFigures,
     load_level,
 )

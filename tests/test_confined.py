@@ -7,10 +7,10 @@ import pytest
 from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
-from gazerig.config.rig_files import AllowedFolder
+from gazerig.config.rig_files import AllowedFolder, RigLayers
 from gazerig.robot.model.parameter import SavedFile
 from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
-from gazerig.robot.run.param_store import ParamStore
+from gazerig.robot.run.live import ParamStore
 
 
 @pytest.fixture
@@ -72,7 +72,7 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     rig = home / "mine.yaml"
     rig.write_text(Path("config/rigs/desk.yaml").read_text())
     made = simulated(str(rig))
-    tuning = ParamStore(made.live_params, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
+    tuning = ParamStore(made.rig, lambda _: None, RigLayers(str(rig), None, None))
     pulse = LoopMonitor(made.clock)
     handler = RequestHandler(made.robot.command, pulse, {}, tuning, paths=tuning.confined)
     hear = handler.answer

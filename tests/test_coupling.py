@@ -20,8 +20,8 @@ from gazerig.robot.loop.body import CoupledServos
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.weight import HeadMassParams, MassParams
-from gazerig.robot.run.assemble import Assembly
-from gazerig.robot.run.bus_wiring import servo_configs
+from gazerig.robot.run.rig_limits import servo_configs
+from gazerig.robot.run.run import Run
 
 PITCH, ROLL = 35.0, 25.0
 COUPLING = CouplingParams("neck_pitch", "neck_roll", 1.5, 1.2)
@@ -109,7 +109,7 @@ def test_one_servo_of_a_pair_speaks_for_both_joints() -> None:
 
 
 def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
-    started: Callable[[Rig], Assembly],
+    started: Callable[[Rig], Run],
 ) -> None:
     """Joints are measured where they are sent, through two servos that know of no joints."""
     rig = rig_with(COUPLING)
@@ -138,7 +138,7 @@ def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
             assert setups[name].min_steps - 1 <= steps <= setups[name].max_steps + 1
 
 
-def test_a_lost_servo_of_a_pair_makes_both_joints_stale(started: Callable[[Rig], Assembly]) -> None:
+def test_a_lost_servo_of_a_pair_makes_both_joints_stale(started: Callable[[Rig], Run]) -> None:
     rig = rig_with(COUPLING)
     made = started(rig)
     read = made.robot.body.bus.read
@@ -188,7 +188,7 @@ def test_bring_up_of_a_coupled_neck(tmp_path: Path) -> None:
 
 
 def test_hobby_servos_of_a_coupled_neck_get_the_range_of_both_joints(
-    started: Callable[[Rig], Assembly],
+    started: Callable[[Rig], Run],
 ) -> None:
     """Channels of a board are checked and armed for pitch and roll at once."""
     rig = load_rig("maker")

@@ -12,7 +12,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 from gazerig.robot.recording.read import RunRecording, report_bad_contents
-from gazerig.robot.run.resimulate import rerun
+from gazerig.robot.run.rerun import rerun
 
 # -- damage ----------------------------------------------------------------------------
 

@@ -25,10 +25,14 @@ from gazerig.robot.description.urdf import Urdf, urdf
 from gazerig.robot.loop.body import Body
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.weight import CounterweightParams, HeadMassParams, MassParams
-from gazerig.robot.run.bus_wiring import rig_bus
-from gazerig.robot.run.rig_description import description_of, sag_compensation, statics_of
+from gazerig.robot.run.buses import rig_bus
+from gazerig.robot.run.rig_description import (
+    description_of,
+    rest_park_deg,
+    sag_compensation,
+    statics_of,
+)
 from gazerig.robot.run.rig_limits import park_rad
-from gazerig.robot.run.rig_weight import rest_park_deg
 
 
 @pytest.fixture(scope="module")

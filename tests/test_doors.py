@@ -25,7 +25,7 @@ from gazerig.doors import admission, livekit, openai_realtime, pipecat, voice_as
 from gazerig.doors.door import Address, Door, DoorLink
 from gazerig.doors.turn_taking import Orders, UnknownMessage
 from gazerig.drivers.plugins import DOOR, SHIPPED, find
-from gazerig.robot.run.door_processes import load_door
+from gazerig.robot.run.doors import load_door
 
 
 def brief(orders: Orders) -> list[Any]:

@@ -17,8 +17,6 @@ from slow_rigs import at_rate
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
 import gazerig
-from gazerig.drivers.errors import SetupError
-from gazerig.robot.run.door_processes import DoorEntry
 
 pytestmark = [
     pytest.mark.usefixtures("ideal_servos"),
@@ -59,7 +57,7 @@ def talking(head: gazerig.Head) -> int:
 def test_doors_begin_and_end_with_the_head(
     assistant: Assistant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """STOP works meanwhile; a killed door costs its state after a second, and is started again."""
+    """STOP works meanwhile; a killed door costs its state after a second, and is reported."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     said: list[str] = []
     port = free_port()
@@ -79,40 +77,16 @@ def test_doors_begin_and_end_with_the_head(
         ):  # fmt: skip
             assistant.send_soon(lva(event))
             wait_for(lambda state=state: does(head, state))  # type: ignore[misc]
-        first, connections = talking(head), len(assistant.sockets)
+        first = talking(head)
         os.kill(first, signal.SIGKILL)
         wait_for(lambda: does(head, "idle"))
         wait_for(lambda: any("ends: not renewed" in line for line in said))
-        wait_for(lambda: len(assistant.sockets) > connections)  # started again
-        assistant.send_soon(lva("listening"))
-        wait_for(lambda: does(head, "listening"))
-        last = talking(head)
         head.stop("a hand")
         assert head.state.stopped == "a hand"
     assert any("voice-assistant: ended with code -9; the head continues" in line for line in said)
     assert re.fullmatch("stopped by the program: not parked.*, torque off", said[-1])
-    for pid in (first, last):
-        with pytest.raises(ProcessLookupError):
-            os.kill(pid, 0)
+    with pytest.raises(ProcessLookupError):
+        os.kill(first, 0)
     with socket.socket() as one:
         one.bind(("127.0.0.1", port))  # it is free again
     assert not [t for t in threading.enumerate() if t.name.startswith("door ")]
-
-
-@pytest.mark.parametrize(
-    ("text", "entry"),
-    [
-        ("wyoming", DoorEntry("wyoming")),
-        ("x ws://h:1", DoorEntry("x", "ws://h:1")),
-        ("x --bind 0.0.0.0:1 ws://h:1", DoorEntry("x", "ws://h:1", "0.0.0.0:1")),
-        *[(wrong, None) for wrong in ("", "x y z", "x --head 3", "x --bind", "x 'y")],
-    ],
-)
-def test_an_entry_has_a_name_an_address_and_a_place_to_listen(
-    text: str, entry: DoorEntry | None
-) -> None:
-    if entry is None:
-        with pytest.raises(SetupError, match="expected NAME"):
-            DoorEntry.parse(text)
-    else:
-        assert DoorEntry.parse(text) == entry

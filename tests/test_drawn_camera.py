@@ -10,10 +10,10 @@ from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.robot.model.frames import CameraMount
-from gazerig.robot.run.assemble import assemble
-from gazerig.robot.run.drawn_camera import DrawnSource, scene_pixels
+from gazerig.robot.run.cameras import DrawnSource, scene_pixels
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.scene_files import load_scene
+from gazerig.robot.run.run import Run
+from gazerig.robot.run.surroundings import load_scene
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 LEFT = ((0.8, -0.6, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, 1.0))
@@ -59,7 +59,7 @@ def test_frames_are_drawn_as_of_the_pose_that_was_told() -> None:
 
 def test_only_a_drawn_scene_in_real_time_has_a_process() -> None:
     rig = load_rig("desk")
-    made = assemble(rig, RunOptions(mock=True, pixels=True, scene="visitor", bus="ideal"))
+    made = Run(rig, RunOptions(mock=True, pixels=True, scene="visitor", bus="ideal"))
     try:
         assert isinstance(made.robot.camera, CameraWorker)
     finally:

@@ -18,20 +18,20 @@ from gazerig.robot.cli import animation
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Express, SetLevel
-from gazerig.robot.run.assemble import Assembly
 from gazerig.robot.run.rig_limits import pose_offset
+from gazerig.robot.run.run import Run
 
 DT = 0.005
 
 
 @pytest.fixture
-def made() -> Iterator[Assembly]:
+def made() -> Iterator[Run]:
     made = started()
     yield made
     made.close()
 
 
-def desired_deg(made: Assembly, tick: Tick) -> dict[str, float]:
+def desired_deg(made: Run, tick: Tick) -> dict[str, float]:
     return dict(zip(made.robot.body.names, map(degrees, tick.desired_rad), strict=True))
 
 
@@ -61,7 +61,7 @@ def test_a_blend_ends_exactly_at_its_goal_and_then_costs_nothing() -> None:
 
 
 def test_an_expression_moves_joints_brows_and_head_and_the_eyes_stay_on_target(
-    made: Assembly,
+    made: Run,
 ) -> None:
     ticks(made, 400)
     made.robot.command(Express("happy"))
@@ -80,7 +80,7 @@ def test_a_lid_keeps_shutting_in_a_sad_face() -> None:
     assert sad.lids == pytest.approx((1.0 - 15.0 / 45.0, 1.0, 1.0, 1.0))
 
 
-def test_a_level_moves_the_jaw_and_falls_to_0_within_a_second(made: Assembly) -> None:
+def test_a_level_moves_the_jaw_and_falls_to_0_within_a_second(made: Run) -> None:
     for _ in range(100):
         made.robot.command(SetLevel("mouth", 0.7))
         last = ticks(made, 1)[-1]
@@ -92,7 +92,7 @@ def test_a_level_moves_the_jaw_and_falls_to_0_within_a_second(made: Assembly) ->
     assert said == ["level mouth: not set any more, so it returns to 0"]
 
 
-def test_a_level_adds_to_an_expression(made: Assembly) -> None:
+def test_a_level_adds_to_an_expression(made: Run) -> None:
     made.robot.command(Express("happy"))
     ticks(made, 200)
     for _ in range(40):
@@ -182,5 +182,4 @@ def test_a_level_from_the_command_line_is_kept_up_and_let_go(
     monkeypatch.setattr(animation, "RealClock", SimulatedClock)
     assert gazerig("ctl", "level", "mouth", "0.7", "--seconds", "0.25") == ""
     assert rig.commands == [SetLevel("mouth", 0.7)] * 4 + [SetLevel("mouth", 0.0)]
-    assert "valid number" in gazerig("ctl", "level", "mouth", "loud")
     assert "no level 'ear'; available: mouth" in gazerig("ctl", "level", "ear", "1")

@@ -12,7 +12,7 @@ from gazerig.config.load import shipped_path
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.robot.model.commands import Express, Value
-from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.run import Run
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -40,7 +40,7 @@ def test_a_jaw_keeps_clear_of_a_neck_that_looks_down() -> None:
     rig = load_rig("expressive")
     pair: Value = {"first": ("neck_pitch", -35.0, -5.0), "second": ("jaw", 4.0, 25.0)}
     low: dict[str, Value] = {"expressions.sulky": {"neck_pitch": -20.0, "jaw": 15.0}}
-    made: Assembly = started(apply_changes(rig, {"guard.collisions": (pair,), **low}))
+    made: Run = started(apply_changes(rig, {"guard.collisions": (pair,), **low}))
     made.robot.command(Express("sulky"))
     worst = -90.0
     for tick in ticks(made, 600):
@@ -65,7 +65,7 @@ def test_a_blink_shuts_the_lids_of_a_sad_face() -> None:
 
 def test_the_jaw_moves_on_while_a_stale_frame_holds_the_neck() -> None:
     made = started(load_rig("expressive"))
-    made.live_params.parts.camera.latest = lambda t_s: None  # type: ignore[assignment,method-assign]
+    made.camera.latest = lambda t_s: None  # type: ignore[assignment,method-assign]
     made.robot.command(Express("surprised"))
     tick = ticks(made, 600)[-1]
     made.close()

@@ -133,14 +133,17 @@ import sys
 from pathlib import PosixPath
 from gazerig.robot.run import session
 from gazerig.robot.run.options import RunOptions
-composed = session.compose(RunOptions(mock=True, **{options!r}).check_and_complete())
-run = session.Session(composed, lambda: None, lambda line: None)
+from gazerig.robot.run.run import Run
+from gazerig.robot.run.run_rig import run_rig
+options = RunOptions(mock=True, **{options!r}).check_and_complete()
+made = Run(run_rig(options), options)
+run = session.Session(made, lambda: None, lambda line: None)
 with run.power_on() as loop:
     for _ in range(20):
         assert loop.step() is None
     names = set(sys.modules)
     run.stopped_by = "seconds"
-composed.assembly.close()
+made.close()
 packages = {{name.partition(".")[0] for name in names}} - sys.stdlib_module_names
 print("PACKAGES", *(name for name in packages if not name.startswith("_")))
 print("LATER", *(name for name in {later!r} if name in names))
@@ -172,12 +175,12 @@ def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_pat
     """Nor does that of a world in real time know MuJoCo: it is in two other processes."""
     pytest.importorskip("gazerig.features.world")
     code = (
-        "import sys; from gazerig.robot.run.assemble import assemble; "
+        "import sys; from gazerig.robot.run.run import Run; "
         "from gazerig.config.schema import load_rig; "
         "from gazerig.robot.run.options import RunOptions; "
-        "assemble(load_rig('desk'), RunOptions(mock=True, fast=True, scene='visitor')).close(); "
+        "Run(load_rig('desk'), RunOptions(mock=True, fast=True, scene='visitor')).close(); "
         "assert not [m for m in sys.modules if 'world.figure' in m or m.startswith('mujoco')]; "
-        "made = assemble(load_rig('desk'), RunOptions(mock=True, world='living-room')); "
+        "made = Run(load_rig('desk'), RunOptions(mock=True, world='living-room')); "
         "made.scene.people(1.0); made.scene.events(); made.close(); "
         "heavy = ('mujoco', 'OpenGL', 'scipy', 'cv2'); "
         "assert not [m for m in sys.modules if m.split('.')[0] in heavy]; "

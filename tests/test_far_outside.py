@@ -14,7 +14,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoMissing, SetupError
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.run import run_bus
+from gazerig.robot.run import emulated
 from gazerig.robot.safety.start_range import far_outside, find_far_outside
 
 EYE = "left_eye_pan"
@@ -25,8 +25,8 @@ Terminal = pytest.CaptureFixture[str]
 
 def place(patch: pytest.MonkeyPatch, angles_deg: Mapping[str, float]) -> None:
     """Let emulated servos begin at these joint angles, with stops far outside the ranges."""
-    patch.setattr(run_bus, "_CROOKED_DEG", angles_deg)
-    patch.setattr(run_bus, "STOP_BEYOND_DEG", 150.0)
+    patch.setattr(emulated, "_CROOKED_DEG", angles_deg)
+    patch.setattr(emulated, "STOP_BEYOND_DEG", 150.0)
 
 
 def rig_of(name: str) -> Rig:

@@ -32,7 +32,7 @@ from gazerig.robot.model.frames import (
 )
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.run import Run
 
 KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
 
@@ -328,7 +328,7 @@ def error_deg(tick: Tick) -> float:
 
 
 def test_the_eyes_stay_on_their_point_while_the_head_bows(
-    started: Callable[[Rig], Assembly],
+    started: Callable[[Rig], Run],
 ) -> None:
     rig = rig_with_lower_neck()
     assert faults(rig) == []
@@ -345,7 +345,7 @@ def test_the_eyes_stay_on_their_point_while_the_head_bows(
 
 
 def test_what_a_look_will_come_to_counts_the_bent_lower_neck(
-    started: Callable[[Rig], Assembly],
+    started: Callable[[Rig], Run],
 ) -> None:
     rig = rig_with_lower_neck()
     made = started(rig)
@@ -358,7 +358,7 @@ def test_what_a_look_will_come_to_counts_the_bent_lower_neck(
 
 
 def test_people_stay_where_they_are_when_the_lower_neck_turns_the_camera(
-    started: Callable[[Rig], Assembly],
+    started: Callable[[Rig], Run],
 ) -> None:
     """The emulated camera is carried by the servos, and frames are placed by what they measure."""
     rig = rig_with_lower_neck()

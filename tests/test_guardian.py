@@ -28,7 +28,7 @@ from gazerig.robot.guardian.heartbeat import (
     Heartbeat,
 )
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
-from gazerig.robot.run.bus_wiring import bus_ports, release_plans
+from gazerig.robot.run.buses import bus_ports, release_plans
 
 PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 

@@ -19,8 +19,8 @@ from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.hands import HAND, Hands, Known
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.run.drawn_motion import SyntheticMotionDetector
-from gazerig.robot.run.scene_files import load_scene
+from gazerig.robot.run.cameras import SyntheticMotion
+from gazerig.robot.run.surroundings import load_scene
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.cameras.frame_times import FrameParams
@@ -65,7 +65,7 @@ def frames(scene: Scene, start_s: float, end_s: float) -> Iterator[Frame]:
     drawn = FrameParams(latency_ms=0.0, horizontal_field_deg=field)
     truth = SceneCamera(FrameParams(latency_ms=0.0), later, mount, lambda t_s: head, rng)
     truth.open()
-    motion, locate = SyntheticMotionDetector(rig.motion), FrameLocator(None, radians(field))
+    motion, locate = SyntheticMotion(rig.motion), FrameLocator(None, radians(field))
     camera = PixelCamera(
         drawn, DrawnScene(later), mount, lambda t_s: head, detector, rng, motion, locate
     )

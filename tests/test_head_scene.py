@@ -20,7 +20,7 @@ from gazerig.robot.dashboard.view.viewpoints import FACE, View, named_view
 from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh, stored_shape
 from gazerig.robot.description.parts import measures_of
 from gazerig.robot.description.people import head, part_of, torso
-from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.rig_description import shape_of
 
 RIGS = sorted(path.stem for path in shipped_path("rigs", "desk").parent.glob("*.yaml"))

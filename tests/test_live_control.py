@@ -9,10 +9,11 @@ import pytest
 from fakes.runs import simulated
 from slow_rigs import at_rate
 
+from gazerig.config.rig_files import RigLayers
 from gazerig.robot.model.commands import Command, Tune
 from gazerig.robot.net.client import connect_to_all
 from gazerig.robot.net.live_server import LiveServer
-from gazerig.robot.run.param_store import ParamStore
+from gazerig.robot.run.live import ParamStore
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 RATE = "loop.rate_hz"
@@ -24,20 +25,15 @@ class Rig:
     def __init__(self, folder: Path) -> None:
         self.path = Path(at_rate(folder, "desk", 80.0))
         made = simulated(str(self.path))
-        self._live_params = made.live_params
-        self.tuning = ParamStore(
-            made.live_params,
-            self._apply,
-            str(self.path),
-            elsewhere=lambda work, *words: work(*words),
-        )
+        self._made = made
+        self.tuning = ParamStore(made.rig, self._apply, RigLayers(str(self.path), None, None))
         self.said: list[str] = []
         about = {"rig": "desk", "pid": 1}
         self.live = LiveServer(made.robot, self.tuning, made.clock, about, self.said.append)
 
     def _apply(self, order: Command) -> None:
         assert isinstance(order, Tune)
-        self._live_params(order, 0.0)
+        self._made._tune(order, 0.0)
 
     def look(self) -> str:
         """Look at the file until it counts, and return the last message."""

@@ -27,11 +27,11 @@ from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
-from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.run import Run
 from gazerig.robot.safety.guard import SOFT_START_RAD_S2
 
 
-def ticks(assembly: Assembly, seconds: float) -> list[Tick]:
+def ticks(assembly: Run, seconds: float) -> list[Tick]:
     seen: list[Tick] = []
     assembly.robot.start(assembly.clock)
     go(assembly, seconds, seen.append)

@@ -7,7 +7,7 @@ import pytest
 import gazerig
 from gazerig.config.faults import ConfigError
 from gazerig.config.load import shipped_path
-from gazerig.robot.run.scene_files import load_scene
+from gazerig.robot.run.surroundings import load_scene
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

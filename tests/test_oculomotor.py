@@ -39,7 +39,7 @@ from gazerig.gaze.oculomotor.saccade_trajectory import RedirectedTrajectory, Sac
 from gazerig.gaze.types import Angles3, Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState
-from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.models import rig_kinematics
 
 
 def test_e17_gaze_timeline_of_a_60_degree_shift() -> None:

@@ -10,10 +10,10 @@ from mixed_rig import rig_of
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.run import Run
 
 
-def ran(rig: Rig, seconds: float) -> tuple[Assembly, list[Tick], tuple[str, ...]]:
+def ran(rig: Rig, seconds: float) -> tuple[Run, list[Tick], tuple[str, ...]]:
     """Run a rig before a visitor; return the run, every tick, and the messages at the start."""
     made = simulated(rig)
     ticks: list[Tick] = []
@@ -43,12 +43,12 @@ def test_it_looks_at_its_visitor_blinks_and_lets_go(name: str, tmp_path: Path) -
 
 
 @pytest.fixture(scope="module")
-def maker() -> tuple[Assembly, list[Tick], tuple[str, ...]]:
+def maker() -> tuple[Run, list[Tick], tuple[str, ...]]:
     """Return twelve seconds of the maker's eyes."""
     return ran(load_rig("maker"), 12.0)
 
 
-Ran = tuple[Assembly, list[Tick], tuple[str, ...]]
+Ran = tuple[Run, list[Tick], tuple[str, ...]]
 
 
 def test_the_makers_eyes_have_no_neck_to_move(maker: Ran) -> None:

@@ -24,8 +24,8 @@ from gazerig.robot.description.build import describe
 from gazerig.robot.guardian.process import releaser
 from gazerig.robot.guardian.release_plan import decode, encode
 from gazerig.robot.model.clock import SimulatedClock
-from gazerig.robot.run.bus_wiring import release_plan
-from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.buses import release_plan
+from gazerig.robot.run.emulated import emulated_lines
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort
 
@@ -61,7 +61,7 @@ def test_a_rig_on_it_looks_at_people(example):
     assert "face" in {tick.target.kind for tick in seen}
     assert all(tick.joints.missing == () and all(tick.joints.torque) for tick in seen)
     assert np.ptp([tick.joints.position_rad for tick in seen], axis=0).min() > 0.05
-    assert made.sent_bytes_digest()
+    assert made.bus.sent_bytes_digest()
 
 
 def test_its_section_is_checked(example, tmp_path):

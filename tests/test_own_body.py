@@ -10,7 +10,7 @@ from gazerig.gaze.types import Vec3
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.models import rig_kinematics
 
 BEHIND: Vec3 = (-0.5, 0.0, 0.12)
 """A camera on the base, behind the head, that sees it from the back."""

@@ -234,3 +234,19 @@ def test_a_face_that_jumps_again_and_again_is_in_a_film() -> None:
         faces = tuple(face_at((x, 0.0, 2.0)) for x in places)
         found = seen(perception, k, faces=faces)
     assert found.bodies.lifeless == found.bodies.ids[:1]
+
+
+def test_a_face_before_a_wall_lives_and_one_in_its_plane_does_not() -> None:
+    for face_m, lifeless in ((2.0, ()), (2.98, (1,))):
+        perception = Perception(STILL, 69.0)
+        for k in range(1, 30):
+            faces = (face_at((0.02 * sin(0.2 * k), 0.0, face_m)),)
+            found = seen(perception, k, faces=faces, depth_m=depth_of(face_m, width=30))
+        assert found.bodies.lifeless == lifeless
+
+
+def test_nothing_is_seen_where_the_rig_ignores_what_is_there() -> None:
+    camera = CameraParams(mount="base", ignore_deg=((-30.0, -10.0, -20.0, 20.0),))
+    faces = face_at((0.7, 0.0, 2.0)), face_at((-0.7, 0.0, 2.0))  # 19 deg to the right and left
+    (found,) = seen(Perception(CameraMount(camera), 69.0), 1, faces=faces).faces
+    assert found.p_world_m[1] > 0.0

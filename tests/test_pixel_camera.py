@@ -22,7 +22,7 @@ from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.scene import PinholeView
 from gazerig.robot.perception.face_pose import face_pose
-from gazerig.robot.run.scene_files import load_scene, scene_names
+from gazerig.robot.run.surroundings import load_scene, scene_names
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.cameras.rendered import PixelCamera

@@ -26,10 +26,11 @@ from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.plugins import ATTENTION, CAMERA, DETECTOR
 from gazerig.drivers.types import ServoConfig
-from gazerig.robot.run import run_bus, session
-from gazerig.robot.run.assemble import RIGS_OWN, assemble
+from gazerig.robot.run import buses as run_buses
+from gazerig.robot.run import session
+from gazerig.robot.run.emulated import emulated_lines
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.run import Run
 from gazerig.sim_mock.pty.client import PtyBuses
 
 ODD = """
@@ -71,13 +72,13 @@ def end_of_run(
 ) -> tuple[str, list[str], bool]:
     """Run a rig; return the reason of its end, its lines, and whether torque stays on."""
     devices: list[Any] = []
-    make = run_bus.build
+    make = run_buses.build
 
     def build(*words: Any) -> Any:
         devices.append(make(*words))
         return devices[-1]
 
-    monkeypatch.setattr(run_bus, "build", build)
+    monkeypatch.setattr(run_buses, "build", build)
     options = {"mock": True, "fast": True, "seconds": 5.0, "seed": 0, **options}
     lines: list[str] = []
     with PtyBuses() as buses:
@@ -85,8 +86,7 @@ def end_of_run(
             (path,) = buses.start(emulated_lines(rig)).values()
             options |= {"mock": False, "port": path}
         chosen = RunOptions(**options)
-        composed = session.ComposedRun(chosen, assemble(rig, chosen, RIGS_OWN), None, None)
-        figures = session.run(composed, lambda: stopped(buses), lines.append)
+        figures = session.Session(Run(rig, chosen), lambda: stopped(buses), lines.append).run()
         commands = [device.faults.command for device in devices] or [buses.command]
         held = [
             one.get("target", one.get("torque"))

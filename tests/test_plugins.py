@@ -26,7 +26,8 @@ from gazerig.drivers.plugins import (
     Plugin,
 )
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.run.camera_factory import real_camera
+from gazerig.robot.run.cameras import place_camera, real_camera
+from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.options import RunOptions, parse_camera
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
@@ -222,7 +223,8 @@ def fish(folder):
 def test_a_camera_of_a_package_is_looked_through_by_its_name(fish, tmp_path, name):
     rig, clock = fish_rig(tmp_path), RealClock()
     options = RunOptions(mock=True, camera=parse_camera(name))
-    camera = real_camera(rig, options, clock, rig.camera, None)
+    view, _ = place_camera(rig, options, rig_kinematics(rig), in_process=True)
+    camera = real_camera(rig, view, options, clock.now_s)
     camera.open()
     try:
         until_s = clock.now_s() + 60.0

@@ -19,7 +19,7 @@ from human.row_03_rests import visits
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, direction
-from gazerig.robot.run import run_rig
+from gazerig.robot.run import surroundings
 from gazerig.robot.run.options import RunOptions
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
@@ -92,18 +92,18 @@ def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> 
     """Return what runs in a profile, and what it looks at."""
     calls, kinds = Profile(subcalls=False, builtins=False), set[str]()
     scene = EverythingOnce()
-    shipped = run_rig.load_scene
+    shipped = surroundings.load_scene
     options = RunOptions(
         True, True, 0, scene.name, profile=profile, scanpath=scanpath, seconds=seconds, bus="ideal"
     )
     rig = apply_changes(load_rig("desk", profile=profile), {"loop.rate_hz": 50.0})
-    run_rig.load_scene = cast(Any, lambda name, seed: scene)
+    surroundings.load_scene = cast(Any, lambda name, seed: scene)
     calls.enable()
     try:
         simulate(rig, options, watch=lambda tick: kinds.add(tick.target.kind))
     finally:
         calls.disable()
-        run_rig.load_scene = shipped
+        surroundings.load_scene = shipped
     named: Counter[str] = Counter()
     for code, times, *_ in calls.getstats():
         if isinstance(code, CodeType) and "gaze" in Path(code.co_filename).parts:

@@ -12,16 +12,22 @@ from msgspec.structs import replace
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.loop.reachability import look_reply
-from gazerig.robot.model.kinematics import gaze_error
+from gazerig.robot.model.kinematics import Kinematics, gaze_error
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import JointAngles
-from gazerig.robot.run.gaze_models import kinematics_and_oculomotor
+from gazerig.robot.run.models import GazeModels, random_generators
 from gazerig.robot.run.rig_limits import limits
 
 RIGS = ("desk", "feetech", "maker")
 DT_S = 0.01
+
+
+def kinematics_and_oculomotor(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
+    models = GazeModels(rig, random_generators(seed))
+    return models.kinematics, models.oculomotor
 
 
 @cache

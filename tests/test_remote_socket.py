@@ -20,11 +20,12 @@ import pytest
 from branch import Branch
 from fakes.runs import simulated
 
+from gazerig.config.rig_files import RigLayers
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.loop import client_control, stop
 from gazerig.robot.loop.loop import Robot, Tick
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import LookAt, Value
+from gazerig.robot.model.commands import Characters, LookAt, Value
 from gazerig.robot.net import client
 from gazerig.robot.net import socket_io as remote_socket
 from gazerig.robot.net import socket_server as server_module
@@ -37,7 +38,7 @@ from gazerig.robot.net.client import (
 )
 from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
 from gazerig.robot.net.socket_server import RemoteServer
-from gazerig.robot.run.param_store import ParamStore
+from gazerig.robot.run.live import ParamStore
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -113,12 +114,7 @@ def errors() -> list[str]:
 
 @pytest.fixture
 def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
-    tuning = ParamStore(
-        beat.made.live_params,
-        beat.robot.command,
-        "desk",
-        elsewhere=lambda work, *words: work(*words),
-    )
+    tuning = ParamStore(beat.made.rig, beat.robot.command, RigLayers("desk", None, None))
     about = {"rig": "desk", "pid": os.getpid()}
     robot = beat.robot
     requests = RequestHandler(robot.command, beat.pulse, about, tuning, menus=robot.menus)
@@ -300,7 +296,7 @@ def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(
         (said,) = answer.values()
         assert re.search(words, said), said
         end.sendall(b'{"do": "characters"}\n')
-        assert line_of(end) == {"ok": [*rig.characters()]}
+        assert line_of(end) == {"ok": [*rig.ask(Characters(), tuple[str, ...])]}
 
 
 def test_an_endless_request_is_refused_and_hung_up_on(
@@ -517,13 +513,13 @@ def test_a_stop_does_not_wait_for_another_thread_of_its_program(
     answer, asked, over = RequestHandler.answer, threading.Event(), threading.Event()
 
     def slow(self: RequestHandler, request: Any, peer: str = "") -> dict[str, object]:
-        if request["do"] == "characters":
+        if request["do"] == "get":
             asked.set()
             over.wait(20.0)
         return answer(self, request, peer)
 
     monkeypatch.setattr(RequestHandler, "answer", slow)
-    other = threading.Thread(target=rig.characters)
+    other = threading.Thread(target=rig.get)
     other.start()
     assert asked.wait(20.0)
     rig.stop("meanwhile")

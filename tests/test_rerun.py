@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from fakes.runs import VISIT, record
 from msgspec import structs
-from recorded_rigs import Run
+from recorded_rigs import RecordedRun
 from recorded_run import exact
 
 from gazerig.config.schema import load_rig
@@ -34,8 +34,8 @@ from gazerig.robot.model.commands import (
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.writer import RunWriter
-from gazerig.robot.run.assemble import Assembly
-from gazerig.robot.run.resimulate import rerun
+from gazerig.robot.run.rerun import rerun
+from gazerig.robot.run.run import Run
 
 NECK_YAW = 6
 PUPPET: dict[int, tuple[Command, ...]] = {
@@ -51,19 +51,19 @@ PUPPET: dict[int, tuple[Command, ...]] = {
 
 
 @pytest.fixture(scope="module")
-def once(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def once(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
     """A run in which one of much is ordered, recorded as ``gazerig run --fast --record`` does."""
     path = tmp_path_factory.mktemp("reruns") / "run.mcap"
 
-    def order(number: int, made: Assembly) -> None:
+    def order(number: int, made: Run) -> None:
         for command in PUPPET.get(number, ()):
             made.robot.command(command)
 
     ticks = record(path, load_rig("desk"), 3.8, replace(VISIT, rig="desk"), order)
-    return Run(RunRecording(path), ticks)
+    return RecordedRun(RunRecording(path), ticks)
 
 
-def test_the_same_code_and_configuration_give_the_same_to_the_bit(once: Run) -> None:
+def test_the_same_code_and_configuration_give_the_same_to_the_bit(once: RecordedRun) -> None:
     assert {type(order) for tick in once.ticks for order in tick.commands} == {
         Ask, LookAt, Jog, Stop, Resume, Tune
     }  # fmt: skip
@@ -71,14 +71,16 @@ def test_the_same_code_and_configuration_give_the_same_to_the_bit(once: Run) -> 
     found = rerun(once.recording, on_tick=again.append)
     assert found.is_same and found.ticks == found.agreeing_ticks == len(once.ticks) == 759
     assert found.first_difference_s is None and found.difference == ""
-    assert found.joints == "recorded" and found.notes == ()
+    assert found.notes == ()
     assert found.recorded_figures == found.rerun_figures
     assert len(once.recording.end.tx_sha256) == 64 and found.sent_bytes_same is True
     # Not the decisions alone: whole ticks, stop, puppet and tuning included.
     assert list(map(exact, again)) == list(map(exact, once.ticks))
 
 
-def test_the_last_bit_of_one_joint_is_seen(once: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_last_bit_of_one_joint_is_seen(
+    once: RecordedRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
     real = RunRecording.moments
 
     def bent(self: RunRecording) -> Iterator[TickRecord]:
@@ -96,7 +98,7 @@ def test_the_last_bit_of_one_joint_is_seen(once: Run, monkeypatch: pytest.Monkey
     assert found.first_difference_s == pytest.approx(0.1)
 
 
-def test_a_recording_without_ticks_is_refused(once: Run, tmp_path: Path) -> None:
+def test_a_recording_without_ticks_is_refused(once: RecordedRun, tmp_path: Path) -> None:
     path = tmp_path / "none.mcap"
     writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), once.recording.info)
     writer.close(RunEnd("seconds"))
@@ -135,7 +137,7 @@ def test_a_show_is_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     paths = tuple(str(tmp_path / f"{name}.yaml") for name in files)
     rig = replace(load_rig("expressive"), track_files=paths)
 
-    def ask(number: int, made: Assembly) -> None:
+    def ask(number: int, made: Run) -> None:
         if (command := COMMANDS.get(number)) is not None:
             made.robot.command(command)
 
@@ -147,6 +149,5 @@ def test_a_show_is_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     assert "switched off" in states[-1][-1].end_reason
     for name in files:
         (tmp_path / f"{name}.yaml").unlink()
-    for joints in ("emulated", "recorded"):
-        again = rerun(RunRecording(tmp_path / "run.mcap"), joints=joints)
-        assert again.is_same and again.sent_bytes_same is True, again
+    again = rerun(RunRecording(tmp_path / "run.mcap"))
+    assert again.is_same and again.sent_bytes_same is True, again

@@ -12,13 +12,13 @@ from desk import GAZE_JOINTS
 from fakes.runs import simulated, ticks
 
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
-from gazerig.config.parameters import NEXT_TICK, apply_changes, parameters, value_of
+from gazerig.config.parameters import NEXT_TICK, apply_changes, differences, parameters, value_of
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.loop.loop import Tick
 from gazerig.robot.model.commands import AnyCommand, Jog, Resume, Stop, Tune, Value
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.run.assemble import Assembly
-from gazerig.robot.run.live_params import rig_in_effect
+from gazerig.robot.run.live import rig_in_effect
+from gazerig.robot.run.run import Run
 
 DT_S = 1.0 / 200.0
 STEPS_PER_RAD = 4096.0 / (2.0 * pi)
@@ -27,22 +27,21 @@ STEPS_PER_RAD = 4096.0 / (2.0 * pi)
 class Running(NamedTuple):
     """A simulated rig that ticks by hand, and every goal that went to the bus."""
 
-    made: Assembly
+    made: Run
     goals: list[list[int]]
     ticks: list[Tick]
 
     @property
     def rig(self) -> Rig:
-        return self.made.live_params.rig
+        return self.made.rig
 
     def go(self, count: int, dt_s: float = DT_S) -> Tick:
         self.ticks.extend(ticks(self.made, count, dt_s))
         return self.ticks[-1]
 
     def tune(self, changes: dict[str, Value]) -> None:
-        base = self.rig
-        rig = rig_in_effect(base, apply_changes(base, changes))
-        self.made.robot.command(self.made.live_params.prepare(base, rig))
+        rig = rig_in_effect(self.rig, apply_changes(self.rig, changes))
+        self.made.robot.command(Tune(tuple(differences(self.rig, rig).items())))
 
 
 def started(scene: str = "visitor", rig: Rig | None = None) -> Running:
@@ -64,7 +63,7 @@ class Judge:
 
     def __init__(self, running: Running) -> None:
         self.running = running
-        self.guard = running.made.live_params.parts.guard
+        self.guard = running.made.guard
         joints, speeds = running.made.robot.body._joints, self.guard._motion.speed
         self.steps = self._steps()
         self.speed = np.array(

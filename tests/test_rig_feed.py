@@ -20,26 +20,26 @@ from gazerig.robot.loop.tick import Tick
 from gazerig.robot.loop.tick_stream import TickStream
 from gazerig.robot.model.control_source import ConversationState, TrackState
 from gazerig.robot.net.topics import RunState
-from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.run import Run
 
 
-class Run(NamedTuple):
-    made: Assembly
+class FeedRun(NamedTuple):
+    made: Run
     ticks: list[Tick]
 
 
 @pytest.fixture(scope="module", params=["desk", "maker"])
-def ran(request: pytest.FixtureRequest) -> Run:
+def ran(request: pytest.FixtureRequest) -> FeedRun:
     """Two simulated seconds, so that there are saccades, a fixation and a blink."""
     made, ticks = simulated(request.param), list[Tick]()
     play(made, 2.0, ticks.append)
-    return Run(made, ticks)
+    return FeedRun(made, ticks)
 
 
 class Page:
     """A page's process that is a socket here, and what feeds it."""
 
-    def __init__(self, made: Assembly) -> None:
+    def __init__(self, made: Run) -> None:
         ours, self.feed = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self.page = PageProcess("127.0.0.1", 0)
         self.page.join(ours)
@@ -53,7 +53,7 @@ class Page:
         self.stream.sinks.add("the page", self.publisher.take)
         self.live = RigFeed()
 
-    def _rig(self, made: Assembly) -> LiveRig:
+    def _rig(self, made: Run) -> LiveRig:
         self.rigs += 1
         return LiveRig(made.shown_rig(), info(made))
 
@@ -72,13 +72,13 @@ class Page:
 
 
 @pytest.fixture
-def page(ran: Run) -> Iterator[Page]:
+def page(ran: FeedRun) -> Iterator[Page]:
     one = Page(ran.made)
     yield one
     one.close()
 
 
-def test_states_and_events_are_those_of_the_ticks_themselves(ran: Run, page: Page) -> None:
+def test_states_and_events_are_those_of_the_ticks_themselves(ran: FeedRun, page: Page) -> None:
     page.comes_up()
     direct = TickFeed()
     events: list[HeadEvent] = []
@@ -98,7 +98,7 @@ def test_states_and_events_are_those_of_the_ticks_themselves(ran: Run, page: Pag
     assert page.said == ["the page is at http://127.0.0.1:9/?token=x"]
 
 
-def test_the_servos_silences_are_counted_and_what_is_seen_is_told(ran: Run, page: Page) -> None:
+def test_the_servos_silences_are_counted_and_what_is_seen_is_told(ran: FeedRun, page: Page) -> None:
     page.comes_up()
     silent = structs.replace(ran.ticks[3].joints, missing=("eyes_pan",))
     for tick in (*ran.ticks[:3], structs.replace(ran.ticks[3], joints=silent)):
@@ -111,7 +111,7 @@ def test_the_servos_silences_are_counted_and_what_is_seen_is_told(ran: Run, page
 
 
 def test_nothing_is_sent_before_the_page_is_there_and_everything_again_to_another(
-    ran: Run, page: Page
+    ran: FeedRun, page: Page
 ) -> None:
     for tick in ran.ticks[:100]:
         page.stream.update(tick)
@@ -127,7 +127,7 @@ def test_nothing_is_sent_before_the_page_is_there_and_everything_again_to_anothe
 
 
 def test_a_picture_comes_once_with_what_was_seen_and_where_the_head_looked(
-    ran: Run, page: Page
+    ran: FeedRun, page: Page
 ) -> None:
     page.comes_up()
     assert page.live.picture() is None
@@ -143,7 +143,7 @@ def test_a_picture_comes_once_with_what_was_seen_and_where_the_head_looked(
     assert page.live.picture() is None
 
 
-def test_a_page_that_takes_nothing_delays_nothing_and_is_counted(ran: Run, page: Page) -> None:
+def test_a_page_that_takes_nothing_delays_nothing_and_is_counted(ran: FeedRun, page: Page) -> None:
     page.comes_up()
     for n in range(3):
         for tick in ran.ticks:

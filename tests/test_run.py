@@ -14,13 +14,14 @@ import cv2
 import numpy as np
 import pytest
 from command_line import figures, gazerig, typed
-from ideal_bus import ideal_buses
 from slow_rigs import at_rate
 
 import gazerig as gazerig_package
 from gazerig.config.faults import ConfigError
+from gazerig.config.schema import load_rig
 from gazerig.robot.run import session
 from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run import Run
 
 
 @pytest.fixture(scope="module")
@@ -51,12 +52,14 @@ def test_summary_tells_all_it_promises(visitor: dict[str, Any]) -> None:
 def test_who_asks_for_no_figures_gets_the_same_bytes_and_how_it_ended() -> None:
     asked = RunOptions(True, True, scene="boxing", seconds=0.5, rig="desk").check_and_complete()
     whole, less = (
-        session.run(session.compose(asked), lambda: None, lambda line: None, summarised=summarised)
+        session.Session(
+            Run(load_rig("desk"), asked), lambda: None, lambda line: None, summarised=summarised
+        ).run()
         for summarised in (True, False)
     )
     assert less["bus"] == whole["bus"] and {*less} < {*whole}
     assert less["stopped_by"] == "seconds" and less["ticks"] == whole["ticks"] != 0
-    summed_up = {"seconds", "gaze_error_deg", "target_share", "behaviours"}
+    summed_up = {"seconds", "gaze_error_deg", "target_share"}
     assert summed_up <= {*whole} and not summed_up & {*less}
 
 
@@ -90,17 +93,6 @@ def test_e59_same_seed_same_bytes_in_another_process(half: str) -> None:
     assert re.fullmatch(r"[0-9a-f]{64}", again["bus"]["tx_sha256"])
     short = ("--seconds", "1", "--seed")
     assert bytes_sent(*short, "1") != bytes_sent(*short, "2")
-
-
-@pytest.mark.slow
-def test_boxing_shows_the_papers_five_behaviours_with_their_latencies(half: str) -> None:
-    with ideal_buses():
-        run = figures(half, "--scene", "boxing")
-    seen = run["behaviours"]
-    for name in ("punch", "attack", "face", "wave", "reach"):
-        assert seen[name]["seen"] == seen[name]["of"] > 0, name
-    assert seen["punch"]["latency_s"] <= 0.4 and seen["wave"]["latency_s"] <= 0.4
-    assert run["seconds"] == pytest.approx(45.0, abs=0.1)
 
 
 # --- Ends of the command run in real time: by a signal

@@ -42,7 +42,7 @@ from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import FramePicker, Recorder
 from gazerig.robot.recording.run_info import PROFILE, RunEnd, RunInfo, as_text, read_text
 from gazerig.robot.recording.writer import RunWriter
-from gazerig.robot.run.assemble import Assembly, Substitutes
+from gazerig.robot.run.run import Run
 
 
 def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
@@ -306,7 +306,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_pa
     list(recording.ticks())  # what is there is not damaged
 
 
-def writing(path: Path) -> tuple[Recorder, Assembly, Any]:
+def writing(path: Path) -> tuple[Recorder, Run, Any]:
     """Begin to record a robot; give the process of the writer too."""
     recorder = Recorder(path, info_for())
     recorder.open()
@@ -374,7 +374,7 @@ def rig(path: Path) -> None:
     recorder.open()
     assert recorder._link is not None
     print(recorder._link.process.pid, flush=True)
-    made = simulated(substitutes=Substitutes(body=recorder.wrap_body))
+    made = simulated(wrap_body=recorder.wrap_body)
     made.robot.start(made.clock)
     wall = RealClock()
     start_s = wall.now_s()

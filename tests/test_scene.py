@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gazerig.config.faults import ConfigError
-from gazerig.robot.run.scene_files import load_scene, scene_names
+from gazerig.robot.run.surroundings import load_scene, scene_names
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 from gazerig.sim_mock.scenes.scene import Scene
 

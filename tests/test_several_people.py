@@ -15,7 +15,6 @@ from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.habituation import Habituation, HabituationParams
 from gazerig.gaze.types import Vec3
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.run.assemble import Substitutes
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
@@ -57,7 +56,8 @@ def looked_at(scene: StillPeople, seconds: float, seed: int) -> np.ndarray:
 
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=50.0))
-    made = simulated(rig, seed=seed, substitutes=Substitutes(camera=before), bus="ideal")
+    made = simulated(rig, seed=seed, bus="ideal")
+    made.robot.camera = before(made.robot.camera)
     ticks: list[Tick] = []
     play(made, seconds, ticks.append)
     places = [person.p_world_face_m for person in scene.people(0.0)]

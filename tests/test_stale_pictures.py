@@ -18,8 +18,7 @@ from gazerig.gaze.attention.attention import STALE_S
 from gazerig.gaze.attention.idle import SEARCH_S
 from gazerig.gaze.types import Vec3
 from gazerig.robot.loop.loop import Tick
-from gazerig.robot.run import run_rig
-from gazerig.robot.run.assemble import Substitutes
+from gazerig.robot.run import surroundings
 from gazerig.robot.safety.guard import FRAME_TIMEOUT_S
 from gazerig.sim_mock.scenes.scene import ScenePerson
 
@@ -85,8 +84,9 @@ def watched(scene: Passer) -> tuple[Rig, list[Tick]]:
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_rig, "load_scene", lambda name, seed: scene)
-        made = simulated(rig, scene.name, 3, Substitutes(camera=Unplugged))
+        patch.setattr(surroundings, "load_scene", lambda name, seed: scene)
+        made = simulated(rig, scene.name, 3)
+    made.robot.camera = Unplugged(made.robot.camera)
     ticks: list[Tick] = []
     play(made, END_S, ticks.append)
     return rig, ticks

@@ -11,8 +11,8 @@ from fakes.scenes import EmptyScene
 from gazerig.config.schema import load_rig
 from gazerig.robot.loop.loop import Tick
 from gazerig.robot.run import run_rig
-from gazerig.robot.run.assemble import assemble
 from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run import Run
 from gazerig.sim_mock.scenes.scene import Thing
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -42,7 +42,7 @@ def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]
         gaze=replace(rig.gaze, head=head),
         detector=replace(rig.detector, work_width_px=128),
     )
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=1, scene=room.name, pixels=True))
+    made = Run(rig, RunOptions(mock=True, fast=True, seed=1, scene=room.name, pixels=True))
     ticks: list[Tick] = []
     play(made, seconds, ticks.append)
     return ticks

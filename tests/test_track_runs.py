@@ -18,8 +18,8 @@ from gazerig.robot.model.commands import LookAt, Play
 from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.run.assemble import Assembly
-from gazerig.robot.run.resimulate import rerun
+from gazerig.robot.run.rerun import rerun
+from gazerig.robot.run.run import Run
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -40,7 +40,7 @@ def steady(name: str) -> Rig:
     return replace(rig, gaze=gaze)
 
 
-def played(made: Assembly, track: str) -> tuple[CommandReply, list[Tick]]:
+def played(made: Run, track: str) -> tuple[CommandReply, list[Tick]]:
     """Play a track and go on until shortly after its end."""
     ticket = made.robot.command(Play(track))
     first = ticks(made, 1)
@@ -51,7 +51,7 @@ def played(made: Assembly, track: str) -> tuple[CommandReply, list[Tick]]:
 
 @pytest.mark.parametrize("name", ("desk", "expressive", "feetech", "maker"))
 def test_joints_follow_tracks_and_the_eyes_stay_on_the_point(
-    name: str, started: Callable[[Rig], Assembly]
+    name: str, started: Callable[[Rig], Run]
 ) -> None:
     rig = steady(name)
     made = started(rig)
@@ -87,7 +87,7 @@ frames:
 
 
 def test_gaze_keeps_the_eyes_on_the_point_while_a_track_owns_neck_and_jaw(
-    tmp_path: Path, started: Callable[[Rig], Assembly]
+    tmp_path: Path, started: Callable[[Rig], Run]
 ) -> None:
     file = tmp_path / "own.yaml"
     file.write_text(OWNED, encoding="utf-8")
@@ -109,7 +109,7 @@ def test_gaze_keeps_the_eyes_on_the_point_while_a_track_owns_neck_and_jaw(
 
 
 def test_owned_eyes_and_lids_are_the_track_s_alone(
-    tmp_path: Path, started: Callable[[Rig], Assembly]
+    tmp_path: Path, started: Callable[[Rig], Run]
 ) -> None:
     file = tmp_path / "stare.yaml"
     file.write_text(
@@ -138,8 +138,8 @@ def test_a_file_in_the_folder_tracks_is_found_without_an_edit_or_a_restart(tmp_p
     with gazerig.open(str(tmp_path / "my.yaml"), fast=True, record=recording) as head:
         head.step(1.0)
         (tmp_path / "tracks" / "late.yaml").write_text(bow.format(-4))
-        assert head._composed is not None
-        assert "late" in [one.name for one in head._composed.assembly.robot.tracks()]
+        assert head._made is not None
+        assert "late" in [one.name for one in head._made.robot.tracks()]
         head.play("late")
         head.step(0.5)
         first_deg = head.state.joints["neck_pitch"].commanded_deg

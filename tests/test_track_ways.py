@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import pytest
 from ticked_rig import TickedRig, connected, gazerig
 
+from gazerig.config.schema import load_rig
 from gazerig.gaze.attention.top_down import Rule
 from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Target
@@ -12,6 +13,7 @@ from gazerig.robot.model.commands import Jog, Play, Resume, Stop, set_client
 from gazerig.robot.net.client import RequestRejected, RobotClient
 from gazerig.robot.run import session
 from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run import Run
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -71,7 +73,7 @@ def test_a_visitor_who_waves_is_nodded_to() -> None:
         rig="desk", mock=True, fast=True, scene="visitor", seconds=20, rules="greeting"
     )
     said: list[str] = []
-    session.run(session.compose(options), lambda: None, said.append)
+    session.Session(Run(load_rig("desk"), options), lambda: None, said.append).run()
     (nod,) = [line for line in said if "track" in line]
     at_s = float(nod.split(" s: ")[0])
     assert 17.5 < at_s < 19.0 and "for rule wait: nod takes 1.0 s" in nod  # the wave begins at 17.5

@@ -272,12 +272,6 @@ def test_nobody_is_faster_than_a_walker(tracker: Tracker) -> None:
     assert {*visit(tracker, 4.0, *[far] * 15)} == {2}
 
 
-def test_a_false_detection_gives_its_number_back(tracker: Tracker) -> None:
-    visit(tracker, 0.0, *[across(0.5)] * 3)
-    taller = across(0.5)._replace(p_m=(1.5, 0.5, 0.9))
-    assert {*visit(tracker, 10.0, *[taller] * 15)} == {1}
-
-
 def test_clothes_that_are_seen_later_settle_the_number(tracker: Tracker) -> None:
     visit(tracker, 0.0, *[dressed(across(0.5), 3)] * 15)
     stranger = visit(tracker, 30.0, across(0.4), *[dressed(across(0.4), 7)] * 15)

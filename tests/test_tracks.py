@@ -1,7 +1,7 @@
 """Tracks as data: curves of least jerk, what a rig can do of them, and bad input."""
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, partial
 from math import degrees, pi, radians
 from pathlib import Path
 from typing import NamedTuple
@@ -15,9 +15,9 @@ from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track, shipped_tracks
 from gazerig.gaze.lids.lids import LidOpenings
-from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.minimum_jerk_curve import evaluate, key_states
 from gazerig.gaze.track.motion_keys import fit_keys, smooth
-from gazerig.gaze.track.pose_offset import PoseOffset
+from gazerig.gaze.track.pose_offset import OwnedPose, PoseOffset
 from gazerig.gaze.track.track import LIMIT_SHARE, KeyFrame, Track
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.track.track_player import TrackPlayer
@@ -28,7 +28,7 @@ from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import TrackReply
 from gazerig.robot.model.track_fit import TrackFit, TrackRefused
 from gazerig.robot.model.types import JointAngles, further_joints
-from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.rig_limits import face_tables, lid_spans, limits, pose_offset
 from gazerig.robot.run.track_file import TOLERANCE_DEG
 
@@ -79,24 +79,25 @@ def test_a_curve_that_does_not_turn_is_the_spline_of_least_jerk_unless_that_swin
 ) -> None:
     spans, steps = np.array(keys).T
     times, values = np.cumsum(spans), np.cumsum(steps)
-    curve = MinimumJerkCurve(times, values)
+    curve = partial(evaluate, *key_states(times, values))
     at = np.linspace(0.0, times[-1], 500)
     least, rate = spline_of_least_jerk(times, values, at)
-    value, speed, acceleration = curve.sample_at(at)
+    value, speed, acceleration = curve(at)
     assert speed.min() > -1e-4 * speed.max()  # never back
     if rate.min() > 0.0:
         assert np.abs(value - least).max() < 1e-6 * np.abs(least).max()
     before = np.maximum(0.0, times - 1e-9)
-    for one, other in zip(curve.sample_at(before)[1:], curve.sample_at(times)[1:], strict=True):
+    for one, other in zip(curve(before)[1:], curve(times)[1:], strict=True):
         assert np.abs(one - other).max() < 1e-5 * max(1.0, np.abs(acceleration).max())
-    assert [curve.value_at(t) for t in at[::50]] == pytest.approx(value[::50], abs=1e-9)
 
 
 def test_a_curve_rests_where_it_turns_and_never_swings_past() -> None:
-    curve = MinimumJerkCurve(np.array([0.3, 0.6, 0.9, 1.4]), np.array([10.0, -4.0, -4.0, 0.0]))
-    value, speed, acceleration = curve.sample_at(np.linspace(0.0, 1.5, 3001))
+    curve = partial(
+        evaluate, *key_states(np.array([0.3, 0.6, 0.9, 1.4]), np.array([10.0, -4.0, -4.0, 0.0]))
+    )
+    value, speed, acceleration = curve(np.linspace(0.0, 1.5, 3001))
     assert value.max() <= 10.0 + 1e-9 and value.min() >= -4.0 - 1e-9
-    at = curve.sample_at(np.array([0.3, 0.6, 0.9, 1.4]))
+    at = curve(np.array([0.3, 0.6, 0.9, 1.4]))
     assert np.abs(at[1]).max() < 1e-9 and np.abs(at[2]).max() < 1e-6
     assert np.abs(np.gradient(value, 5e-4) - speed).max() < 0.2
     assert np.abs(np.gradient(speed, 5e-4) - acceleration)[5:-5].max() < 20.0
@@ -232,9 +233,9 @@ def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> Non
     even, values_deg = smooth(times, truth + random.normal(0.0, 0.15, 200))
     found, values = fit_keys(even, values_deg, TOLERANCE_DEG)
     assert 4 <= len(found) <= 30
-    curve = MinimumJerkCurve(found, values, float(values_deg[0]))
-    assert np.abs(curve.sample_at(even)[0] - values_deg).max() <= TOLERANCE_DEG
-    assert np.abs(curve.sample_at(times - times[0])[0] - truth).max() < TOLERANCE_DEG + 0.6
+    curve = partial(evaluate, *key_states(found, values, float(values_deg[0])))
+    assert np.abs(curve(even)[0] - values_deg).max() <= TOLERANCE_DEG
+    assert np.abs(curve(times - times[0])[0] - truth).max() < TOLERANCE_DEG + 0.6
     still = fit_keys(even, np.full(len(even), 3.0), TOLERANCE_DEG)
     assert len(still[0]) == 0
 
@@ -271,14 +272,13 @@ def interrupted(track: str, rig_name: str, moments: int) -> tuple[Floats, Sequen
     """
     rig, random = load_rig(rig_name), np.random.default_rng(len(track))
     player = TrackPlayer(len(further_joints(rig.joints)))
-    choices = TrackChoices(shipped_tracks(), player, rig.names, lid_spans(rig))
+    choices = TrackChoices(shipped_tracks(), player, TrackFit(rig.names, lid_spans(rig)))
     bounds, others = limits(rig.joints), (*choices.names, track, track, "")
-    at_rest = tuple([0.0] * len(rig.names))
     offsets, t, began = [PoseOffset.from_flat(player.rest.tolist())] * 3, 0.0, 0
     for _ in range(moments):
         name = track if not player.voices else others[int(random.integers(len(others)))]
         speed = float(random.uniform(0.5, 2.0))
-        reply = choices.play(Play(name, speed), t, at_rest, bounds)
+        reply = choices.play(Play(name, speed), t, bounds)
         began += bool(name) and not reply.refused
         for _ in range(int(random.integers(1, round(0.25 / DT_S)))):
             t += DT_S
@@ -319,8 +319,7 @@ class Show(NamedTuple):
     bounds: Sequence[JointLimit]
 
     def play(self, name: str, t_s: float, **how: object) -> int:
-        rest = (0.0,) * len(rig().names)
-        reply = self.choices.play(Play(name, **how), t_s, rest, self.bounds)  # type: ignore[arg-type]
+        reply = self.choices.play(Play(name, **how), t_s, self.bounds)  # type: ignore[arg-type]
         assert reply.track is not None, reply
         return reply.track.number
 
@@ -336,7 +335,7 @@ class Show(NamedTuple):
 
 def show(**tracks: Track) -> Show:
     player = TrackPlayer(len(further_joints(rig().joints)))
-    choices = TrackChoices(tracks, player, rig().names, lid_spans(rig()))
+    choices = TrackChoices(tracks, player, TrackFit(rig().names, lid_spans(rig())))
     return Show(player, choices, limits(rig().joints))
 
 
@@ -420,8 +419,8 @@ def test_an_owned_jaw_goes_from_the_present_angle_to_the_track_and_back() -> Non
     for k in range(2200):
         t = k * 0.005
         it.player.step(t)
-        (index,) = it.player.owned.layers or (index,)
-        angles.append(it.player.owned.mix(index, radians(5.0)))
+        (index,) = it.player.owned or (index,)
+        angles.append(OwnedPose(it.player.owned).mix(index, radians(5.0)))
     at = np.degrees(angles)
     assert at[0] == pytest.approx(5.0) and at[-1] == pytest.approx(5.0)
     assert at[400] == pytest.approx(2.0, abs=0.01)  # of the track alone

@@ -1,6 +1,5 @@
 """Tuning: values set, saved, reverted and read again while a rig runs."""
 
-from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -10,19 +9,15 @@ from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
 from gazerig.config.parameters import values
+from gazerig.config.rig_files import RigLayers
 from gazerig.config.schema import load_rig
 from gazerig.robot.model.commands import Command, Tune
-from gazerig.robot.run.param_store import ParamStore
+from gazerig.robot.run.live import ParamStore
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 DESK = Path("config/rigs/desk.yaml")
 NOW = datetime(2026, 1, 31, 23, 59, 59)
-
-
-def here(work: Callable[..., Any], *words: Any) -> Any:
-    """Call in this process."""
-    return work(*words)
 
 
 class Bench:
@@ -32,14 +27,13 @@ class Bench:
         rig = load_rig(name, character)
         self.made = simulated(rig, **chosen)
         self.orders: list[Command] = []
-        self.tuning = ParamStore(
-            self.made.live_params, self.take, name, character, now=lambda: NOW, elsewhere=here
-        )
+        layers = RigLayers(name, character, None)
+        self.tuning = ParamStore(self.made.rig, self.take, layers, now=lambda: NOW)
 
     def take(self, order: Command) -> None:
         self.orders.append(order)
         assert isinstance(order, Tune)
-        self.said = self.made.live_params(order, 0.0)
+        self.said = self.made._tune(order, 0.0)
 
 
 @pytest.fixture
@@ -88,7 +82,7 @@ def test_a_good_edit_that_nobody_has_heard_of_is_in_force_when_saved(mine: Path)
     bench.tuning.save()
     rig = load_rig(str(mine))
     assert (rig.loop.rate_hz, rig.gaze.lids.close_ms) == (100.0, 90.0)
-    assert rig.gaze == bench.made.live_params.rig.gaze and bench.made.loop.rate_hz == 200.0
+    assert rig.gaze == bench.made.rig.gaze and bench.made.loop.rate_hz == 200.0
 
 
 def test_a_shipped_rig_asks_for_a_path_and_goes_on_from_it(tmp_path: Path) -> None:
@@ -116,7 +110,7 @@ def test_a_file_edited_by_hand_is_put_in_force_and_what_is_unsaved_stays(mine: P
     mine.write_text(text.replace("open_ms: 175.0", "open_ms: 150.0"), encoding="utf-8")
     lines = bench.tuning.reload(mine)
     assert set(lines) == {"loop.rate_hz = 100.0 (at the next start)", "gaze.lids.open_ms = 150.0"}
-    lids = bench.made.live_params.rig.gaze.lids
+    lids = bench.made.rig.gaze.lids
     assert (lids.close_ms, lids.open_ms, bench.made.loop.rate_hz) == (90.0, 150.0, 200.0)
     assert [c.key for c in bench.tuning.unsaved()] == ["gaze.lids.close_ms"]
 
@@ -127,15 +121,15 @@ def test_characters_are_switched_and_what_is_unsaved_stays_over_them() -> None:
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
     bench.tuning.apply_character("sleepy")
     want = load_rig("desk", "sleepy").gaze
-    got = bench.made.live_params.rig.gaze
+    got = bench.made.rig.gaze
     assert got.head == want.head and got.top_down == want.top_down
     assert got.lids.close_ms == 90.0 and got.lids.open_ms == want.lids.open_ms
     assert bench.tuning.character_name == "sleepy"
     bench.tuning.revert()
-    assert bench.made.live_params.rig == load_rig("desk", "shy")
+    assert bench.made.rig == load_rig("desk", "shy")
     assert bench.tuning.character_name == "shy" and bench.tuning.unsaved() == ()
     bench.tuning.apply_character("none")
-    assert bench.made.live_params.rig == load_rig("desk")
+    assert bench.made.rig == load_rig("desk")
     with pytest.raises(ConfigError, match="nothing named 'slepy'"):
         bench.tuning.apply_character("slepy")
     assert bench.tuning.character_name == "none"
@@ -172,7 +166,7 @@ def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> Non
     assert bench.tuning.unsaved() == ()
     bench.tuning.apply_character("bold")
     bench.tuning.reload(mine)
-    assert bench.made.live_params.rig.gaze.scanpath.model == "random"
+    assert bench.made.rig.gaze.scanpath.model == "random"
     assert [change.key for change in bench.tuning.unsaved()] == ["character"]
     bench.tuning.set({"gaze.idle.hold_ms": 300.0})
     bench.tuning.save()

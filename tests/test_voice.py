@@ -14,12 +14,14 @@ from fakes.waiting import wait_for
 from test_sound import needs_espeak
 
 import gazerig
+from gazerig.drivers.sound.espeak import SpokenText
 from gazerig.drivers.sound.sound_file import write_wav
 from gazerig.errors import Refused
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Say
 from gazerig.robot.model.control_source import TrackState
+from gazerig.robot.run import voice
 
 RATE = 16000
 SHIPPED = Path(__file__).parents[1] / "config" / "rigs" / "expressive.yaml"
@@ -102,6 +104,24 @@ def test_the_jaw_follows_the_speech_and_is_shut_at_its_end(folder: Path, what: s
             assert 4 <= shut <= 7  # once in each of six syllables
 
 
+def test_the_lips_close_on_the_phonemes_of_a_text(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    t_s = np.arange(2 * RATE) / RATE
+    pcm = (12000 * np.sin(2 * np.pi * 1000 * t_s)).astype("<i2").tobytes()
+    phonemes = [("m", 0.3), ("a", 0.4), ("b", 0.8), ("a", 0.9), ("p", 1.4), ("a", 1.42)]
+    monkeypatch.setattr(voice, "speak", lambda text, name: SpokenText(pcm, RATE, phonemes))
+    ticks = Ticks()
+    with opened(folder, ticks, fast=True) as head:
+        head.step(2.0)  # it begins gently
+        assert head.say("mabapa").wait(10.0) == "arrived"
+    times, jaw = np.array([(one.position_s, angle) for one, angle in ticks.speech()]).T
+    silent_s = 0.05
+    for middle_s in (0.332, 0.825, 1.372):
+        assert np.interp(middle_s + silent_s - 0.015, times, jaw) < 0.1 * JAW_DEG
+        assert np.interp(middle_s + silent_s - 0.12, times, jaw) > 0.8 * JAW_DEG
+
+
 @pytest.mark.parametrize(
     ("what", "message"),
     [
@@ -123,7 +143,7 @@ def test_clients_of_the_network_may_name_sounds_of_the_folders_only(
 ) -> None:
     write_wav(tmp_path / "secret.wav", speech(0.5), RATE)
     with opened(folder, fast=True) as head:
-        voice = head._composed.voice
+        voice = head._made.voice
         assert voice.prepare(Say("short.wav"), True).sound == str(folder / "short.wav")
         for name in (str(tmp_path / "secret.wav"), "../secret.wav"):
             with pytest.raises(
@@ -146,7 +166,7 @@ def speaking(folder: Path) -> Iterator[Any]:
 
 
 def sound_s(head: Any) -> float | None:
-    player = head._composed.voice._player
+    player = head._made.voice._player
     found: float | None = player.position_s(RealClock().now_s()) if player is not None else None
     return found
 
@@ -162,7 +182,7 @@ def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder:
     with speaking(folder) as head:
         track = next(one for one in head.state.tracks if one.name == "speech")
         assert track.clock == "sound" or track.position_s < 1.0
-        pid = head._composed.voice._player.pid
+        pid = head._made.voice._player.pid
         for end in (lambda: head.play(""), lambda: head.jog("neck_yaw", 1.0), head.stop):
             end()
             wait_for(lambda: is_silent(head))
@@ -176,7 +196,7 @@ def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder:
 
 def test_a_stream_moves_the_mouth_and_a_stall_shuts_it(folder: Path) -> None:
     with opened(folder) as head:
-        voice = head._composed.voice
+        voice = head._made.voice
         voice.feed(speech(1.0), RATE, 1)
         wait_for(lambda: head.state.joints["jaw"].commanded_deg > 0.3 * JAW_DEG)
         wait_for(lambda: any("stalled" in one.text for one in head.events(0.0)))

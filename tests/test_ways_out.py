@@ -16,9 +16,9 @@ from gazerig.robot.cli.run import report_faults
 from gazerig.robot.loop.loop import Robot
 from gazerig.robot.loop.power_down import SAME_REQUEST_S, Interrupts, PowerDown
 from gazerig.robot.run import session
-from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.figures import Summary
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.run_summary import Summary
+from gazerig.robot.run.run import Run
 from gazerig.sim_mock.device import Device
 
 # --- the door alone
@@ -200,14 +200,13 @@ def ran(
     rig: str,
     said: list[str],
     seconds: float = 1.5,
-    before: Callable[[Assembly], None] | None = None,
+    before: Callable[[Run], None] | None = None,
 ) -> dict[str, Any]:
-    composed = session.compose(
-        RunOptions(True, True, rig=rig, seconds=seconds).check_and_complete()
-    )
+    options = RunOptions(True, True, rig=rig, seconds=seconds).check_and_complete()
+    made = Run(load_rig(rig), options)
     if before is not None:
-        before(composed.assembly)
-    return session.run(composed, lambda: None, said.append)
+        before(made)
+    return session.Session(made, lambda: None, said.append).run()
 
 
 @pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])
@@ -274,7 +273,7 @@ def test_a_joint_that_does_not_move_is_said_counted_and_in_the_exit_code(
 ) -> None:
     said: list[str] = []
 
-    def jam(made: Assembly) -> None:
+    def jam(made: Run) -> None:
         devices[0].faults.command("stick 7")
 
     figures = ran("desk", said, 15.0, jam)

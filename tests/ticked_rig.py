@@ -15,13 +15,13 @@ from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.net.client import RobotClient
 from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
-from gazerig.robot.run.assemble import Assembly
+from gazerig.robot.run.run import Run
 
 
 class TickedRig:
     """A rig that ticks once whenever a command comes, and its connection in one object."""
 
-    def __init__(self, made: Assembly) -> None:
+    def __init__(self, made: Run) -> None:
         self.made, self.pulse = made, LoopMonitor(made.clock)
         self.commands: list[Command] = []
         self.handler = RequestHandler(

@@ -17,10 +17,10 @@ from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.robot.loop.body import Body
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.types import JointAngles
-from gazerig.robot.run.bus_wiring import rig_bus
+from gazerig.robot.run.buses import rig_bus
+from gazerig.robot.run.emulated import emulated_lines, servo_index
 from gazerig.robot.run.rig_description import sag_compensation
 from gazerig.robot.run.rig_limits import limits, park_rad
-from gazerig.robot.run.run_bus import emulated_lines, servo_index
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, build
@@ -31,7 +31,7 @@ MS_S = 0.001
 SPEED_MS, ACCEL_MS = 5, 10
 PULSE_MS = 20
 STOP_DEG = 4.0
-"""Emulated mechanical stops lie so far beyond a joint's range (robot/run/run_bus.py)."""
+"""Emulated mechanical stops lie so far beyond a joint's range (robot/run/emulated.py)."""
 
 
 class Shafts(SimulatedClock):

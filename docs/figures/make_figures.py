@@ -29,9 +29,9 @@ from gazerig.gaze.scanpath.scanpath import ScanpathParams, markov_walk, normalis
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
 from gazerig.robot.loop.loop import Tick, run  # noqa: E402
 from gazerig.robot.model.frames import PoseHistory  # noqa: E402
-from gazerig.robot.run.assemble import assemble
-from gazerig.robot.run.gaze_models import kinematics_and_oculomotor
+from gazerig.robot.run.models import rig_kinematics  # noqa: E402
 from gazerig.robot.run.options import RunOptions  # noqa: E402
+from gazerig.robot.run.run import Run
 
 sys.path.append(str(Path(__file__).parents[2] / "tests"))
 from true_gaze import (  # noqa: E402
@@ -244,11 +244,11 @@ def scanpath() -> None:
 def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"]) -> np.ndarray:
     """Run a drawn scene; give rows of time and degrees: person, gaze, facing, head, gaze off."""
     rig = load_rig("desk")
-    made = assemble(rig, RunOptions(True, True, 0, scene, pixels=True))
+    made = Run(rig, RunOptions(True, True, 0, scene, pixels=True))
     assert made.scene is not None
     people = made.scene.people
     rows: list[tuple[float, ...]] = []
-    kinematics, _ = kinematics_and_oculomotor(rig, 0)
+    kinematics = rig_kinematics(rig)
 
     def watch(tick: Tick) -> None:
         person = people(tick.t_s - (rows[0][0] if rows else tick.t_s))[0]

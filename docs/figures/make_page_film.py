@@ -18,10 +18,11 @@ from PIL import Image  # noqa: E402
 from shown_page import free_port, wait_for  # noqa: E402
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.robot.loop.loop import LoopCount  # noqa: E402
-from gazerig.robot.run.assemble import assemble  # noqa: E402
+from gazerig.robot.loop.tick import Tick  # noqa: E402
+from gazerig.robot.loop.tick_stream import Observers  # noqa: E402
+from gazerig.robot.run.observers import RunObservers  # noqa
 from gazerig.robot.run.options import RunOptions  # noqa: E402
-from gazerig.robot.run.run_observers import RunObservers  # noqa: E402
+from gazerig.robot.run.run import Run  # noqa
 
 OUT = Path(__file__).parents[1] / "page.webp"
 MOST_BYTES = 1_500_000
@@ -53,13 +54,13 @@ class Film:
 
     def _run(self) -> None:
         """Make the rig and let it go on: what renders belongs to the thread that made it."""
-        made = assemble(
-            load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, world="living-room")
-        )
+        made = Run(load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, world="living-room"))
         say = self._said.append
-        observers = RunObservers(made, RunOptions(page=f"127.0.0.1:{free_port()}"), say, say)
+        made.options = RunOptions(page=f"127.0.0.1:{free_port()}")
+        people, observers = RunObservers(made, say, say), Observers[Tick](say)
+        people.attach(observers)
         made.robot.start(made.clock)
-        observers.open()
+        people.open()
         clock, tick_s = made.clock, 1.0 / made.loop.rate_hz
         try:
             while not self._over.wait(self.pace_s):
@@ -68,7 +69,7 @@ class Film:
                 observers.update(made.robot.tick(self._now_s, tick_s))
         finally:
             made.robot.stop()
-            observers.close(LoopCount(0, 0, "the end of the film"))
+            people.close("the end of the film")
             made.close()
 
     def now_s(self) -> float:

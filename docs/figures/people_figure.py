@@ -10,7 +10,7 @@ import numpy as np
 from trace_figure import BEGIN_S, FACE, GAZE, HEAD, LID, SECONDS, Trace, recorded
 
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.scene_files import load_scene
+from gazerig.robot.run.surroundings import load_scene
 
 _HEAD_M = (0.04, 0.0, 0.13)
 

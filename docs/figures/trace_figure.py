@@ -17,7 +17,7 @@ from gazerig.gaze.angles import yaw_pitch
 from gazerig.robot.loop.tick import Tick, cyclopean_direction
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.run_rig import with_options
-from gazerig.robot.run.scene_files import load_scene
+from gazerig.robot.run.surroundings import load_scene
 
 BEGIN_S, SECONDS, RATE_HZ = 8.0, 20.0, 200.0
 PROFILES = ("robot", "mitake", "nakamoto")

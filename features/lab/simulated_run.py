@@ -7,9 +7,9 @@ from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.run.assemble import assemble
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.session import ComposedRun, run
+from gazerig.robot.run.run import Run
+from gazerig.robot.run.session import Session
 
 
 class SimulatedRun(NamedTuple):
@@ -48,8 +48,7 @@ def simulate(
             failures.append(error)  # a run continues without a failed observer
             raise
 
-    composed = ComposedRun(options, assemble(rig, options), None, None)
-    figures = run(composed, stopped, lambda line: None, watch=update)
+    figures = Session(Run(rig, options), stopped, lambda line: None, watch=update).run()
     if failures:
         raise failures[0]
     stopped_by = str(figures["stopped_by"])

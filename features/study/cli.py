@@ -13,7 +13,15 @@ from gazerig.config.load import shipped_path
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.robot.cli.options import complete_shipped, run_option
+from gazerig.robot.cli.options import (
+    CameraOption,
+    MockOption,
+    NoBrowserOption,
+    OakOption,
+    PortOption,
+    complete_shipped,
+    run_option,
+)
 from gazerig.robot.cli.progress import progress_bar
 from gazerig.robot.cli.run import is_desktop_here, open_page
 from gazerig.robot.cli.terminal import clear_errors, record_signals, say
@@ -65,12 +73,12 @@ def run(
     data: Annotated[
         Path | None, typer.Option(help="Folder of the data; default: NAME-data, after the file.")
     ] = None,
-    mock: Annotated[bool, run_option("mock")] = False,
-    port: Annotated[str | None, run_option("port")] = None,
-    camera: Annotated[str | None, run_option("camera")] = None,
-    oak: Annotated[bool, run_option("oak")] = False,
+    mock: MockOption = False,
+    port: PortOption = None,
+    camera: CameraOption = None,
+    oak: OakOption = False,
     page: Annotated[str, run_option("page")] = "127.0.0.1:8090",
-    no_browser: Annotated[bool, run_option("no_browser")] = False,
+    no_browser: NoBrowserOption = False,
     simulate: Annotated[
         int, typer.Option(metavar="N", min=0, help="Simulate N participants instead; 0: none.")
     ] = 0,

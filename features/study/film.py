@@ -25,7 +25,7 @@ from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.types import order_joints
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_description import description_of
-from gazerig.robot.run.scene_files import load_scene
+from gazerig.robot.run.surroundings import load_scene
 
 SIZE_PX, RATE_HZ = 720, 25.0
 # Time of a simulated run before its film, in which the head finds the person, seconds.

@@ -8,9 +8,8 @@ of spoken phonemes, or else where the loudness has a short deep dip. The level t
 
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,22 +23,13 @@ _LOUD_DECAY = float(np.exp(-FRAME_S / 8.0))
 _FIRST_LOUD = 0.02
 _DIP_SHARE, _DIP_FRAMES, _DIP_MARGIN = 0.4, 10, 2
 _KEY_S = 0.02
-_LEAST_CLOSED_S, LONGEST_CLOSURE_S = 0.08, 0.12
+_LEAST_CLOSED_S, _LONGEST_CLOSURE_S = 0.08, 0.12
 """A level that is smoothed within 80 ms closes in the shortest closure. Lips part between an m and
 the next b; a person holds neither longer than the longest."""
 _LEAST_OPEN_S = 0.05
 _P_CLOSED_S = 0.055
 _CLOSED_SHARE = {"b": 0.5, "m": 0.65}
 _LONGEST_S = 1200.0
-
-
-@dataclass(frozen=True)
-class MouthParams:
-    """Motion while the head speaks."""
-
-    # fmt: off
-    level: Annotated[str, "level of the rig's table that opens the mouth; a rig without it plays only the sound"] = "mouth"
-    # fmt: on
 
 
 class Closure(NamedTuple):
@@ -69,7 +59,7 @@ def phoneme_closures(spoken: Sequence[tuple[str, float]], end_s: float) -> tuple
     for begin_s, last_s in closures:
         if joined and begin_s - joined[-1].end_s < _LEAST_OPEN_S:
             begin_s = joined.pop().begin_s
-        joined.append(Closure(max(begin_s, last_s - LONGEST_CLOSURE_S), last_s))
+        joined.append(Closure(max(begin_s, last_s - _LONGEST_CLOSURE_S), last_s))
     return tuple(joined)
 
 

@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
-from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.gaze.track.pose_offset import NO_OFFSET, OwnedPose, PoseOffset
 from gazerig.gaze.track.track import POSE_CHANNELS
 from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.gaze.types import Floats
@@ -21,6 +21,8 @@ from gazerig.params import Bounds, unknown_text
 
 HOLD_S = 0.5
 """A level that was not set for this time returns to 0, as its program may have ended."""
+MOUTH = "mouth"
+"""The level that opens the mouth of a rig that has one."""
 NEUTRAL = "neutral"
 """The initial expression; without an entry in the rig's table all its offsets are 0."""
 _LIDS = slice(5, 9)
@@ -52,11 +54,10 @@ class FaceRange(NamedTuple):
 
 
 class FaceTables(NamedTuple):
-    """Expressions of a rig, neutral first, and its levels; mouth: level that opens it, or ""."""
+    """Expressions of a rig, neutral first, and its levels."""
 
     expressions: Mapping[str, FaceRange]
     levels: Mapping[str, FaceRange]
-    mouth: str = ""
 
 
 NO_TABLES = FaceTables({}, {})
@@ -155,28 +156,27 @@ class Animation:
             self._at_rest = all([blend.is_at_rest for blend in self._blends.values()])
         flat = self._face + moved
         flat[_LIDS] = self._face[_LIDS] * (1.0 + moved[_LIDS])
-        if not tracks.owned.layers:
-            self._sum = PoseOffset.from_flat(flat.tolist())
-            return self._sum
-        first = len(POSE_CHANNELS)
-        flat[first:] = [tracks.owned.mix(first + i, a) for i, a in enumerate(flat[first:].tolist())]
-        self._sum = PoseOffset.from_flat(flat.tolist())._replace(owned=tracks.owned)
+        values: list[float] = flat.tolist()
+        self._sum = PoseOffset.from_flat(values)
+        if tracks.owned:
+            owned, first = OwnedPose(tracks.owned), len(POSE_CHANNELS)
+            joints = [owned.mix(first + i, value) for i, value in enumerate(values[first:])]
+            self._sum = self._sum._replace(joints_rad=tuple(joints), owned=owned)
         return self._sum
 
     def _speak(self, t_s: float) -> None:
         """Let the mouth follow a speech that knows its openings; it shuts at the end of any."""
-        mouth, speech = self._tables.mouth, self.tracks.speech
-        if mouth and speech is not None and speech.motion.mouth is not None:
+        speech = self.tracks.speech
+        if MOUTH not in self._tables.levels:
+            return
+        if speech is not None and speech.motion.mouth is not None:
             at_s = speech.position_s(t_s) + speech.lead_s
-            self.set_level(mouth, float(np.interp(at_s, *speech.motion.mouth)), t_s)
-        elif mouth and speech is None and self._speaks:
-            self.set_level(mouth, 0.0, t_s)
+            self.set_level(MOUTH, float(np.interp(at_s, *speech.motion.mouth)), t_s)
+        elif speech is None and self._speaks:
+            self.set_level(MOUTH, 0.0, t_s)
         self._speaks = speech is not None
 
     @property
     def loudness(self) -> float | None:
         """Return the loudness 0..1 of a speech by its mouth, 1 without one; None: no speech."""
-        if self.tracks.speech is None:
-            return None
-        mouth = self._tables.mouth
-        return self._shares[mouth] if mouth else 1.0
+        return self._shares.get(MOUTH, 1.0) if self.tracks.speech is not None else None

@@ -7,8 +7,6 @@ swing past the chosen extremes. If the curve of least jerk would swing back betw
 passes the values in between more slowly. Any unit; speed and acceleration are per second.
 """
 
-from bisect import bisect_right
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,40 +16,27 @@ _SHARES = np.linspace(0.0, 1.0, 33)[:, None]
 """Places within a segment at which its direction is checked."""
 
 
-class MinimumJerkCurve:
-    """A curve from rest at a value through key values to rest at the last of them.
+def key_states(times_s: Floats, values: Floats, start: float = 0.0) -> tuple[Floats, Floats]:
+    """Return the states of a curve from rest at a value through keys to rest at the last of them.
 
     Args:
         times_s: (n,) Times of the keys, increasing, the first above 0.
         values: (n,) Values at those times.
         start: Value at time 0.
 
-    Raises:
-        ValueError: The times do not increase from 0.
+    Returns:
+        (n + 1,) times from 0, and (3, n + 1) values, speeds and accelerations.
     """
+    knots, position = np.append(0.0, times_s), np.append(start, values)
+    return knots, np.stack((position, *_states(position, np.diff(knots))))
 
-    def __init__(self, times_s: Floats, values: Floats, start: float = 0.0) -> None:
-        self._knots = np.append(0.0, times_s)
-        span = np.diff(self._knots)
-        if not (span > 0.0).all():
-            raise ValueError("the times of the keys must increase from 0")
-        position = np.append(start, values)
-        self._table = _coefficients(span, position, *_states(position, span))
-        self._rows: list[list[float]] = self._table.T.tolist()
-        self._starts: list[float] = self._knots[:-1].tolist()
 
-    def value_at(self, t_s: float) -> float:
-        """Return the value at a time since the start."""
-        i = max(0, bisect_right(self._starts, t_s) - 1)
-        c0, c1, c2, c3, c4, c5 = self._rows[i]
-        t = min(max(0.0, t_s), float(self._knots[-1])) - self._starts[i]
-        return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
-
-    def sample_at(self, times_s: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return (n,) values, speeds and accelerations at (n,) times."""
-        times = np.clip(times_s, 0.0, self._knots[-1])
-        i = np.searchsorted(self._knots[1:-1], times, side="right")
-        return _evaluate(self._table[:, i], times - self._knots[i])
+def evaluate(knots: Floats, states: Floats, times_s: Floats) -> Floats:
+    """Return the states at (k,) times of curves through (3, ..., n) states at (n,) knots."""
+    at = np.clip(times_s, knots[0], knots[-1])
+    i = np.searchsorted(knots[1:-1], at, side="right")
+    table = _coefficients(knots[i + 1] - knots[i], states[..., i], states[..., i + 1])
+    return np.stack(_evaluate(table, at - knots[i]))
 
 
 def _evaluate(coefficients: Floats, t: Floats) -> tuple[Floats, Floats, Floats]:
@@ -75,7 +60,8 @@ def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     if stops.all():
         return np.zeros(len(position)), np.zeros(len(position))
     speed, acceleration = _least_jerk(position, span, stops)
-    table = _coefficients(span, position, speed, acceleration)
+    states = np.stack((position, speed, acceleration))
+    table = _coefficients(span, states[:, :-1], states[:, 1:])
     rate = _evaluate(table, _SHARES * span)[1] * np.sign(mean)
     first = np.flatnonzero(stops)[:-1]  # of the segments from one stop to the next
     lowest = np.minimum.reduceat(rate.min(axis=0), first)
@@ -123,13 +109,13 @@ def _least_jerk(position: Floats, span: Floats, stops: NDArray[np.bool_]) -> tup
     return states[:, 0], states[:, 1]
 
 
-def _coefficients(span: Floats, position: Floats, speed: Floats, acceleration: Floats) -> Floats:
-    """Return the (6, n - 1) coefficients of fifth-order polynomials between n states."""
-    d, T = np.diff(position), span
-    v0, v1, a0, a1 = speed[:-1], speed[1:], acceleration[:-1], acceleration[1:]
+def _coefficients(T: Floats, begin: Floats, end: Floats) -> Floats:
+    """Return the coefficients of fifth-order polynomials between two states in a time."""
+    (p, v0, a0), (q, v1, a1) = begin, end
+    d = q - p
     return np.stack(
         (
-            position[:-1],
+            p,
             v0,
             0.5 * a0,
             (20.0 * d - (8.0 * v1 + 12.0 * v0) * T - (3.0 * a0 - a1) * T * T) / (2.0 * T**3),

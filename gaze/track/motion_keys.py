@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.minimum_jerk_curve import evaluate, key_states
 from gazerig.gaze.turning_points import turning_points
 from gazerig.gaze.types import Floats
 
@@ -95,8 +95,8 @@ def _inner_keys(times_s: Floats, values: Floats, tolerance: float) -> list[int]:
     """Return the indices of the keys between two stops, and the last."""
     chosen = [len(values) - 1]
     for _ in range(_MOST_KEYS):
-        curve = MinimumJerkCurve(times_s[chosen], values[chosen], float(values[0]))
-        error = np.abs(curve.sample_at(times_s)[0] - values)
+        states = key_states(times_s[chosen], values[chosen], float(values[0]))
+        error = np.abs(evaluate(*states, times_s)[0] - values)
         if error.max() <= tolerance:
             break
         error[[0, *chosen]] = 0.0

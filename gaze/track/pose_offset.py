@@ -1,6 +1,6 @@
 """Offset that is added to the pose by gaze, and angles that tracks give instead of it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from gazerig.gaze.track.track import LID_CHANNELS, POSE_CHANNELS
@@ -10,23 +10,19 @@ _EYES, _LIDS = POSE_CHANNELS.index("eyes_yaw"), POSE_CHANNELS.index(LID_CHANNELS
 
 
 class OwnedPose:
-    """Values of the channels that tracks own in one tick, and what gaze would have given.
+    """Values of the channels that tracks give instead of gaze, in one tick.
 
-    layers: of each channel, (value, weight) of each track that owns it, the newest last; replaced
-        in every tick
-    gaze: the last value by gaze of each channel, from which a track blends out
+    Args:
+        shares: Value and share, 0..1, of each channel.
     """
 
-    def __init__(self) -> None:
-        self.layers: dict[int, list[tuple[float, float]]] = {}
-        self.gaze: dict[int, float] = {}
+    def __init__(self, shares: Mapping[int, tuple[float, float]]) -> None:
+        self._shares = shares
 
     def mix(self, channel: int, value: float) -> float:
         """Return the value of a channel for the value by gaze."""
-        self.gaze[channel] = value
-        for owned, weight in self.layers.get(channel, ()):
-            value += weight * (owned - value)
-        return value
+        owned, share = self._shares.get(channel, (0.0, 0.0))
+        return value + share * (owned - value)
 
     def mix_head(self, head: Angles3) -> Angles3:
         """Return the head's angles."""

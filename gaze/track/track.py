@@ -114,14 +114,6 @@ class Track:
     loop: Annotated[bool, "repeat the track until it is ended"] = False
     # fmt: on
 
-    @property
-    def layers(self) -> tuple[str, ...]:
-        """Return what its frames move: head, eyes, lids, levels and joints."""
-        channels = dict.fromkeys(channel for frame in self.frames for channel in frame.values())
-        groups = {name: name.partition("_")[0] for name in (*HEAD_CHANNELS, *EYE_CHANNELS)}
-        groups |= dict.fromkeys(LID_CHANNELS, "lids")
-        return tuple(dict.fromkeys(groups.get(one, one.removeprefix(LEVEL)) for one in channels))
-
     def faults(self) -> Iterator[tuple[str, str]]:
         """Yield the faults between its parts: key, and rule."""
         if not self.frames and not self.sound:

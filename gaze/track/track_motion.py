@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.minimum_jerk_curve import evaluate, key_states
 from gazerig.gaze.track.track import Track
 from gazerig.gaze.types import Floats
 
@@ -14,6 +14,8 @@ _SHARES = np.unique([*np.linspace(0.0, 1.0, 25), 0.5 - sqrt(3.0) / 6.0, 0.5 + sq
 """Places between two keys at which limits are checked: also those of the largest acceleration
 between two rests."""
 _BLOCK = 500
+_LEAST_S = 0.02
+"""Length of a track that has no motion of its own."""
 _BLEND_STRAIN = 1.09
 """Factor that joints may need in a blend, which may use more of their limits than a motion."""
 _ROUNDS, _KEPT = 12, 1.0 + 1e-3
@@ -50,7 +52,9 @@ class TrackMotion:
 
     Attributes:
         channels: Channels that it moves or owns.
+        moves: Whether there are any.
         mouth: Times and openings of the mouth of a speech, None without one.
+        lead_s: Time by which the openings must be ahead of the sound.
         rate: Mean speed of the position; ``speed`` if nothing behind the first key is slower.
         slowed_by: Factor by which it takes longer.
         slowest: Index of the joint that needs this, or -1.
@@ -64,37 +68,32 @@ class TrackMotion:
     ) -> None:  # fmt: skip
         self.track, self.owned, self.sound_s, self.speed = track, owned, sound_s, speed
         self.channels = owned | {row.channel for row in rows}
+        self.moves = bool(rows or owned)
         self.mouth: tuple[Floats, Floats] | None = None
+        self.lead_s = 0.0
         self.cues = sorted((time_s, name) for name, time_s in track.cues.items())
-        self._rows, self._count, self._strain = rows, count, strain
+        rows = rows or (ChannelKeys(0, np.array([_LEAST_S]), np.zeros(1)),)
         self._positions = np.unique(np.concatenate(([0.0], *(row.times_s for row in rows))))
-        self._times = self._positions / speed
-        self.slowest = -1
-        self._slow_down()
-        requested_s = self._positions[-1] / speed
-        self.slowed_by = float(self._times[-1] / requested_s) if requested_s else 1.0
-        if len(self._times) > 1:
-            self._positions[0] = self._positions[1] - self._times[1] * speed
-        moved_s = float(np.ptp(self._positions))
-        self.rate = round(moved_s / self._times[-1], 6) if moved_s else speed
+        self._times, self._count, self._strain = self._positions / speed, count, strain
+        self._slow_down(rows)
+        self.slowed_by = float(self._times[-1] * speed / self._positions[-1])
+        self._positions[0] = self._positions[1] - self._times[1] * speed
+        self.rate = round(float(np.ptp(self._positions) / self._times[-1]), 6)
         last_s = float(self._positions[-1])
         self.length_s = max([last_s, sound_s, *(time_s for time_s, _ in self.cues)])
         self.duration_s = float(self._times[-1]) + (self.length_s - last_s) / speed
 
-    def _slow_down(self) -> None:
+    def _slow_down(self, rows: Sequence[ChannelKeys]) -> None:
         """Make the curves, with more time between keys where a joint would be too fast."""
+        self.slowest = -1
         for attempt in range(_ROUNDS + 2):
-            self._curves = [
-                (
-                    row.channel,
-                    MinimumJerkCurve(
-                        np.interp(row.times_s, self._positions, self._times), row.values
-                    ),
-                )
-                for row in self._rows
-            ]
+            self._states: Floats = np.zeros((3, self._count, len(self._times)))
+            for row in rows:
+                times_s = np.interp(row.times_s, self._positions, self._times)
+                knots, states = key_states(times_s, row.values)
+                self._states[:, row.channel] += evaluate(knots, states, self._times)
             factors = self._factors()
-            if factors.max(initial=1.0) <= _KEPT:
+            if factors.max() <= _KEPT:
                 return
             if self.slowest < 0:
                 self.slowest = int(factors.max(axis=0).argmax())
@@ -113,26 +112,11 @@ class TrackMotion:
             _, speed, acceleration = self.sample_at(times.ravel())
             factors = self._strain(speed, acceleration)
             found.append(factors.reshape(*times.shape, -1).max(axis=1))
-        return np.concatenate(found) if found else np.zeros((0, 1))
+        return np.concatenate(found)
 
     def sample_at(self, times_s: Floats) -> Floats:
         """Return (3, n, channels) values, speeds and accelerations at (n,) times."""
-        found: Floats = np.zeros((3, len(times_s), self._count))
-        for channel, curve in self._curves:
-            found[:, :, channel] += curve.sample_at(times_s)
-        return found
-
-    def values_at(self, time_s: float) -> dict[int, float]:
-        """Return the value of each channel that it moves at a time since its start."""
-        found = dict.fromkeys(self.channels, 0.0)
-        for channel, curve in self._curves:
-            found[channel] += curve.value_at(time_s)
-        return found
-
-    @property
-    def moves(self) -> bool:
-        """Return whether it moves or owns a joint."""
-        return bool(self._curves or self.owned)
+        return evaluate(self._times, self._states, times_s).swapaxes(1, 2)
 
     def position_at(self, time_s: float) -> float:
         """Return the position in the track at a time since its start."""
@@ -144,21 +128,21 @@ class TrackMotion:
         later_s = max(0.0, position_s - float(self._positions[-1]))
         return float(np.interp(position_s, self._positions, self._times)) + later_s / self.speed
 
-    def blend_s(self, time_s: float, base: Floats, least_s: float, rising: bool) -> float:
-        """Return the shortest time in which it can grow from or fade to a base within limits.
+    def blend_s(self, time_s: float, least_s: float, rising: bool) -> float:
+        """Return the shortest time in which it can grow from rest or fade to it within limits.
 
         Args:
             time_s: Time since its start at which the blend begins.
-            base: (channels,) Values at its other end.
             least_s: Shortest time.
-            rising: Whether it grows from the base.
+            rising: Whether it grows.
         """
         for blend_s in [1.25**i * least_s for i in range(16)]:
             times = np.linspace(0.0, blend_s, 81)
             s = times / blend_s
             weight = s**3 * (10.0 + s * (6.0 * s - 15.0))
-            value = self.sample_at(time_s + times)[0] - base
-            value *= (weight if rising else 1.0 - weight)[:, None]
+            value = (
+                self.sample_at(time_s + times)[0] * (weight if rising else 1.0 - weight)[:, None]
+            )
             speed = np.gradient(value, times, axis=0)
             acceleration = np.gradient(speed, times, axis=0)
             if self._strain(speed, acceleration).max() <= _BLEND_STRAIN:

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 
 from gazerig.gaze.minimum_jerk import min_jerk
-from gazerig.gaze.track.pose_offset import OwnedPose
 from gazerig.gaze.track.track import FINISHED, HEAD_CHANNELS, POSE_CHANNELS, rest_value
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.types import Floats
@@ -22,7 +21,7 @@ _LAST = "\uffff"
 _CLOCK_GAIN, _CLOCK_SMOOTH_S = 1.0, 0.25
 
 
-class Voice:
+class PlayingTrack:
     """One track that plays.
 
     Args:
@@ -78,7 +77,7 @@ class Voice:
             self._next_cue = passed
         if self._time_s < motion.duration_s + self.lead_s:
             return False
-        if self.rounds == 1 or not motion.duration_s:
+        if self.rounds == 1:
             return True
         self.rounds = max(0, self.rounds - 1)
         self._time_s -= motion.duration_s
@@ -88,7 +87,7 @@ class Voice:
     def correct(self, t_s: float, position_s: float) -> None:
         """Follow another clock: its position at a time, approached slowly."""
         self._late_s = (position_s - self.position_s(t_s)) / self.motion.speed
-        if self.rounds != 1 and self.motion.duration_s:  # the clock may be in another round
+        if self.rounds != 1:  # the clock may be in another round
             self._late_s -= self.motion.duration_s * round(self._late_s / self.motion.duration_s)
 
     def leave(self, reason: str, t_s: float, exit_s: float, until_s: float | None = None) -> None:
@@ -117,43 +116,42 @@ class TrackPlayer:
 
     Attributes:
         voices: Tracks that move the head, the newest last; also those that are ending.
-        owned: Angles that tracks give instead of gaze.
+        owned: Value and share of each channel that tracks give instead of gaze.
         moves: Whether ``step`` may return another offset than last time.
     """
 
     def __init__(self, joints: int) -> None:
         names = (*POSE_CHANNELS, *[""] * joints)
         self.rest: Floats = np.array([rest_value(name) for name in names])
-        self.owned = OwnedPose()
         self.reset()
 
     def reset(self) -> None:
         """Rest immediately, for a head whose joints are hand-guided or switched off."""
-        self.voices: list[Voice] = []
-        self.owned.layers = {}
+        self.voices: list[PlayingTrack] = []
+        self.owned: dict[int, tuple[float, float]] = {}
         self.moves = True
 
     @property
-    def playing(self) -> list[Voice]:
+    def playing(self) -> list[PlayingTrack]:
         """Return the tracks that play, the newest last."""
         return [voice for voice in self.voices if not voice.end_reason]
 
     @property
-    def speech(self) -> Voice | None:
+    def speech(self) -> PlayingTrack | None:
         """Return the speech that plays."""
         return next((voice for voice in self.playing if voice.name == SPEECH), None)
 
     @property
     def replaces_gaze(self) -> bool:
         """Return whether a track gives the head's angles."""
-        return any([channel < len(HEAD_CHANNELS) for channel in self.owned.layers])
+        return any([channel < len(HEAD_CHANNELS) for channel in self.owned])
 
-    def play(self, voice: Voice) -> None:
+    def play(self, voice: PlayingTrack) -> None:
         """Begin a track at its time."""
         self.voices.append(voice)
         self.moves = True
 
-    def overlapping(self, motion: TrackMotion, name: str) -> list[Voice]:
+    def overlapping(self, motion: TrackMotion, name: str) -> list[PlayingTrack]:
         """Return the tracks that another one replaces: those of its channels, or of its name."""
         return [
             voice
@@ -162,7 +160,7 @@ class TrackPlayer:
         ]
 
     def end(
-        self, voices: Iterable[Voice], reason: str, t_s: float, until_s: float | None = None
+        self, voices: Iterable[PlayingTrack], reason: str, t_s: float, until_s: float | None = None
     ) -> float:
         """End tracks: they fade to gaze within the limits of the joints.
 
@@ -179,10 +177,7 @@ class TrackPlayer:
         for voice in voices:
             exit_s, motion = 0.0, voice.motion
             if motion.moves and t_s >= voice.begins_s:
-                base = np.zeros(len(self.rest))
-                for i in motion.owned:
-                    base[i] = self.owned.gaze.get(i, self.rest[i]) - self.rest[i]
-                exit_s = motion.blend_s(voice.time_s(t_s), base, BLEND_OUT_S, rising=False)
+                exit_s = motion.blend_s(voice.time_s(t_s), BLEND_OUT_S, rising=False)
             voice.leave(reason, t_s, exit_s, until_s)
             longest_s = max(longest_s, voice.gone_s - t_s)
         self.moves = True
@@ -197,14 +192,16 @@ class TrackPlayer:
                 else:
                     voice.leave(FINISHED, t_s, 0.0)
         self.voices = [voice for voice in self.voices if t_s < voice.gone_s]
-        self.moves, self.owned.layers = bool(self.voices), {}
+        self.moves, self.owned = bool(self.voices), {}
         offset: Floats = np.zeros(len(self.rest))
         for voice in self.voices:
-            weight, owned = voice.weight(t_s), voice.motion.owned
-            for i, value in voice.motion.values_at(voice.time_s(t_s)).items():
-                if i in owned:
-                    layer = float(self.rest[i]) + value, weight
-                    self.owned.layers.setdefault(i, []).append(layer)
-                else:
-                    offset[i] += weight * value
+            weight, motion = voice.weight(t_s), voice.motion
+            values = motion.sample_at(np.array([voice.time_s(t_s)]))[0, 0]
+            for i in motion.owned:  # the newest above the others
+                value, share = self.owned.get(i, (0.0, 0.0))
+                both = weight + share * (1.0 - weight)
+                mixed = weight * (self.rest[i] + values[i]) + share * (1.0 - weight) * value
+                self.owned[i] = float(mixed / both if both else 0.0), both
+                values[i] = 0.0
+            offset += weight * values
         return offset

@@ -14,7 +14,7 @@ from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.options import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import NO_TRACK, Express, Play, Say, SetLevel
+from gazerig.robot.model.commands import NO_TRACK, Express, Play, Say, SetLevel, Tracks
 from gazerig.robot.net.client import RobotClient
 
 app = typer.Typer()
@@ -99,7 +99,7 @@ def play(
     """Play a track on the running head, or list all tracks with their fit to this rig."""
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
         if track is None or listed:
-            for one in rig.tracks():
+            for one in rig.ask(Tracks(), tuple[dict[str, Any], ...]):
                 say(_track_line(one))
             return
         from_s: float | str = start

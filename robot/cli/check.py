@@ -20,7 +20,7 @@ def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and list all faults at once; no servo is contacted."""
     with clear_errors(rig):
         from gazerig.config.schema import load_rig
-        from gazerig.robot.run.rig_weight import weight_findings
+        from gazerig.robot.run.rig_description import weight_findings
 
         loaded = load_rig(rig)
         say(good_text(rig, loaded))

@@ -23,12 +23,16 @@ from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import (
     FAR_M,
     Ask,
+    Character,
+    Fault,
     Look,
     LookAt,
     LookAtDirection,
     LookAtInHead,
     LookAtPerson,
     LookAtPixel,
+    Parameters,
+    Revert,
     Talk,
     TalkOrder,
 )
@@ -112,7 +116,7 @@ def get(
         values = rig.get(prefix)
         found = [
             param
-            for param in rig.parameters(prefix)
+            for param in rig.ask(Parameters(prefix), tuple[Parameter, ...])
             if not differs or _value_text(values[param.key]) != _value_text(param.default)
         ]
         if not values:
@@ -174,7 +178,7 @@ def save(
 def revert(pid: PidOption = None) -> None:
     """Apply the values of the rig's file again."""
     with connect(pid) as rig:
-        notes = rig.revert()
+        notes = rig.change(Revert())
     _print_lines(notes)
     say(f"{_count_text(len(notes))} undone")
 
@@ -189,7 +193,7 @@ def character(
 ) -> None:
     """Apply another character to the running rig."""
     with connect(pid) as rig:
-        _print_lines(rig.apply_character(name))
+        _print_lines(rig.change(Character(name)))
         say(f"character {name} is active")
 
 
@@ -375,7 +379,7 @@ def fault(
 ) -> None:
     """Inject a fault into the emulated servos, or push the head in a world."""
     with connect(pid, "fault") as rig:
-        print(rig.fault(" ".join(words)))
+        print(rig.ask(Fault(" ".join(words)), str))
 
 
 def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:

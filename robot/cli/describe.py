@@ -35,10 +35,9 @@ def describe(
         from gazerig.config.schema import load_rig
         from gazerig.robot.description.files import FORMATS, description_files, file_name
         from gazerig.robot.run.rig_description import description_of
-        from gazerig.robot.run.servo_drives import servo_drives
 
         loaded = load_rig(rig)
-        description = description_of(loaded).with_drives(servo_drives(loaded))
+        description = description_of(loaded)
         asked = dict(zip(FORMATS, (mjcf, urdf, glb), strict=True))
         wanted = [name for name, one in asked.items() if one] or list(FORMATS)
         folder = out or Path(f"{file_name(description.name)}_description")

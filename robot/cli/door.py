@@ -8,7 +8,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.plugins import DOOR, registrations
 from gazerig.errors import Error
 from gazerig.robot.cli.terminal import clear_errors, say
-from gazerig.robot.run.door_processes import load_door
+from gazerig.robot.run.doors import load_door
 
 app = typer.Typer()
 

@@ -14,9 +14,8 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
 from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.params import choices_of
-from gazerig.robot.cli.options import RigCommand
 from gazerig.robot.cli.terminal import clear_errors, complete_rig
-from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.emulated import emulated_lines
 from gazerig.sim_mock.device_spec import EXAMPLE, line_of
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.line import BusSettings
@@ -30,7 +29,7 @@ _BAUDS: dict[str, tuple[int, ...]] = {"dynamixel": DYNAMIXEL_BAUDS, "feetech": F
 _CHANNELS: tuple[int, ...] = choices_of(MaestroParams, "channels")
 
 
-@app.command(cls=RigCommand)
+@app.command()
 def emulate(
     rig: Annotated[
         str | None,

@@ -10,9 +10,9 @@ import tty
 from typing import Self
 
 _ARROWS = {"A": "up", "B": "down", "C": "right", "D": "left"}
-# Sequences of arrow keys in both modes of a terminal (ECMA-48 CSI, or SS3), and of other keys,
-# which are ignored.
-_SEQUENCE = re.compile(r"\x1b(?:\[[0-9;?]*([A-Za-z~])|O([A-Za-z]))")
+# Arrow keys in both modes of a terminal (ECMA-48 CSI, or SS3), other keys that send sequences, and
+# single characters.
+_KEY = re.compile(r"\x1b(?:\[[0-9;?]*|O)(?P<code>[A-Za-z~])|(?P<typed>.)", re.DOTALL)
 _BEGUN = re.compile(r"\x1b(?:\[[0-9;?]*|O)?$")
 
 
@@ -23,15 +23,9 @@ def split_keys(text: str) -> tuple[list[str], str]:
     send sequences are omitted.
     """
     begun = _BEGUN.search(text)
-    rest = begun[0] if begun is not None else ""
-    text = text[: len(text) - len(rest)]
-    keys: list[str] = []
-    while text:
-        sequence = _SEQUENCE.match(text)
-        key = text[0] if sequence is None else _ARROWS.get(sequence[1] or sequence[2])
-        keys += [key] if key is not None else []
-        text = text[sequence.end() if sequence is not None else 1 :]
-    return keys, rest
+    end = begun.start() if begun is not None else len(text)
+    keys = (found["typed"] or _ARROWS.get(found["code"]) for found in _KEY.finditer(text[:end]))
+    return [key for key in keys if key is not None], text[end:]
 
 
 class TerminalInput:

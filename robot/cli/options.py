@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from gazerig.config.shipped_files import shipped_names
+from gazerig.drivers.errors import PluginError
 from gazerig.robot.cli.terminal import RigArgument
 from gazerig.robot.run.options import Option, RunOptions
 
@@ -35,10 +36,13 @@ def complete_shipped(kind: str, home: Path | None = None) -> Callable[[str], lis
 
 
 def complete_world(incomplete: str) -> list[str]:
-    """Complete a world with physics, or other surroundings."""
-    from gazerig.robot.run.surroundings import surroundings_names
+    """Complete a world with physics; without that feature there is none."""
+    from gazerig.robot.run.surroundings import world
 
-    return [name for name in surroundings_names() if name.startswith(incomplete)]
+    try:
+        return [name for name in world().names() if name.startswith(incomplete)]
+    except PluginError:
+        return []
 
 
 _COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
@@ -66,6 +70,13 @@ def run_option(name: str, is_shown: bool = True) -> Any:
         hidden=not is_shown,
         autocompletion=_COMPLETIONS.get(name),
     )
+
+
+MockOption = Annotated[bool, run_option("mock")]
+PortOption = Annotated[str | None, run_option("port")]
+CameraOption = Annotated[str | None, run_option("camera")]
+OakOption = Annotated[bool, run_option("oak")]
+NoBrowserOption = Annotated[bool, run_option("no_browser")]
 
 
 def add_run_options(command: F) -> F:

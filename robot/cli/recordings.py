@@ -8,13 +8,12 @@ import typer
 from rich.table import Table
 
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.robot.cli.options import RigCommand
 from gazerig.robot.cli.progress import Console, progress_bar
 from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, complete_rig, say
 
 if TYPE_CHECKING:
     from gazerig.robot.loop.tick import Tick
-    from gazerig.robot.run.resimulate import Resimulation
+    from gazerig.robot.run.rerun import Rerun
 
 app = typer.Typer(add_completion=False)
 
@@ -24,7 +23,7 @@ Recording = Annotated[
 _EVENTS = ("saccade", "fixation", "pursuit", "blink")
 
 
-@app.command(cls=RigCommand)
+@app.command()
 def rerun(
     file: Recording,
     rig: Annotated[
@@ -36,19 +35,16 @@ def rerun(
         ),
     ] = None,
     character: Annotated[str | None, typer.Option(help="Another character.")] = None,
-    joints: Annotated[str | None, typer.Option(help="Recorded or emulated joints.")] = None,
 ) -> None:
     """Run a recording's input through the present models: same input, same bytes."""
     with clear_errors():
         from gazerig.robot.recording.read import RunRecording, report_bad_contents
-        from gazerig.robot.run import resimulate
+        from gazerig.robot.run.rerun import rerun as run_again
 
         recording = RunRecording(file)
         with report_bad_contents(file), progress_bar() as tell:
             on_tick = _progress(tell, "running again", recording.duration_s)
-            result = resimulate.rerun(
-                recording, rig=rig, character=character, joints=joints, on_tick=on_tick
-            )
+            result = run_again(recording, rig, character, on_tick)
         for line in result.notes:
             say(line)
         say(agreement_text(result))
@@ -56,8 +52,8 @@ def rerun(
         for name, was, now in compare_figures(result.recorded_figures, result.rerun_figures):
             table.add_row(name, was, now, style=None if was == now else "bold")
         Console().print(table)
-    # Results must be identical only if joints are replayed and nothing else has changed.
-    is_changed = rig is not None or character is not None or result.joints != "recorded"
+    # Results must be identical only if nothing has changed.
+    is_changed = rig is not None or character is not None
     if not (result.is_same or is_changed):
         raise typer.Exit(FAULT)
 
@@ -99,7 +95,7 @@ def export(
             say(f"{', '.join(trace.estimated)}: {ESTIMATED}")
 
 
-def agreement_text(result: "Resimulation") -> str:
+def agreement_text(result: "Rerun") -> str:
     """Return how far a rerun agrees with the recorded run, as text."""
     text = f"{result.agreeing_ticks} of {result.ticks} ticks are bit-identical"
     if result.first_difference_s is not None:
@@ -110,7 +106,7 @@ def agreement_text(result: "Resimulation") -> str:
         text += (
             f"; the bytes on the bus are {'the same' if result.sent_bytes_same else 'different'}"
         )
-    return f"joints {result.joints}: {text}"
+    return text
 
 
 def compare_figures(

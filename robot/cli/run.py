@@ -13,7 +13,7 @@ from typing import Any
 import typer
 
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.cli.options import RigCommand, add_run_options
+from gazerig.robot.cli.options import add_run_options
 from gazerig.robot.cli.terminal import (
     FAULT,
     clear_errors,
@@ -24,14 +24,13 @@ from gazerig.robot.cli.terminal import (
 )
 from gazerig.robot.dashboard.door.token_file import hide_token
 from gazerig.robot.loop.joint_faults import fault_text
-from gazerig.robot.run.computer import level_text
-from gazerig.robot.run.options import RunOptions, parse_camera
+from gazerig.robot.run.options import RunOptions, level_text, parse_camera
 
 app = typer.Typer()
 DEFAULT_PAGE = "127.0.0.1:8080"
 
 
-@app.command(cls=RigCommand)
+@app.command()
 @add_run_options
 def run(**given: Any) -> None:
     """Run the head: gazerig run --mock, then open the page at the printed address."""
@@ -50,17 +49,20 @@ def run(**given: Any) -> None:
         if shows is not None:
             shows("loading: a few seconds ...")
         # Vision and emulator are large; `check` and `--help` do not import them.
-        from gazerig.robot.run import session
+        from gazerig.robot.run.run import Run
+        from gazerig.robot.run.run_rig import run_rig
+        from gazerig.robot.run.session import Session
 
         browse = open_page if not asked.no_browser and is_desktop_here() else None
         opening = StartLine("" if asked.fast else start_text(asked))
         with exit_on_signals():
-            composed = session.compose(asked)
+            made = Run(run_rig(asked), asked)
         with record_signals() as stopped:
-            figures = session.run(
-                composed, stopped, opening.say, shows, opening.update, browse,
+            session = Session(
+                made, stopped, opening.say, shows, opening.update, browse,
                 summarised=summary is not None,
             )  # fmt: skip
+            figures = session.run()
         if summary is not None:
             text = json.dumps(figures, indent=2) + "\n"
             if summary == "-":

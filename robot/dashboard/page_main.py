@@ -41,7 +41,7 @@ from gazerig.robot.dashboard.feed.page_process import (
 from gazerig.robot.dashboard.feed.rig_feed import RigFeed
 from gazerig.robot.dashboard.package_panels import PackagePanels
 from gazerig.robot.dashboard.view.scene import HeadScene
-from gazerig.robot.loop.head_state import head_state
+from gazerig.robot.loop.head_state import HeadEvent, head_state
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.net.topics import PanelContent, RigInfo, RunState
 
@@ -161,8 +161,10 @@ class Page:
             topics.append(feed.run_state())
             topics += self._panels.draw(head_state(head.tick)) if wanted.rig else ()
         picture = feed.picture() if wanted.pictures else None
-        events = feed.ticks.events(self._number)
-        self._number = feed.ticks.number
+        events: tuple[HeadEvent, ...] = ()
+        if feed.ticks.number > self._number:
+            events = feed.ticks.events(self._number)
+            self._number = feed.ticks.number
         news = HeadNews(head.tick, events, tuple(topics), picture)
         self.door.call_soon(self.door.distribute, news)
         self._scene.show(head, feed.shown_world())

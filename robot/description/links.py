@@ -59,24 +59,6 @@ class Visual(NamedTuple):
         return move_mesh(stored_shape(self.shape), scale=self.scale)
 
 
-class ServoDrive(NamedTuple):
-    """Servo as it acts at its joint, all values per rad of the joint.
-
-    armature_kg_m2: inertia of its rotor at the output of the gear
-    friction_nm: dry friction of motor and gear
-    damping_nm_s: viscous friction, and the loss of torque due to the motor's induced voltage
-    kp_nm_rad, kv_nm_s: gains of its controller on the errors of position and speed
-    force_nm: largest torque of its controller, at standstill
-    """
-
-    armature_kg_m2: float
-    friction_nm: float
-    damping_nm_s: float
-    kp_nm_rad: float
-    kv_nm_s: float
-    force_nm: float
-
-
 class LinkJoint(NamedTuple):
     """The hinge between a link and its parent.
 
@@ -85,7 +67,6 @@ class LinkJoint(NamedTuple):
     axis: unit vector in the link's frame; positive angles turn about it by the right-hand rule
     max_torque_nm: largest torque of the servo at the joint
     awake_rad: its angle while the head is awake and looks straight ahead
-    drive: its servos; None if they are unknown or not part of the description
     """
 
     name: str
@@ -96,7 +77,6 @@ class LinkJoint(NamedTuple):
     max_torque_nm: float
     follows: str = ""
     awake_rad: float = 0.0
-    drive: ServoDrive | None = None
 
 
 class Link(NamedTuple):
@@ -139,16 +119,6 @@ class Description(NamedTuple):
     def link(self, name: str) -> Link:
         """Return a link by its name."""
         return next(link for link in self.links if link.name == name)
-
-    def with_drives(self, drives: Mapping[str, ServoDrive]) -> "Description":
-        """Return the description with the servos at its joints, by the joints' names."""
-        links = (
-            link._replace(joint=link.joint._replace(drive=drives.get(link.joint.name)))
-            if link.joint is not None
-            else link
-            for link in self.links
-        )
-        return self._replace(links=tuple(links))
 
     def angles(self, names: Sequence[str], position_rad: Sequence[float]) -> dict[str, float]:
         """Return the angle of every joint, those that follow others included.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from gazerig.gaze.angles import compose, turn_about
 from gazerig.robot.description.links import OPTICAL_FRAME, ROUGHNESS, Description, Link
-from gazerig.robot.description.mesh_files import Text, element, mesh_files
+from gazerig.robot.description.mesh_files import element, mesh_files
 from gazerig.robot.model.frames import quaternion
 
 _LOOKS_GROUP, _COLLISIONS_GROUP = "2", "3"
@@ -87,19 +87,9 @@ def _body(parent: ET.Element, link: Link) -> ET.Element:
         kg, com_m, ((xx, xy, xz), (_, yy, yz), (_, _, zz)) = link.inertia
         element(body, "inertial", pos=com_m, mass=kg, fullinertia=(xx, yy, zz, xy, xz, yz))
     if joint is not None:
-        losses: dict[str, Text] = {}
-        if joint.drive is not None:
-            losses = {
-                "armature": joint.drive.armature_kg_m2,
-                "damping": joint.drive.damping_nm_s,
-                "frictionloss": joint.drive.friction_nm,
-                # Stiff, so that a load below the friction does not creep.
-                "solreffriction": "0.002 1",
-                "solimpfriction": "0.9999 0.9999 0.001 0.5 2",
-            }
         element(
             body, "joint", name=joint.name, type="hinge", axis=joint.axis,
-            range=(joint.low_rad, joint.high_rad), ref=at_rad or None, **losses,
+            range=(joint.low_rad, joint.high_rad), ref=at_rad or None,
         )  # fmt: skip
     for shape in link.collisions:
         element(
@@ -110,21 +100,15 @@ def _body(parent: ET.Element, link: Link) -> ET.Element:
 
 
 def _add_servos(root: ET.Element, description: Description) -> None:
-    """Add a servo to each joint, or a motor if the data of its servo are unknown."""
+    """Add a motor to each joint, and the linkages that turn two joints together."""
     linkages, actuators = element(root, "equality"), element(root, "actuator")
     for joint in description.joints:
-        name, drive, most = joint.name, joint.drive, joint.max_torque_nm
+        name, most = joint.name, joint.max_torque_nm
         if joint.follows:
             # The largest stiffness that is stable with steps of 1 ms.
             element(
                 linkages, "joint", joint1=name, joint2=joint.follows, solref="0.002 1",
                 polycoef="0 1 0 0 0",
             )  # fmt: skip
-        elif drive is None:
-            element(actuators, "motor", name=name, joint=name, ctrlrange=(-most, most))
         else:
-            element(
-                actuators, "position", name=name, joint=name, kp=drive.kp_nm_rad, kv=drive.kv_nm_s,
-                forcerange=(-drive.force_nm, drive.force_nm),
-                ctrlrange=(joint.low_rad, joint.high_rad),
-            )  # fmt: skip
+            element(actuators, "motor", name=name, joint=name, ctrlrange=(-most, most))

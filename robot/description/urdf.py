@@ -89,8 +89,5 @@ def _add_joint(root: ET.Element, link: Link, parent: str, taken: Collection[str]
         hinge, "limit", lower=joint.low_rad, upper=joint.high_rad,
         effort=joint.max_torque_nm, velocity=joint.max_speed_rad_s,
     )  # fmt: skip
-    if joint.drive is not None:
-        drive = joint.drive
-        element(hinge, "dynamics", damping=drive.damping_nm_s, friction=drive.friction_nm)
     if joint.follows:
         element(hinge, "mimic", joint=joint.follows, multiplier="1", offset="0")

@@ -401,7 +401,7 @@ class CommandExecutor:
         if starts and self.lead.pose_rad:
             return CommandReply(f"{self.lead.state.client}: the joints are held at their angles")
         robot = self._robot
-        reply = robot.track_choices.play(command, t_s, self.commanded_rad, robot.guard.limits)
+        reply = robot.track_choices.play(command, t_s, robot.guard.limits)
         if starts:
             by = f" for {command.who}" if command.who else ""
             robot.messages.append(f"track{by}: {reply.text()}")

@@ -84,10 +84,7 @@ class JointFaults:
 
     def figures(self) -> dict[str, dict[str, dict[str, float]]]:
         """Return the faults that have ended: joint -> reason -> times and seconds."""
-        return {
-            joint: {reason: self._counted[joint][reason] for reason in sorted(self._counted[joint])}
-            for joint in sorted(self._counted)
-        }
+        return self._counted
 
     def _end(self, key: tuple[str, str]) -> float | None:
         """Count a fault; return its duration in s, None if it was not reported."""

@@ -2,24 +2,22 @@
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 
-import numpy as np
 from msgspec import Struct, structs
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.sound.sound_file import check_sound
-from gazerig.gaze.track.animation import NO_TABLES, FaceTables
 from gazerig.gaze.track.track import MAX_DURATION_S, Track
 from gazerig.gaze.track.track_motion import TrackMotion
-from gazerig.gaze.track.track_player import BLEND_IN_S, SPEECH, TrackPlayer, Voice
+from gazerig.gaze.track.track_player import BLEND_IN_S, SPEECH, PlayingTrack, TrackPlayer
 from gazerig.params import unknown_text
 from gazerig.robot.model.commands import EndTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, TrackReply
 from gazerig.robot.model.track_fit import TrackFit, TrackRefused
-from gazerig.robot.model.types import JointAngles
 
 _MOST_KEPT = 64
 """Number of curves that are kept for the next time."""
@@ -37,7 +35,6 @@ class TrackInfo(Struct, frozen=True):
         owns: Joints that gaze does not move meanwhile.
         sound: Path of its sound, "" without one.
         cues: Names and times in s of its cues.
-        layers: What it moves: head, eyes, lids, levels and joints by name.
     """
 
     name: str
@@ -48,7 +45,6 @@ class TrackInfo(Struct, frozen=True):
     owns: tuple[str, ...] = ()
     sound: str = ""
     cues: tuple[tuple[str, float], ...] = ()
-    layers: tuple[str, ...] = ()
 
 
 class TrackChoices:
@@ -57,9 +53,7 @@ class TrackChoices:
     Args:
         tracks: All known tracks by name.
         player: Plays them.
-        joints: Joints of the rig, in the order of all sequences of joints.
-        lid_spans_rad: Range of each lid from shut to open, by joint.
-        tables: Expressions and levels of the rig.
+        fit: Fits them to the rig.
         latency_s: Latency of the joints, by which motion is ahead of its sound.
         changes: Returns the tracks whose files have changed since the last call, or the fault of
             a file.
@@ -69,50 +63,37 @@ class TrackChoices:
         self,
         tracks: Mapping[str, Track],
         player: TrackPlayer,
-        joints: tuple[str, ...],
-        lid_spans_rad: Mapping[str, float],
-        tables: FaceTables = NO_TABLES,
+        fit: TrackFit,
         latency_s: float = 0.0,
         changes: Callable[[], Mapping[str, Track | str]] = dict,
     ) -> None:
+        self.latency_s = latency_s
         self._tracks: dict[str, Track | str] = dict(tracks)
-        self._player, self._joints, self._tables = player, joints, tables
+        self._player, self._fit = player, fit
         self._changes, self._changed = changes, set[str]()
-        self._started: list[tuple[Voice, TrackState]] = []
+        self._fitted = lru_cache(_MOST_KEPT)(self._fit_track)
+        self._started: list[tuple[PlayingTrack, TrackState]] = []
         self._number = 0
-        self._lid_spans_rad: Mapping[str, float] | None = None
-        self.retune(lid_spans_rad, latency_s)
-
-    def retune(self, lid_spans_rad: Mapping[str, float], latency_s: float) -> None:
-        """Change the parameters of the next track."""
-        self._latency_s = latency_s
-        if lid_spans_rad != self._lid_spans_rad:  # else what is prepared stays
-            self._lid_spans_rad = lid_spans_rad
-            self._fit = TrackFit(self._joints, lid_spans_rad, self._tables)
-            self._prepared: dict[object, tuple[TrackMotion, TrackReply]] = {}
-            self._names: tuple[str, ...] | None = None
 
     # --- the available ones
 
-    def _read_files(self) -> None:
-        """Take over tracks whose files have changed."""
+    def _known(self) -> dict[str, Track | str]:
+        """Return all tracks, or the faults of their files, as they are now."""
         if changed := self._changes():
             self._tracks |= changed
             self._changed |= changed.keys()
-            self._prepared, self._names = {}, None
+            self._fitted.cache_clear()
+        return self._tracks
 
     @property
     def names(self) -> tuple[str, ...]:
         """Return the tracks whose joints this rig has. Thread-safe."""
-        self._read_files()
-        if self._names is None:
-            found = []
-            for name, track in self._tracks.items():
-                with contextlib.suppress(TrackRefused):
-                    if isinstance(track, Track) and self._fit.rows(track):
-                        found.append(name)
-            self._names = tuple(found)
-        return self._names
+        found = []
+        for name, track in self._known().items():
+            with contextlib.suppress(TrackRefused):
+                if isinstance(track, Track) and self._fit.rows(track):
+                    found.append(name)
+        return tuple(found)
 
     def all_tracks(self, limits: Sequence[JointLimit]) -> tuple[TrackInfo, ...]:
         """Return all tracks with their fit to this rig. Thread-safe.
@@ -120,19 +101,18 @@ class TrackChoices:
         Args:
             limits: Limits of the joints.
         """
-        self._read_files()
-        return tuple([self._info(name, track, limits) for name, track in self._tracks.items()])
+        return tuple([self._info(name, track, limits) for name, track in self._known().items()])
 
     def _info(self, name: str, track: Track | str, limits: Sequence[JointLimit]) -> TrackInfo:
-        if isinstance(track, str):
-            return TrackInfo(name, "", refused=track)
+        description = track.description if isinstance(track, Track) else ""
         try:
             motion, reply = self.prepare(Play(name), limits)
         except ValueError as refused:
-            return TrackInfo(name, track.description, refused=str(refused))
+            return TrackInfo(name, description, refused=str(refused))
+        track = motion.track
         return TrackInfo(
-            name, track.description, motion.duration_s, reply.slowed_by, "",
-            self._fit.owns(track), track.sound, tuple(track.cues.items()), track.layers,
+            name, description, motion.duration_s, reply.slowed_by, "", self._fit.owns(track),
+            track.sound, tuple(track.cues.items()),
         )  # fmt: skip
 
     def prepare(
@@ -141,29 +121,32 @@ class TrackChoices:
         """Return a track's motion on this rig, which takes time at first. Thread-safe.
 
         Raises:
-            ValueError: There is no such track, or the rig cannot play it.
+            ValueError: There is no such track or cue, or the rig cannot play the track.
         """
         if isinstance(command, Speak):
             track = Track(SPEECH, sound=command.sound, volume=command.volume)
-            motion = self._fit.speech(track, command.level, command.mouth, command.duration_s)
+            duration_s, level, mouth = command.duration_s, command.level, command.mouth
+            motion = self._fit.speech(track, level, mouth, duration_s, limits)
             return motion, TrackReply(SPEECH, motion.duration_s)
-        name = command.track
-        track_or_fault = command.definition or self._tracks.get(name)
-        if track_or_fault is None:
+        name, how = command.track, (command.speed, command.sound_s, tuple(limits))
+        if command.definition is not None:
+            return self._fit.motion(name, command.definition, how[2], *how[:2])
+        return self._fitted(name, *how)
+
+    def _fit_track(
+        self, name: str, speed: float, sound_s: float, limits: tuple[JointLimit, ...]
+    ) -> tuple[TrackMotion, TrackReply]:
+        track = self._tracks.get(name)
+        if track is None:
             raise ValueError(unknown_text("track", name, self.names))
-        if isinstance(track_or_fault, str):
-            raise ValueError(f"{name}: {track_or_fault}")
-        key = name, command.speed, tuple(limits)
-        if key not in self._prepared or command.definition:
-            try:
-                sound_s = command.sound_s or _sound_s(track_or_fault.sound)
-                found = self._fit.motion(name, track_or_fault, limits, command.speed, sound_s)
-            except TrackRefused as refused:
-                raise ValueError(f"{name}: {refused}") from None
-            if len(self._prepared) >= _MOST_KEPT:
-                self._prepared = {}
-            self._prepared[key] = found
-        return self._prepared[key]
+        if isinstance(track, str):
+            raise ValueError(f"{name}: {track}")
+        try:
+            if track.sound and not sound_s:
+                sound_s = check_sound(Path(track.sound), MAX_DURATION_S).duration_s
+            return self._fit.motion(name, track, limits, speed, sound_s)
+        except (TrackRefused, SetupError) as refused:
+            raise ValueError(f"{name}: {refused}") from None
 
     def require(self, command: Play | Speak, limits: Sequence[JointLimit]) -> None:
         """Check that a track can be played, and compute its curves. Thread-safe.
@@ -171,7 +154,7 @@ class TrackChoices:
         Raises:
             ValueError: It cannot; the message lists the available tracks or cues.
         """
-        self._read_files()
+        self._known()
         if isinstance(command, Speak) or command.track:
             motion, _ = self.prepare(command, limits)
             _start_s(command, motion)
@@ -215,16 +198,12 @@ class TrackChoices:
         self._started = shown
         return tuple([state for _, state in shown])
 
-    def play(
-        self, command: Play | Speak, t_s: float, commanded_rad: JointAngles,
-        limits: Sequence[JointLimit],
-    ) -> CommandReply:  # fmt: skip
-        """Start a track from the joints' present angles, or end all tracks.
+    def play(self, command: Play | Speak, t_s: float, limits: Sequence[JointLimit]) -> CommandReply:
+        """Start a track, or end all tracks.
 
         Args:
             command: Track, speed and count, or a speech.
             t_s: Present time.
-            commanded_rad: Joint angles last sent.
             limits: Present limits of the joints.
         """
         player, fit = self._player, self._fit
@@ -249,18 +228,13 @@ class TrackChoices:
         begins_s = max([t_s, *fading])
         entry_s = 0.0
         if motion.owned or from_s > 0.0:
-            base = np.zeros(len(player.rest))
-            owned = [*motion.owned]
-            base[owned] = (fit.channel_means(commanded_rad) - player.rest)[owned]
-            entry_s = motion.blend_s(motion.time_at(from_s), base, BLEND_IN_S, rising=True)
+            entry_s = motion.blend_s(motion.time_at(from_s), BLEND_IN_S, rising=True)
         player.end(staying, ended, t_s, begins_s + entry_s)
-        lead_s = self._latency_s if motion.sound_s else 0.0
-        if motion.mouth is not None:
-            lead_s += 0.5 * self._tables.levels[self._tables.mouth].smoothing_s
+        lead_s = motion.lead_s + (self.latency_s if motion.sound_s else 0.0)
         rounds = 1
         if isinstance(command, Play):
             rounds = 0 if command.loop or track.loop else max(1, command.times)
-        voice = Voice(name, motion, begins_s, from_s, rounds, lead_s, entry_s)
+        voice = PlayingTrack(name, motion, begins_s, from_s, rounds, lead_s, entry_s)
         player.play(voice)
         self._number += 1
         duration_s = begins_s - t_s + lead_s + motion.duration_s * max(1, rounds)
@@ -331,15 +305,3 @@ def _start_s(command: Play | Speak, motion: TrackMotion) -> float:
     if start_s > motion.length_s:
         raise ValueError(f"{name} lasts {motion.length_s:.2f} s: from_s must be less")
     return start_s
-
-
-def _sound_s(path: str) -> float:
-    """Return the duration of a track's sound in s, 0 without one.
-
-    Raises:
-        TrackRefused: It cannot be played.
-    """
-    try:
-        return check_sound(Path(path), MAX_DURATION_S).duration_s if path else 0.0
-    except SetupError as error:
-        raise TrackRefused(str(error)) from None

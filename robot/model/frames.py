@@ -176,6 +176,8 @@ class CameraMount:
 
     def is_ignored(self, way: Vec3) -> bool:
         """Return whether the rig ignores what is in a direction from the camera."""
+        if not self._ignore_rad:
+            return False
         yaw, pitch = yaw_pitch(way)
         return any(
             right <= yaw <= left and low <= pitch <= high

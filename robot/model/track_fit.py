@@ -110,7 +110,12 @@ class TrackFit:
         return motion, reply
 
     def speech(
-        self, track: Track, level: str, mouth: Sequence[tuple[float, float]], duration_s: float
+        self,
+        track: Track,
+        level: str,
+        mouth: Sequence[tuple[float, float]],
+        duration_s: float,
+        limits: Sequence[JointLimit],
     ) -> TrackMotion:
         """Return the motion of a speech: none but that of a level, whose channels it takes.
 
@@ -119,13 +124,15 @@ class TrackFit:
             level: Level that opens the mouth, "" without one.
             mouth: Times and openings; () if they arrive during the speech.
             duration_s: Its duration, s.
+            limits: Limits of the joints.
         """
-        strain = self._strain(frozenset(), ())
+        strain = self._strain(frozenset(), limits)
         motion = TrackMotion(track, (), len(self.channels), frozenset(), strain, 1.0, duration_s)
         if level in self._ranges:
             motion.channels = frozenset(np.flatnonzero(self._ranges[level].gain).tolist())
             if mouth:
                 motion.mouth = (*np.array(mouth).T,)
+                motion.lead_s = 0.5 * self._ranges[level].smoothing_s
         return motion
 
     def rows(self, track: Track) -> tuple[list[ChannelKeys], tuple[str, ...]]:
@@ -195,18 +202,6 @@ class TrackFit:
                 values = clipped
             found.append(row._replace(values=values))
         return found, tuple(smaller.items())
-
-    def channel_means(self, values: Sequence[float]) -> Floats:
-        """Return the mean over the joints of each channel; 0 for a channel without a joint."""
-        found: Floats = np.zeros(len(self.channels))
-        for i, channel in enumerate(self.channels):
-            of = [
-                v
-                for j, v in zip(self.joints, values, strict=True)
-                if channel_of_joint(j) == channel
-            ]
-            found[i] = sum(of) / max(1, len(of))
-        return found
 
     def _strain(self, owned: frozenset[int], limits: Sequence[JointLimit]) -> Strain:
         """Return the factors by which motion must take longer to keep the limits.

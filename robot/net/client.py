@@ -26,35 +26,30 @@ from gazerig.errors import HeadEnded, NotFound, Refused
 from gazerig.robot.model.commands import (
     HEARTBEAT_S,
     SLOW,
-    Character,
-    Characters,
+    Change,
     Command,
     ControlCommand,
-    Fault,
     Get,
     Hello,
     LookAt,
-    Parameters,
     ReadMenus,
     ReadStatus,
     Renew,
     Request,
     Resume,
-    Revert,
     Save,
     SayPiece,
     Set,
     State,
     Stop,
     Talk,
-    Tracks,
     Unsaved,
     Value,
     check_command,
     set_client,
     verb,
 )
-from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
+from gazerig.robot.model.parameter import ParamChange, SavedFile
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.net.socket_io import (
     ANSWER_BYTES,
@@ -275,17 +270,13 @@ class RobotClient:
         """Return the present values of all keys that start with ``prefix``."""
         return self.ask(Get(prefix), dict[str, Any])
 
-    def parameters(self, prefix: str = "") -> tuple[Parameter, ...]:
-        """Return the rules and defaults of all keys that start with ``prefix``."""
-        return self.ask(Parameters(prefix), tuple[Parameter, ...])
-
     def set_many(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
         """Apply several values in the same tick, or none; return notes for the user."""
         try:
             json.dumps(changes, allow_nan=False)
         except (TypeError, ValueError) as error:
             raise RequestRejected(f"only finite numbers, text and lists: {error}") from None
-        return self._change(Set(dict(changes)))
+        return self.change(Set(dict(changes)))
 
     def unsaved(self) -> tuple[ParamChange, ...]:
         """Return the present values that differ from the rig's file."""
@@ -296,29 +287,9 @@ class RobotClient:
         whole = None if path is None else str(Path(path).expanduser().absolute())
         return self.ask(Save(whole), SavedFile)
 
-    def revert(self) -> tuple[str, ...]:
-        """Apply the values of the rig's file again."""
-        return self._change(Revert())
-
-    def characters(self) -> tuple[str, ...]:
-        """Return the names of the characters that can be applied to the rig."""
-        return self.ask(Characters(), tuple[str, ...])
-
-    def apply_character(self, name: str) -> tuple[str, ...]:
-        """Apply another character to the rig."""
-        return self._change(Character(name))
-
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return the choices of ``Ask``: menu -> choices, the present one first."""
         return self.ask(ReadMenus(), dict[str, tuple[str, ...]])
-
-    def tracks(self) -> tuple[dict[str, Any], ...]:
-        """Return all tracks: name, description, duration_s, slowed_by, refused (if it is)."""
-        return self.ask(Tracks(), tuple[dict[str, Any], ...])
-
-    def fault(self, text: str) -> str:
-        """Execute a fault command of the emulated servos; return a description of it."""
-        return self.ask(Fault(text), str)
 
     def say_piece(
         self, pcm: bytes, rate_hz: int, channels: int = 1, last: bool = False, volume: float = 1.0
@@ -400,7 +371,8 @@ class RobotClient:
                 return other.send(command)
         return self.ask(command, _Done).reply or CommandReply()
 
-    def _change(self, request: Request) -> tuple[str, ...]:
+    def change(self, request: Change) -> tuple[str, ...]:
+        """Send a request that changes values; return notes for the user."""
         return self.ask(request, _Done).notes
 
 

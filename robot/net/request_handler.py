@@ -66,7 +66,7 @@ FIXED = "these parameters cannot be changed while the rig runs"
 
 
 class ParamAccess(Protocol):
-    """The parameters of a running rig, such as ``gazerig.robot.run.param_store.ParamStore``."""
+    """The parameters of a running rig, such as ``gazerig.robot.run.live.ParamStore``."""
 
     @property
     def version(self) -> int:

@@ -171,18 +171,15 @@ def peer_pid(end: socket.socket) -> int | None:
     return int(pid) if uid == os.getuid() else None
 
 
-def remove_dead_sockets(path: Path) -> tuple[int, ...]:
-    """Remove the sockets of killed rigs; return their process ids."""
-    dead: list[int] = []
-    for place, pid in find_sockets(path).items():
+def remove_dead_sockets(path: Path) -> None:
+    """Remove the sockets of killed rigs."""
+    for place in find_sockets(path):
         try:
             connect_to_socket(place, 0.2).close()
         except ConnectionRefusedError:
             place.unlink(missing_ok=True)
-            dead.append(pid)
         except OSError:  # busy, or removed meanwhile
             continue
-    return tuple(dead)
 
 
 class Wire:

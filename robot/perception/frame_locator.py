@@ -69,8 +69,9 @@ _LEAST_SHARE, _MOST_SPREAD_M, _LEAST_SD = 0.3, 0.12, 0.01
 _MOST_DEPTH_RATIO = 1.6
 # A face is flat if the depth beside and above it differs by at most this at 0 m, and in addition
 # per squared metre: a stereo camera's error grows so. The face of a person who leans at a wall is
-# .18 m before it.
+# .18 m before it. Places beside and above a head, in heights from its eyes to its mouth (.07 m).
 _FLAT_M, _FLAT_PER_M2 = 0.05, 0.01
+_AROUND = (-2.9, 0.0), (2.9, 0.0), (0.0, -3.4)
 # The centre of a patch wanders within it; the error of its flow is proportional to the flow and to
 # the search range.
 _MIDDLE_OF_RADIUS, _PLACED_M = 0.3, 0.002
@@ -268,11 +269,10 @@ def _depth_ratio(
 
 def _is_flat(face: DetectedFace, found: Detections) -> bool:
     """Return whether a face is in one plane with what is beside and above it."""
-    x, y, width, height = face.box_px
-    size = 0.5 * width, 0.5 * height
+    (x, y), side = face.landmarks_px.mean(axis=0).tolist(), float(np.ptp(face.landmarks_px[:, 1]))
     middle, *around = (
-        _depth(found, (x + across * width, y + down * height, *size))
-        for across, down in ((0.25, 0.25), (-1.0, 0.0), (1.5, 0.0), (0.25, -1.0))
+        _depth(found, (x + (across - 0.5) * side, y + (down - 0.5) * side, side, side))
+        for across, down in ((0.0, 0.0), *_AROUND)
     )
     if middle is None:
         return False

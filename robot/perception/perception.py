@@ -126,14 +126,13 @@ class Perception:
         for track in in_sight:
             if track.seen_s == t_s:
                 track.life.record(track.filter, axis, t_s)
+        ways = [rotate_back(R, sub(track.p_world_m, p)) for track in in_sight]
+        inside = _in_picture(ways, located.intrinsics, detections)
         self._tracks = tracks = tuple(
             [
                 track
-                for track in in_sight
-                if track.counts
-                and _in_picture(
-                    rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, detections
-                )
+                for track, here in zip(in_sight, inside, strict=True)
+                if track.counts and (here or track.seen_s == t_s)
             ]
         )
         self._percept = Percept(
@@ -210,10 +209,10 @@ class Perception:
         )
 
 
-def _in_picture(p_camera_m: Vec3, lens: Intrinsics, found: Detections) -> bool:
-    """Return whether a position is inside the image; people outside it are only remembered."""
-    x, y = project([p_camera_m], lens)[0].tolist()  # NaN behind the camera
-    return bool(0.0 <= x < found.width_px and 0.0 <= y < found.height_px)
+def _in_picture(p_camera_m: list[Vec3], lens: Intrinsics, found: Detections) -> list[bool]:
+    """Return which positions are inside the image; people outside it are only remembered."""
+    places = project(p_camera_m, lens).tolist() if p_camera_m else []  # NaN behind the camera
+    return [0.0 <= x < found.width_px and 0.0 <= y < found.height_px for x, y in places]
 
 
 def _bodies(tracks: tuple[BodyTrack, ...]) -> Bodies:

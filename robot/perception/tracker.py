@@ -54,7 +54,9 @@ _REMEMBER_PERSON_S = 300.0
 # angle and time on, faces that appear or jump there are in a film.
 _JUMP_M, _JUMP_M_S = 0.1, 2.0
 _FILM_RAD, _FILM_S, _JUMPS = radians(12.0), 30.0, 4
-# A person in fewer frames than this may be a false detection, whose number is reused. Number of
+# Time after which a person who is out of sight may be one in view whose clothes are known.
+_LOST_S = 0.8
+# A person in fewer frames than this may be a false detection, which is not remembered. Number of
 # frames with clothes after which the number is final. Largest number of stored people who left.
 _KNOWN, _CLOTHED, _MOST_LEFT = 10, 5, 30
 
@@ -65,7 +67,6 @@ class Tracker:
     def __init__(self) -> None:
         self._tracks: list[BodyTrack] = []
         self._next_person, self._next_thing = 1, FIRST_THING
-        self._free: set[int] = set()
         self._left: list[SeenPerson] = []
         self._jumps: list[tuple[Vec3, float]] = []
 
@@ -127,8 +128,6 @@ class Tracker:
                 self._left = [*self._left, _person(track)][-_MOST_LEFT:]
             elif track.returned_person is not None:
                 self._left.append(track.returned_person)
-            else:
-                self._free.add(track.id)  # the number of a false detection
         self._tracks = kept
         return tuple([t for t in self._tracks if t.unseen_s <= self._coasts_s(t)])
 
@@ -176,11 +175,11 @@ class Tracker:
             track.filmed_s = track.at_s
 
     def _number(self, track: BodyTrack) -> None:
-        """Give a person's new track the number of the person who has returned, or a free one."""
+        """Give a person's new track the number of the person who has returned, or the next one."""
         if track.returned_person is not None:
             self._left.append(track.returned_person)
         # Without clothes, one who was missed for a moment is not another who appears nearby.
-        lost_s = IN_SIGHT_S if track.clothes.frames >= _CLOTHED else FORGET_S
+        lost_s = _LOST_S if track.clothes.frames >= _CLOTHED else FORGET_S
         gone = [
             one
             for one in self._tracks
@@ -191,22 +190,11 @@ class Tracker:
         track.returned_person = back = find_returned(recent, _person(track))
         if back is None:
             if before is not None or not track.id:
-                track.id = self._new_number()
+                track.id, self._next_person = self._next_person, self._next_person + 1
             return
-        if before is None and track.id:
-            self._free.add(track.id)
         track.id = back.id
         self._left = [one for one in self._left if one.id != back.id]
         self._tracks = [one for one in self._tracks if one not in gone or one.id != back.id]
-
-    def _new_number(self) -> int:
-        """Return the lowest number that was never used for a person."""
-        if self._free:
-            number = min(self._free)
-            self._free.remove(number)
-            return number
-        self._next_person += 1
-        return self._next_person - 1
 
     def _update_track(self, track: BodyTrack, detection: Located, p_camera: Vec3) -> None:
         """Update a track with a detection."""

@@ -1,6 +1,7 @@
 """Options of one run: one value from the command line to the assembly."""
 
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -8,12 +9,44 @@ from typing import Annotated, NamedTuple
 from gazerig.drivers.errors import SetupError
 from gazerig.params import unknown_text
 from gazerig.robot.dashboard.door.token_file import read_token
-from gazerig.robot.run.computer import LEVELS, LoadLevel
 
 DEFAULT_SCENE = "visitor"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 BUSES = ("emulated", "ideal")
 """Replacements of the servos: byte-true emulators, or servos without bytes."""
+
+
+class LoadLevel(NamedTuple):
+    """A load level of a computer.
+
+    Attributes:
+        rate_hz: highest rate of the loop, None for the rig's.
+        pictures: pictures of the camera in a world: "full", "coarse" (15 per second, without
+            smoothed edges) or "none" (detections are computed).
+        room: whether ``make run`` is in a room with physics.
+        text: Description of the level.
+    """
+
+    rate_hz: float | None
+    pictures: str
+    room: bool
+    text: str
+
+
+LEVELS = {
+    "full": LoadLevel(None, "full", True, "the rig's loop rate, full pictures"),
+    "small": LoadLevel(100.0, "coarse", True, "a loop of 100 Hz, 15 coarse pictures a second"),
+    "busy": LoadLevel(100.0, "none", True, "a loop of 100 Hz, a room without rendered pictures"),
+    "least": LoadLevel(50.0, "none", False, "a loop of 50 Hz, a scene instead of a room"),
+}
+"""Load levels by name, from the highest to the lowest."""
+
+
+def level_text(name: str) -> str:
+    """Return a description of a level in one line, with the options that override it."""
+    return (
+        f"measured for this computer ({name}): {LEVELS[name].text}; --rate and --world override it"
+    )
 
 
 class Option(NamedTuple):
@@ -122,12 +155,6 @@ class RunOptions:
         named = None if self.summary is None or self.summary == "-" else Path(self.summary)
         return tuple(path for path in (self.record, named) if path is not None)
 
-    @property
-    def initial_choices(self) -> tuple[tuple[str, str], ...]:
-        """Return the initial choices of the robot's menus, as (menu, choice)."""
-        asked = (("behaviour", self.behaviour), ("conversation", self.conversation))
-        return tuple((menu, choice) for menu, choice in asked if choice is not None)
-
     def check_and_complete(self, blind: bool = False) -> "RunOptions":
         """Return the options with the default scene if none was given.
 
@@ -138,30 +165,16 @@ class RunOptions:
             SetupError: they contradict each other.
         """
         _ = self.page_address, self.page_token
-        if self.fast and not self.mock:
-            raise SetupError("--fast needs --mock: real servos need real time")
-        if self.name is not None and not _NAME.fullmatch(self.name):
-            raise SetupError(f"--name {self.name}: a letter, then at most 31 of a-z A-Z 0-9 _ -")
-        self._refuse_bus()
-        asked = [
+        views = [
             name
             for name in ("scene", "video", "camera", "oak", "replay", "world")
-            # Compared with None, because webcam 0 is valid.
+            # Webcam 0 is valid.
             if getattr(self, name) is not None and getattr(self, name) is not False
         ]
-        if len(asked) > 1:
-            options = " and ".join(f"--{name}" for name in asked)
-            raise SetupError(f"{options} exclude each other: the head looks at one of them")
-        if self.record_camera is not None and self.camera is None and not self.oak:
-            raise SetupError("--record-camera writes the frames of --oak or --camera: give one")
-        scene = self.scene
-        if not asked and not blind:
-            if not self.mock:
-                raise SetupError(
-                    "nothing to look at: give --oak, --camera N, --video FILE or --scene NAME"
-                )
-            scene = DEFAULT_SCENE
-        self._refuse_clashes(scene)
+        scene = DEFAULT_SCENE if self.mock and not views and not blind else self.scene
+        for is_broken, rule in self._rules(views, scene, blind):
+            if is_broken:
+                raise SetupError(rule)
         level = self.level
         bare = level is not None and level.pictures == "none" and self.world is not None
         return replace(self, scene=scene, no_pictures=self.no_pictures or bare)
@@ -177,48 +190,71 @@ class RunOptions:
             raise SetupError(unknown_text("--computer", self.computer, LEVELS))
         return None if self.computer is None else LEVELS[self.computer]
 
-    def _refuse_bus(self) -> None:
-        """Reject a bus that is unknown, or that replaces no servos."""
-        if self.bus is None:
-            return
-        if self.bus not in BUSES:
-            raise SetupError(unknown_text("--bus", self.bus, BUSES))
-        if self.port is not None:
-            raise SetupError(
-                f"--bus {self.bus} and --port exclude each other: servos at a port are real"
-            )
-        if not self.mock:
-            raise SetupError(
-                f"--bus {self.bus} needs --mock: it selects the replacement of the rig's servos"
-            )
-
-    def _refuse_clashes(self, scene: str | None) -> None:
-        """Reject options that exclude each other."""
-        world, camera = self.world is not None, self.camera is not None or self.oak
-        if self.port is not None and self.mock:
-            raise SetupError("--port and --mock exclude each other: --mock has its own port")
-        if self.fast and camera:
-            raise SetupError(
-                "--fast needs a scene, a film or a recording: a camera runs in real time"
-            )
-        if world and not self.mock:
-            raise SetupError("--world needs --mock: real servos are in the real world")
-        if world and self.bus == "ideal" and not self.fast:
-            raise SetupError(
-                "--world with --bus ideal needs --fast: ideal servos have no real time"
-            )
-        if world and self.pixels:
-            raise SetupError(
-                "--world and --pixels exclude each other: a world is rendered in any case"
-            )
-        if self.no_pictures and not world:
-            raise SetupError(
-                "--no-pictures needs --world: pictures of a scene are drawn only with --pixels"
-            )
-        if self.pixels and scene is None:
-            raise SetupError("--pixels draws a scene: it cannot be used with a film or a camera")
-        if self.fast and self.seconds is None and scene is None and not world:
-            raise SetupError("--fast needs --seconds S with a film: it would never end")
+    def _rules(
+        self, views: Sequence[str], scene: str | None, blind: bool
+    ) -> Iterator[tuple[bool, str]]:
+        """Yield whether a rule is broken, and its text."""
+        world, mock, bus = self.world is not None, self.mock, self.bus
+        has_camera = self.camera is not None or self.oak
+        yield self.fast and not mock, "--fast needs --mock: real servos need real time"
+        yield (
+            self.name is not None and not _NAME.fullmatch(self.name),
+            f"--name {self.name}: a letter, then at most 31 of a-z A-Z 0-9 _ -",
+        )
+        yield (
+            bus is not None and bus not in BUSES,
+            unknown_text("--bus", str(bus), BUSES),
+        )
+        yield (
+            bus is not None and self.port is not None,
+            f"--bus {bus} and --port exclude each other: servos at a port are real",
+        )
+        yield (
+            bus is not None and not mock,
+            f"--bus {bus} needs --mock: it selects the replacement of the rig's servos",
+        )
+        yield (
+            len(views) > 1,
+            f"{' and '.join(f'--{name}' for name in views)} exclude each other: "
+            "the head looks at one of them",
+        )
+        yield (
+            self.record_camera is not None and not has_camera,
+            "--record-camera writes the frames of --oak or --camera: give one",
+        )
+        yield (
+            not (views or blind or mock),
+            "nothing to look at: give --oak, --camera N, --video FILE or --scene NAME",
+        )
+        yield (
+            self.port is not None and mock,
+            "--port and --mock exclude each other: --mock has its own port",
+        )
+        yield (
+            self.fast and has_camera,
+            "--fast needs a scene, a film or a recording: a camera runs in real time",
+        )
+        yield world and not mock, "--world needs --mock: real servos are in the real world"
+        yield (
+            world and bus == "ideal" and not self.fast,
+            "--world with --bus ideal needs --fast: ideal servos have no real time",
+        )
+        yield (
+            world and self.pixels,
+            "--world and --pixels exclude each other: a world is rendered in any case",
+        )
+        yield (
+            self.no_pictures and not world,
+            "--no-pictures needs --world: pictures of a scene are drawn only with --pixels",
+        )
+        yield (
+            self.pixels and scene is None,
+            "--pixels draws a scene: it cannot be used with a film or a camera",
+        )
+        yield (
+            self.fast and self.seconds is None and scene is None and not world,
+            "--fast needs --seconds S with a film: it would never end",
+        )
 
 
 def parse_host_port(text: str) -> tuple[str, int]:

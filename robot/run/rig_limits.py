@@ -1,12 +1,14 @@
-"""Conversion of a rig's file to radians and metres, for the parts of the robot."""
+"""Conversion of a rig's file to radians, metres and servos, for the parts of the robot."""
 
 from collections.abc import Mapping
 from math import radians
 
 from gazerig.config.rig import Rig
+from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.track.animation import NEUTRAL, FaceRange, FaceTables
 from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.types import Angles2, Vec3
+from gazerig.robot.loop.body import servo_setups
 from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.kinematics import LIDS, NECK, LidEnds
 from gazerig.robot.model.types import further_joints, order_joints
@@ -18,6 +20,23 @@ EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
 def limits(joints: Mapping[str, JointParams]) -> tuple[JointLimit, ...]:
     """Return the joints' limits, in the order of ``order_joints``."""
     return tuple(joints[name].limit() for name in order_joints(joints))
+
+
+def bus_names(rig: Rig) -> tuple[str, ...]:
+    """Return the names of the buses with joints; the unnamed one, "", is the first."""
+    used = {joint.bus for joint in rig.joints.values()}
+    return tuple(name for name in ("", *rig.buses) if name in used)
+
+
+def joints_on(rig: Rig, name: str) -> tuple[str, ...]:
+    """Return the joints of one bus, in the order of all joints."""
+    return tuple(joint for joint in rig.names if rig.joints[joint].bus == name)
+
+
+def servo_configs(rig: Rig) -> tuple[ServoConfig, ...]:
+    """Return the configuration of a rig's servos for the buses, in the order of its joints."""
+    gentle_deg_s = rig.guard.soft_start_speed_deg_s
+    return servo_setups(rig.joints, park_rad(rig), gentle_deg_s, rig.couplings.values())
 
 
 def face_parts_m(rig: Rig) -> dict[str, Vec3]:
@@ -104,8 +123,7 @@ def face_tables(rig: Rig) -> FaceTables:
         )
         for name, level in rig.levels.items()
     }
-    mouth = rig.gaze.mouth.level
-    return FaceTables(expressions, levels, mouth if mouth in levels else "")
+    return FaceTables(expressions, levels)
 
 
 def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:

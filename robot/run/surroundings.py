@@ -1,39 +1,116 @@
-"""Surroundings of an emulated rig: servo mechanics, camera view and appearance.
+"""Surroundings of an emulated rig: a simulated scene, or the world with physics of ``--world``.
 
-``gazerig run --world NAME`` runs in them. A package provides its own by an entry point of the group
-``gazerig.surroundings``, which names a subclass of ``Surroundings``.
+The world is a feature, found by the entry point ``world`` of the group ``gazerig.surroundings``.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, cast
 
-from gazerig.drivers.errors import PluginError
-from gazerig.drivers.plugins import SURROUNDINGS, find, is_ours, registrations
+from gazerig.config.load import find_file, load
+from gazerig.config.shipped_files import is_path, shipped_names
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.plugins import SURROUNDINGS, find
+from gazerig.gaze.attention.top_down import TopDownParams
+from gazerig.robot.run.options import RunOptions
+from gazerig.sim_mock.scenes.faces_scene import FacesScene, faults
+from gazerig.sim_mock.scenes.scene import Scene
+from gazerig.sim_mock.scenes.script import SceneScript
 
 if TYPE_CHECKING:
     import numpy as np
 
     from gazerig.config.rig import Rig
-    from gazerig.drivers.types import Camera
+    from gazerig.drivers.types import Camera, FaceDetector
     from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
     from gazerig.robot.model.clock import Clock
-    from gazerig.robot.model.frames import CameraParams
-    from gazerig.robot.run.options import RunOptions
-    from gazerig.robot.run.program_parts import ProgramParts
-    from gazerig.robot.run.run_bus import CameraPoses, RunBus
-    from gazerig.sim_mock.scenes.scene import Scene
+    from gazerig.robot.run.buses import RunBus
+    from gazerig.robot.run.cameras import CameraView
 
-WORLD = "world"
-"""Our own surroundings, which handle all names that no package has."""
+KIND = "scenes"
+"""Folder of the shipped scenes."""
+
+
+def scene_names() -> tuple[str, ...]:
+    """Return the names of the shipped scenes."""
+    return shipped_names(KIND)
+
+
+def load_scene(name_or_path: str, seed: int = 0) -> FacesScene:
+    """Return a simulated scene.
+
+    Args:
+        name_or_path: name of a shipped scene, or path of a script.
+        seed: Seed of acts with a random time.
+
+    Raises:
+        gazerig.config.load.ConfigError: the file has faults.
+        SetupError: the name is unknown.
+    """
+    if not is_path(name_or_path) and name_or_path not in scene_names():
+        raise SetupError(
+            f"--scene {name_or_path}: unknown; scenes: {', '.join(scene_names())}; "
+            "or give the path of a script (.yaml)"
+        )
+    script = _read(*script_file(KIND, name_or_path))
+    return FacesScene(Path(name_or_path).stem, script, seed)
+
+
+def script_file(
+    kind: str, name_or_path: str, home: Path | None = None
+) -> tuple[Path, tuple[int, int, int] | None]:
+    """Return the path of a script, and the version of its content, None if it cannot be read.
+
+    Raises:
+        gazerig.config.load.ConfigError: no shipped script has this name.
+    """
+    path = find_file(kind, name_or_path, home)
+    try:
+        facts = path.stat()
+    except OSError:
+        return path, None
+    return path, (facts.st_ino, facts.st_mtime_ns, facts.st_size)
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path, version: tuple[int, int, int] | None) -> SceneScript:
+    """Read a script, with a cache, as a run requests it several times."""
+    return load(path, SceneScript, checks=(faults,))
+
+
+def scene_of(options: RunOptions) -> Scene | None:
+    """Return the people and things around a rig, None if its camera has another source.
+
+    Raises:
+        gazerig.config.load.ConfigError: the script has faults.
+        SetupError: the scene or world is unknown.
+    """
+    if options.world is not None:
+        return world().scene(options)
+    return None if options.scene is None else load_scene(options.scene, options.seed)
+
+
+def refuse_missing_rules(rules: TopDownParams, scene: Scene, option: str) -> None:
+    """Reject a scene whose planner needs behaviours without rules.
+
+    Raises:
+        SetupError: the message names them.
+    """
+    missing = [behaviour for behaviour in scene.behaviours if behaviour not in rules.rules]
+    if missing:
+        raise SetupError(
+            f"{option}: the rig has no rule for {', '.join(missing)}; "
+            "add it under gaze.top_down.rules"
+        )
 
 
 class RunRoom(Protocol):
-    """Surroundings of one run; the rig's emulated servos are in them."""
+    """The world of one run; the rig's emulated servos are in it."""
 
     @property
-    def scene(self) -> "Scene":
-        """Return the people and things in it, for scores and the page."""
+    def scene(self) -> Scene:
+        """Return the people and things in it."""
 
     @property
     def clock(self) -> "Clock":
@@ -41,28 +118,24 @@ class RunRoom(Protocol):
 
     @property
     def run_bus(self) -> "RunBus":
-        """Return the bus of the rig's servos; its ``close`` ends the surroundings."""
+        """Return the bus of the rig's servos; its ``close`` ends the world."""
 
     def camera(
         self,
         rig: "Rig",
-        options: "RunOptions",
-        sight: "CameraPoses",
-        placed: "CameraParams",
+        options: RunOptions,
+        view: "CameraView",
         rng: "np.random.Generator",
-        own: "ProgramParts",
-        say: Callable[[str], None],
+        detector: "Callable[[], FaceDetector]",
     ) -> "Camera":
         """Return the rig's camera; called only once.
 
         Args:
             rig: Rig with the parameters of detectors.
             options: Options of the run.
-            sight: Placement of the camera, and history of its rotation.
-            placed: Present parameters of the camera.
+            view: Placement of the camera.
             rng: Random numbers of its noise.
-            own: Camera and detector of a program.
-            say: Receives messages for the user.
+            detector: Creates the face detector.
         """
 
     def start_s(self) -> float | None:
@@ -72,58 +145,31 @@ class RunRoom(Protocol):
         """Return its appearance for the page, None if it is not shown."""
 
 
-class Surroundings(ABC):
-    """Surroundings of a run; constructed without arguments."""
+class Surroundings(Protocol):
+    """The feature that makes worlds."""
 
-    @abstractmethod
-    def scene(self, options: "RunOptions") -> "Scene":
-        """Return the people and things in the surroundings of a run; nothing is started.
+    def scene(self, options: RunOptions) -> Scene:
+        """Return the people and things in the world of a run; nothing is started.
 
         Raises:
-            SetupError: they cannot be used.
+            SetupError: the world cannot be used.
         """
 
-    @abstractmethod
-    def open(self, rig: "Rig", options: "RunOptions", clock: "Clock") -> RunRoom:
-        """Return the surroundings of a run, with the rig's emulated servos in them.
-
-        Args:
-            rig: the rig.
-            options: Options of the run; ``options.world`` names the surroundings.
-            clock: Clock of the run.
+    def open(self, rig: "Rig", options: RunOptions, clock: "Clock") -> RunRoom:
+        """Return the world of a run, with the rig's emulated servos in it.
 
         Raises:
-            SetupError: they cannot be used.
+            SetupError: the world cannot be used.
         """
 
     def names(self) -> tuple[str, ...]:
         """Return the names for shell completion of ``--world``."""
-        return ()
 
 
-def surroundings(name: str) -> Surroundings:
-    """Return the surroundings of a name or path: a package's of that name, otherwise our world.
+def world() -> Surroundings:
+    """Return the feature that makes worlds.
 
     Raises:
-        PluginError: they cannot be imported, or several packages have this name.
+        PluginError: it cannot be imported.
     """
-    outside = any(one.name == name and not one.is_ours for one in registrations(SURROUNDINGS))
-    found = find(SURROUNDINGS, name if outside and not is_ours(SURROUNDINGS, name) else WORLD)
-    part = found.load()
-    if isinstance(part, type) and issubclass(part, Surroundings):
-        return part()
-    raise PluginError(f"{found.label} is not a subclass of {Surroundings.__module__}.Surroundings")
-
-
-def surroundings_names() -> list[str]:
-    """Return the names for ``--world``, ours and packages', without missing ones."""
-    names: list[str] = []
-    for one in registrations(SURROUNDINGS):
-        if not one.is_ours:
-            names.append(one.name)
-            continue
-        try:
-            names += surroundings(one.name).names()
-        except PluginError:
-            continue
-    return names
+    return cast(type[Surroundings], find(SURROUNDINGS, "world").load())()

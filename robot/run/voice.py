@@ -26,6 +26,7 @@ from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
 from gazerig.drivers.sound.sound_file import check_sound, read_samples, write_wav
 from gazerig.drivers.sound.speech import speak
 from gazerig.gaze.mouth.mouth import Mouth, phoneme_closures
+from gazerig.gaze.track.animation import MOUTH
 from gazerig.gaze.track.track import FINISHED
 from gazerig.gaze.track.track_player import SPEECH
 from gazerig.gaze.types import Floats
@@ -100,12 +101,11 @@ class RunVoice:
         self._opener: threading.Thread | None = None
         self._fault = ""
         self._closed = False
-        self._tick: Tick | None = None
         self._played: TrackState | None = None
         self._watched_s = self._fed_s = 0.0
         self._over = False
         self._stream: _Stream | None = None
-        self._files = deque[Any](maxlen=_KEPT_FILES)
+        self._files = deque[Any]()
 
     # --- speech
 
@@ -180,6 +180,8 @@ class RunVoice:
         """Write samples to a file that exists until the run ends, or some texts later."""
         file = tempfile.NamedTemporaryFile(prefix="gazerig-voice-", suffix=".wav")  # noqa: SIM115
         self._files.append(file)
+        if len(self._files) > _KEPT_FILES:
+            self._files.popleft().close()
         write_wav(Path(file.name), pcm, rate_hz)
         return file.name
 
@@ -231,18 +233,12 @@ class RunVoice:
             if not 0.0 <= volume <= 1.0:
                 raise SoundError(f"the volume is {volume:g}: give 0..1")
             if not volume and not self._level:
-                raise SoundError(
-                    f"this head has no level {self._rig().gaze.mouth.level!r} that a sound without "
-                    "volume could move"
-                )
+                raise SoundError("this head has no level mouth, which a sound without volume moves")
             self._open_loudspeaker(self._rig().sound.device if volume else SILENT_DEVICE)
         now_s = self._clock.now_s()
         with self._lock:
-            tick, player = self._tick, self._player
-            if player is None:
+            if (player := self._player) is None:
                 raise SoundError("the run has ended")
-            if tick is not None and tick.stopped:
-                raise SoundError("the head is stopped: resume it first")
             stream = self._stream or self._start_stream(player, rate_hz, channels, volume)
             if (rate_hz, channels) != (stream.rate_hz, stream.channels):
                 raise SoundError(
@@ -281,7 +277,6 @@ class RunVoice:
 
         It never waits: while another thread opens the loudspeaker, the next tick is followed.
         """
-        self._tick = tick
         if self._fast or not self._lock.acquire(blocking=False):
             return
         try:
@@ -387,8 +382,7 @@ class RunVoice:
     @property
     def _level(self) -> str:
         """Return the level that opens the mouth, "" for a rig without it."""
-        level = self._rig().gaze.mouth.level
-        return level if level in self._rig().levels else ""
+        return MOUTH if MOUTH in self._rig().levels else ""
 
     def _try(self, command: Command) -> None:
         """Queue a command; a refusal is not important, as the next one follows."""
@@ -397,7 +391,7 @@ class RunVoice:
 
     def stop(self) -> None:
         """Stop all sound, as the head parks."""
-        self._tick = self._played = self._stream = None
+        self._played = self._stream = None
         if self._player is not None:
             self._player.stop()
 
@@ -408,7 +402,8 @@ class RunVoice:
             if self._player is not None:
                 self._player.close()
             self._player = None
-            self._files.clear()
+            for file in self._files:
+                file.close()
 
 
 def _sounding_track(tick: Tick) -> TrackState | None:

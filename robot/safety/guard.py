@@ -135,11 +135,6 @@ class Guard:
             for i, celsius, hot in found
         ]
 
-    @property
-    def is_gentle(self) -> bool:
-        """Return whether any joint still moves slowly."""
-        return any(self._gentle)
-
     def check(
         self, desired_rad: JointAngles, joints: JointState, frame_age_s: float, t_s: float
     ) -> GuardResult:

@@ -38,8 +38,8 @@ from child_processes import running_as
 from present import present
 
 from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.run.emulated import emulated_lines
 from gazerig.robot.run.rig_limits import park_rad
-from gazerig.robot.run.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
 RIGS = {"desk": "dynamixel", "feetech": "feetech", "maker": "maestro", "pca9685": "pca9685"}

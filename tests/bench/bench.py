@@ -93,8 +93,8 @@ def bench_tick() -> None:
     from ruckig import InputParameter, OutputParameter, Ruckig
 
     from gazerig.config.schema import load_rig
-    from gazerig.robot.run.assemble import assemble
     from gazerig.robot.run.options import RunOptions
+    from gazerig.robot.run.run import Run
 
     planner, given, found = Ruckig(9, 0.005), InputParameter(9), OutputParameter(9)
     given.max_velocity, given.max_acceleration = [6.0] * 9, [60.0] * 9
@@ -109,7 +109,7 @@ def bench_tick() -> None:
         found.pass_to_input(given)
 
     def tick(bus: str) -> float:
-        made = assemble(load_rig("desk"), RunOptions(True, True, 0, "visitor", bus=bus))
+        made = Run(load_rig("desk"), RunOptions(True, True, 0, "visitor", bus=bus))
         return timed(lambda: play(made, 10.0)) / 2000
 
     peer = "ruckig, a step of nine axes"

@@ -27,8 +27,8 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Bodies, Face, Percept, Target
 from gazerig.robot.loop.loop import Tick
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
-from gazerig.robot.run.assemble import Assembly, Substitutes
-from gazerig.robot.run.scene_files import load_scene
+from gazerig.robot.run.run import Run
+from gazerig.robot.run.surroundings import load_scene
 
 KEYS = st.lists(st.sampled_from(get_args(Key)), max_size=60)
 
@@ -107,14 +107,13 @@ def steered(desk_rig: Rig) -> FaceSteering:
 
 
 @pytest.fixture
-def made(steered: FaceSteering, desk_rig: Rig) -> Iterator[Assembly]:
-    own = Substitutes(chooser=lambda own: steered)
-    found = simulated(exact_gaze(desk_rig), "sits-still", 1, own)
+def made(steered: FaceSteering, desk_rig: Rig) -> Iterator[Run]:
+    found = simulated(exact_gaze(desk_rig), "sits-still", 1, chooser=steered)
     yield found
     found.close()
 
 
-def ticks(made: Assembly, steered: FaceSteering, seconds: float) -> Tick:
+def ticks(made: Run, steered: FaceSteering, seconds: float) -> Tick:
     """Run in simulated time, in which nothing prevents an Enter."""
     start_s, last_s, tick = made.clock.now_s(), made.clock.now_s(), None
     for slot in range(1, int(seconds * 200) + 1):
@@ -128,7 +127,7 @@ def ticks(made: Assembly, steered: FaceSteering, seconds: float) -> Tick:
 
 
 def test_both_eyes_meet_the_true_place_of_the_part_on_the_face(
-    made: Assembly, steered: FaceSteering
+    made: Run, steered: FaceSteering
 ) -> None:
     made.robot.start(made.clock)
     (person,) = load_scene("sits-still").people(0.0)

@@ -14,7 +14,7 @@ from gazerig.config.schema import Rig
 from gazerig.features.bringup.manual_control import ManualControl, Step
 from gazerig.robot.loop.body import Body
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
-from gazerig.robot.run.bus_wiring import rig_bus
+from gazerig.robot.run.buses import rig_bus
 from gazerig.robot.run.rig_limits import limits, park_rad
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.devices import DynamixelLine

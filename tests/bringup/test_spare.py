@@ -24,7 +24,7 @@ from gazerig.features.bringup.servo_setup import (
     open_at,
     search_rates,
 )
-from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.emulated import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 

@@ -27,8 +27,7 @@ from gazerig.features.bringup.telemetry import (
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.model.weight import HeadMassParams, MassParams
-from gazerig.robot.run.bus_wiring import bus_names, joints_on
-from gazerig.robot.run.rig_limits import lid_spans, limits
+from gazerig.robot.run.rig_limits import bus_names, joints_on, lid_spans, limits
 from gazerig.robot.run.track_file import TOLERANCE_DEG, write_track
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec

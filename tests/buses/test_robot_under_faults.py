@@ -6,10 +6,10 @@ import pytest
 from loop_deaths import RIGS, rig_of
 from mixed_rig import mixed_rig
 
-import gazerig.robot.run.run_bus as run_bus
-from gazerig.robot.run.assemble import assemble
+import gazerig.robot.run.buses as run_buses
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_limits import limits
+from gazerig.robot.run.run import Run
 from gazerig.sim_mock.device import Device
 
 FAULTS = {
@@ -26,14 +26,14 @@ class Watched:
 
     def __init__(self, monkeypatch, rig):
         self.devices: list[Device] = []
-        build = run_bus.build
+        build = run_buses.build
 
         def kept(*given):
             self.devices.append(build(*given))
             return self.devices[-1]
 
-        monkeypatch.setattr(run_bus, "build", kept)
-        self.made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+        monkeypatch.setattr(run_buses, "build", kept)
+        self.made = Run(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
         self.bounds = limits(rig.joints)
         self.made.robot.start(self.made.clock)
         self.began_s, self.k = self.made.clock.now_s(), 0

@@ -5,13 +5,16 @@ from pathlib import Path
 from typing import Any
 
 from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.loop.body import Body
+from gazerig.robot.loop.chooser import TargetChooser
 from gazerig.robot.loop.loop import LoopCount, run
+from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.run.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run import Run
 from gazerig.robot.run.run_rig import run_info
-from gazerig.robot.run.session import shut_down
+from gazerig.robot.run.session import prepare_shutdown
 
 VISIT = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
 
@@ -20,15 +23,17 @@ def simulated(
     rig: Rig | str = "desk",
     scene: str = "visitor",
     seed: int = 0,
-    substitutes: Substitutes = RIGS_OWN,
+    chooser: TargetChooser | None = None,
+    wrap_body: Callable[[Body], Body] | None = None,
     **options: Any,
-) -> Assembly:
+) -> Run:
     """Return a robot in simulated time that has not begun; options: others of RunOptions."""
     found = RunOptions(mock=True, fast=True, seed=seed, scene=scene, **options)
-    return assemble(load_rig(rig) if isinstance(rig, str) else rig, found, substitutes)
+    whole = load_rig(rig) if isinstance(rig, str) else rig
+    return Run(whole, found, chooser=chooser, wrap_body=wrap_body)
 
 
-def ticks(made: Assembly, number: int, dt_s: float = 0.005) -> list[Tick]:
+def ticks(made: Run, number: int, dt_s: float = 0.005) -> list[Tick]:
     """Tick on in simulated time, 200 times a second; return the ticks."""
     done = []
     for _ in range(number):
@@ -40,7 +45,7 @@ def ticks(made: Assembly, number: int, dt_s: float = 0.005) -> list[Tick]:
 Watch = Callable[[Tick], object]
 
 
-def go(made: Assembly, seconds: float, watch: Watch = lambda tick: None) -> LoopCount:
+def go(made: Run, seconds: float, watch: Watch = lambda tick: None) -> LoopCount:
     """Run the loop of a robot that has started for a time."""
 
     def end(s: float) -> str | None:
@@ -49,7 +54,7 @@ def go(made: Assembly, seconds: float, watch: Watch = lambda tick: None) -> Loop
     return run(made.robot, made.clock, made.loop, end, watch)
 
 
-def play(made: Assembly, seconds: float, watch: Watch = lambda tick: None) -> LoopCount:
+def play(made: Run, seconds: float, watch: Watch = lambda tick: None) -> LoopCount:
     """Start a robot, run its loop for a time, stop it and close it."""
     made.robot.start(made.clock)
     try:
@@ -64,12 +69,12 @@ def record(
     rig: Rig,
     seconds: float,
     options: RunOptions = VISIT,
-    at: Callable[[int, Assembly], None] = lambda n, made: None,
+    at: Callable[[int, Run], None] = lambda n, made: None,
 ) -> list[Tick]:
     """Record a run as ``gazerig run --fast --record`` does; ``at``: called after each tick."""
     recorder = Recorder(path, run_info(rig, options), patient=True)
     recorder.open()
-    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
+    made = Run(rig, options, wrap_body=recorder.wrap_body)
     seen: list[Tick] = []
 
     def watch(tick: Tick) -> None:
@@ -80,7 +85,7 @@ def record(
     made.robot.start(made.clock)
     stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(made.robot, made.clock, made.loop, stop, watch)
-    shut_down(made, count, lambda line: None)
-    recorder.close(count.stopped_by, made.sent_bytes_digest())
+    prepare_shutdown(made, lambda line: None, Interrupts()).shut_down()
+    recorder.close(count.stopped_by, made.bus.sent_bytes_digest())
     made.close()
     return seen

@@ -64,7 +64,7 @@ def steps(rig_name: str, sizes_deg: Sequence[float]) -> Iterator[Step]:
     bench.start()
     i = bench.names.index(EYES[rig_name])
     desired = [0.0] * len(bench.names)
-    while bench.guard.is_gentle:
+    while any(bench.guard._gentle):
         bench.tick(tuple(desired))
     for size in sizes_deg:
         for side in (1.0, -1.0):

@@ -20,7 +20,7 @@ from gazerig.gaze.angles import add, scale, sub, yaw_pitch
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Value
 from gazerig.robot.recording.gaze_angles import GazeAngles, GazeAnglesBuilder, target_text
-from gazerig.robot.run import run_rig
+from gazerig.robot.run import surroundings
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.run_rig import with_options
 from gazerig.sim_mock.scenes.scene import Scene
@@ -173,16 +173,16 @@ def half_rate_run(scene: str, profile: str, seconds: float) -> MeasuredRun:
 @contextmanager
 def _scenes(scene: str | Scene) -> Any:
     """Have a scene of a test's own among those that a run can be put into."""
-    shipped: Any = run_rig.load_scene
+    shipped: Any = surroundings.load_scene
     if not isinstance(scene, str):
         one: Any = scene
-        run_rig.load_scene = cast(
+        surroundings.load_scene = cast(
             Any, lambda name, seed=0: one if name == one.name else shipped(name, seed)
         )
     try:
         yield
     finally:
-        run_rig.load_scene = shipped
+        surroundings.load_scene = shipped
 
 
 def _run(
@@ -200,7 +200,7 @@ def _run(
     rig = apply_changes(
         with_options(load_rig(options.rig, options.character, options.profile), options), overrides
     )
-    columns, held = _Columns(), run_rig.load_scene(scene, seed)
+    columns, held = _Columns(), surroundings.load_scene(scene, seed)
     made = simulate(rig, options, watch=columns.update)
     return columns.gathered(held, made.trace)
 

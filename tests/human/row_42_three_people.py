@@ -12,7 +12,7 @@ from human.measured_run import Figures, MeasuredRun, Runs
 from human.row_45_talk import faces_deg
 from human.spells import apart_deg, spells
 
-from gazerig.robot.run.scene_files import load_scene
+from gazerig.robot.run.surroundings import load_scene
 
 SCENES = {
     "three-people": ("left_one", "middle_one", "right_one"),

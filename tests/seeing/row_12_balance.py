@@ -16,8 +16,8 @@ from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
 from gazerig.gaze.types import Face, Vec3
 from gazerig.robot.loop.loop import run
 from gazerig.robot.loop.tick import Tick, cyclopean_direction
-from gazerig.robot.run.assemble import assemble
 from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run import Run
 
 NEAR_M, FRONTAL_RAD = 1.5, radians(45.0)
 BESIDE_DEG, FACE_M = 3.0, 0.09
@@ -40,7 +40,7 @@ def _beside_deg(tick: Tick, eye: Vec3, face: Face) -> float:
 def percent_on_faces(options: RunOptions) -> float:
     """Run the shipped desk rig; return how much of the time was spent on present faces, in %."""
     rig = load_rig(options.rig)
-    made = assemble(replace(rig, loop=replace(rig.loop, rate_hz=100.0)), options)
+    made = Run(replace(rig, loop=replace(rig.loop, rate_hz=100.0)), options)
     there = on_face = 0
 
     def count(tick: Tick) -> None:

@@ -6,7 +6,7 @@ from gazerig.drivers.errors import install_command
 from gazerig.features.world.gl_context import NoRenderer
 from gazerig.features.world.run import first_world
 from gazerig.features.world.run.first_world import ROOM, main
-from gazerig.robot.run.computer import ComputerFigures
+from gazerig.robot.cli.computer import ComputerFigures
 
 
 class Free:

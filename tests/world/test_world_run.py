@@ -19,11 +19,12 @@ from gazerig.gaze.types import Vec3
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import MoveOpponent
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.run.assemble import Assembly, assemble, with_options
-from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.emulated import emulated_lines
+from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.resimulate import rerun
-from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.rerun import rerun
+from gazerig.robot.run.run import Run
+from gazerig.robot.run.run_rig import with_options
 from gazerig.sim_mock.pty.line import BusSettings
 
 simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
@@ -47,7 +48,7 @@ def test_without_a_renderer_the_run_ends_with_the_reason_and_the_remedy(
 ) -> None:
     monkeypatch.setenv("MUJOCO_GL", "none")
     with pytest.raises(NoRenderer, match=r"No module named 'mujoco\.none'.*--no-pictures"):
-        assemble(load_rig("desk"), replace(FAST, no_pictures=False))
+        Run(load_rig("desk"), replace(FAST, no_pictures=False))
 
 
 # --- The world of the emulator's process, and the camera that looks into it from another one
@@ -160,7 +161,7 @@ def test_the_script_takes_over_again_after_a_second(scene: WorldScene) -> None:
 
 
 def test_the_recording_of_a_moved_opponent_repeats_to_the_bit(tmp_path: Path) -> None:
-    def order(number: int, made: Assembly) -> None:
+    def order(number: int, made: Run) -> None:
         if number % 10 == 0 and (p_m := path(0.005 * number)) is not None:
             made.robot.command(MoveOpponent(p_m))
 

@@ -6,7 +6,7 @@ from typing import Any
 from gazerig.config.schema import Rig, load_rig
 from gazerig.features.world.figure import Figures
 from gazerig.features.world.run.run_world import rig_in_world
-from gazerig.robot.run.run_bus import emulated_lines, servo_index
+from gazerig.robot.run.emulated import emulated_lines, servo_index
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.scenes.script import SceneScript
 

@@ -35,8 +35,8 @@ from gazerig.features.bringup.doctor.diagnostics import (
 )
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
-from gazerig.robot.run.bus_wiring import bus_names
-from gazerig.robot.run.rig_weight import weight_findings
+from gazerig.robot.run.rig_description import weight_findings
+from gazerig.robot.run.rig_limits import bus_names
 from gazerig.robot.safety.start_range import find_far_outside
 
 app = typer.Typer()

@@ -31,9 +31,9 @@ from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.events import group_events
 from gazerig.robot.loop.power_down import Interrupts, PowerDown
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.run.bus_wiring import guarded_rig_bus
+from gazerig.robot.run.buses import guarded_rig_bus
+from gazerig.robot.run.rig_description import rest_park_deg
 from gazerig.robot.run.rig_limits import limits, park_rad
-from gazerig.robot.run.rig_weight import rest_park_deg
 from gazerig.robot.safety.guard import Guard
 
 app = typer.Typer()

@@ -16,8 +16,9 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_setup import open_at
 from gazerig.robot.cli.progress import Console
 from gazerig.robot.cli.terminal import confirm, say, status
-from gazerig.robot.run.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
-from gazerig.robot.run.run_bus import emulated_lines
+from gazerig.robot.run.buses import bus_ports
+from gazerig.robot.run.emulated import emulated_lines
+from gazerig.robot.run.rig_limits import bus_names, joints_on, servo_configs
 from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.client import PtyBuses
 

@@ -37,7 +37,7 @@ from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.cli.ports import JsonOption, MockOption
 from gazerig.features.bringup.servo_kinds import KINDS, servo_kind
 from gazerig.features.bringup.servo_setup import Answers, search_rate
-from gazerig.robot.cli.options import DEFAULT_RIG, RigCommand
+from gazerig.robot.cli.options import DEFAULT_RIG
 from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, complete_suggestions, say
 
 app = typer.Typer()
@@ -64,7 +64,7 @@ class SearchRound(NamedTuple):
         return self.board is not None or (self.answers is not None and bool(self.answers.found))
 
 
-@app.command(cls=RigCommand)
+@app.command()
 def scan(
     rig: Annotated[
         str | None,

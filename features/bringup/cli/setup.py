@@ -25,8 +25,8 @@ from gazerig.features.bringup.cli.ports import (
 )
 from gazerig.features.bringup.servo_kinds import KINDS, servo_kind
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, confirm, finish_lines, say
-from gazerig.robot.run.bus_wiring import bus_names
-from gazerig.robot.run.run_bus import CHAINS
+from gazerig.robot.run.emulated import CHAINS
+from gazerig.robot.run.rig_limits import bus_names
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 app = typer.Typer()

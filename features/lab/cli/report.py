@@ -7,7 +7,7 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.robot.cli.options import DEFAULT_RIG, RigCommand, run_option
+from gazerig.robot.cli.options import DEFAULT_RIG, run_option
 from gazerig.robot.cli.progress import Steps, progress_bar
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, record_signals, say
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False)
 
 
-@app.command(cls=RigCommand)
+@app.command()
 def report(
     file: Annotated[
         Path | None,
@@ -39,8 +39,6 @@ def report(
     character: Annotated[str | None, run_option("character")] = None,
     profile: Annotated[str | None, run_option("profile")] = None,
     scanpath: Annotated[str | None, run_option("scanpath")] = None,
-    saccade: Annotated[str | None, run_option("saccade")] = None,
-    conversation: Annotated[str | None, run_option("conversation")] = None,
     bus: Annotated[str | None, run_option("bus")] = None,
     seed: Annotated[int, run_option("seed")] = 0,
     out: Annotated[Path | None, typer.Option(help="HTML page to write.")] = None,
@@ -68,8 +66,8 @@ def report(
         with progress_bar() as tell:
             if scene is not None:
                 run_options = RunOptions(
-                    True, True, seed, scene, scanpath=scanpath, saccade=saccade, bus=bus, rig=rig,
-                    character=character, profile=profile, conversation=conversation,
+                    True, True, seed, scene, scanpath=scanpath, bus=bus, rig=rig,
+                    character=character, profile=profile,
                     seconds=seconds,
                 ).check_and_complete()  # fmt: skip
                 runs = [_simulate_run(run_options, tell)]

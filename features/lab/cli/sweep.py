@@ -9,7 +9,7 @@ import typer
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.robot.cli.ctl import read_value
-from gazerig.robot.cli.options import RigCommand, run_option
+from gazerig.robot.cli.options import run_option
 from gazerig.robot.cli.progress import progress_bar
 from gazerig.robot.cli.terminal import (
     FAULT,
@@ -25,7 +25,7 @@ from gazerig.robot.run.options import DEFAULT_SCENE, RunOptions
 app = typer.Typer(add_completion=False)
 
 
-@app.command(cls=RigCommand)
+@app.command()
 def sweep(
     rig: RigArgument = "desk",
     setting: Annotated[
@@ -57,7 +57,6 @@ def sweep(
     bus: Annotated[str | None, run_option("bus")] = None,
     profile: Annotated[str | None, run_option("profile")] = None,
     character: Annotated[str | None, run_option("character")] = None,
-    conversation: Annotated[str | None, run_option("conversation")] = None,
     force: ForceOption = False,
 ) -> None:
     """Vary parameters over many simulated runs; write a table of all runs as CSV.
@@ -68,12 +67,12 @@ def sweep(
         # Models are slow to import; `--help` does not need them.
         from gazerig.features.lab.sweep.points import check_points, grid
         from gazerig.features.lab.sweep.runs import FAILED, open_executor, run_all, table_text
-        from gazerig.robot.run.assemble import assemble
+        from gazerig.robot.run.run import Run
         from gazerig.robot.run.run_rig import run_rig
 
         run_options = RunOptions(
             mock=True, fast=True, scene=scene, seconds=seconds, bus=bus, rig=rig, profile=profile,
-            character=character, conversation=conversation,
+            character=character,
         ).check_and_complete()  # fmt: skip
         points = grid(setting or (), read_value)
         if points == [{}]:
@@ -82,7 +81,7 @@ def sweep(
         table = out or Path(f"sweep-{Path(rig).stem}-{Path(scene or '').stem}.csv")
         refuse_existing(table, force=force)
         own = run_rig(run_options)
-        assemble(own, run_options).close()
+        Run(own, run_options).close()
         check_points(own, points)
         runs = [(point, seed + number) for point in points for number in range(seeds)]
         with (

@@ -9,7 +9,8 @@ from importlib.util import find_spec
 
 from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.world.gl_context import open_context
-from gazerig.robot.run.computer import LEVELS, load_level, measure
+from gazerig.robot.cli.computer import load_level, measure
+from gazerig.robot.run.options import LEVELS
 
 ROOM = "--world living-room"
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "software")

@@ -3,15 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from math import radians
 
 import numpy as np
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.camera.capture_loop import CameraParts
 from gazerig.drivers.camera.worker import CameraWorker
-from gazerig.drivers.types import Camera
-from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
 from gazerig.features.world.run.run_world import RunWorld
 from gazerig.features.world.run.sight import LATENCY_MS, ComputedCamera, RenderedWorld
@@ -20,21 +18,12 @@ from gazerig.features.world.shapes import SpecShapes
 from gazerig.features.world.world_spec import state_file
 from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.frames import CameraParams
-from gazerig.robot.perception.motion_source import MotionSource
-from gazerig.robot.run.bus_wiring import guarded_rig_bus, servo_configs
-from gazerig.robot.run.camera_factory import frame_locator
-from gazerig.robot.run.drawn_camera import DrawnSource
-from gazerig.robot.run.gaze_models import rig_kinematics
+from gazerig.robot.run.buses import RunBus, guarded_rig_bus, ideal_run_bus, in_process_run_bus
+from gazerig.robot.run.cameras import CameraView, DrawnSource, SyntheticMotion
+from gazerig.robot.run.emulated import emulated_lines
+from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.program_parts import ProgramParts
-from gazerig.robot.run.run_bus import (
-    CameraPoses,
-    RunBus,
-    emulated_lines,
-    ideal_run_bus,
-    in_process_run_bus,
-)
+from gazerig.robot.run.rig_limits import servo_configs
 from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.scenes.scene import Scene
 
@@ -57,36 +46,31 @@ class RigRoom:
         self,
         rig: Rig,
         options: RunOptions,
-        sight: CameraPoses,
-        placed: CameraParams,
+        view: CameraView,
         rng: np.random.Generator,
-        own: ProgramParts,
-        say: Callable[[str], None],
+        detector: Callable[[], FaceDetector],
     ) -> Camera:
         """Return the rig's camera; arguments as of ``RunRoom.camera``.
 
         Raises:
             NoRenderer: nothing on this machine can render.
         """
-        world, poses, locate = self.world, self.head, frame_locator(placed)
-        field_deg = placed.horizontal_field_deg
+        world, poses, locate = self.world, self.head, view.locate
         if options.no_pictures:
-            return ComputedCamera(world.scene, sight.mount, field_deg, poses, rng, locate)
-        rendered = RenderedWorld(world.spec, sight.mount, placed, rng, world.camera, poses)
+            field_deg = view.params.horizontal_field_deg
+            return ComputedCamera(world.scene, view.mount, field_deg, poses, rng, locate)
+        rendered = RenderedWorld(world.spec, view.mount, view.params, rng, world.camera, poses)
         if isinstance(poses, SimulatedPoses):
-            from gazerig.robot.run.drawn_motion import SyntheticMotionDetector
-
             return rendered.pixels(
                 poses.head,
-                own.make_detector(rig.detector),
+                detector(),
                 LATENCY_MS,
-                SyntheticMotionDetector(rig.motion),
+                SyntheticMotion(rig.motion),
                 locate,
                 poses.begin_s,
             )
-        motion = partial(MotionSource, rig.motion, placed.lens, radians(field_deg), sight.turns)
         source = partial(DrawnSource, rendered.served_pixels, poses)
-        parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
+        parts = CameraParts(source, detector, view.motion(rig.motion), locate)
         return CameraWorker(parts, self.clock.now_s)
 
     def start_s(self) -> float | None:

@@ -17,11 +17,10 @@ from gazerig.features.world.room import HOME
 from gazerig.features.world.timeline import CHECKS
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import WorldSpec
-from gazerig.robot.run.bus_wiring import bus_names
+from gazerig.robot.run.emulated import BOARDS, CHAINS, STOP_BEYOND_DEG, start_angles_rad
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.run_bus import BOARDS, CHAINS, STOP_BEYOND_DEG, start_angles_rad
-from gazerig.robot.run.run_rig import refuse_missing_rules
-from gazerig.robot.run.scene_files import script_file
+from gazerig.robot.run.rig_limits import bus_names
+from gazerig.robot.run.surroundings import refuse_missing_rules, script_file
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import SceneScript, WorldCameraParams
 

@@ -19,7 +19,7 @@ from gazerig.gaze.types import Mat3
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.scene import PinholeView
-from gazerig.robot.run.drawn_camera import HeadPose, NoFaces
+from gazerig.robot.run.cameras import HeadPose, NoFaces
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Scene

@@ -5,11 +5,11 @@ from gazerig.config.shipped_files import shipped_names
 from gazerig.features.world.room import HOME
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.surroundings import RunRoom, Surroundings
+from gazerig.robot.run.surroundings import RunRoom
 from gazerig.sim_mock.scenes.scene import Scene
 
 
-class WorldSurroundings(Surroundings):
+class WorldSurroundings:
     """A world with physics, from a script's name or path or from a user's own MJCF file.
 
     Modules are imported on use: those with MuJoCo and people are heavy.

@@ -65,7 +65,7 @@ function wave(name) {
   return waves.get(name);
 }
 
-/** One track: its name and time, sound, bar with cues, layers and joints that it owns. */
+/** One track: its name and time, sound, bar with cues, and joints that it owns. */
 function drawTrack(canvas, track) {
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", `${spaced(track.name)} at ${track.position_s.toFixed(1)} s`);
@@ -100,5 +100,5 @@ function drawTrack(canvas, track) {
   pen.fillRect(x, TOP - 2, 2, WAVE + BAR + 2);
   const owns = track.owns?.length ? `owns ${track.owns.map(spaced).join(", ")}` : "owns no joint";
   pen.fillStyle = ink;
-  pen.fillText([info?.layers?.join(", "), owns].filter(Boolean).join("; "), 0, HIGH - 6, width);
+  pen.fillText(owns, 0, HIGH - 6, width);
 }

@@ -19,7 +19,7 @@ from gazerig.robot.net.topics import (
 )
 
 WIDTH_PX = 640
-_JPEG_QUALITY = 70
+_JPEG_QUALITY = 65
 _DARK_GROUND = 38
 _NEAREST_M = 0.05
 """Smallest distance of a marked point from the plane of the camera, m."""

@@ -37,7 +37,7 @@ TICKS, RIG, STATE, DETECTED = b"t", b"g", b"a", b"d"
 """First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, and a frame."""
 _KEPT = 400
 """Number of gaze points that are kept for frames which arrive late: those of two seconds."""
-_DRAWING_SHARE = 0.07
+_DRAWING_SHARE = 0.06
 """Largest share of a processor for drawing images of a simulated camera that delivers none."""
 
 

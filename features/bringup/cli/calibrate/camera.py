@@ -15,6 +15,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.capture_loop import CameraParts
 from gazerig.drivers.camera.oak.source import OakSource
+from gazerig.drivers.camera.orientation import FrameOrientation
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.camera.webcam import Webcam
@@ -59,7 +60,6 @@ from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import NECK, Kinematics
-from gazerig.robot.run.camera_factory import frame_orientation
 from gazerig.robot.run.rig_limits import lid_ends, neck_span
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
@@ -193,7 +193,7 @@ class _Eye(contextlib.ExitStack):
         self.scene = BoardScene(rig.camera, board, self.kinematics) if source is None else None
         self._worker: CameraWorker | None = None
         if source is not None:
-            orientation = frame_orientation(rig.camera)
+            orientation = FrameOrientation(rig.camera.rotation, rig.camera.mirrored)
             parts = CameraParts(lambda: source, _NullDetector, orientation=orientation)
             self._worker = CameraWorker(parts, self.clock.now_s, in_thread=True)
 

@@ -41,8 +41,8 @@ from gazerig.robot.loop.loop import LoopCount, Tick
 from gazerig.robot.loop.loop import run as run_loop
 from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.net.live_server import LiveServer
-from gazerig.robot.run.assemble import Substitutes, assemble
 from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.run import Run
 from gazerig.robot.run.session import prepare_shutdown
 
 STILL_SCENE = "sits-still"
@@ -113,7 +113,7 @@ def _calibrate(
     """Let the user steer the gaze from part to part; the rig ends parked, torque off."""
     begin = FaceCalibration(rig.face_parts_mm)
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), REST_M, "eyes_pan" not in rig.joints)
-    made = assemble(exact_gaze(rig), options, Substitutes(chooser=lambda own: steering))
+    made = Run(exact_gaze(rig), options, chooser=steering)
     about = {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"}
     door = LiveServer(made.robot, None, made.clock, about, say)
     session = _CalibrationSession(steering, lines, made.clock.now_s, stopped, door)

@@ -48,7 +48,7 @@ from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.loop.power_down import Interrupts, PowerDown
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.run.bus_wiring import release_plan
+from gazerig.robot.run.buses import release_plan
 
 
 def calibrate_joints(

@@ -13,10 +13,8 @@ from gazerig.robot.loop.tick import Tick
 
 _FIXATION_RAD_S = radians(40.0)
 """Largest speed of a fixation; 30 is usual, and a servo step in 20 ms is already 4.4 deg/s."""
-
 _EVENTS_KEPT = 100
 """Number of newest values stored; a rig that runs for weeks must not fill the memory."""
-
 _PERIOD_S = 0.02
 """Least time between two samples of the gaze, as those of an eye tracker at 50 Hz."""
 
@@ -66,8 +64,7 @@ class Summary:
             point = add(target.p_world_m, scale(target.v_world_m_s, max(0.0, t_s - target.at_s)))
             off_left = angle_between(left, sub(point, pose.p_world_eye_left_m))
             off_right = angle_between(right, sub(point, pose.p_world_eye_right_m))
-            error_rad = 0.5 * (off_left + off_right)
-            self._errors_mdeg[round(1000.0 * degrees(error_rad))] += 1
+            self._errors_mdeg[round(500.0 * degrees(off_left + off_right))] += 1
 
     def figures(self) -> dict[str, object]:
         """Return the figures of the ticks; the caller adds bus, loop and frames."""
@@ -83,7 +80,6 @@ class Summary:
                 "median": _percentile_deg(self._errors_mdeg, 50.0),
                 "p95": _percentile_deg(self._errors_mdeg, 95.0),
             },
-            "estimated": list(last.estimated_joints) if last else [],
             "limited": dict(sorted(self._limited.items())),
             "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
         }
@@ -101,7 +97,5 @@ def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:
 def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
     """Return shares of the total, largest first."""
     total = sum(seconds.values())
-    if total <= 0.0:
-        return {}
     by_time = sorted(seconds.items(), key=lambda item: -item[1])
-    return {name: round(time / total, 4) for name, time in by_time}
+    return {name: round(time / total, 4) for name, time in by_time if total > 0.0}

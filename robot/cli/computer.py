@@ -1,6 +1,6 @@
 """Measurement of this computer in a second, and choice of the load level that it can run.
 
-``python -m gazerig.robot.run.computer`` prints the option of ``gazerig run``.
+``python -m gazerig.robot.cli.computer`` prints the option of ``gazerig run``.
 """
 
 import os
@@ -12,8 +12,6 @@ from gazerig.robot.model.clock import RealClock
 
 _WAITS, _WAIT_S, _LATE_S = 80, 0.005, 0.002
 _BUSY_S = 0.3
-LOWEST_HZ = 50.0
-"""Rate of the loop on the weakest computer."""
 
 
 class ComputerFigures(NamedTuple):
@@ -32,32 +30,6 @@ class ComputerFigures(NamedTuple):
     software: bool | None
 
 
-class LoadLevel(NamedTuple):
-    """A load level of a computer.
-
-    Attributes:
-        rate_hz: highest rate of the loop, None for the rig's.
-        pictures: pictures of the camera in a world: "full", "coarse" (15 per second, without
-            smoothed edges) or "none" (detections are computed).
-        room: whether ``make run`` is in a room with physics.
-        text: Description of the level.
-    """
-
-    rate_hz: float | None
-    pictures: str
-    room: bool
-    text: str
-
-
-LEVELS = {
-    "full": LoadLevel(None, "full", True, "the rig's loop rate, full pictures"),
-    "small": LoadLevel(100.0, "coarse", True, "a loop of 100 Hz, 15 coarse pictures a second"),
-    "busy": LoadLevel(100.0, "none", True, "a loop of 100 Hz, a room without rendered pictures"),
-    "least": LoadLevel(LOWEST_HZ, "none", False, "a loop of 50 Hz, a scene instead of a room"),
-}
-"""Load levels by name, from the highest to the lowest."""
-
-
 def load_level(figures: ComputerFigures) -> str:
     """Return the name of the level that a computer can run.
 
@@ -71,13 +43,6 @@ def load_level(figures: ComputerFigures) -> str:
     if share < 0.75 or late >= 0.15:
         return "least" if weak else "busy" if late >= 0.25 else "small"
     return "small" if weak or late >= 0.05 else "full"
-
-
-def level_text(name: str) -> str:
-    """Return a description of a level in one line, with the options that override it."""
-    return (
-        f"measured for this computer ({name}): {LEVELS[name].text}; --rate and --world override it"
-    )
 
 
 def measure(software: bool | None) -> ComputerFigures:

@@ -1,0 +1,470 @@
+"""The camera of a run: a simulated scene, a film, a recording, a real one, or a browser's."""
+
+import threading
+from collections.abc import Callable
+from functools import partial
+from math import radians
+from operator import itemgetter
+from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
+
+import numpy as np
+
+from gazerig.config.rig import Rig
+from gazerig.drivers.camera import camera_plugins
+from gazerig.drivers.camera.browser_source import FIELD_DEG, BrowserSource
+from gazerig.drivers.camera.capture_loop import CameraParts, Motion
+from gazerig.drivers.camera.orientation import FrameOrientation
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.camera.shared_slots import JpegSlot, PoseBuffer, TimedPose
+from gazerig.drivers.camera.source import FrameSource, Shot
+from gazerig.drivers.camera.worker import CameraWorker
+from gazerig.drivers.errors import PluginError, SetupError
+from gazerig.drivers.plugins import CAMERA, CameraPlugin, find, is_ours, load
+from gazerig.drivers.types import Camera, DetectedFace, FaceDetector, ImageArray, MovingBlob
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory, fixed_mount
+from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
+from gazerig.robot.perception.frame_locator import FrameLocator
+from gazerig.robot.perception.motion_source import MotionSource
+from gazerig.robot.run.options import RunOptions
+from gazerig.sim_mock.cameras.detections import SceneCamera
+from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
+from gazerig.sim_mock.cameras.frame_times import FrameParams
+from gazerig.sim_mock.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from gazerig.drivers.camera.file_player import FilePlayer
+    from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera
+
+HeadPose = Callable[[float], tuple[Mat3, Vec3]]
+"""Function that returns rotation and position [m] of the head in the world at a time [s]."""
+MakeDetector = Callable[[], FaceDetector]
+
+_FILM_DELAY_S = 0.05
+"""Age of a film's frames in simulated time."""
+
+
+class CameraView(NamedTuple):
+    """Placement of a run's camera, and the past poses of the head that carries it.
+
+    params: lens and placement; fixed if its frames cannot turn with the head
+    turns: history of its rotation, for another process; None if it is fixed
+    """
+
+    params: CameraParams
+    mount: CameraMount
+    poses: PoseHistory
+    turns: PoseBuffer | None
+
+    @property
+    def field_rad(self) -> float:
+        """Return the horizontal field of view."""
+        return radians(self.params.horizontal_field_deg)
+
+    @property
+    def locate(self) -> FrameLocator:
+        """Return the locator of detections in the camera's axes."""
+        return FrameLocator(self.params.lens, self.field_rad)
+
+    def motion(self, params: MotionParams) -> Callable[[], Motion]:
+        """Return a function that creates the motion detector in the camera's process."""
+        return partial(MotionSource, params, self.params.lens, self.field_rad, self.turns)
+
+
+def place_camera(
+    rig: Rig, options: RunOptions, kinematics: Kinematics, in_process: bool
+) -> tuple[CameraView, tuple[str, ...]]:
+    """Return the placement of a run's camera, and messages about it.
+
+    Args:
+        rig: Defines the camera.
+        options: Select its source.
+        kinematics: Kinematics of the head.
+        in_process: Whether another process reads the camera and needs its rotation.
+    """
+    what, params, notes = options.camera_source, rig.camera, tuple[str, ...]()
+    filmed = options.video is not None or options.replay is not None
+    if what is not None and (filmed or options.mock) and params.mount != "base":
+        where = "" if filmed else " next to an emulated head"
+        notes = (f"{what}{where} does not turn with the head: the camera counts as fixed",)
+        params = fixed_mount(params, kinematics)
+    mount = CameraMount(params)
+    turns = PoseBuffer() if in_process and mount.on_head else None
+
+    def send(t_s: float, R_world_head: Mat3) -> None:
+        if turns is not None:
+            turns.record(t_s, mount.rotation(R_world_head))
+
+    return CameraView(params, mount, PoseHistory(kinematics, tell=send), turns), notes
+
+
+def detector_of(rig: Rig, own: FaceDetector | None) -> MakeDetector:
+    """Return a function that creates the detector of a program, otherwise that of the rig."""
+    return partial(face_detector, rig.detector) if own is None else lambda: own
+
+
+def own_camera(
+    rig: Rig, view: CameraView, camera: Camera | FrameSource, options: RunOptions,
+    now_s: Callable[[], float], detector: MakeDetector,
+) -> Camera:  # fmt: skip
+    """Return the camera of a program, with the rig's detectors if it returns frames.
+
+    Raises:
+        SetupError: it returns frames in simulated time.
+    """
+    if not camera_plugins.is_source(camera):
+        return cast(Camera, camera)
+    if options.fast:
+        raise SetupError(
+            f"camera {type(camera).__name__} of the program returns frames in real time: in "
+            "simulated time return detections"
+        )
+    parts = _parts(rig, view, partial(cast, FrameSource, camera), detector)
+    return CameraWorker(parts, now_s, in_thread=True)
+
+
+def real_camera(
+    rig: Rig, view: CameraView, options: RunOptions, now_s: Callable[[], float],
+    own: FaceDetector | None = None,
+) -> Camera:  # fmt: skip
+    """Return the camera of a film, a recording, a webcam, an OAK-D or a package.
+
+    Args:
+        rig: Parameters of camera and detectors.
+        view: Placement of the camera.
+        options: Select the camera.
+        now_s: The host's clock.
+        own: A program's own detector, which exists only in this process.
+
+    Raises:
+        SetupError: a film, recording or model file cannot be used.
+    """
+    detector = detector_of(rig, own)
+    source = _source(rig, options)
+    parts = _parts(rig, view, source, detector)
+    if options.fast:
+        from gazerig.sim_mock.cameras.video import FilmCamera
+
+        film = cast("FilePlayer", source())
+        motion = view.motion(rig.motion)()
+        return FilmCamera(
+            film, detector(), _FILM_DELAY_S, 0.0, motion, view.locate, parts.orientation
+        )
+    if isinstance(options.camera, str) and not is_ours(CAMERA, options.camera):
+        camera = source()
+        if not camera_plugins.is_source(camera):
+            return cast(Camera, camera)
+    recorded = parts._replace(record=options.record_camera)
+    return CameraWorker(recorded, now_s, in_thread=own is not None)
+
+
+def _parts(
+    rig: Rig, view: CameraView, source: Callable[[], FrameSource], detector: MakeDetector
+) -> CameraParts:
+    orientation = FrameOrientation(view.params.rotation, view.params.mirrored)
+    return CameraParts(source, detector, view.motion(rig.motion), view.locate, orientation)
+
+
+def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
+    """Return a function that creates the source of frames, in the process that will use it."""
+    name = options.camera
+    if options.replay is not None:
+        return partial(camera_plugins.recording, options.replay)
+    if options.video is not None:
+        return partial(camera_plugins.film, str(options.video))
+    if options.oak or name == "oak":
+        return partial(camera_plugins.oak, rig.oak)
+    if isinstance(name, int) or name == "webcam":
+        return partial(camera_plugins.webcam, rig.webcam, name if isinstance(name, int) else 0)
+    assert name is not None
+    params = rig.plugins.get(name)
+    try:
+        params = load(CAMERA, name, CameraPlugin).params() if params is None else params
+    except TypeError as error:
+        label = find(CAMERA, name).label
+        raise PluginError(f"{label} needs a section {name} in the rig") from error
+    return partial(camera_plugins.create_camera_part, name, params)
+
+
+# --- simulated scenes
+
+
+def true_head_pose(steps: Callable[[], dict[str, float]], rig: Rig, head: Kinematics) -> HeadPose:
+    """Return the pose of the emulated head, from the true positions of its servos.
+
+    Its mechanics are those of the rig at the start, even if parameters change later.
+    """
+    pairs = rig.couplings.values()
+    necks = (*NECK, *LOWER_NECK)
+    linkages = {
+        name: rig.joints[name].make_linkage()
+        for name in {*necks, *(joint for pair in pairs for joint in pair.joints)}
+        & rig.joints.keys()
+    }
+    absent, angles_of = dict.fromkeys(necks, 0.0), itemgetter(*necks)
+
+    def now(_: float) -> tuple[Mat3, Vec3]:
+        at, angles = steps(), absent.copy()
+        for name, linkage in linkages.items():
+            angles[name] = linkage.angle_rad(at[name])
+        for pair in pairs:
+            first, second = pair.joints
+            angles[first], angles[second] = pair.joint_rad((angles[first], angles[second]))
+        yaw, pitch, roll, lower_yaw, lower_pitch = angles_of(angles)
+        return head.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
+
+    return now
+
+
+def scene_camera(
+    rig: Rig, view: CameraView, options: RunOptions, now_s: Callable[[], float],
+    own: FaceDetector | None, scene: Scene, head: HeadPose, rng: np.random.Generator,
+) -> Camera:  # fmt: skip
+    """Return a camera on a simulated scene: its detections are computed, or its frames drawn.
+
+    Args:
+        rig: Parameters of camera and detectors.
+        view: Placement of the camera.
+        options: Whether frames are drawn, and whether time is simulated.
+        now_s: The host's clock.
+        own: A program's own detector, which exists only in this process.
+        scene: The scene in front of the camera.
+        head: True pose of the head.
+        rng: Random numbers of the camera's noise.
+    """
+    field_deg = rig.camera.horizontal_field_deg
+    params, locate = FrameParams(horizontal_field_deg=field_deg), view.locate
+    if not options.pixels:
+        return SceneCamera(params, scene, view.mount, head, rng, locate)
+    detector = detector_of(rig, own)
+    if options.fast:
+        from gazerig.sim_mock.cameras.rendered import PixelCamera
+
+        motion = SyntheticMotion(rig.motion)
+        drawn = DrawnScene(scene)
+        return PixelCamera(params, drawn, view.mount, head, detector(), rng, motion, locate)
+    poses = PoseBuffer()
+    draw = partial(scene_pixels, scene, view.mount, field_deg, rng)
+    parts = CameraParts(
+        partial(DrawnSource, draw, poses), detector, view.motion(rig.motion), locate
+    )
+    return CameraWorker(
+        parts, now_s, tell=lambda t_s: poses.record(t_s, *head(t_s)), in_thread=own is not None
+    )
+
+
+def scene_pixels(
+    scene: Scene, mount: CameraMount, field_deg: float, rng: np.random.Generator, head: HeadPose
+) -> "PixelCamera":
+    """Return the camera that draws a scene, for its own process."""
+    from gazerig.sim_mock.cameras.rendered import PixelCamera
+
+    params = FrameParams(horizontal_field_deg=field_deg, latency_ms=0.0)
+    return PixelCamera(params, DrawnScene(scene), mount, head, NoFaces(), rng)
+
+
+class NoFaces:
+    """Detector that finds no faces: the camera's process detects them later."""
+
+    def find(self, bgr: ImageArray) -> tuple[DetectedFace, ...]:
+        """Return no faces."""
+        return ()
+
+
+class SyntheticMotion:
+    """Motion detector of drawn frames, whose rotation of the camera is known."""
+
+    def __init__(self, params: MotionParams) -> None:
+        from gazerig.drivers.vision.motion import detector  # with OpenCV
+
+        self._enabled, self._vision = params.enabled, detector
+        self._detector = detector.MotionDetector(params)
+        self._before: Mat3 | None = None
+
+    def __call__(self, shot: "Exposure", lens: Intrinsics) -> tuple[MovingBlob, ...]:
+        """Find motion since the previous frame; empty if disabled."""
+        R, before = shot.R_world_camera, self._before
+        self._before = R
+        if not self._enabled:
+            return ()
+        turned = None
+        if before is not None and self._detector.before_s is not None:
+            turned = self._vision.relative_rotation(np.array(R), np.array(before))
+        return self._detector.find(shot.image, shot.captured_s, lens, turned)
+
+
+class NewestHeadPose(Protocol):
+    """Newest pose of the head in the camera's process; ``first_s``: start of the scene."""
+
+    @property
+    def first_s(self) -> float: ...  # noqa: D102
+
+    def newest(self) -> TimedPose | None: ...  # noqa: D102
+
+
+_LOOK_S = 0.002
+
+
+class DrawnSource:
+    """Source of a scene's frames, drawn from the newest pose of the head.
+
+    The control loop only sends the pose. The camera's process draws and detects, so that neither
+    can delay a tick.
+
+    Args:
+        make: Returns the drawing camera, given the head's pose.
+        poses: Poses of the head.
+    """
+
+    def __init__(self, make: "Callable[[HeadPose], PixelCamera]", poses: NewestHeadPose) -> None:
+        self._camera, self._poses = make(self._head_pose), poses
+        self._now: TimedPose | None = None
+        self._number = 0
+        self._due_s = 0.0
+
+    def open(self) -> None:
+        """Start with the first frame."""
+        self._camera.open()
+        self._number = 0
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        """Draw the next frame, from the newest pose; None if ``stop`` was set."""
+        while not stop.is_set():
+            newest, wait_s = self._poses.newest(), self._due_s - now_s()
+            if newest is None or wait_s > 0.0:
+                stop.wait(max(wait_s, _LOOK_S))
+                continue
+            self._now = newest
+            if self._number == 0:
+                self._camera.latest(self._poses.first_s)  # the time of the scene starts here
+            found = self._camera.latest(newest.t_s)
+            if found is None or found.image is None or found.number == self._number:
+                stop.wait(_LOOK_S)
+                continue
+            self._number = found.number
+            self._due_s = max(now_s(), newest.t_s + 1.0 / self._camera.rate_hz)
+            return Shot(found.captured_s, found.number, found.image)
+        return None
+
+    def events(self) -> tuple[str, ...]:
+        """Return no events: a drawn camera has none."""
+        return ()
+
+    def close(self) -> None:
+        """Free the renderer; safe to call twice."""
+        self._camera.close()
+
+    def _head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
+        assert self._now is not None  # ``take`` waits for the first pose
+        return self._now.R_world_head, self._now.p_world_head_m
+
+
+# --- a browser's camera
+
+SILENT_S = 1.5
+"""Silence after which a browser counts as gone."""
+
+
+def browser_worker(
+    rig: Rig, now_s: Callable[[], float], pictures: JpegSlot, before: int
+) -> CameraWorker:
+    """Return the process that analyses a browser's images; ``before``: number of earlier ones."""
+    locate = FrameLocator(None, radians(FIELD_DEG))
+    motion = partial(MotionSource, rig.motion, None, locate.field_rad, None)
+    source = partial(BrowserSource, pictures)
+    parts = CameraParts(source, detector_of(rig, None), motion, locate, before=before)
+    return CameraWorker(parts, now_s)
+
+
+class BrowserCamera:
+    """A browser's own camera, used instead of an emulated rig's while its images arrive.
+
+    The images arrive through the page's process, and are analysed in a camera process like those
+    of a webcam. The head looks at the person in front of the browser; when they end, the simulated
+    scene returns.
+
+    Args:
+        make: Returns the process that analyses the images of a slot; see ``browser_worker``.
+        now_s: The host's clock.
+        use: Called in the loop's thread with the camera to use, None for the rig's own.
+        report: Called with each event as one line.
+
+    in_use: whether the browser's camera is in use
+    """
+
+    def __init__(
+        self,
+        make: Callable[[JpegSlot, int], CameraWorker],
+        now_s: Callable[[], float],
+        use: Callable[[Camera | None], None],
+        report: Callable[[str], None],
+    ) -> None:
+        self.in_use = False
+        self._make, self._now_s, self._use, self._report = make, now_s, use, report
+        self._pictures = JpegSlot()
+        self._worker: CameraWorker | None = None
+        self._starting: threading.Thread | None = None
+        self._begun = 1
+        self._closed = False
+        self._fault = ""
+
+    def take(self, jpeg: bytes) -> None:
+        """Store an image of a browser; called from one thread other than the loop's."""
+        if self._closed or not self._pictures.put(jpeg, self._now_s()):
+            return
+        if self._worker is None and (self._starting is None or not self._starting.is_alive()):
+            self._starting = threading.Thread(
+                target=self._start, name="browser camera", daemon=True
+            )
+            self._starting.start()
+
+    def _start(self) -> None:
+        """Start the process, which takes a second; the scene continues meanwhile."""
+        worker = self._make(self._pictures, self._begun)
+        self._begun += 1
+        try:
+            worker.open()
+        except SetupError as error:
+            self._fault = f"a browser's camera cannot be used: {error}"
+            return
+        self._worker = worker
+        if self._closed:
+            worker.close()
+
+    def update(self) -> bool:
+        """Begin or end the use of the camera, and return whether that has changed.
+
+        Called by the loop in each tick.
+        """
+        worker, now_s, was_in_use = self._worker, self._now_s(), self.in_use
+        fault, self._fault = self._fault, ""
+        if fault:
+            self._report(fault)
+        if worker is None:
+            return False
+        if now_s - self._pictures.came_s > SILENT_S:
+            self._worker = None
+            if self.in_use:
+                self._switch(None, "the browser's camera has ended: the scene continues")
+            threading.Thread(target=worker.close, name="browser camera", daemon=True).start()
+        elif not self.in_use and worker.latest(now_s) is not None:
+            self._switch(
+                worker,
+                "using a browser's camera; its unknown field of view is assumed to be "
+                f"{FIELD_DEG:g} deg; the scene pauses",
+            )
+        return self.in_use != was_in_use
+
+    def _switch(self, camera: Camera | None, line: str) -> None:
+        self.in_use = camera is not None
+        self._use(camera)
+        self._report(line)
+
+    def close(self) -> None:
+        """End the process; safe to call twice."""
+        self._closed = True
+        worker, self._worker = self._worker, None
+        if worker is not None:
+            worker.close()

@@ -1,0 +1,132 @@
+"""Doors of a running rig: each is a process, which connects to the head like any other program.
+
+A door is the object of an entry point of the group ``gazerig.door``. It uses the public ``import
+gazerig`` only, so nothing that a neighbour sends can delay the control loop.
+"""
+
+import argparse
+import shlex
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from typing import Protocol, cast
+
+from gazerig.drivers.errors import PluginError
+from gazerig.drivers.plugins import DOOR, find
+from gazerig.drivers.process import child_process
+from gazerig.drivers.process.visible_text import visible
+from gazerig.errors import Error
+
+_ENDS_S = 2.0
+_MAX_LINE = 400
+
+
+class RunnableDoor(Protocol):
+    """The object of a door's entry point."""
+
+    summary: str
+
+    def run(
+        self, head: int | str | None = None, address: str = "", bind: str = "",
+        say: Callable[[str], None] = ..., ends_with_input: bool = False,
+    ) -> None:  # fmt: skip
+        """Run the door until it is ended; see ``gazerig.doors.door.Door.run``."""
+
+
+def load_door(name: str) -> RunnableDoor:
+    """Return the door of a name.
+
+    Raises:
+        PluginError: no package has it, or it cannot be imported; the message lists the doors.
+    """
+    found = find(DOOR, name)
+    door = found.load()
+    if not callable(getattr(door, "run", None)):
+        raise PluginError(f"{found.label} is not a Door of gazerig.doors.door")
+    return cast(RunnableDoor, door)
+
+
+class DoorProcesses:
+    """The processes of a rig's doors; one that ends is reported.
+
+    Args:
+        entries: The rig's key ``doors``: the words after ``gazerig door``.
+        pid: Process id of the head.
+        say: Receives one line per message.
+    """
+
+    def __init__(self, entries: Iterable[str], pid: int, say: Callable[[str], None]) -> None:
+        self._entries, self._pid, self._say = tuple(entries), pid, say
+        self._running: list[subprocess.Popen[bytes]] = []
+        self._threads: list[threading.Thread] = []
+        self._closing = False
+
+    def open(self) -> None:
+        """Start all doors, without waiting."""
+        for entry in self._entries:
+            words = (str(self._pid), *shlex.split(entry))
+            pipe = subprocess.PIPE
+            process = child_process.start(__name__, *words, stdin=pipe, stderr=pipe)
+            self._running.append(process)
+            thread = threading.Thread(
+                target=self._follow, args=(entry, process), name=f"door {entry}", daemon=True
+            )
+            self._threads.append(thread)
+            thread.start()
+
+    def close(self) -> None:
+        """End all doors, which end with their input; a process that hangs is killed."""
+        self._closing = True
+        for process in self._running:
+            assert process.stdin is not None
+            with suppress(OSError):
+                process.stdin.close()
+        for process in self._running:
+            try:
+                process.wait(_ENDS_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+        for thread in self._threads:
+            thread.join(_ENDS_S)
+
+    def _follow(self, entry: str, process: "subprocess.Popen[bytes]") -> None:
+        """Report a door's lines, and its end."""
+        label = f"door {next(iter(entry.split()), '')}"
+        with process:
+            for line in process.stderr or ():
+                text = line[:_MAX_LINE].decode("utf-8", "replace").strip()
+                if text and not self._closing:
+                    self._say(f"{label}: {text}")
+            code = process.wait()
+        if not self._closing:
+            self._say(
+                f"{label}: ended with code {code}; the head continues; start the door again with "
+                f"gazerig door {entry}"
+            )
+
+
+def main() -> int:
+    """Run a door until the rig's process ends; its command line: process id, then the entry."""
+
+    def say(line: str) -> None:
+        sys.stderr.write(f"{visible(line)}\n")
+        sys.stderr.flush()
+
+    parser = argparse.ArgumentParser(prog="door")
+    parser.add_argument("pid", type=int)
+    parser.add_argument("name")
+    parser.add_argument("address", nargs="?", default="")
+    parser.add_argument("--bind", default="")
+    entry = parser.parse_args()
+    try:
+        load_door(entry.name).run(entry.pid, entry.address, entry.bind, say, ends_with_input=True)
+    except Error as error:
+        say(str(error))
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
