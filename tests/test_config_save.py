@@ -193,3 +193,10 @@ def test_somebody_elses_change_meanwhile_is_not_lost(small):
     with pytest.raises(ConfigError, match="changed by another program"):
         put(small, {"name": "mine"}, slow)
     assert "id: 77" in small.read_text()
+
+
+def test_flow_mappings_and_block_lists_keep_their_style(small):
+    put(small, {"joints.pan.id": 7, "joints.tilt.gains": (800, 1, 10)})
+    text = small.read_text()
+    assert "    pan: {id: 7, zero_step: 2000}    # flow\n" in text
+    assert "        - 800   # P\n        - 1\n        - 10    # D\n" in text
