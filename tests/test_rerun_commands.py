@@ -48,14 +48,9 @@ def said(*arguments: object) -> tuple[int, str]:
 
 def test_a_rerun_says_that_all_is_the_same(run_file: Path) -> None:
     code, words = said("rerun", run_file)
-    assert code == 0 and "run again" in words
+    assert code == 0
     reported = re.search(r"(\d+) of (\d+) ticks are bit-identical", words)
     assert reported is not None and reported[1] == reported[2] and int(reported[1]) > 350
-
-
-def test_a_rerun_with_another_character_shows_both(run_file: Path) -> None:
-    code, words = said("rerun", run_file, "--character", "shy")
-    assert code == 0 and "saccades" in words
 
 
 def test_a_viewer_reads_the_description_of_the_rig(tmp_path: Path) -> None:
@@ -72,15 +67,6 @@ def test_a_viewer_reads_the_description_of_the_rig(tmp_path: Path) -> None:
         (_, _, state), *_ = reader.iter_messages(["/joint_states"])
     joints = {one.get("name") for one in robot.iter("joint")}
     assert {one["name"] for one in json.loads(state.data)["joints"]} <= joints
-
-
-def test_figures_of_two_runs_stand_side_by_side() -> None:
-    was = {"saccades": 3, "gaze_error_deg": {"median": 0.123456}, "events": [1, 2]}
-    now = {"saccades": 4, "gaze_error_deg": {"median": None}, "blinks": 1}
-    assert list(recordings.compare_figures(was, now)) == [
-        ("saccades", "3", "4"), ("gaze error deg median", "0.1235", "-"),
-        ("events", "2 of them", "-"), ("blinks", "-", "1"),
-    ]  # fmt: skip
 
 
 # --- Runs of a rig of six hobby servos without a neck: recorded, done again, reported, exported

@@ -1,15 +1,14 @@
 """Commands rerun and export, for recorded runs."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.robot.cli.progress import Console, progress_bar
-from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, complete_rig, say
+from gazerig.robot.cli.progress import progress_bar
+from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, say
 
 if TYPE_CHECKING:
     from gazerig.robot.loop.tick import Tick
@@ -23,18 +22,7 @@ Recording = Annotated[
 
 
 @app.command()
-def rerun(
-    file: Recording,
-    rig: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="RIG",
-            help="A rig instead of the recorded one.",
-            autocompletion=complete_rig,
-        ),
-    ] = None,
-    character: Annotated[str | None, typer.Option(help="Another character.")] = None,
-) -> None:
+def rerun(file: Recording) -> None:
     """Run a recording's input through the present models: same input, same bytes."""
     with clear_errors():
         from gazerig.robot.recording.read import RunRecording, report_bad_contents
@@ -43,17 +31,10 @@ def rerun(
         recording = RunRecording(file)
         with report_bad_contents(file), progress_bar() as tell:
             on_tick = _progress(tell, "running again", recording.duration_s)
-            result = run_again(recording, rig, character, on_tick)
-        for line in result.notes:
+            result = run_again(recording, on_tick)
+        for line in (*result.notes, agreement_text(result)):
             say(line)
-        say(agreement_text(result))
-        table = Table("", "recorded", "run again", title=f"{file.name} run again")
-        for name, was, now in compare_figures(result.recorded_figures, result.rerun_figures):
-            table.add_row(name, was, now, style=None if was == now else "bold")
-        Console().print(table)
-    # Results must be identical only if nothing has changed.
-    is_changed = rig is not None or character is not None
-    if not (result.is_same or is_changed):
+    if not result.is_same:
         raise typer.Exit(FAULT)
 
 
@@ -97,29 +78,6 @@ def agreement_text(result: "Rerun") -> str:
             f"; the bytes on the bus are {'the same' if result.sent_bytes_same else 'different'}"
         )
     return text
-
-
-def compare_figures(
-    was: Mapping[str, object], now: Mapping[str, object]
-) -> Iterator[tuple[str, str, str]]:
-    """Return the figures of two runs side by side: name and both values as text."""
-    both = _flat_figures(was), _flat_figures(now)
-    for name in both[0] | both[1]:
-        yield name, both[0].get(name, "-"), both[1].get(name, "-")
-
-
-def _flat_figures(figures: Mapping[str, object], within: str = "") -> dict[str, str]:
-    """Return figures and figures of figures by name as text."""
-    found: dict[str, str] = {}
-    for key, value in figures.items():
-        name = within + key.replace("_", " ")
-        if isinstance(value, Mapping):
-            found |= _flat_figures(value, f"{name} ")
-        elif isinstance(value, list | tuple):
-            found[name] = f"{len(value)} of them"
-        elif value is not None:
-            found[name] = f"{value:.4g}" if isinstance(value, float) else str(value)
-    return found
 
 
 def _progress(
