@@ -1,6 +1,6 @@
 """Commands rerun and export, for recorded runs."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,7 +19,6 @@ app = typer.Typer(add_completion=False)
 Recording = Annotated[
     Path, typer.Argument(metavar="FILE", help="A recording of gazerig run --record.")
 ]
-_EVENTS = ("saccade", "fixation", "pursuit", "blink")
 
 
 @app.command()
@@ -31,7 +30,8 @@ def rerun(file: Recording) -> None:
 
         recording = RunRecording(file)
         with report_bad_contents(file), progress_bar() as tell:
-            result = run_again(recording, _progress(tell, "running again", recording.duration_s))
+            on_tick = _progress(tell, "running again", recording.duration_s)
+            result = run_again(recording, on_tick)
         for line in (*result.notes, agreement_text(result)):
             say(line)
     if not result.is_same:
@@ -46,13 +46,7 @@ def export(
 ) -> None:
     """Export a run as CSV for eye-tracking tools: samples and events, degrees, + left and + up."""
     with clear_errors():
-        from gazerig.robot.recording.export_csv import csv_files, write_csv
-        from gazerig.robot.recording.gaze_angles import (
-            ESTIMATED,
-            collect_gaze_angles,
-            find_intervals,
-            label_samples,
-        )
+        from gazerig.robot.recording.export_csv import GazeExport, csv_files
         from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
         recording = RunRecording(file)
@@ -60,19 +54,16 @@ def export(
         refuse_existing(*csv_files(stem), force=force)
         if recording.note:
             say(recording.note)
+        gaze = GazeExport()
         with report_bad_contents(file), progress_bar() as tell:
             on_tick = _progress(tell, "reading", recording.duration_s)
-            trace = collect_gaze_angles(_watch(recording.ticks(), on_tick))
-            labels = label_samples(trace)
-            stretches = find_intervals(trace, labels)
-        say("\n".join(map(str, write_csv(trace, labels, stretches, stem, force))))
-        counts = (f"{sum(s.event == kind for s in stretches)} {kind}s" for kind in _EVENTS)
-        say(
-            f"{len(trace.time_s)} samples in {trace.time_s[-1]:.1f} s, {', '.join(counts)}; labels "
-            f"are the plan's, {1e3 * labels.lag_s:.0f} ms later, as the eyes follow it"
-        )
-        if trace.estimated:
-            say(f"{', '.join(trace.estimated)}: {ESTIMATED}")
+            for tick in recording.ticks():
+                gaze.update(tick)
+                on_tick(tick)
+        summary = gaze.write(stem, force)
+        say("\n".join(map(str, (*csv_files(stem), summary))))
+        if gaze.estimated:
+            say(f"estimated from commands, not measured: {', '.join(gaze.estimated)}")
 
 
 def agreement_text(result: "Rerun") -> str:
@@ -101,9 +92,3 @@ def _progress(
         tell(text, min(1.0, (tick.t_s - start_s[0]) / total_s) if total_s else 1.0)
 
     return on_tick
-
-
-def _watch(ticks: Iterable["Tick"], on_tick: Callable[["Tick"], None]) -> Iterator["Tick"]:
-    for tick in ticks:
-        on_tick(tick)
-        yield tick
