@@ -206,10 +206,6 @@ class RunOptions:
             unknown_text("--bus", str(bus), BUSES),
         )
         yield (
-            bus is not None and self.port is not None,
-            f"--bus {bus} and --port exclude each other: servos at a port are real",
-        )
-        yield (
             bus is not None and not mock,
             f"--bus {bus} needs --mock: it selects the replacement of the rig's servos",
         )
@@ -240,16 +236,12 @@ class RunOptions:
             "--world with --bus ideal needs --fast: ideal servos have no real time",
         )
         yield (
-            world and self.pixels,
-            "--world and --pixels exclude each other: a world is rendered in any case",
-        )
-        yield (
             self.no_pictures and not world,
             "--no-pictures needs --world: pictures of a scene are drawn only with --pixels",
         )
         yield (
             self.pixels and scene is None,
-            "--pixels draws a scene: it cannot be used with a film or a camera",
+            "--pixels draws a scene: it cannot be used with a world, a film or a camera",
         )
         yield (
             self.pixels and not self.fast,
