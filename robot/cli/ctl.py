@@ -72,13 +72,6 @@ def connect(pid: str | None, who: str = "") -> Iterator[RobotClient]:
         yield rig
 
 
-def complete_key(incomplete: str) -> list[str]:
-    """Complete a key of the running rig."""
-    with contextlib.suppress(DriverError), RobotClient.connect() as rig:
-        return list(rig.get(incomplete))
-    return []
-
-
 @ctl.command()
 def rigs(as_json: JsonOption = False) -> None:
     """List the running rigs: name, rig, process, address of the page with its token."""
@@ -101,9 +94,7 @@ def rigs(as_json: JsonOption = False) -> None:
 def get(
     prefix: Annotated[
         str,
-        typer.Argument(
-            metavar="KEY", help="A key, or the start of keys.", autocompletion=complete_key
-        ),
+        typer.Argument(metavar="KEY", help="A key, or the start of keys."),
     ] = "",
     differs: Annotated[
         bool, typer.Option("--differs", help="Only values that differ from the defaults.")
