@@ -194,9 +194,6 @@ def test_an_unknown_key_of_a_joint_is_the_only_error(
     assert "left_eye_pan.zero_stepp: unknown key; did you mean 'zero_step'" in line
 
 
-MINIMAL = DESK.with_name("minimal.yaml")
-
-
 def test_a_shell_sees_that_line_and_that_exit_code() -> None:
     done = gazerig("run", "--no-page", "--mock", "--scene", "circus", timeout=30)
     one_line_and_exit_code_2(done.returncode, done.stderr, "circus")
