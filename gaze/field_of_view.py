@@ -7,8 +7,8 @@ moving fist. Own bodies are therefore excluded.
 
 from math import atan2, radians, sqrt
 
-from gazerig.gaze.angles import angles_of, compose, direction, rotate, rotate_back, rotation, sub
-from gazerig.gaze.types import Angles2, Angles3, BodyRows, GazeState, Mat3, Vec3
+from gazerig.gaze.angles import compose, direction, rotate, rotate_back, rotation, sub
+from gazerig.gaze.types import Angles2, BodyRows, GazeState, Mat3, Vec3
 
 FIELD_DEG = (100.0, 60.0, 60.0, 75.0)
 """Extent of an eye's field from its line of sight towards temple and nose, up and down."""
@@ -53,11 +53,6 @@ def eye_axes(state: GazeState, left: bool) -> Mat3:
     """Return R_world_eye of one eye: x along its line of sight, y left, z up."""
     angles: Angles2 = state.eye_left_rad if left else state.eye_right_rad
     return compose(state.R_world_head, rotation((angles[0], angles[1], 0.0)))
-
-
-def head_in_space(state: GazeState) -> Angles3:
-    """Return the head's (yaw, pitch, roll) in the world: the neck's if no lower neck is bent."""
-    return state.head_rad if state.base_rad == (0.0, 0.0) else angles_of(state.R_world_head)
 
 
 def line_of_sight(state: GazeState, left: bool) -> Vec3:

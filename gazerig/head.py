@@ -109,9 +109,6 @@ class Order:
     def wait(self, timeout_s: float | None = 10.0) -> Outcome:
         """Wait until the order has ended; step a head in simulated time until then.
 
-        For a point that is out of reach this returns as soon as the reply arrives; the head is then
-        still moving.
-
         Args:
             timeout_s: seconds by the head's own clock; None: without limit.
 

@@ -178,7 +178,8 @@ LEFT, RIGHT = [1.0, 0.3, 0.3], [1.0, -0.3, 0.3]
 def test_orders_have_outcomes(rig: Rig) -> None:
     status, answer = rig.post({"do": "look_at", "p_world_m": LEFT, "tag": "a"}, "?wait_s=15")
     assert status == 200 and answer["tag"] == "a" and answer["outcome"] == "arrived"
-    assert rig.post({"do": "look_at", "p_world_m": [-1, 0.1, 0.3]})[1]["outcome"] == "out of reach"
+    behind = rig.post({"do": "look_at", "p_world_m": [-1, 0.1, 0.3]}, "?wait_s=15")[1]
+    assert behind["outcome"] == "out of reach"
     assert rig.post({"do": "play", "track": "nod"}, "?wait_s=15")[1]["outcome"] == "arrived"
     status, answer = rig.post({"do": "look_at_person", "id": 99})
     assert status == 409 and "99" in answer["refused"] and answer["reply"]["refused"]

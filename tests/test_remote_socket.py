@@ -348,9 +348,7 @@ def test_a_program_leads_while_it_lives_and_is_named(
     monkeypatch.setattr(client_control, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
     monkeypatch.setattr(client, "_EVERY_S", 0.05)
     with RobotClient.connect(who="a show") as show:
-        reply = show.send(LookAt((-1.0, 0.0, 0.3)))
-        assert 60.0 < reply.error_deg < 90.0 and "neck_yaw stays at" in reply.text()
-        assert show.in_control
+        assert show.send(LookAt((-1.0, 0.0, 0.3))).control_number and show.in_control
         status = rig.status()
         assert status["controlled_by"] == f"a show (process {os.getpid()}): look at -1 0 0.3"
         count = len(beat.ticks)

@@ -274,9 +274,9 @@ def look(
                 rig.look_freely()
                 say("it looks freely")
                 return
-            reply = rig.send(structs.replace(command, stay=stay))
+            rig.send(structs.replace(command, stay=stay))
             until = "Ctrl-C" if seconds is None else f"{seconds:g} s have passed"
-            say(f"{reply.text()}, until: {'gazerig ctl look free' if stay else until}")
+            say(f"it looks there, until: {'gazerig ctl look free' if stay else until}")
             if stay:
                 return
             # Until Ctrl-C or until another client controls the gaze.

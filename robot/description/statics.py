@@ -17,11 +17,9 @@ from gazerig.robot.description.links import (
 )
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.kinematics import LOWER_NECK, NECK
+from gazerig.robot.model.kinematics import NECK
 from gazerig.robot.model.weight import GEAR_FRICTION, MovingBody, weight_nm
 
-NECK_JOINTS = (*LOWER_NECK, *NECK)
-"""Joints that carry the head."""
 STRONG_SHARE = 1.0 / 3.0
 """Fraction of the stall torque above which a servo becomes hot while it holds."""
 _CELLS = 64
@@ -84,7 +82,7 @@ class Statics:
         is that end of its range.
         """
         pose = dict(near_rad)
-        necks = [name for name in NECK_JOINTS if name in self.joints]
+        necks = [name for name in NECK if name in self.joints]
         for name in (*necks, *necks):
             pose[name] = self._rest_rad(name, pose)
         return {name: pose[name] for name in necks}

@@ -217,7 +217,7 @@ class Robot:
         self.guard.reset(t_s, goals)
         joints = self.body.read(t_s)
         pose = self.kinematics.forward(joints)
-        self.poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
+        self.poses.remember(t_s, pose.head_rad, pose.R_world_head)
         self.newest = None
         self.attention.reset(t_s)
         self.conversation_gaze.reset(t_s)
@@ -258,7 +258,7 @@ class Robot:
         lead, stop, conversation = executor.lead, executor.stop, executor.conversation
         joints = self.body.read(t_s)
         pose = self.kinematics.forward(joints)
-        self.poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
+        self.poses.remember(t_s, pose.head_rad, pose.R_world_head)
         if executor.models_took_over():
             self.oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)
@@ -299,7 +299,7 @@ class Robot:
         self.newest = Tick(
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events,
             commands, stop.reason,
-            lead.measure(target, pose, joints.position_rad, converges, t_s),
+            lead.measure(target, pose, gaze, joints.position_rad, converges, t_s),
             self.track_choices.states(t_s),
             conversation=conversation.state,
         )  # fmt: skip

@@ -35,6 +35,7 @@ class ControlState(Struct, frozen=True):
         description: Command as text, e.g. "look at 1 0 0.3", "neck_yaw at 17.2 deg".
         joints: Held joints.
         since_s: Start of the same client's uninterrupted control of this kind.
+        limited: Error of a gaze that rests off its point, and the angles that limit it, else "".
     """
 
     number: int = 0
@@ -47,6 +48,7 @@ class ControlState(Struct, frozen=True):
     description: str = ""
     joints: tuple[str, ...] = ()
     since_s: float = 0.0
+    limited: str = ""
 
     @property
     def client(self) -> str:

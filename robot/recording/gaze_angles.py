@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.angles import add, angle_between, sub, yaw_pitch
-from gazerig.gaze.field_of_view import head_in_space, line_of_sight
+from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3, body_name
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Jog, Stop
@@ -143,7 +143,7 @@ class GazeAnglesBuilder:
         left, right, cyclopean = gaze_in_space(pose)
         planned = _degrees(sub(tick.gaze.gaze_point_world_m, pose.p_world_head_m))
         lids = [pose.lid_left, pose.lid_right, pose.lower_left, pose.lower_right]
-        head = tuple(map(degrees, head_in_space(pose)))
+        head = tuple(map(degrees, pose.head_rad))
         self._joints = tick.guard_result.joints
         self._estimated.update(dict.fromkeys(tick.estimated_joints))
         if missing:

@@ -25,7 +25,7 @@ from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory, fixed_mount
-from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
+from gazerig.robot.model.kinematics import NECK, Kinematics
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.motion_source import MotionSource
 from gazerig.robot.run.options import RunOptions
@@ -197,13 +197,11 @@ def true_head_pose(steps: Callable[[], dict[str, float]], rig: Rig, head: Kinema
     Its mechanics are those of the rig at the start, even if parameters change later.
     """
     pairs = rig.couplings.values()
-    necks = (*NECK, *LOWER_NECK)
     linkages = {
         name: rig.joints[name].make_linkage()
-        for name in {*necks, *(joint for pair in pairs for joint in pair.joints)}
-        & rig.joints.keys()
+        for name in {*NECK, *(joint for pair in pairs for joint in pair.joints)} & rig.joints.keys()
     }
-    absent, angles_of = dict.fromkeys(necks, 0.0), itemgetter(*necks)
+    absent, angles_of = dict.fromkeys(NECK, 0.0), itemgetter(*NECK)
 
     def now(_: float) -> tuple[Mat3, Vec3]:
         at, angles = steps(), absent.copy()
@@ -212,8 +210,7 @@ def true_head_pose(steps: Callable[[], dict[str, float]], rig: Rig, head: Kinema
         for pair in pairs:
             first, second = pair.joints
             angles[first], angles[second] = pair.joint_rad((angles[first], angles[second]))
-        yaw, pitch, roll, lower_yaw, lower_pitch = angles_of(angles)
-        return head.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
+        return head.head_pose(angles_of(angles))
 
     return now
 

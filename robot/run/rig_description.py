@@ -9,12 +9,12 @@ from gazerig.config.rig import Rig
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import Description
 from gazerig.robot.description.statics import (
-    NECK_JOINTS,
     STRONG_SHARE,
     Statics,
     moving_bodies,
 )
 from gazerig.robot.loop.sag import SagCompensation
+from gazerig.robot.model.kinematics import NECK
 from gazerig.robot.model.types import JointAngles, order_joints
 from gazerig.robot.model.weight import AMBIENT_C, STALL_RISE_C, MassParams
 from gazerig.robot.run.rig_limits import lid_ends, park_rad
@@ -49,14 +49,14 @@ def statics_of(rig: Rig, *, of_neck: bool = False) -> Statics:
         rig: the rig.
         of_neck: only for the joints of the neck, with all others at 0, which is faster.
     """
-    joints = {n: joint for n, joint in rig.joints.items() if not of_neck or n in NECK_JOINTS}
+    joints = {n: joint for n, joint in rig.joints.items() if not of_neck or n in NECK}
     pairs = [pair for pair in rig.couplings.values() if {*pair.joints} <= {*joints}]
     return Statics(moving_bodies(description_of(rig), joints), joints, pairs)
 
 
 def sag_compensation(rig: Rig) -> SagCompensation | None:
     """Return what makes up for the sag of a rig's neck; None without a neck."""
-    if rig.joints.keys().isdisjoint(NECK_JOINTS):
+    if rig.joints.keys().isdisjoint(NECK):
         return None
     return SagCompensation(statics_of(rig, of_neck=True), order_joints(rig.joints))
 
@@ -70,7 +70,7 @@ def rest_park_deg(rig: Rig) -> dict[str, float]:
     Only masses in the rig's file change it, because masses from shapes are estimates.
     """
     park = dict(rig.park_deg)
-    if rig.mass == MassParams() or rig.joints.keys().isdisjoint(NECK_JOINTS):
+    if rig.mass == MassParams() or rig.joints.keys().isdisjoint(NECK):
         return park
     statics = statics_of(rig, of_neck=True)
     pose = {name: radians(park.get(name, 0.0)) for name in statics.joints}
@@ -118,7 +118,7 @@ _SMALLEST = 0.01
 
 def weight_findings(rig: Rig) -> Iterator[WeightFinding]:
     """Return findings about the load of a neck at rest, its heat, and its motion when parked."""
-    if rig.joints.keys().isdisjoint(NECK_JOINTS):
+    if rig.joints.keys().isdisjoint(NECK):
         return
     statics = statics_of(rig, of_neck=True)
     level = statics.stall_shares({})

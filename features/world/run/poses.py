@@ -8,12 +8,12 @@ from gazerig.drivers.camera.shared_slots import TimedPose
 from gazerig.features.world.state_file import StateReader, WorldState
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
+from gazerig.robot.model.kinematics import NECK, Kinematics
 
 if TYPE_CHECKING:
     from gazerig.features.world.physics import World
 
-_ABSENT = dict.fromkeys((*NECK, *LOWER_NECK), 0.0)
+_ABSENT = dict.fromkeys(NECK, 0.0)
 
 
 class RigInState(NamedTuple):
@@ -33,8 +33,7 @@ class RigInState(NamedTuple):
         for name in angles.keys() & self.joints.keys():
             angles[name] = float(state.qpos[self.joints[name]])
         yaw, pitch, roll = (angles[name] for name in NECK)
-        lower_yaw, lower_pitch = (angles[name] for name in LOWER_NECK)
-        return self.kinematics.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
+        return self.kinematics.head_pose((yaw, pitch, roll))
 
 
 class WorldPoses:
@@ -74,7 +73,7 @@ class WorldPoses:
         """Return the current pose of the head; upright before the first state."""
         newest = self._file().newest()
         if newest is None:
-            return self._rig.kinematics.head_pose((0.0, 0.0, 0.0), (0.0, 0.0))
+            return self._rig.kinematics.head_pose((0.0, 0.0, 0.0))
         return self._rig.head(newest)
 
     def _file(self) -> StateReader:
