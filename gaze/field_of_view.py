@@ -13,8 +13,6 @@ from gazerig.gaze.types import Angles2, BodyRows, GazeState, Mat3, Vec3
 FIELD_DEG = (100.0, 60.0, 60.0, 75.0)
 """Extent of an eye's field from its line of sight towards temple and nose, up and down."""
 _TEMPORAL, _NASAL, _UP, _DOWN = map(radians, FIELD_DEG)
-OWN = "own"
-"""Kind of bodies that belong to the robot itself and are never targets."""
 
 
 def visible_bodies(bodies: BodyRows, state: GazeState) -> dict[int, str]:
@@ -28,11 +26,8 @@ def visible_bodies(bodies: BodyRows, state: GazeState) -> dict[int, str]:
     return {
         id: kind
         for id, p, kind in zip(bodies.ids, bodies.p_world_m, bodies.kinds, strict=True)
-        if kind != OWN
-        and (
-            _is_inside(p, state.p_world_eye_left_m, left, left=True)
-            or _is_inside(p, state.p_world_eye_right_m, right, left=False)
-        )
+        if _is_inside(p, state.p_world_eye_left_m, left, left=True)
+        or _is_inside(p, state.p_world_eye_right_m, right, left=False)
     }
 
 

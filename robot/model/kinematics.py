@@ -9,57 +9,21 @@ yaw axis.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import asin, atan2, hypot, pi, sqrt
+from math import asin, atan2, hypot, pi
 from operator import itemgetter
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from gazerig.gaze.angles import (
     add,
     angle_between,
-    dot,
-    norm,
     rotate,
     rotation,
-    scale,
     sub,
 )
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, order_joints
-
-
-class Capsule(NamedTuple):
-    """All points within ``radius_m`` of the line from ``start_m`` to ``end_m``, in one frame."""
-
-    start_m: Vec3
-    end_m: Vec3
-    radius_m: float
-
-    def contains(self, p_m: Vec3) -> bool:
-        """Return whether a point is inside."""
-        axis = sub(self.end_m, self.start_m)
-        along = dot(sub(p_m, self.start_m), axis) / max(dot(axis, axis), 1e-12)
-        nearest = add(self.start_m, scale(axis, min(1.0, max(0.0, along))))
-        return norm(sub(p_m, nearest)) < self.radius_m
-
-    def hit_m(self, p_m: Vec3, direction: Vec3) -> float | None:
-        """Return the distance from an outside point along a unit vector, None without a hit.
-
-        The distance is that to the sphere about the point of the line nearest to the ray.
-        """
-        axis, off = sub(self.end_m, self.start_m), sub(self.start_m, p_m)
-        aa, ad = dot(axis, axis), dot(axis, direction)
-        denominator = aa - ad * ad
-        share = 0.0
-        if denominator > 1e-12:
-            share = (ad * dot(off, direction) - dot(off, axis)) / denominator
-        middle = add(off, scale(axis, min(1.0, max(0.0, share))))
-        along = dot(middle, direction)
-        off2 = dot(middle, middle) - along * along
-        if along <= 0.0 or off2 >= self.radius_m**2:
-            return None
-        return along - sqrt(self.radius_m**2 - off2)
 
 
 @dataclass(frozen=True)
@@ -134,15 +98,9 @@ class Kinematics:
         )
         return R, p
 
-    def body_volumes(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Capsule, Capsule]:
-        """Return approximate volumes of head and neck in the world.
-
-        The head extends from the neck's pitch axis to the point between the eyes, with the eyes'
-        distance as radius. The neck extends from its base to that axis, with half that radius.
-        """
-        pivot = add(p_world_head_m, rotate(R_world_head, (-self._ahead_m, 0.0, -self._above_m)))
-        head = Capsule(pivot, p_world_head_m, 2.0 * self._half)
-        return head, Capsule((0.0, 0.0, 0.0), pivot, self._half)
+    def pivot_m(self, R_world_head: Mat3, p_world_head_m: Vec3) -> Vec3:
+        """Return the intersection of the neck's pitch and roll axes in the world."""
+        return add(p_world_head_m, rotate(R_world_head, (-self._ahead_m, 0.0, -self._above_m)))
 
     def neck_angles_to(self, p_world_m: Vec3) -> Angles2:
         """Return the neck yaw and pitch at which the head's x axis passes through a point.

@@ -62,7 +62,6 @@ from gazerig.robot.run.rig_limits import (
 )
 from gazerig.robot.run.run_rig import run_info, with_options
 from gazerig.robot.run.surroundings import RunRoom, refuse_missing_rules, scene_of, world
-from gazerig.robot.run.track_file import TrackFolder
 from gazerig.robot.run.voice import RunVoice
 from gazerig.robot.safety.guard import Guard
 
@@ -170,7 +169,7 @@ class Run:
             attention = chooser or with_rule(rig, models.attention)
             if rule is not None:
                 attention = RuleChooser(rule, attention, _label("attention", rule))
-            self.tracks = _tracks(rig, models, options.rig)
+            self.tracks = _tracks(rig, models)
             self.robot = Robot(
                 wrap_body(self.body) if wrap_body is not None else self.body,
                 models.kinematics,
@@ -180,7 +179,6 @@ class Run:
                     view.params.horizontal_field_deg,
                     face_parts_m(rig),
                     view.params.lens,
-                    models.kinematics.body_volumes,
                 ),
                 view.poses,
                 attention,
@@ -310,14 +308,13 @@ class Run:
         browser.close()
 
 
-def _tracks(rig: Rig, models: GazeModels, rig_file: str) -> TrackChoices:
-    """Return the tracks of a rig, those in the folder beside its file included."""
+def _tracks(rig: Rig, models: GazeModels) -> TrackChoices:
+    """Return the tracks of a rig."""
     return TrackChoices(
         tracks_of(rig.track_files),
         models.animation.tracks,
         TrackFit(rig.names, lid_spans(rig), face_tables(rig)),
         rig.gaze.oculomotor.eye_lag_ms / 1e3,
-        TrackFolder(rig_file).changes,
     )
 
 

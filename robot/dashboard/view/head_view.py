@@ -147,7 +147,7 @@ def eyes_m(head: ShownHead) -> tuple[Vec3, Vec3]:
 def pivot_m(head: ShownHead) -> Vec3:
     """Return the intersection of the neck's pitch and roll axes, world."""
     pose = head.tick.pose
-    return head.rig.kinematics.body_volumes(pose.R_world_head, pose.p_world_head_m)[0].start_m
+    return head.rig.kinematics.pivot_m(pose.R_world_head, pose.p_world_head_m)
 
 
 def head_dimensions(head: ShownHead) -> HeadMeasures:
