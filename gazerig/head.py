@@ -410,9 +410,8 @@ class Head(ABC):
         return self._send(Talk("thinking", person, stay=self._stay))
 
     def speaking(
-        self, person: int | None = None, *, seconds: float | None = None, text: str = "",
-        words: Iterable[tuple[str, float]] = (), sound: Path | str = "",
-    ) -> Order:  # fmt: skip
+        self, person: int | None = None, *, seconds: float | None = None, text: str = ""
+    ) -> Order:
         """Look as a speaker does, from now on; report it when the sound begins.
 
         A long turn begins averted, and the gaze returns to the partner before the planned end.
@@ -420,17 +419,13 @@ class Head(ABC):
 
         Args:
             person: as in ``listening``: the addressee.
-            seconds: time until the planned end; None: from ``words``, or estimated from ``text``.
+            seconds: time until the planned end; None: estimated from ``text``.
             text: what is spoken.
-            words: (word, start in seconds from now) pairs.
-            sound: path of the sound file that is spoken.
 
         Raises:
             Refused: a value is invalid.
         """
-        return self._send(
-            Talk("speaking", person, seconds, text, tuple(words), str(sound), self._stay)
-        )
+        return self._send(Talk("speaking", person, seconds, text, self._stay))
 
     def interrupt(self) -> Order:
         """Return to the face at once and listen: the partner has interrupted speech or thought."""

@@ -149,8 +149,8 @@ def test_a_viewer_sees_head_and_eyes_as_they_stand_in_space(recorded: Recorded) 
 
 @pytest.mark.parametrize("odd", [0.25, nan, -inf])
 def test_any_tick_comes_back(recorded: Recorded, odd: float, tmp_path: Path) -> None:
-    track = TrackState(2, "nod", 0.5, 1.0, owns=("jaw",), who="somebody", since_s=3.5)
-    lead = ControlState(4, True, False, odd, "", "pointer", "somebody", "look", ("neck_yaw",), 1.5)
+    track = TrackState(2, "nod", 0.5, 1.0, owns=("jaw",), who="somebody")
+    lead = ControlState(4, True, False, odd, "", "pointer", "somebody", "look", ("neck_yaw",))
     face = Face(3, (odd, 0.0, 1.0), (0.0,) * 3, ((1.0, 0.0, 0.0),) * 3, ((odd,) * 3,) * 8, 0.5)
     bodies = Bodies((3, 9), ("face", "hand"), *(np.full((2, 3), odd),) * 3, np.array([odd, 1.0]),
                     np.full((2, 6, 6), odd))  # fmt: skip

@@ -134,7 +134,7 @@ class ClientControl:
             if not self.has_target:
                 self.end(f"{command.who or 'a client'} has released the joints")
             elif self.state.active:  # the gaze returns to the previous target
-                state = self._new_state(self.state.number, self.state, t_s)
+                state = self._new_state(self.state.number)
                 self.state = replace(state, arrived=self.state.arrived)
             return
         if command.who != self._lease.who:
@@ -234,9 +234,9 @@ class ClientControl:
         self._lease.start(command.who, command.stay, t_s)
         self._started_s = t_s
         self._until_s = None if command.for_s is None else t_s + command.for_s
-        self.state = self._new_state(before.number + 1, before, t_s)
+        self.state = self._new_state(before.number + 1)
 
-    def _new_state(self, number: int, before: ControlState, t_s: float) -> ControlState:
+    def _new_state(self, number: int) -> ControlState:
         """Return the state of a control that begins or changes its target."""
         pointer = isinstance(self._look, LookAt) and self._look.pointer
         state = ControlState(
@@ -246,13 +246,10 @@ class ClientControl:
             who=self._lease.who,
             description=_look_text(self._look),
             joints=tuple(self._jogged),
-            since_s=t_s,
         )
         if self._jogged:
             angles = (f"{name} at {degrees(a):.1f} deg" for name, a in self._jogged.items())
             state = replace(state, description=", ".join(angles))
-        if before.active and (before.kind, before.who) == (state.kind, state.who):
-            state = replace(state, since_s=before.since_s)
         return state
 
 

@@ -282,7 +282,7 @@ def _gaze(tick: Tick, source: ControlSource) -> tuple[GazeReading, str]:
     name, reason, phase, kind = target_name(target), target.why, str(gaze.phase), target.kind
     part = PART_NAMES[target.part] if target.part is not None else None
     headline = _looks_text(target)
-    sentence = control_sentence(source, tick.t_s)
+    sentence = control_sentence(source)
     if source.kind == "track":
         headline = f"{sentence}, and {headline}"
     elif source.overrides_gaze:

@@ -226,7 +226,7 @@ class TrackChoices:
         state = TrackState(
             self._number, name, voice.position_s(t_s), motion.length_s, motion.rate, rounds == 0,
             fit.owns(track), command.who, track.sound, limited="; ".join(filter(None, limited)),
-            since_s=t_s, volume=track.volume,
+            volume=track.volume,
         )  # fmt: skip
         self._started.append((voice, state))
         return CommandReply(track=reply)

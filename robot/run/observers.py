@@ -156,10 +156,6 @@ class RunObservers:
             observers.add("the remote control", self._server.update)
         observers.add("the voice", self._run.voice.update)
 
-    def busy_message(self) -> str:
-        """Return a message if the computer is too busy, "" if not or if time is simulated."""
-        return busy_text(self._timing.figures())
-
     def show_parking(self, tick: Tick) -> None:
         """Show a tick of the motion to the parking pose, which is not recorded."""
         with contextlib.suppress(Exception):  # nothing may prevent the head from parking
