@@ -259,22 +259,6 @@ def test_what_is_too_large_for_a_hand_at_the_persons_distance_is_as_near_as_make
     assert level(found.p_m) == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    "seen",
-    [FIST._replace(compact=False),  # an arm
-     FIST._replace(radius_m=0.19),  # a large hand
-     FIST._replace(p_m=(0.9, 0.2, -0.1), fastest_m=(0.9, 0.2, -0.1), radius_m=0.13,
-             depth_measured=True, along_sd_m=0.02)],
-)  # fmt: skip
-def test_other_hands_are_as_far_as_the_person_or_as_measured(seen: Located) -> None:
-    hands = Hands()
-    for k in range(6):
-        (found,) = hands.label([seen], [FACE], EYE, k / 30)
-    assert level(found.p_m) == pytest.approx(
-        level(seen.p_m) if seen.depth_measured else 1.0, abs=0.02
-    )
-
-
 def reaching(wide_m: float, **more: object) -> Located:
     """Return an arm from aside, as wide as given if it were as far away as the person of FACE."""
     said = {"from_side": True, "p": (2.0, 1.1, -0.2), "fastest_m": BESIDE} | more
@@ -286,19 +270,3 @@ def test_an_arm_that_comes_in_at_the_side_is_as_near_as_makes_it_as_wide_as_a_ha
     seen = [reaching(0.17)] * 3 + [reaching(0.06)] * 3 + [reaching(0.25)] * 2
     away = [level(hands.label([one], [FACE], EYE, k / 30)[0].p_m) for k, one in enumerate(seen)]
     assert away[1:] == pytest.approx([0.5] * 7, abs=0.03), "and stays there as less of it moves"
-
-
-@pytest.mark.parametrize(
-    "seen",
-    [reaching(0.1),  # as wide as an arm is there
-     reaching(0.17, from_side=False), reaching(0.17, p=(2.0, 0.55, -0.4)),  # from the shoulder
-     reaching(0.17, p=(1.0, 0.55, -0.1), fastest_m=(1.0, 0.35, -0.1), radius_m=0.12,
-              depth_measured=True, along_sd_m=0.02)],
-)  # fmt: skip
-def test_other_arms_are_as_far_as_the_person_or_as_measured_however_wide(
-    seen: Located,
-) -> None:
-    hands = Hands()
-    for k, one in enumerate([patch(from_side=True)] * 2 + [seen] * 4):
-        (found,) = hands.label([one], [FACE], EYE, k / 30)
-    assert found.kind == HAND and level(found.p_m) == pytest.approx(1.0, abs=0.07)
