@@ -284,7 +284,6 @@ class Robot:
             guard_result = stopped_result(joints, desired, stop.reason, self.body.names)
         else:
             guard_result = self.guard.check(desired, joints, self._frame_age_s(percept, t_s), t_s)
-            self.messages += self.guard.take_reports()
             self.body.write(guard_result.command_rad)
         executor.commanded_rad = guard_result.command_rad
         executor.remember_people(percept)

@@ -1,6 +1,5 @@
 """Emulated scenes: their picture, and a boxer whom a person can move."""
 
-from collections.abc import Sequence
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from gazerig.drivers.camera.pinhole import Intrinsics
@@ -38,10 +37,6 @@ class SceneView(Protocol):
 
 class MovableOpponent(Protocol):
     """A boxer; its times are those of the scene."""
-
-    @property
-    def spans_s(self) -> Sequence[tuple[float, float]]:
-        """Return the times in which a person moved it, (start, end)."""
 
     def move(self, p_m: Vec3, t_s: float) -> None:
         """Move the leading fist to a point."""
