@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
@@ -20,13 +20,15 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.net.request_handler import (
     REFUSALS,
     LoopMonitor,
-    ParamAccess,
-    PathGuard,
     RequestHandler,
-    Speaker,
     accept_only_stops,
 )
 from gazerig.robot.net.socket_server import RemoteServer
+
+if TYPE_CHECKING:
+    from gazerig.config.rig_files import AllowedFolder
+    from gazerig.robot.run.live import ParamStore
+    from gazerig.robot.run.voice import RunVoice
 
 EVERY_S = 0.5
 _CALIBRATED = "it is being calibrated"
@@ -142,14 +144,14 @@ class LiveServer:
     def __init__(
         self,
         robot: Robot,
-        tuning: ParamAccess | None,
+        tuning: "ParamStore | None",
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
-        paths: PathGuard | None = None,
-        voice: Speaker | None = None,
+        paths: "AllowedFolder | None" = None,
+        voice: "RunVoice | None" = None,
     ) -> None:
         self._say, self._tuning = say, tuning
         pulse = LoopMonitor(clock)
