@@ -22,7 +22,6 @@ from gazerig.robot.loop.tick_stream import Observers, TickStream, failure_text
 from gazerig.robot.loop.timing import LoopTiming, busy_text
 from gazerig.robot.model.commands import Talk
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.scene import has_opponent
 from gazerig.robot.net.client import rig_name
 from gazerig.robot.net.live_server import LiveServer
 from gazerig.robot.net.topics import JointInfo, RigInfo, RunState
@@ -114,7 +113,7 @@ class RunObservers:
             run.rig.name,
             str(run.params.path),
             options.mock,
-            has_opponent(shapes),
+            shapes is not None and shapes.opponent is not None,
             "" if computed else str(detector_status(run.rig.detector)),
             level_text(options.computer) if options.computer is not None else "",
             dict(zip(names, map(_joint_info, limits(run.rig.joints)), strict=True)),
