@@ -5,7 +5,7 @@ from collections.abc import Callable
 from functools import partial
 from math import radians
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from gazerig.drivers.camera.file_player import FilePlayer
+    from gazerig.features.world.run.poses import WorldPoses
     from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera
 
 HeadPose = Callable[[float], tuple[Mat3, Vec3]]
@@ -292,15 +293,6 @@ class SyntheticMotion:
         return self._detector.find(shot.image, shot.captured_s, lens, turned)
 
 
-class NewestHeadPose(Protocol):
-    """Newest pose of the head in the camera's process; ``first_s``: start of the scene."""
-
-    @property
-    def first_s(self) -> float: ...  # noqa: D102
-
-    def newest(self) -> TimedPose | None: ...  # noqa: D102
-
-
 _LOOK_S = 0.002
 
 
@@ -315,7 +307,9 @@ class DrawnSource:
         poses: Poses of the head.
     """
 
-    def __init__(self, make: "Callable[[HeadPose], PixelCamera]", poses: NewestHeadPose) -> None:
+    def __init__(
+        self, make: "Callable[[HeadPose], PixelCamera]", poses: "PoseBuffer | WorldPoses"
+    ) -> None:
         self._camera, self._poses = make(self._head_pose), poses
         self._now: TimedPose | None = None
         self._number = 0
