@@ -11,6 +11,7 @@ from fakes.scenes import EmptyScene
 from present import present
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.types import Located
 from gazerig.gaze.angles import angle_between, rotation, sub
 from gazerig.gaze.attention.persons import Persons
@@ -18,8 +19,8 @@ from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.hands import HAND, Hands, Known
+from gazerig.robot.perception.motion_source import MotionSource
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.run.cameras import SyntheticMotion
 from gazerig.robot.run.surroundings import load_scene
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
@@ -65,7 +66,8 @@ def frames(scene: Scene, start_s: float, end_s: float) -> Iterator[Frame]:
     drawn = FrameParams(latency_ms=0.0, horizontal_field_deg=field)
     truth = SceneCamera(FrameParams(latency_ms=0.0), later, mount, lambda t_s: head, rng)
     truth.open()
-    motion, locate = SyntheticMotion(rig.motion), FrameLocator(None, radians(field))
+    turns, locate = PoseBuffer(), FrameLocator(None, radians(field))
+    motion = MotionSource(rig.motion, None, radians(field), turns)
     camera = PixelCamera(
         drawn, DrawnScene(later), mount, lambda t_s: head, detector, rng, motion, locate
     )
@@ -74,6 +76,7 @@ def frames(scene: Scene, start_s: float, end_s: float) -> Iterator[Frame]:
     poses = PoseHistory(neck)
     for number in range(round(30.0 * (end_s - start_s))):
         t_s = number / 30.0 + 1e-6
+        turns.record(t_s, mount.rotation(head[0]))
         poses.remember(t_s, (0.0, 0.0, 0.0))
         found = truth.latest(t_s)
         faces.found = found.faces if found is not None else ()
