@@ -228,7 +228,7 @@ def joints_of(text: str) -> tuple[str, ...]:
 def _lines(new: NewRig, board: _Board) -> Iterator[str]:
     usual = {name: _TABLES.joints.get(name, _Joint()) for name in new.joints}
     there = "no board yet: only with --mock" if new.board == "none" else "`gazerig scan` lists it"
-    yield f"# A head of {len(new.joints)} servos. All keys, with units and ranges: docs/parameters.md."
+    yield f"# A head of {len(new.joints)} servos. The shipped rig desk.yaml explains the keys."
     yield f"name: {format_value(new.name)}"
     yield "profile: robot"
     port = format_value(board.port)
