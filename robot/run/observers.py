@@ -77,7 +77,11 @@ class RunObservers:
                 self._parts.append(("the page", self._page.open, self._page.close))
             doors = DoorProcesses(run.rig.doors, os.getpid(), say)
             self._parts.append(("the doors", doors.open, doors.close))
-        self._parts.append(("the voice", lambda: None, run.voice.close))
+        has_sound = not options.fast and any(
+            one.sound for one in run.tracks.all_tracks(limits(run.rig.joints))
+        )
+        opened = run.voice.open if has_sound else lambda: None
+        self._parts.append(("the voice", opened, run.voice.close))
 
     def _make_server(self) -> LiveServer:
         run, options = self._run, self._run.options

@@ -194,6 +194,15 @@ class RunVoice:
             if failed:
                 raise SoundError(failed[0])
 
+    def open(self) -> None:
+        """Start the sound's process, which takes longer than a tick.
+
+        Raises:
+            SetupError: it cannot be started.
+        """
+        with self._lock:
+            self._player_on(self._rig().sound.device).prepare()
+
     def _player_on(self, device: str) -> SoundPlayer:
         """Return the player of a loudspeaker instead of that of another one."""
         if self._player is not None and self._device != device:
