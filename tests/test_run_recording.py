@@ -205,11 +205,9 @@ def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path) ->
         tmp_path: "is not a file",
         tmp_path / "text": "is not a recording: make one with gazerig run --record",
         tmp_path / "empty": "is not a recording",
-        written(tmp_path / "camera", "gazerig-camera-1"): "a recording of a camera, not of a run",
+        written(tmp_path / "camera", "gazerig-camera-1"): "not a recording of a run",
         written(tmp_path / "newer", "gazerig-run-9"): "of format 9, .* reads 2: use the version",
-        written(
-            tmp_path / "other", "ros2"
-        ): r"not a recording of gazerig \(its profile is 'ros2'\)",
+        written(tmp_path / "other", "ros2"): r"not a recording of a run \(its profile is 'ros2'\)",
         written(tmp_path / "bare", PROFILE): "it contains nothing of a run",
     }
     for path, words in wrong.items():
