@@ -79,8 +79,7 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--maestro", "7"), "--maestro 7: a board has 6, 12, 18, 24 channels"),
-        (("--servos", "1:xl330-m077", "--baud", "12"), "--baud 12: servos of this kind know 9600"),
+        ((), "name a rig, or its servos: --servos 1-6:xl330-m077"),
         (("--servos", "1:xl330-m077", "--link", "README.md"), "File exists"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,

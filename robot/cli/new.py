@@ -117,18 +117,17 @@ def new(
     file: Annotated[Path, typer.Argument(help="The YAML file to write.")] = Path("myrig.yaml"),
     board: Annotated[
         str | None,
-        typer.Option(help=f"{', '.join(BOARDS)}.", autocompletion=lambda: list(BOARDS)),
+        typer.Option(help=f"{', '.join(BOARDS)}."),
     ] = None,
     joints: Annotated[
         str | None,
         typer.Option(
             help=f"{', '.join(MECHANISMS)}; or names of joints: eyes_pan,eyes_tilt,jaw.",
-            autocompletion=lambda: list(MECHANISMS),
         ),
     ] = None,
     camera: Annotated[
         str | None,
-        typer.Option(help=f"{', '.join(CAMERAS)}.", autocompletion=lambda: list(CAMERAS)),
+        typer.Option(help=f"{', '.join(CAMERAS)}."),
     ] = None,
     eyes_mm: Annotated[
         float | None,

@@ -65,7 +65,7 @@ class RunObservers:
         self._status: StatusLine | None = None
         self._parts: list[tuple[str, Callable[[], object], Callable[[], object]]] = []
         if run.recorder is not None:
-            self._parts.append(("the recording", run.recorder.begin, self._close_recording))
+            self._parts.append(("the recording", lambda: None, self._close_recording))
         if not options.fast:
             self._server = self._make_server()
             self._parts.append(("the remote control", self._server.open, self._server.close))
