@@ -162,7 +162,7 @@ def test_a_character_is_saved_by_its_name_and_of_the_values_only_those_set_by_ha
 
 
 def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> None:
-    bench = Bench(str(mine), scanpath="random", saccade="min_jerk")
+    bench = Bench(str(mine), scanpath="random")
     assert bench.tuning.unsaved() == ()
     bench.tuning.apply_character("bold")
     bench.tuning.reload(mine)

@@ -221,30 +221,27 @@ class SceneAgent:
 
     def __init__(self, run: Run) -> None:
         self._run, self._scene = run, run.scene
-        self._acts: tuple[AgentAct, ...] = getattr(run.scene, "agent", ())
-        self._start_s: float | None = None
-        self._next = 0
+        self._done = 0
         self._seen: dict[int, Vec3] = {}
 
     def update(self, tick: Tick) -> None:
         """Report what has become due at the newest tick."""
         scene: Any = self._scene
-        if self._start_s is None:
-            begun_s = self._run.scene_start_s()
-            self._start_s = tick.t_s if begun_s is None else begun_s
+        acts: tuple[AgentAct, ...] = scene.agent
+        start_s = self._run.scene_start_s()
+        if start_s is None:
+            return
         if tick.percept is not None:
             self._seen |= {face.id: face.p_world_m for face in tick.percept.faces}
-        since_s = tick.t_s - self._start_s
-        while self._next < len(self._acts) and since_s >= self._acts[self._next].at_s:
-            act = self._acts[self._next]
-            self._next += 1
+        rounds, since_s = divmod(tick.t_s - start_s, scene.round_s)
+        due = int(rounds) * len(acts) + sum(act.at_s <= since_s for act in acts)
+        while self._done < due:
+            act = acts[self._done % len(acts)]
+            self._done += 1
             person = self._person_id(scene.face(act.person, since_s)) if act.person else None
             self._run.robot.command(
                 Talk(act.state, person, act.seconds, act.text, who="mock agent", stay=True)
             )
-        if scene.round_s and since_s >= scene.round_s and self._next == len(self._acts):
-            self._start_s += scene.round_s
-            self._next = 0
 
     def _person_id(self, place: Vec3) -> int | None:
         """Return perception's number of the person last seen at a place, None without one."""

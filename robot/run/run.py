@@ -35,7 +35,6 @@ from gazerig.robot.run.cameras import (
     HeadPose,
     browser_worker,
     detector_of,
-    own_camera,
     place_camera,
     real_camera,
     scene_camera,
@@ -128,7 +127,7 @@ class Run:
             # Camera
             now_s, view = self.clock.now_s, self.view
             if camera is not None:
-                seen = own_camera(rig, view, camera, options, now_s, detector_of(rig, detector))
+                seen = real_camera(rig, view, options, now_s, detector, camera)
             elif self.room is not None:
                 seen = self.room.camera(
                     rig, options, view, random["camera"], detector_of(rig, detector)

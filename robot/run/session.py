@@ -177,16 +177,14 @@ class Session:
 
 
 def _choose(run: Run) -> None:
-    """Make the choices of the command line.
+    """Choose the state of a conversation that the command line names.
 
     Raises:
-        SetupError: there is no such choice.
+        SetupError: there is no such state.
     """
     try:
-        for menu in ("behaviour", "conversation"):
-            choice = getattr(run.options, menu)
-            if choice is not None:
-                run.robot.ask(menu, choice)
+        if run.options.conversation is not None:
+            run.robot.ask("conversation", run.options.conversation)
     except ValueError as error:
         raise SetupError(str(error)) from error
 

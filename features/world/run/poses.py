@@ -15,14 +15,6 @@ if TYPE_CHECKING:
 _ABSENT = dict.fromkeys(NECK, 0.0)
 
 
-class TimedPose(NamedTuple):
-    """Rotation (three rows) and position [m] of the head in the world at a time [s]."""
-
-    t_s: float
-    R_world_head: Mat3
-    p_world_head_m: Vec3
-
-
 class RigInState(NamedTuple):
     """The joints of a rig in the state of a world; can be sent to another process.
 
@@ -63,22 +55,14 @@ class WorldPoses:
         """Return the host's time at the start of the script of the people, None before."""
         return self._file().begin_s
 
-    @property
-    def first_s(self) -> float:
-        """Return the same time, 0 before the start."""
-        return self.begin_s or 0.0
-
-    def newest(self) -> TimedPose | None:
-        """Return the newest pose, None before the first."""
-        newest = self._file().newest()
-        if newest is None:
-            return None
-        self.state = newest
-        return TimedPose(newest.host_s, *self._rig.head(newest))
+    def newest(self) -> WorldState | None:
+        """Return the newest state, None before the first."""
+        self.state = self._file().newest() or self.state
+        return self.state
 
     def head(self, t_s: float) -> tuple[Mat3, Vec3]:
         """Return the current pose of the head; upright before the first state."""
-        newest = self._file().newest()
+        newest = self.newest()
         if newest is None:
             return self._rig.kinematics.head_pose((0.0, 0.0, 0.0))
         return self._rig.head(newest)

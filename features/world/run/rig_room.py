@@ -14,7 +14,6 @@ from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPo
 from gazerig.features.world.run.run_world import RunWorld
 from gazerig.features.world.run.sight import (
     LATENCY_MS,
-    ComputedCamera,
     RenderedSource,
     RenderedWorld,
 )
@@ -29,6 +28,8 @@ from gazerig.robot.run.emulated import emulated_lines
 from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_limits import servo_configs
+from gazerig.sim_mock.cameras.detections import SceneCamera
+from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.pty.client import PtyBuses
 
 
@@ -68,14 +69,14 @@ class RigRoom:
         """
         world, poses, locate = self.world, self.head, view.locate
         if options.no_pictures:
-            field_deg = view.params.horizontal_field_deg
-            return ComputedCamera(world.scene, view.mount, field_deg, poses, rng, locate)
+            params = FrameParams(horizontal_field_deg=view.params.horizontal_field_deg)
+            return SceneCamera(
+                params, world.scene, view.mount, poses.head, rng, locate, self.start_s
+            )
         rendered = RenderedWorld(world.spec, view.mount, view.params, rng, world.camera, poses)
         if isinstance(poses, SimulatedPoses):
             motion = view.motion(rig.motion)()
-            return rendered.pixels(
-                poses.head, detector(), LATENCY_MS, motion, locate, poses.begin_s
-            )
+            return rendered.pixels(poses.head, detector(), LATENCY_MS, motion, locate)
         source = partial(RenderedSource, rendered, poses)
         parts = CameraParts(source, detector, view.motion(rig.motion), locate)
         return CameraWorker(parts, self.clock.now_s)
