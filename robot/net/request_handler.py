@@ -96,12 +96,6 @@ class ParamAccess(Protocol):
     def apply_character(self, name: str) -> tuple[str, ...]:
         """Apply another character to the rig; return notes for the user."""
 
-    def files(self) -> tuple[Path, ...]:
-        """Return the files in use: the rig's file and its overlays."""
-
-    def reload(self, path: Path) -> tuple[str, ...]:
-        """Apply the contents of a file; on errors change nothing and raise with all of them."""
-
 
 class PathGuard(Protocol):
     """Rules for the files that a client may name (``config.rig_files.AllowedFolder``)."""
@@ -204,7 +198,6 @@ class RequestHandler:
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         params: The parameters, None if they cannot be read or changed.
         fixed: Reason why parameters cannot be changed.
-        saved: Called with each written file.
         voice: Says sounds and texts; None if the head has no voice.
         menus: Returns the menus.
         tracks: Returns the available tracks.
@@ -221,7 +214,6 @@ class RequestHandler:
         params: ParamAccess | None = None,
         *,
         fixed: str = FIXED,
-        saved: Callable[[Path], None] = lambda path: None,
         voice: Speaker | None = None,
         menus: Callable[[], Mapping[str, tuple[str, ...]]] = dict,
         tracks: Callable[[], Sequence[TrackInfo]] = tuple,
@@ -230,7 +222,7 @@ class RequestHandler:
         paths: PathGuard | None = None,
     ) -> None:
         self._command, self._pulse, self._about = command, pulse, dict(about)
-        self._params, self._fixed, self._saved, self._paths = params, fixed, saved, paths
+        self._params, self._fixed, self._paths = params, fixed, paths
         self._voice, self._menus, self._tracks = voice, menus, tracks
         self._fault, self._changing = fault, changing
         self._unsaved = -1, 0
@@ -323,9 +315,7 @@ class RequestHandler:
                 file = Path(path).expanduser() if path else None
                 if file is not None and not file.is_absolute():
                     raise ValueError(f"{path}: give the absolute path; the rig has its own folder")
-                saved = params.save(file)
-                self._saved(saved.path)
-                return saved
+                return params.save(file)
             case Revert():
                 return params.revert()
             case Character(name):
