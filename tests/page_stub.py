@@ -93,7 +93,6 @@ class Stub:
         add_page_files(app.router)
         app.router.add_get("/view/", _answer_view)
         app.router.add_get("/api/v1/socket", self._serve_socket)
-        app.router.add_get("/api/v1/waveform", _answer_waveform)
         app.router.add_post("/api/v1/do", self._serve_request)
         self._runner = web.AppRunner(app, shutdown_timeout=0.1)
         await self._runner.setup()
@@ -163,10 +162,6 @@ def _encode(kind: str, value: object) -> str:
 
 async def _answer_view(request: web.Request) -> web.Response:
     return web.Response(text=VIEW, content_type="text/html")
-
-
-async def _answer_waveform(request: web.Request) -> web.Response:
-    return web.json_response({"ok": [0.5] * 160})
 
 
 @contextmanager

@@ -226,7 +226,7 @@ def test_a_refused_value_is_put_back_and_anothers_change_is_shown(
     wait_for(lambda: stub.orders("save") == [{"do": "save", "path": None}], "the order to save")
 
 
-def test_a_track_plays_on_a_timeline_with_its_sound_and_cues(page: tuple[Stub, Person]) -> None:
+def test_a_track_plays_on_a_timeline(page: tuple[Stub, Person]) -> None:
     stub, person = page
     person.open("Play")
     person.click("document.querySelector('#drawer-play input[type=checkbox]')")
@@ -236,11 +236,11 @@ def test_a_track_plays_on_a_timeline_with_its_sound_and_cues(page: tuple[Stub, P
     playing = TrackState(1, "wave", 1.0, 3.0, sound="/sounds/hello.wav", who="ann", loop=True)
     stub.show(tracks=(playing,), control_source=ControlSource("track", "ann", "wave"))
     wait_for(lambda: person.reads("wave: started by ann"), "the track")
-    # The sound's outline is half as high as its row: ink in the middle of the row, none above.
+    # The bar has ink, and the row of the names of cues has none.
     ink = (
         "document.querySelector('canvas.track').getContext('2d').getImageData({}, 1, 1).data[3] > 0"
     )
-    wait_for(lambda: person.run(ink.format("201, 31")), "the sound")
+    wait_for(lambda: person.run(ink.format("201, 35")), "the bar")
     assert not person.run(ink.format("201, 22"))
     person.click("document.querySelector('#drawer-play [data-choice=none]')")
     wait_for(lambda: stub.orders("end_track") == [{"do": "end_track", "track": ""}], "the end")

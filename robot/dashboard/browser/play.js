@@ -1,4 +1,4 @@
-// Panel: play tracks; those that play are on a timeline, with sound and cues.
+// Panel: play tracks; those that play are on a timeline with cues.
 
 import { prepare } from "/rig/charts.js";
 import { choices, onChoices } from "/rig/choices.js";
@@ -8,7 +8,7 @@ import { spaced } from "/rig/words.js";
 
 const NONE = "none"; // ends all tracks
 const FINISHED = "finished"; // the end reason of a track at its own end
-const WAVE = 22, BAR = 7, TOP = 20, HIGH = TOP + WAVE + BAR + 22;
+const BAR = 7, TOP = 32, HIGH = TOP + BAR + 22;
 
 export default {
   drawer: "play",
@@ -52,20 +52,7 @@ function remarks({ name, who, limited, end_reason }) {
   return texts.map((text) => note(`${spaced(name)}: ${text}`));
 }
 
-const waves = new Map(); // track -> outline of its sound, null while it is not known
-
-function wave(name) {
-  if (!waves.has(name)) {
-    waves.set(name, null);
-    fetch(`/api/v1/waveform?track=${encodeURIComponent(name)}`)
-      .then((answer) => answer.json())
-      .then(({ ok }) => waves.set(name, ok ?? null))
-      .catch(() => {});
-  }
-  return waves.get(name);
-}
-
-/** One track: its name and time, sound, bar with cues, and joints that it owns. */
+/** One track: its name and time, bar with cues, and joints that it owns. */
 function drawTrack(canvas, track) {
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", `${spaced(track.name)} at ${track.position_s.toFixed(1)} s`);
@@ -80,13 +67,7 @@ function drawTrack(canvas, track) {
   pen.textAlign = "right";
   pen.fillText(`${Math.max(0, track.position_s).toFixed(1)} of ${track.duration_s.toFixed(1)} s`, width, 13);
   pen.textAlign = "left";
-  const outline = track.sound ? wave(track.name) : null;
-  pen.fillStyle = colour("calm");
-  outline?.forEach((share, i) => {
-    const tall = Math.max(0.6, share * WAVE), step = width / outline.length;
-    pen.fillRect(i * step, TOP + (WAVE - tall) / 2, 0.8 * step, tall);
-  });
-  const bar = TOP + WAVE, x = across(track.position_s);
+  const bar = TOP, x = across(track.position_s);
   pen.fillStyle = colour("line-grid");
   pen.fillRect(0, bar, width, BAR);
   pen.fillStyle = colour("level-ok");
@@ -97,7 +78,7 @@ function drawTrack(canvas, track) {
     pen.fillText(name, Math.min(across(at_s) + 3, width - pen.measureText(name).width), bar - 4);
   }
   pen.fillStyle = colour("text");
-  pen.fillRect(x, TOP - 2, 2, WAVE + BAR + 2);
+  pen.fillRect(x, TOP - 2, 2, BAR + 4);
   const owns = track.owns?.length ? `owns ${track.owns.map(spaced).join(", ")}` : "owns no joint";
   pen.fillStyle = ink;
   pen.fillText(owns, 0, HIGH - 6, width);
