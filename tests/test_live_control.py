@@ -16,7 +16,7 @@ def test_without_a_socket_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
         (Path(folder) / "gazerig").write_text("in the way")
         made, said = simulated("desk"), list[str]()
-        live = LiveServer(made.robot, None, made.clock, {"rig": "desk", "pid": 1}, said.append)
+        live = LiveServer(made.robot, None, {"rig": "desk", "pid": 1}, said.append)
         live.open()
         live.close()
     (line,) = said

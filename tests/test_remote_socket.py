@@ -23,8 +23,8 @@ from fakes.runs import simulated
 from gazerig.config.rig_files import RigLayers
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.loop import client_control, stop
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.loop import Robot, Tick
-from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Characters, LookAt, Value
 from gazerig.robot.net import client
 from gazerig.robot.net import socket_io as remote_socket
@@ -36,7 +36,7 @@ from gazerig.robot.net.client import (
     RobotClient,
     connect_to_all,
 )
-from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
+from gazerig.robot.net.request_handler import RequestHandler
 from gazerig.robot.net.socket_server import RemoteServer
 from gazerig.robot.run.live import ParamStore
 
@@ -53,7 +53,7 @@ class Beat:
         self.made = made = simulated()
         self.robot: Robot = made.robot
         self.clock = made.clock
-        self.pulse = LoopMonitor(self.clock)
+        self.pulse = TickFeed()
         self.ticks: list[Tick] = []
         self.hold = threading.Event()
         self._over = threading.Event()
@@ -140,7 +140,7 @@ def open_server() -> RemoteServer:
 
 
 def beatless() -> RequestHandler:
-    return RequestHandler(lambda command: None, LoopMonitor(RealClock()), {"rig": "other"})
+    return RequestHandler(lambda command: None, TickFeed(), {"rig": "other"})
 
 
 def test_close_removes_it_and_hangs_up(folder: Path) -> None:
@@ -231,7 +231,7 @@ def test_a_loop_that_hangs_is_told_to_who_stops(
             rig.stop()
     finally:
         beat.hold.clear()
-    assert beat.pulse.wait_for_commands(20.0)
+    assert beat.pulse.wait_for_ticks(2, 20.0)
     rig.resume()
 
 
@@ -354,9 +354,9 @@ def test_a_program_leads_while_it_lives_and_is_named(
         status = rig.status()
         assert status["controlled_by"] == f"a show (process {os.getpid()}): look at -1 0 0.3"
         count = len(beat.ticks)
-        assert beat.pulse.wait_for_commands(20.0, ticks=800)  # twice as long
+        assert beat.pulse.wait_for_ticks(800, 20.0)  # twice as long
         assert show.in_control and beat.ticks[-1].controlled_by and len(beat.ticks) > count
-    assert beat.pulse.wait_for_commands(20.0, ticks=500)
+    assert beat.pulse.wait_for_ticks(500, 20.0)
     assert beat.ticks[-1].controlled_by == "" and rig.status()["controlled_by"] == ""
 
 

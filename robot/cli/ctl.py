@@ -49,8 +49,6 @@ app.add_typer(ctl)
 ctl.add_typer(animation.app)
 
 _CONTROL_CHECK_S = 0.2
-_DELAYED_S = 1.0
-"""A loop without a tick for this long is reported as delayed."""
 _LAST_MESSAGES = 5
 _NEGATIVE = {"ignore_unknown_options": True}
 """Click settings: -3 is a number, not an option."""
@@ -465,8 +463,6 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
         return [*lines, "it has just started: nothing is known yet"]
     if now["stopped"]:
         lines.append(f"STOPPED, torque off: {now['stopped']}; gazerig ctl resume continues")
-    if now["age_s"] > _DELAYED_S:
-        lines.append(f"the loop is delayed: the following data are {now['age_s']:.1f} s old")
     joints = ", ".join(
         f"{name} {degrees(one['measured_rad']):.1f}" for name, one in now["joints"].items()
     )

@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.loop import Robot
-from gazerig.robot.model.clock import Clock
 from gazerig.robot.net.request_handler import (
-    LoopMonitor,
     ParamAccess,
     PathGuard,
     RequestHandler,
@@ -28,7 +27,6 @@ class LiveServer:
     Args:
         robot: Executes commands.
         tuning: Parameters and their files; None: only stop and resume are accepted.
-        clock: Clock of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         say: Prints a line on the terminal.
         fault: Executes a fault command of emulated servos; None if the servos are real.
@@ -45,7 +43,6 @@ class LiveServer:
         self,
         robot: Robot,
         tuning: ParamAccess | None,
-        clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
         fault: Callable[[str], str] | None = None,
@@ -54,20 +51,19 @@ class LiveServer:
         voice: Speaker | None = None,
     ) -> None:
         self._say = say
-        pulse = LoopMonitor(clock)
+        feed = TickFeed()
         if tuning is None:
             only = accept_only_stops(robot.command, _CALIBRATED)
-            fixed = f"{_CALIBRATED}: its parameters are fixed"
-            handler = partial(RequestHandler, only, pulse, about, fixed=fixed)
+            handler = partial(RequestHandler, only, feed, about)
         else:
             handler = partial(
-                RequestHandler, robot.command, pulse, about, tuning, voice=voice,
+                RequestHandler, robot.command, feed, about, tuning, voice=voice,
                 menus=robot.menus, tracks=robot.tracks, fault=fault, changing=changing,
             )  # fmt: skip
         self._server = RemoteServer(handler(), say)
         # Apart from programs of this computer, so that neither uses up the other's time.
         self._page_server = RemoteServer(handler(paths=paths), say)
-        self.serve, self.update = self._page_server.serve, pulse.update
+        self.serve, self.update = self._page_server.serve, feed.update
 
     def open(self) -> None:
         """Listen to other programs; print a line if that fails."""

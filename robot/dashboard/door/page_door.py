@@ -409,8 +409,7 @@ class PageDoor:
             if tick is None or tick.t_s >= self._replied_s:
                 break
             await asyncio.sleep(_LOOK_S)
-        state = head_state(tick) if tick is not None else None
-        return HeadReport(state, self._feed.events(after), self._feed.number)
+        return self._feed.report(after)
 
     async def _post(self, request: web.Request) -> web.StreamResponse:
         wait_s = parse_query(request, _Wait).wait_s
