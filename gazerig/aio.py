@@ -124,11 +124,11 @@ class AsyncHead:
     wink = _order(Head.wink)
     stop = _order(Head.stop)
     resume = _order(Head.resume)
-    get = _call(RemoteHead.get)
-    set = _call(RemoteHead.set)
-    save = _call(RemoteHead.save)
-    revert = _call(RemoteHead.revert)
-    menus = _call(RemoteHead.menus)
+    get = _call(Head.get)
+    set = _call(Head.set)
+    save = _call(Head.save)
+    revert = _call(Head.revert)
+    menus = _call(Head.menus)
 
     async def state(self) -> HeadState:
         """Return the newest tick of the control loop."""

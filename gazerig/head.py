@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from math import radians
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from gazerig.drivers.sound.params import KINDS
 from gazerig.errors import HeadEnded, Refused
@@ -26,6 +26,7 @@ from gazerig.robot.model.commands import (
     EndTrack,
     Express,
     Frame,
+    Get,
     Jog,
     LookAt,
     LookAtDirection,
@@ -34,14 +35,22 @@ from gazerig.robot.model.commands import (
     LookAtPixel,
     MoveOpponent,
     Play,
+    ReadMenus,
+    Request,
     Resume,
+    Revert,
+    Save,
     Say,
+    SayPiece,
+    Set,
     SetLevel,
     Stop,
     SyncTrack,
     Talk,
     Value,
+    as_value,
 )
+from gazerig.robot.model.parameter import SavedFile
 from gazerig.robot.model.reply import CommandReply, Outcome, Progress, command_outcome
 
 STREAM_AHEAD_S = 1.0
@@ -372,11 +381,11 @@ class Head(ABC):
         self._say_piece(b"", rate_hz, channels, volume, last=True)
         return Order(self, CommandReply)
 
-    @abstractmethod
     def _say_piece(
         self, piece: bytes, rate_hz: int, channels: int, volume: float, last: bool = False
     ) -> float:
         """Say a piece of a stream; return the length that has not been heard, s."""
+        return float(self._ask(SayPiece(piece, rate_hz, channels, last, volume), float))
 
     def converse(self, mode: str) -> Order:
         """Look away and blink as speakers or listeners do.
@@ -476,11 +485,10 @@ class Head(ABC):
 
     # Parameters
 
-    @abstractmethod
     def get(self, prefix: str = "") -> Mapping[str, Value]:
         """Return the present values of all keys of the rig that start with a prefix."""
+        return {key: as_value(value) for key, value in self._ask(Get(prefix), dict).items()}
 
-    @abstractmethod
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
         """Apply values at dotted keys, all of them or none.
 
@@ -490,22 +498,33 @@ class Head(ABC):
         Raises:
             Refused: rules are broken; the message names all of them.
         """
+        return tuple(self._ask(Set(dict(changes)), tuple))
 
-    @abstractmethod
     def save(self, path: Path | str | None = None) -> Path:
         """Write the present values into the rig's file, or into another one; return its path.
 
         Raises:
             Refused: the file cannot be written, or is a file of the program.
         """
+        whole = None if path is None else str(Path(path).expanduser().absolute())
+        saved: SavedFile = self._ask(Save(whole), SavedFile)
+        return saved.path
 
-    @abstractmethod
     def revert(self) -> tuple[str, ...]:
         """Restore the values of the rig's file; return a line for each change."""
+        return tuple(self._ask(Revert(), tuple))
 
-    @abstractmethod
     def menus(self) -> Mapping[str, tuple[str, ...]]:
         """Return behaviours, conversation modes and lid states; the active one is the first."""
+        return dict(self._ask(ReadMenus(), dict[str, tuple[str, ...]]))
+
+    @abstractmethod
+    def _ask(self, request: Request, kind: Any) -> Any:
+        """Send a request; return its result, which has the given type.
+
+        Raises:
+            Refused: a rule forbids it.
+        """
 
     # State
 

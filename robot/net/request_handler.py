@@ -212,16 +212,12 @@ class RequestHandler:
                 if self._fault is None:
                     raise ValueError(REAL)
                 return {"ok": self._fault(text)}
-            case ReadMenus():
-                return {"ok": self._menus()}
             case Tracks():
                 return {"ok": self._tracks()}
-            case SayPiece():
-                return {"ok": self._say_piece(request)}
             case Command():
                 done: object = self._command(self._speech(request))
             case _:
-                done = self._handle_params(request)
+                done = self.perform(request)
         if isinstance(done, Ticket):
             reply = done.wait(_TAKEN_UP_S)
             if reply is None:
@@ -235,8 +231,16 @@ class RequestHandler:
             return {"ok": {"notes": done or ()}}
         return {"ok": done}
 
-    def _handle_params(self, request: Request) -> object:
-        """Return the answer to a question, or the notes for the user of a change."""
+    def perform(self, request: Request) -> object:
+        """Return the answer to a question, or the notes of a change that the loop has not read.
+
+        Raises:
+            one of REFUSALS: a rule forbids it.
+        """
+        if isinstance(request, ReadMenus):
+            return self._menus()
+        if isinstance(request, SayPiece):
+            return self._say_piece(request)
         params, paths = self._params, self._paths
         if params is None:
             if isinstance(request, Get | Parameters | Unsaved | Characters):
