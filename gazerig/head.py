@@ -5,7 +5,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from math import radians
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, Self
 
 from gazerig.drivers.sound.params import KINDS
@@ -45,7 +44,6 @@ from gazerig.robot.model.commands import (
     Set,
     SetLevel,
     Stop,
-    SyncTrack,
     Talk,
     Value,
     as_value,
@@ -55,6 +53,8 @@ from gazerig.robot.model.reply import CommandReply, Outcome, Progress, command_o
 
 STREAM_AHEAD_S = 1.0
 """Length of a stream that is sent before it is heard."""
+_ACCEPTS_S = 1.0
+"""Time in which the head must accept an order."""
 
 
 class Order:
@@ -63,13 +63,10 @@ class Order:
     Args:
         host: the head.
         read_reply: returns the reply once the head has accepted the order, None before.
-        within_s: time in which the head must accept it, seconds.
     """
 
-    def __init__(
-        self, host: "Head", read_reply: Callable[[], CommandReply | None], within_s: float = 1.0
-    ) -> None:
-        self._host, self._read_reply, self._within_s = host, read_reply, within_s
+    def __init__(self, host: "Head", read_reply: Callable[[], CommandReply | None]) -> None:
+        self._host, self._read_reply = host, read_reply
         self._reply: CommandReply | None = None
         self._outcome: Outcome | None = None
         self._why = ""
@@ -86,10 +83,10 @@ class Order:
         """
         reply = self._accepted_reply()
         if reply is None:
-            self._host._pause(lambda: self._accepted_reply() is not None, self._within_s)
+            self._host._pause(lambda: self._accepted_reply() is not None, _ACCEPTS_S)
             reply = self._accepted_reply()
         if reply is None:
-            raise HeadEnded(f"the head has not accepted the order within {self._within_s:g} s")
+            raise HeadEnded(f"the head has not accepted the order within {_ACCEPTS_S:g} s")
         return reply
 
     @property
@@ -177,12 +174,7 @@ class Head(ABC):
         """Start the head, or connect to it."""
 
     @abstractmethod
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Park and switch off a head of this program, or disconnect from another program's."""
 
     # Gaze
@@ -305,15 +297,6 @@ class Head(ABC):
         """End a track, or all; its joints return to gaze."""
         return self._send(EndTrack(track))
 
-    def sync_track(self, number: int, position_s: float) -> Order:
-        """Give the position of a track by a clock of yours, at most some ten times per second.
-
-        Args:
-            number: ``Order.reply.track.number`` of its ``play``.
-            position_s: position at which it should be now.
-        """
-        return self._send(SyncTrack(number, position_s))
-
     def express(self, expression: str, strength: float = 1.0) -> Order:
         """Blend to an expression of the rig's table, and keep it.
 
@@ -386,17 +369,6 @@ class Head(ABC):
     ) -> float:
         """Say a piece of a stream; return the length that has not been heard, s."""
         return float(self._ask(SayPiece(piece, rate_hz, channels, last, volume), float))
-
-    def converse(self, mode: str) -> Order:
-        """Look away and blink as speakers or listeners do.
-
-        Args:
-            mode: "none", "talk", "listen" or "think".
-
-        Raises:
-            Refused: the mode is unknown.
-        """
-        return self._send(Ask("conversation", mode))
 
     # Conversation
 
@@ -555,11 +527,9 @@ class Head(ABC):
         iterator steps the head.
 
         Args:
-            rate_hz: highest number of states per second.
+            rate_hz: highest number of states per second, above 0.
             seconds: duration by the head's own clock; None: without end.
         """
-        if not rate_hz > 0.0:
-            raise Refused(f"rate_hz {rate_hz:g}: above 0")
         last_s, end_s = float("-inf"), float("inf")
         while True:
             state = self.state

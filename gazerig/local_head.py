@@ -7,7 +7,6 @@ import signal
 import threading
 from collections.abc import Callable, Iterable
 from functools import partial
-from types import TracebackType
 from typing import Any, Self
 
 from gazerig.config.faults import ConfigError
@@ -118,25 +117,14 @@ class RunningHead(LocalHead):
         closing: the block has ended, and waits until the head has parked.
     """
 
-    def __init__(
-        self,
-        rig: str,
-        make: Callable[[], Run],
-        say: Callable[[str], None] | None = None,
-    ) -> None:
-        super().__init__(rig, make, say)
-        self._interrupts = Interrupts(also=self._abandonment_reason, signals=False)
-        self._owner = threading.current_thread()
-        self._started, self._finished = threading.Event(), threading.Event()
-        self._failure: BaseException | None = None
-        self._pid = os.getpid()
-        self.closing = False
-        self._ended_by = ""
-
     def __enter__(self) -> Self:
         """Switch the torque on at the present joint angles; return after the first tick."""
-        self._owner = threading.current_thread()
-        run = self._make_run()
+        run = self._make_run()  # first: a second block changes nothing of the first
+        self._owner, self._pid = threading.current_thread(), os.getpid()
+        self._interrupts = Interrupts(also=self._abandonment_reason, signals=False)
+        self._started, self._finished = threading.Event(), threading.Event()
+        self._failure: BaseException | None = None
+        self.closing, self._ended_by = False, ""
         # Not a daemon thread, so that the interpreter waits for parking before it exits.
         self._thread = threading.Thread(
             target=self._run, args=(run,), name=f"head {self.rig}", daemon=False
@@ -153,12 +141,7 @@ class RunningHead(LocalHead):
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Park, switch the torque off, and wait until that is done.
 
         Raises:
@@ -166,11 +149,11 @@ class RunningHead(LocalHead):
             KeyboardInterrupt: Ctrl-C was pressed in the meantime.
             SystemExit: SIGTERM or SIGHUP arrived in the meantime.
         """
-        raised = self._close()
-        if error is not None:
+        by_signal = self._close()
+        if raised[1] is not None:
             return
-        if raised is not None:
-            raise raised
+        if by_signal is not None:
+            raise by_signal
         if self._ended.startswith("fault"):
             raise HeadEnded(f"the head has ended: {self._ended}") from self._failure
 
@@ -271,18 +254,13 @@ class SimulatedHead(LocalHead):
             self._stack = stack.pop_all()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Park and switch off, in simulated time."""
         fault = self._ended
         self._session.stopped_by = self._ended = fault or _ENDED
         # An error of the program's own block is not a fault of the head.
         self._stack.close()
-        if fault and error is None:
+        if fault and raised[1] is None:
             raise HeadEnded(f"the head has ended: {fault}")
 
     @property

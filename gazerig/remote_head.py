@@ -1,6 +1,5 @@
 """A head that runs in another program of the same user."""
 
-from types import TracebackType
 from typing import Any, Self
 
 from gazerig.errors import HeadEnded
@@ -33,12 +32,7 @@ class RemoteHead(Head):
         """Return the head itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Give up control and disconnect."""
         self._client.close()
 

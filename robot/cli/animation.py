@@ -14,7 +14,16 @@ from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.options import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import NO_TRACK, Express, Play, Say, SetLevel, Tracks
+from gazerig.robot.model.commands import (
+    NO_TRACK,
+    Express,
+    Play,
+    ReadMenus,
+    Say,
+    SayPiece,
+    SetLevel,
+    Tracks,
+)
 from gazerig.robot.net.client import RobotClient
 
 app = typer.Typer()
@@ -40,7 +49,7 @@ def express(
     """Move the running head's face to an expression, or list the expressions."""
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl express") as rig:
         if expression is None:
-            there = rig.menus().get("expression", ())
+            there = rig.ask(ReadMenus(), dict[str, tuple[str, ...]]).get("expression", ())
             say(", ".join(there) or "this rig has no table expressions")
             return
         rig.send(Express(expression, strength))
@@ -128,9 +137,9 @@ def say_aloud(
         if what == "-":
             clock = RealClock()
             while piece := sys.stdin.buffer.read(2 * round(_PIECE_S * rate)):
-                waits_s = rig.say_piece(piece, rate) - 1.0
+                waits_s = rig.ask(SayPiece(piece, rate), float) - 1.0
                 clock.sleep_until(clock.now_s() + max(0.0, waits_s))
-            rig.say_piece(b"", rate, last=True)
+            rig.ask(SayPiece(b"", rate, last=True), float)
             return
         if Path(what).suffix.lower() in KINDS and Path(what).is_file():
             what = str(Path(what).absolute())

@@ -32,11 +32,14 @@ from gazerig.robot.model.commands import (
     LookAtPerson,
     LookAtPixel,
     Parameters,
+    ReadMenus,
     Revert,
+    Save,
     Talk,
     TalkOrder,
+    Unsaved,
 )
-from gazerig.robot.model.parameter import Parameter
+from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.net.client import RobotClient, connect_to_all
 
 ctl = typer.Typer(
@@ -119,7 +122,7 @@ def get(
         ]
         if not values:
             raise SetupError(f"{prefix}: no key begins with it; gazerig ctl get lists all")
-        unsaved = {change.key for change in rig.unsaved()}
+        unsaved = {change.key for change in rig.ask(Unsaved(), tuple[ParamChange, ...])}
     if as_json:
         print(json.dumps({param.key: values[param.key] for param in found}, indent=2))
         return
@@ -144,7 +147,7 @@ def put(
         changes = read_pairs(pairs)
     with connect(pid) as rig:
         notes = rig.set_many(changes)
-        unsaved = len(rig.unsaved())
+        unsaved = len(rig.ask(Unsaved(), tuple[ParamChange, ...]))
     _print_lines(notes)
     if not notes:
         say("all of these values are already active")
@@ -163,7 +166,8 @@ def save(
 ) -> None:
     """Write changed values into the rig's YAML; comments stay, the old file is kept as a backup."""
     with connect(pid) as rig:
-        saved = rig.save(path)
+        whole = str(path.expanduser().absolute()) if path is not None else None
+        saved = rig.ask(Save(whole), SavedFile)
     _print_lines(map(str, saved.changes))
     if not saved.changes:
         say(f"{saved.path} already contains all values: nothing to save")
@@ -213,7 +217,7 @@ def ask(
             rig.send(Ask(menu, choice))
             say(f"{menu} {choice} is active")
             return
-        menus = rig.menus()
+        menus = rig.ask(ReadMenus(), dict[str, tuple[str, ...]])
         if menu is not None and menu not in menus:
             raise SetupError(unknown_text("menu", menu, menus))
         shown = menus if menu is None else {menu: menus[menu]}
@@ -269,7 +273,7 @@ def look(
         command = read_look(where, head, distance)
         with RobotClient.connect(pid, "gazerig ctl look") as rig:
             if command == LookAt(None):
-                rig.look_freely()
+                rig.send(LookAt(None))
                 say("it looks freely")
                 return
             reply = rig.send(structs.replace(command, stay=stay))
@@ -284,7 +288,7 @@ def look(
                 while rig.in_control and clock.now_s() < end_s:
                     clock.sleep_until(min(end_s, clock.now_s() + _CONTROL_CHECK_S))
             if rig.in_control:
-                rig.look_freely()
+                rig.send(LookAt(None))
                 say("it looks freely")
                 return
             now = rig.status()
