@@ -52,7 +52,7 @@ def _moved(text: str, source: str, page: str) -> str:
 
     def link(match: re.Match[str]) -> str:
         label, words, target, anchor = match[1], match[2], match[3], match[4] or ""
-        if not target or ":" in target or target == "parameters.md":
+        if not target or ":" in target:
             return match[0]
         path = os.path.normpath(PurePosixPath(source).parent / target)
         on_site = FROM_ELSEWHERE.get(path, path.removeprefix("docs/"))

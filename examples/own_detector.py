@@ -1,7 +1,7 @@
 """A face detector of one's own: upright patches of the colour of skin.
 
 Shows: gazerig.open(detector=...): any object with a method ``find``.
-Run:   python examples/own_detector.py            finds the visitor of a drawn room
+Run:   python examples/own_detector.py            finds the visitor of a drawn scene
        python examples/own_detector.py my.yaml 0  your own head, through webcam 0
 """
 
@@ -34,7 +34,11 @@ def _face(x: float, y: float, width: float, height: float) -> DetectedFace:
 
 
 if __name__ == "__main__":
-    mine, camera = (sys.argv[1], int(sys.argv[2])) if sys.argv[2:] else ("desk", None)
-    with gazerig.open(mine, mock=camera is None, camera=camera, detector=Skin()) as head:
+    opened = (
+        gazerig.open(sys.argv[1], camera=int(sys.argv[2]), detector=Skin())
+        if sys.argv[2:]
+        else gazerig.open("desk", fast=True, detector=Skin())
+    )
+    with opened as head:
         for state in head.states(rate_hz=4.0, seconds=4.0):
             print(f"{len(state.people)} seen, looks at {state.gaze.target}")

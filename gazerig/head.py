@@ -527,9 +527,11 @@ class Head(ABC):
         iterator steps the head.
 
         Args:
-            rate_hz: highest number of states per second, above 0.
+            rate_hz: highest number of states per second.
             seconds: duration by the head's own clock; None: without end.
         """
+        if not rate_hz > 0.0:
+            raise Refused(f"rate_hz {rate_hz:g}: above 0")
         last_s, end_s = float("-inf"), float("inf")
         while True:
             state = self.state

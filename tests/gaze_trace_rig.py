@@ -14,7 +14,6 @@ from gazerig.gaze.angles import add, angle_between, direction, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.lids.blink import LidParams
 from gazerig.gaze.lids.lids import Lids
-from gazerig.gaze.oculomotor.drift import Drift
 from gazerig.gaze.oculomotor.gaze_point import OculomotorParams
 from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
@@ -76,9 +75,7 @@ class Rig:
         neck_deg: float = 90.0,
         params: OculomotorParams = AT_ONCE,
         saccade: SaccadeParams = SACCADE,
-        drift: Drift | None = None,
         dice: int = 0,
-        pursuit: PursuitParams | None = None,
     ) -> None:
         self.kinematics = Kinematics(geometry, GAZE_JOINTS, LIDS)
         span = (-radians(eye_deg), radians(eye_deg))
@@ -88,11 +85,10 @@ class Rig:
             self.kinematics,
             ((span, span), (span, span)),
             SaccadeModel(saccade),
-            Pursuit(pursuit if pursuit is not None else PursuitParams()),
+            Pursuit(PursuitParams()),
             HeadModel(head, radians(eye_deg), (neck, neck)),
             Lids(LidParams(blinks_per_min=0.0, law="none"), np.random.default_rng(0)),
             np.random.default_rng(dice),
-            drift,
         )
         self.joints = joints_at(ZERO, 0.0)
 

@@ -173,17 +173,6 @@ def test_an_opponent_has_two_hands_and_a_third_that_comes_later_protects_nothing
     assert any(plan.action == "attack" and "chest" in plan.why for plan in plans)
 
 
-def test_a_hand_that_is_not_seen_any_more_is_where_it_was_for_a_while() -> None:
-    bout = Bout()
-    bout.see(guarding, 9)
-    # One that is seen with another number is the one of those two that was nearer.
-    plans = bout.see(seen, 81, fist(7, (0.9, 0.4, -0.2)))
-    unknown = next(k for k, plan in enumerate(plans) if "not both hands" in plan.why)
-    assert unknown * DT_S == pytest.approx(0.6, abs=2 * DT_S)
-    assert all("guard is closed" in plan.why for plan in plans[:unknown])
-    assert all("not both hands" in plan.why for plan in plans[unknown:])
-
-
 @pytest.mark.parametrize(("v_z_m_s", "opens"), [(-1.2, True), (-0.3, False), (1.2, False)])
 def test_hands_that_dropped_out_of_the_picture_leave_the_face_open(
     v_z_m_s: float, opens: bool
@@ -198,19 +187,6 @@ def test_hands_that_dropped_out_of_the_picture_leave_the_face_open(
     if opens:
         assert attacked[0] * DT_S == pytest.approx(0.2, abs=1.5 * DT_S)
         assert "side of the face is open" in plans[attacked[0] - 1].why
-
-
-def test_after_a_punch_less_room_will_do_for_a_moment() -> None:
-    narrow = fist(2, (0.88, 0.12, -0.09)), fist(3, (0.88, -0.12, -0.09))
-    room = hit_places(face(), [SeenHand(2, (-0.12, 0.12, -0.09), 0.0)], EYE)[0].clear_m
-    assert 0.6 * 0.28 < room < 0.28
-    assert actions(Bout().see(seen, 30, *narrow)) == {"wait"}
-    bout = Bout()
-    bout.see(punch, 4)
-    after = bout.see(seen, 20, *narrow)
-    chosen = [plan.action for plan in after]
-    assert chosen[0] == "guard" and "attack" in chosen
-    assert "after a punch" in after[chosen.index("attack")].why
 
 
 def test_a_punch_ends_an_attack() -> None:
@@ -260,14 +236,6 @@ def test_a_choice_of_the_menu_overrules_the_planner_until_it_is_given_back() -> 
     )
     later = [punch(k * DT_S) for k in range(13, 16)]
     assert looks(model, later)[-1].plan.startswith("guard: hand 3 arrives")
-
-
-def test_without_a_planner_nothing_is_planned_and_planned_is_no_choice() -> None:
-    model = attention()
-    targets = looks(model, [punch(k * DT_S) for k in range(6)])
-    assert {one.plan for one in targets} == {""} and model.top_down.behaviour == "wait"
-    with pytest.raises(ValueError, match="no rule for behaviour 'planned'"):
-        model.top_down.behave(PLANNED)
 
 
 def test_a_planner_needs_the_rules_it_chooses_between() -> None:

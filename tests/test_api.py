@@ -222,9 +222,6 @@ def test_the_end_of_the_block_parks_whatever_ends_it() -> None:
         ({"scene": "moon"}, gazerig.SetupError, "unknown; scenes"),
         ({"scene": "visitor", "video": "x.avi"}, gazerig.SetupError, "exclude each other"),
         ({"video": "/nowhere.avi"}, gazerig.SetupError, "nowhere.avi"),
-        ({"camera": object()}, gazerig.SetupError, "object of the program has no method latest"),
-        ({"detector": object()}, gazerig.SetupError, "has no method find"),
-        ({"attention": object()}, gazerig.SetupError, "has no method choose"),
     ],
 )
 def test_what_does_not_fit_is_one_line_of_one_family(

@@ -177,16 +177,6 @@ def test_motion_ends_a_look_away() -> None:
 # ---- without a conversation -----------------------------------------------------------
 
 
-def test_silent_bouts_of_mutual_gaze_last_as_long_as_people_prefer() -> None:
-    found = stays(aversion(17), 6000.0)
-    mutual = np.array([s.seconds for s in found if s.kind == "face"])
-    away = np.array([s.seconds for s in found if s.kind == "away"])
-    assert np.median(mutual) == pytest.approx(3.3, rel=0.06)
-    assert np.std(np.log(mutual)) == pytest.approx(0.43, abs=0.04)
-    assert mutual.max() <= 14.5 + DT
-    assert away.mean() == pytest.approx(0.6, rel=0.06) and away.max() < 4.0
-
-
 def test_a_target_that_a_user_has_chosen_is_left_in_a_conversation_only() -> None:
     model = aversion(18)
     t = leaves_at(model)
@@ -195,20 +185,3 @@ def test_a_target_that_a_user_has_chosen_is_left_in_a_conversation_only() -> Non
     assert again[0] == "face" and "away" in again
     model.choose_mode("talk", t + 40.0)
     assert set(kinds(model, t + 40.0, 40.0, ordered=True)) == {"face", "away"}
-
-
-def test_thinkers_look_up_speakers_aside_and_for_the_given_times() -> None:
-    ways: dict[TurnState, np.ndarray] = {}
-    for state in ("thinking", "speaking"):
-        model = aversion(20)
-        model.enter(state, None, None, 0.0, 0.0)
-        ways[state] = angles_and_ways(model, 3000.0)[1]
-    assert np.mean(np.abs(ways["thinking"] - 90.0) < 40.0) == pytest.approx(0.7, abs=0.05)
-    aside = np.abs((ways["speaking"] + 90.0) % 180.0 - 90.0) < 40.0
-    assert aside.mean() == pytest.approx(0.78, abs=0.05)
-    model = aversion(21)
-    model.retune("people", AversionParams(speaking_s=(1.5, 4.0)), ConversationParams())
-    model.enter("speaking", None, None, 0.0, 0.0)
-    found = stays(model, 3000.0, 0.05)
-    for kind, mean_s in (("face", 1.5), ("away", 4.0)):
-        assert np.mean([s.seconds for s in found if s.kind == kind]) == pytest.approx(mean_s, 0.1)

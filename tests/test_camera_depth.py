@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gazerig.drivers.camera.depth_roi import depth_at, resize_depth, to_metres, to_millimetres
+from gazerig.drivers.camera.depth_roi import depth_at, resize_depth
 
 BOX = (20.0, 10.0, 40.0, 40.0)
 
@@ -48,14 +48,6 @@ def test_whatever_the_picture_the_answer_is_a_distance_in_it_or_none(depth, box)
         assert low <= found.distance_m <= high
     assert 0.0 <= found.valid_share <= 1.0
     assert np.isfinite(found.spread_m)
-
-
-def test_millimetres_there_and_back_are_exact():
-    mm = np.arange(65536, dtype=np.uint16).reshape(256, 256)
-    depth = to_metres(mm)
-    assert np.isnan(depth[0, 0]) and depth[3, 232] == np.float32(1.0)
-    assert not depth.flags.writeable
-    assert np.array_equal(to_millimetres(depth), mm)
 
 
 def test_resizing_invents_no_distance():

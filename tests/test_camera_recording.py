@@ -12,7 +12,7 @@ from gazerig.drivers.camera.capture_loop import CameraParts, CaptureLoop
 from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
-from gazerig.drivers.camera.recorder import CameraRecorder, RecordingWriter
+from gazerig.drivers.camera.recorder import RecordingWriter
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.robot.run.options import RunOptions
@@ -165,34 +165,3 @@ def test_a_run_records_the_frames_of_its_camera_and_never_over_a_file(tmp_path):
     assert set(events) == {"something of the source"}
     with pytest.raises(SetupError, match="--oak or --camera"):
         RunOptions(mock=True, record_camera=tmp_path / "x.mcap").check_and_complete()
-
-
-def test_full_disk_ends_the_recording_and_not_the_camera(tmp_path, monkeypatch):
-    def full(self, captured_s, number, messages) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(RecordingWriter, "add", full)
-    recorder = CameraRecorder(tmp_path / "r.mcap")
-    for k in range(6):
-        recorder.add(shot(k))
-    recorder.finish()
-    (line,) = recorder.events()
-    assert line.endswith("recording ended: No space left on device")
-
-
-def test_slow_disk_leaves_pictures_out_and_says_so(tmp_path, monkeypatch):
-    go, written = threading.Event(), list[int]()
-
-    def slow(self, captured_s, number, messages) -> None:
-        go.wait(20.0)
-        written.append(number)
-
-    monkeypatch.setattr(RecordingWriter, "add", slow)
-    recorder = CameraRecorder(tmp_path / "r.mcap")
-    for _ in range(60):
-        recorder.add(shot(0))
-    go.set()
-    recorder.finish()
-    assert len(written) == 30
-    (line,) = recorder.events()
-    assert "is slower than the camera" in line

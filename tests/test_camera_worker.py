@@ -278,19 +278,6 @@ def test_a_process_that_ends_or_hangs_is_told_of_and_started_again(end, care, re
     camera.close()
 
 
-def test_a_film_that_pauses_is_no_lost_camera(recording):
-    camera = process(partial(CameraReplay, recording), CameraRecovery(silent_s=0.1, restart_s=0.2))
-    camera.open()
-    wait_for(lambda: camera.frames > 5)
-    os.kill(pid_of(camera), signal.SIGSTOP)
-    before = camera.frames
-    time.sleep(1.0)
-    os.kill(pid_of(camera), signal.SIGCONT)
-    wait_for(lambda: camera.frames > before)
-    assert camera.events() == ()
-    camera.close()
-
-
 def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     path = write_film(tmp_path / "film.avi", 3)
     camera = process(partial(Film, path), CameraRecovery(0.001, 0.005, give_up_s=0.1))

@@ -2,7 +2,6 @@
 
 import logging
 import signal
-import sys
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -45,24 +44,6 @@ def test_the_list_of_commands_is_that_of_their_modules() -> None:
 def test_the_version_is_that_of_the_package(capfd: Terminal) -> None:
     assert typed("--version") == 0
     assert capfd.readouterr().out == f"gazerig {__version__}\n" == f"gazerig {version('gazerig')}\n"
-
-
-def test_a_shell_completes_rigs_scenes_and_characters(
-    monkeypatch: pytest.MonkeyPatch, capfd: Terminal
-) -> None:
-    monkeypatch.setenv("_GAZERIG_COMPLETE", "complete_bash")
-
-    def completed(words: str) -> list[str]:
-        monkeypatch.setenv("COMP_WORDS", f"gazerig {words}")
-        monkeypatch.setenv("COMP_CWORD", str(len(words.split())))
-        typed()
-        return capfd.readouterr().out.split()
-
-    # The name of the running program is completed: not "python -m pytest".
-    monkeypatch.setattr(sys.modules["__main__"], "__package__", None)
-    assert completed("check de") == ["desk"] == gazerig().stdout.split()
-    assert completed("run --character bo") == ["bold"]
-    assert "steps-aside" in completed("run --scene st")
 
 
 def test_an_error_is_one_line_and_debug_shows_where_it_comes_from(

@@ -126,8 +126,8 @@ def test_stop_stops_every_rig_that_runs(head: gazerig.Head, rig: str) -> None:
         assert invoked("stop").code == 0
         with gazerig.connect(process.pid) as other:
             assert head.state.stopped and other.state.stopped
-        named = json.loads(invoked("ctl", "rigs", "--json").out)
-        assert [row["name"] for row in named] == ["desk", "desk"]
+        named = invoked("ctl", "rigs").out.splitlines()
+        assert [row.split()[0] for row in named] == ["desk", "desk"]
         ambiguous = invoked("ctl", "--rig", "desk", "get", RATE)
         assert ambiguous.code == 2 and "2 rigs named desk are running" in ambiguous.err
         assert invoked("ctl", "--rig", str(process.pid), "get", RATE).code == 0

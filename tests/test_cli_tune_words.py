@@ -1,18 +1,10 @@
 """Values, points and commands of gazerig ctl as they are typed, without a rig."""
 
-from math import pi
-
 import pytest
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.cli.ctl import read_look, read_pairs, read_value
-from gazerig.robot.model.commands import (
-    LookAt,
-    LookAtDirection,
-    LookAtInHead,
-    LookAtPerson,
-    LookAtPixel,
-)
+from gazerig.robot.model.commands import LookAt, LookAtPerson
 
 
 @pytest.mark.parametrize(
@@ -29,12 +21,9 @@ def test_values_are_read_as_in_the_file(text: str, value: object) -> None:
 
 def test_pairs_and_points() -> None:
     assert read_pairs(["a", "1", "b", "x"]) == {"a": 1, "b": "x"}
-    assert read_look(["1", "-0.5", "2e-1"]) == LookAt((1.0, -0.5, 0.2))
-    assert read_look(["1", "-0.5", "2e-1"], head=True) == LookAtInHead((1.0, -0.5, 0.2))
+    assert read_look(["1", "-0.5", "2e-1"]) == LookAt((1.0, -0.5, 0.2), stay=True)
     assert read_look(["free"]) == LookAt(None)
-    assert read_look(["person", "3"]) == LookAtPerson(3)
-    assert read_look(["pixel", "320", "200"], distance_m=1.5) == LookAtPixel((320.0, 200.0), 1.5)
-    assert read_look(["direction", "90", "-30"], True) == LookAtDirection((pi / 2, -pi / 6), "head")
+    assert read_look(["person", "3"]) == LookAtPerson(3, stay=True)
     for words in (["1", "2"], ["person", "1.5"], ["person"], ["pixel", "1"], ["free", "1"]):
         with pytest.raises(SetupError, match="give X Y Z in metres"):
             read_look(words)

@@ -7,7 +7,7 @@ from fakes.small_config import Rig, faults_of, one_id_each, write
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.load import ConfigError, load, read_yaml, shipped_names, shipped_path
+from gazerig.config.load import ConfigError, load, read_yaml, shipped_path
 
 GOOD = """\
 # a rig
@@ -79,37 +79,6 @@ def test_an_absent_file_is_named_with_a_near_one(tmp_path: Path) -> None:
         f"{tmp_path / 'nodd.yaml'}: No such file or directory; did you mean 'nod.yaml'? "
         "name a YAML file that you may read"
     )
-
-
-def test_a_document_knows_its_lines_and_keeps_its_text(tmp_path: Path) -> None:
-    document = read_yaml(write(tmp_path, "\ufeff" + GOOD + "matrix:\n  - [1]\n  - [2,\n     3]\n"))
-    assert document.data["joints"]["pan"] == {"id": 2, "max_speed_deg_s": 500}
-    assert document.data["matrix"] == ((1,), (2, 3))
-    assert document.text.startswith("# a rig") and "# ours" in document.text
-    lines = {
-        "name": 2,
-        "joints": 3,
-        "joints.neck.id": 4,
-        "joints.pan": 5,
-        "joints.pan.id": 6,
-        "camera.fps": 9,
-        "matrix.0": 11,
-        "matrix.1": 12,
-        "matrix.1.1": 13,
-        "joints.pan.nothing": 5,
-        "": 2,
-    }
-    assert {key: document.line(key) for key in lines} == lines
-
-
-def test_shipped_files_are_found_by_name() -> None:
-    with pytest.raises(ConfigError, match=r"^config/rigs: nothing named '\.\./x' is shipped"):
-        shipped_path("rigs", "../x")
-    with pytest.raises(ConfigError, match="available: none"):
-        shipped_path("hats", "top")
-    for kind in ("rigs", "profiles", "scanpaths"):
-        for name in shipped_names(kind):
-            assert shipped_path(kind, name).is_file()
 
 
 def test_an_unknown_shipped_name_lists_those_that_exist(

@@ -204,39 +204,6 @@ def test_all_faults_together_in_one_message(tmp_path: Path) -> None:
     assert faults_of(tmp_path, ALL_WRONG, CHECKS) == ALL_FAULTS.splitlines()
 
 
-def is_nod(rig: Rig) -> Iterator[tuple[str, str]]:
-    if rig.name != "nod":
-        yield "name", "is not ours"
-
-
-def gains_name_joints(rig: Rig) -> Iterator[tuple[str, str]]:
-    for name, gain in rig.gains.items():
-        if name not in rig.joints:
-            yield f"gains.{name}", "no such joint"
-        elif gain / rig.joints[name].low_deg > 0:
-            yield f"gains.{name}", "has the wrong sign"
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "keys"),
-    [
-        ("name: nod", "name: 5", ["name"]),
-        ("neck: {id: 1}", "neck: {id: 999}", ["joints.neck.id"]),
-        ("neck: {id: 1}", "neck: {idd: 2}", ["joints.neck.idd", "joints.neck.id"]),
-        ("neck: {id: 1}", "neck: {id: 1, low_deg: x}", ["joints.neck.low_deg"]),
-        ("joints:", "joints: 5\nspare:", ["joints", "spare.neck", "spare.pan"]),
-        ("gains:", "gains: {nekc: 1}\nspare:", ["gains.nekc", "spare.neck"]),
-    ],
-)
-def test_a_check_finds_nothing_that_a_right_value_could_mend(
-    tmp_path: Path, old: str, new: str, keys: list[str]
-) -> None:
-    file = write(tmp_path, f"{GOOD}gains:\n  neck: 1\n".replace(old, new))
-    with pytest.raises(ConfigError) as caught:
-        load(file, Rig, checks=(*CHECKS, is_nod, gains_name_joints))
-    assert sorted(fault.key for fault in caught.value.faults) == sorted(keys)
-
-
 # ---- layers -----------------------------------------------------------------------------
 
 

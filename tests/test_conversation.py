@@ -1,6 +1,6 @@
 """Conversation: the state that a voice agent reports, its end, and what the gaze makes of it."""
 
-from math import inf, radians
+from math import inf
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,17 +8,14 @@ import msgspec
 import numpy as np
 import pytest
 from commanded_robot import Running
-from gaze_targets import target
 
 import gazerig
-from gazerig.gaze.angles import angle_between
 from gazerig.gaze.attention.conversation import (
     NOD,
     AversionParams,
     ConversationGaze,
     ConversationParams,
 )
-from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
 from gazerig.robot.loop.head_state import HeadState, head_state
 from gazerig.robot.model.commands import LookAt, Renew, Talk, TalkOrder
@@ -150,19 +147,3 @@ def gaze(seed: int) -> ConversationGaze:
     attention: Any = SimpleNamespace(converse=lambda *of: None)
     rngs = (np.random.default_rng((seed, n)) for n in range(2))
     return ConversationGaze("people", AversionParams(), ConversationParams(), attention, *rngs)
-
-
-def test_a_look_away_stays_beside_a_face_that_moves_into_it() -> None:
-    model, head = gaze(2), (0.0, 0.0, 0.0)
-
-    def look(at_m: Vec3, t_s: float) -> Target:
-        return model.look(target(at_m, at_s=t_s, top_down=True), head, t_s)
-
-    ahead = (1.0, 0.0, 0.0)
-    look(ahead, 0.0)
-    model.enter("thinking", None, None, 0.0, 0.0)
-    away = look(ahead, 0.1)
-    assert away.kind == "away" and look(ahead, 0.2).p_world_m == away.p_world_m
-    moved = look(away.p_world_m, 0.3)  # the face is where the gaze was
-    assert moved.kind == "away" and moved.shift > away.shift
-    assert angle_between(moved.p_world_m, away.p_world_m) > radians(7.0)

@@ -105,11 +105,7 @@ def _works_on_a_head(words: str) -> None:
     if words == "ctl resume":
         works("stop")
         assert "no hand" in works(words, answers="y\n")
-    elif re.match(r"ctl look (?!.*--stay)", words):
-        if "person" in words:
-            wait_for(lambda: invoked(*words.split(), "--stay").code == 0, "somebody to be seen")
-        works_until_ctrl_c(typed_alone(words), "Ctrl-C")
-    elif "--person" in words:
+    elif "person" in words:
         wait_for(lambda: invoked(*shlex.split(words)).code == 0, "somebody to be seen")
     else:
         works(words)

@@ -11,11 +11,9 @@ from present import present
 from typer.testing import CliRunner
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.errors import SetupError
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.robot.cli.emulate import app
-from gazerig.sim_mock.device_spec import line_of
 
 ROOT = Path(__file__).parents[1]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTTIN)
@@ -81,8 +79,7 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--maestro", "7"), "--maestro 7: a board has 6, 12, 18, 24 channels"),
-        (("--servos", "1:xl330-m077", "--baud", "12"), "--baud 12: servos of this kind know 9600"),
+        ((), "name a rig, or its servos: --servos 1-6:xl330-m077"),
         (("--servos", "1:xl330-m077", "--link", "README.md"), "File exists"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
@@ -97,18 +94,3 @@ def test_bad_input_is_one_clear_line(options, says, monkeypatch):
     assert says in done.stderr
     assert done.stderr.count("\n") == 1
     assert done.stdout == ""
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("1:xl330-m077,", "not IDS:MODEL"),
-        ("1:sts3215,7:xc330-m288", "a line of kind feetech has no such model"),
-        ("1:xl331", "a line has no such model, but xl330-m077"),
-        ("1-3:xl330-m077,2:xc330-m288", "id 2 is taken"),
-    ],
-)
-def test_servos_that_cannot_be_are_refused(text, says):
-    with pytest.raises(SetupError) as error:
-        line_of(text, 1_000_000)
-    assert says in str(error.value)

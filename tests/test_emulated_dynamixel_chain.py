@@ -12,10 +12,8 @@ from gazerig.sim_mock.dynamixel.servo import (
     DATA_LENGTH,
     DATA_RANGE,
     DynamixelMemory,
-    DynamixelServo,
     registers_of,
 )
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
 def vector(text: str) -> bytes:
@@ -95,9 +93,6 @@ def test_stuffed_write_is_unstuffed():
     assert bench.chain.receive(packet)[8] == 6
 
 
-# --- rules
-
-
 # --- bus watchdog
 
 
@@ -138,15 +133,3 @@ def test_every_register_keeps_to_its_access_range_and_size(model):
             assert memory.fields(at, raw(register.low - 1, size)) == DATA_RANGE, register.name
         if size > 1:
             assert memory.fields(at, bytes(size - 1)) == DATA_LENGTH, register.name
-
-
-@EVERY
-def test_the_eeprom_is_locked_under_torque_and_nothing_changes(model):
-    servo = DynamixelServo(ServoSpec(1, model.name), 0)
-    assert servo.write(64, b"\1") == 0
-    before = bytes(servo.memory.bytes[:64])
-    for register in registers_of(model):
-        if register.address < 64 and register.access == "rw":
-            value = register.low or 0
-            assert servo.write(register.address, raw(value, register.size)) == ACCESS
-    assert bytes(servo.memory.bytes[:64]) == before

@@ -1,7 +1,5 @@
 """One emulated Dynamixel servo alone: registers, torque, protections."""
 
-import pytest
-
 from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo, registers_of
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
@@ -28,16 +26,6 @@ class Bench:
         """Let time pass until then; give whether it listens."""
         self.ms = ms
         return self.servo.advance(ms, ms)
-
-
-@pytest.mark.parametrize(
-    ("mode", "goal", "at"), [(3, 1000, 1000), (4, -5000, -5000), (5, 3000, 2048), (1, 3000, 2048)]
-)
-def test_it_moves_in_the_modes_with_a_position(mode, goal, at):
-    bench = Bench()
-    assert (bench.put(11, mode), bench.put(64, 1), bench.put(116, goal)) == (0, 0, 0)
-    bench.at(4000)
-    assert bench.get(132) == pytest.approx(at, abs=12)
 
 
 # --- protections against load, heat and voltage

@@ -39,13 +39,6 @@ def test_the_makers_examples_are_answered_to_the_byte():
 # --- memory
 
 
-def test_read_only_registers_stay_and_nobody_complains(bench):
-    for address in (0, 3, 56, 62, 65):
-        before = bench.read(1, address)
-        assert bench.write(1, address, before ^ 0x55) == 0
-        assert bench.read(1, address) == before
-
-
 def test_only_what_is_written_while_it_is_open_is_kept(bench):
     bench.write(1, 22, 5)
     bench.write(1, 55, 0)

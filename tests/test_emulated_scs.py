@@ -5,7 +5,7 @@ import math
 import pytest
 from fakes.pty_bus import PtyBus
 from fakes.waiting import eventually
-from servo_bench import ALL, READ, SYNC_READ, SYNC_WRITE, WRITE, FeetechBench
+from servo_bench import READ, WRITE, FeetechBench
 
 from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -39,13 +39,6 @@ def test_its_table_has_the_high_byte_first(model, number, turn_steps):
     assert bench.word(56) == pytest.approx(300 + turn_steps / 4, abs=1)
     bench.chain.faults.command(f"turn 1 {turn_steps}")
     assert bench.word(56) == 1023
-
-
-def test_it_answers_no_sync_read_and_takes_sync_writes():
-    bench = ScsBench((1, "scs0009", 100.0), (2, "scs0009", 200.0))
-    assert bench.chain.receive(FeetechBench.instruction(ALL, SYNC_READ, 56, 2, 1, 2)) == b""
-    bench.ask(ALL, SYNC_WRITE, 42, 2, 1, 1, 0, 2, 2, 0)
-    assert [bench.word(42, i) for i in (1, 2)] == [256, 512]
 
 
 # --- judged by a client that was written by others

@@ -5,9 +5,7 @@ from servo_bench import (
     ALL,
     MAKES,
     PING,
-    REBOOT,
     WRITE,
-    DynamixelBench,
 )
 
 BAUD = 1_000_000
@@ -16,10 +14,6 @@ BAUD = 1_000_000
 @pytest.fixture(params=MAKES, ids=lambda make: make.model)
 def make(request):
     return request.param
-
-
-def three(make, **options):
-    return make(*[(i, make.model, 1000.0 * i) for i in (1, 2, 3)], **options)
 
 
 def ids(said):
@@ -43,20 +37,3 @@ def test_only_a_client_at_the_servos_baud_rate_is_heard(make):
 @pytest.fixture
 def bench(make):
     return make()
-
-
-# --- restarts
-
-
-def test_a_reboot_is_deafness_then_as_at_power_on(make):
-    bench = three(make)
-    bench.enable_torque(1, 1500)
-    bench.put("position_p_gain", 99)
-    assert bench.ask(1, REBOOT) == ([(1, 0, b"")] if make is DynamixelBench else [])
-    deaf_s = bench.chain[1].restart_ms / 1000.0
-    assert deaf_s == (0.4 if make is DynamixelBench else 0.8)
-    bench.wait(deaf_s - 0.01)
-    assert bench.ask(1, PING) == []
-    bench.wait(0.02)
-    assert bench.get("torque_enable") == 0
-    assert bench.get("position_p_gain") == bench.get("position_p_gain", 2) != 99

@@ -66,16 +66,6 @@ def test_a_new_goal_starts_from_the_present_speed_and_keeps_to_the_limits(
 # --- gains and limits
 
 
-@pytest.mark.parametrize("gain", [1.0, 4.0])
-def test_the_steady_error_under_load_is_the_load_over_p_and_i_removes_it(gain):
-    # 0.05 Nm of 0.215 Nm, no friction: PWM 0.2326, of which P makes one share per step.
-    made = shaft(loop=Loop(p=gain * P, d=D), weight_nm=-0.05, **SMOOTH)
-    end = go(made, 300, 4000)[-1]
-    assert 300 - end == pytest.approx(0.05 / 0.215 / (gain * P), rel=1e-3)
-    with_i = shaft(loop=Loop(p=gain * P, i=P / 200.0, d=D), weight_nm=-0.05)
-    assert abs(go(with_i, 300, 4000)[-1] - 300) < 1.0
-
-
 @pytest.mark.parametrize(("more_p", "more_d"), [(1.0, 0.0), (2.0, 1.0)])
 def test_pd_control_moves_a_shaft_as_its_differential_equation_says(more_p, more_d):
     # x'' = a (P (goal - x) - D x') - x' / T, a the no-load speed over the time T to reach it.
@@ -102,19 +92,6 @@ def test_pwm_limit_and_slope_bound_the_output():
 
 
 # --- body and surroundings
-
-
-def test_without_torque_friction_takes_the_speed_and_never_adds_any():
-    made = shaft()
-    made.lead_to(1e6, 0.0, 0.0)
-    run(made, 100)
-    made.disable()
-    speeds = []
-    for _ in range(3000):
-        made.run(1)
-        speeds.append(made.v)
-    assert speeds == sorted(speeds, reverse=True)
-    assert speeds[0] > 10 and speeds[-1] == 0.0 and made.effort == 0.0
 
 
 def test_stops_are_never_passed_and_a_stalled_motor_draws_its_stall_current():

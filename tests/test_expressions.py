@@ -14,9 +14,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.minimum_jerk import PEAK_SPEED, MinimumJerkBlend
 from gazerig.gaze.track.animation import HOLD_S, LevelParams
-from gazerig.robot.cli import animation
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Express, SetLevel
 from gazerig.robot.run.rig_limits import pose_offset
 from gazerig.robot.run.run import Run
@@ -166,20 +164,13 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
     yield from connected(monkeypatch)
 
 
-def test_an_expression_from_the_command_line(rig: TickedRig) -> None:
-    assert "neutral, happy, sad, surprised" in gazerig("ctl", "express")
-    assert "happy is active, strength 0.5" in gazerig(
-        "ctl", "express", "happy", "--strength", "0.5"
-    )
-    assert rig.tick(200)["jaw"] == pytest.approx(3.0)
+def test_expressions_and_levels_from_the_command_line(rig: TickedRig) -> None:
+    assert "expression happy is active" in gazerig("ctl", "ask", "expression", "happy")
+    assert rig.tick(200)["jaw"] == pytest.approx(6.0)
     assert "expression: happy (in force), neutral, sad" in gazerig("ctl", "ask", "expression")
-    assert "available: neutral, happy, sad, surprised" in gazerig("ctl", "express", "glad")
-
-
-def test_a_level_from_the_command_line_is_kept_up_and_let_go(
-    rig: TickedRig, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(animation, "RealClock", SimulatedClock)
-    assert gazerig("ctl", "level", "mouth", "0.7", "--seconds", "0.25") == ""
-    assert rig.commands == [SetLevel("mouth", 0.7)] * 4 + [SetLevel("mouth", 0.0)]
-    assert "no level 'ear'; available: mouth" in gazerig("ctl", "level", "ear", "1")
+    assert "done" in gazerig("ctl", "do", '{"do": "set_level", "level": "mouth", "value": 0.7}')
+    assert rig.commands[-1] == SetLevel("mouth", 0.7)
+    assert "no level 'ear'; available: mouth" in gazerig(
+        "ctl", "do", '{"do": "set_level", "level": "ear", "value": 1}'
+    )
+    assert "Invalid value 'dance'" in gazerig("ctl", "do", '{"do": "dance"}')

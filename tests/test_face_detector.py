@@ -118,7 +118,7 @@ def test_altered_or_missing_model_file_names_the_cure(tmp_path):
 
 
 def test_unknown_detector_is_refused():
-    with pytest.raises(SetupError, match="'other': there is auto"):
+    with pytest.raises(SetupError, match="no detector 'other'; available: auto"):
         face_detector(FaceDetectorParams(kind="other"))
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import av
-import cv2
 import numpy as np
 import pytest
 from fakes.films import write_film
@@ -93,25 +92,6 @@ def film_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def shade(picture: np.ndarray) -> int:
     """Return the number of the film's picture, from 0."""
     return round(float(picture.mean()) / 10)
-
-
-@pytest.mark.parametrize(
-    "pixels",
-    [
-        np.full((1, 1, 3), 9, np.uint8),
-        np.full((40, 30, 4), 9, np.uint8),
-        np.full((40, 30), 9 << 8, np.uint16),
-    ],
-)
-def test_still_repeats_ten_times_a_second(tmp_path: Path, pixels: Any) -> None:
-    file = tmp_path / "still_%02d.png"  # one file, no pattern
-    cv2.imwrite(str(file), pixels)
-    still = Film(str(file))
-    still.open()
-    for k in range(3):
-        shot = still.next_shot()
-        assert shot.captured_s == pytest.approx(0.1 * k)
-        assert shot.image.shape == (*pixels.shape[:2], 3) and (shot.image == 9).all()
 
 
 # ---- what is wrong with the file --------------------------------------------------------

@@ -100,13 +100,6 @@ def test_the_place_left_is_avoided_by_a_gaussian_that_decays(
     assert interest(model, seen, -1, 17.0) == [1.0]
 
 
-def test_what_is_attended_is_not_avoided_and_without_habituation_nothing_is() -> None:
-    seen, still = bodies("hand", (1, 0, 0)), HabituationParams(decay_rate_1_s=0.0)
-    for model, attended in ((Habituation(still, NO_STAYS), 1), (Habituation("none", NO_STAYS), -1)):
-        model.record_left((1.0, 0.0, 0.0), 0.0)
-        assert interest(model, seen, attended, 0.1) == [1.0]
-
-
 def test_a_single_still_face_is_never_left() -> None:
     targets = watch(bodies("face", (1, 0, 0)), 120.0)
     assert {(t.id, t.kind, t.salience, t.shift) for t in targets} == {(1, "face", 0.5, 1)}

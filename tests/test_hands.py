@@ -11,6 +11,7 @@ from fakes.scenes import EmptyScene
 from present import present
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.types import Located
 from gazerig.gaze.angles import angle_between, rotation, sub
 from gazerig.gaze.attention.persons import Persons
@@ -18,8 +19,8 @@ from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.hands import HAND, Hands, Known
+from gazerig.robot.perception.motion_source import MotionSource
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.run.cameras import SyntheticMotion
 from gazerig.robot.run.surroundings import load_scene
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
@@ -65,7 +66,8 @@ def frames(scene: Scene, start_s: float, end_s: float) -> Iterator[Frame]:
     drawn = FrameParams(latency_ms=0.0, horizontal_field_deg=field)
     truth = SceneCamera(FrameParams(latency_ms=0.0), later, mount, lambda t_s: head, rng)
     truth.open()
-    motion, locate = SyntheticMotion(rig.motion), FrameLocator(None, radians(field))
+    turns, locate = PoseBuffer(), FrameLocator(None, radians(field))
+    motion = MotionSource(rig.motion, None, radians(field), turns)
     camera = PixelCamera(
         drawn, DrawnScene(later), mount, lambda t_s: head, detector, rng, motion, locate
     )
@@ -74,6 +76,7 @@ def frames(scene: Scene, start_s: float, end_s: float) -> Iterator[Frame]:
     poses = PoseHistory(neck)
     for number in range(round(30.0 * (end_s - start_s))):
         t_s = number / 30.0 + 1e-6
+        turns.record(t_s, mount.rotation(head[0]))
         poses.remember(t_s, (0.0, 0.0, 0.0))
         found = truth.latest(t_s)
         faces.found = found.faces if found is not None else ()
@@ -259,22 +262,6 @@ def test_what_is_too_large_for_a_hand_at_the_persons_distance_is_as_near_as_make
     assert level(found.p_m) == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    "seen",
-    [FIST._replace(compact=False),  # an arm
-     FIST._replace(radius_m=0.19),  # a large hand
-     FIST._replace(p_m=(0.9, 0.2, -0.1), fastest_m=(0.9, 0.2, -0.1), radius_m=0.13,
-             depth_measured=True, along_sd_m=0.02)],
-)  # fmt: skip
-def test_other_hands_are_as_far_as_the_person_or_as_measured(seen: Located) -> None:
-    hands = Hands()
-    for k in range(6):
-        (found,) = hands.label([seen], [FACE], EYE, k / 30)
-    assert level(found.p_m) == pytest.approx(
-        level(seen.p_m) if seen.depth_measured else 1.0, abs=0.02
-    )
-
-
 def reaching(wide_m: float, **more: object) -> Located:
     """Return an arm from aside, as wide as given if it were as far away as the person of FACE."""
     said = {"from_side": True, "p": (2.0, 1.1, -0.2), "fastest_m": BESIDE} | more
@@ -286,19 +273,3 @@ def test_an_arm_that_comes_in_at_the_side_is_as_near_as_makes_it_as_wide_as_a_ha
     seen = [reaching(0.17)] * 3 + [reaching(0.06)] * 3 + [reaching(0.25)] * 2
     away = [level(hands.label([one], [FACE], EYE, k / 30)[0].p_m) for k, one in enumerate(seen)]
     assert away[1:] == pytest.approx([0.5] * 7, abs=0.03), "and stays there as less of it moves"
-
-
-@pytest.mark.parametrize(
-    "seen",
-    [reaching(0.1),  # as wide as an arm is there
-     reaching(0.17, from_side=False), reaching(0.17, p=(2.0, 0.55, -0.4)),  # from the shoulder
-     reaching(0.17, p=(1.0, 0.55, -0.1), fastest_m=(1.0, 0.35, -0.1), radius_m=0.12,
-              depth_measured=True, along_sd_m=0.02)],
-)  # fmt: skip
-def test_other_arms_are_as_far_as_the_person_or_as_measured_however_wide(
-    seen: Located,
-) -> None:
-    hands = Hands()
-    for k, one in enumerate([patch(from_side=True)] * 2 + [seen] * 4):
-        (found,) = hands.label([one], [FACE], EYE, k / 30)
-    assert found.kind == HAND and level(found.p_m) == pytest.approx(1.0, abs=0.07)

@@ -61,7 +61,7 @@ def test_without_torque_they_stand_still():
     ("words", "said"),
     [
         (("--bus", "ideal"), "--bus ideal needs --mock"),
-        (("--mock", "--bus", "ideal", "--port", "/dev/x"), "--bus ideal and --port exclude"),
+        (("--mock", "--bus", "ideal", "--port", "/dev/x"), "--port and --mock exclude"),
     ],
 )
 def test_options_that_make_no_sense_are_refused_in_one_line(words, said):

@@ -15,10 +15,6 @@ def world():
     return World()
 
 
-def rates(places):
-    return [b - a for a, b in zip(places, places[1:], strict=False)]
-
-
 # --- bytes
 
 
@@ -46,15 +42,6 @@ def test_bytes_without_sense_are_protocol_errors_and_end_all_pulses(world, wrong
 
 
 # --- motion
-
-
-def test_with_both_limits_it_is_a_trapezoid_that_ends_on_the_target(world):
-    world.ask(target(0, 4000) + speed(0, 40) + acceleration(0, 16) + target(0, 6000))
-    places = [4000] + [world.after(0.01).position() for _ in range(100)]
-    assert rates(places)[:5] == [2, 4, 6, 8, 10]
-    assert max(rates(places)) == 40 and rates(places).count(40) >= 28
-    assert places[-1] == 6000
-    assert all(abs(change) <= 3 for change in rates(rates(places)))
 
 
 def test_the_first_target_after_silence_ignores_the_limits(world):

@@ -9,7 +9,7 @@ from seeing.moving_room import FIELD_RAD, FOCAL_PX, HEIGHT, WIDTH, Board, Pose, 
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import MovingBlob
-from gazerig.drivers.vision.motion.detector import MotionDetector, relative_rotation
+from gazerig.drivers.vision.motion.detector import MotionDetector
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.robot.model.intrinsics import rays
 
@@ -83,7 +83,7 @@ def watch(
                 frame(seen_from, t_s, (WALL, *boards), rng).image,
                 t_s,
                 LENS,
-                relative_rotation(now, before) if known else None,
+                np.transpose(now) @ before if known else None,
                 depth(rotation(seen_from), (WALL, *boards), t_s, rng) if depth_known else None,
             )
         )

@@ -94,23 +94,6 @@ def test_e100_a_person_is_at_one_place_however_the_camera_is_mounted_and_whateve
         assert (x / z, y / z) == pytest.approx((0.2, -0.12), abs=4.0 / width)
 
 
-def test_a_lens_of_another_shape_is_reported_once_and_the_gaze_goes_on() -> None:
-    lens = LensParams((640, 480), (460.0, 460.0), (320.0, 240.0))
-    analyzer = FrameAnalyzer(Spot(), None, FrameLocator(lens, radians(69.0)))
-
-    def look(width: int, height: int) -> tuple[str, ...]:
-        spot = spot_at(np.array([0.1, 0.0, 1.0]), width, height, 1.2)
-        found = analyzer.analyze(Shot(0.0, 1, spot))
-        assert found.located is not None and len(found.located.faces) == 1
-        return analyzer.events()
-
-    assert look(1280, 960) == ()  # the same field, finer
-    (line,) = look(640, 400)
-    assert "640 x 480" in line and "640 x 400" in line and "calibrate" in line
-    assert look(640, 480) == look(640, 400) == ()
-    assert len(look(1280, 720)) == 1  # another size that does not fit
-
-
 # ---- The lens model: pixels to directions and back, other sizes of picture, and what perception
 
 

@@ -142,16 +142,6 @@ def test_what_is_hardly_a_palm_or_on_the_head_is_no_hand(palm: DetectedPalm) -> 
     assert [places(percept) for percept in hands(palm)] == [[]] * 30
 
 
-def test_a_hand_that_the_searches_no_longer_show_is_gone_soon() -> None:
-    perception = Perception(STILL, 69.0)
-    there = []
-    for number in range(1, 60):
-        palms = None if number % 6 != 1 else (palm_at(P_PALM),) * (number < 30)
-        percept = percept_at(perception, number, faces=(face_at(P_FACE),), palms=palms)
-        there.append(bool(places(percept)))
-    assert all(there[:30]) and not any(there[45:])
-
-
 # ---- the network ----------------------------------------------------------------------------
 
 

@@ -1,15 +1,13 @@
 """The emulated PCA9685: rules of NXP's data sheet, smbus2's messages, Adafruit's library."""
 
 import errno
-import sys
-from types import SimpleNamespace
 
 import pytest
 from pca9685_world import SMBus
 from smbus2 import i2c_msg
 
 from gazerig.sim_mock.pca9685.bridge import build_bridge
-from gazerig.sim_mock.pca9685.chip import AI, ALL_LED, LED0, MODE1, PRESCALE, SLEEP
+from gazerig.sim_mock.pca9685.chip import AI, LED0, MODE1, PRESCALE, SLEEP
 
 ADDRESS = 0x40
 MIDDLE = (0, 0, 307 & 0xFF, 307 >> 8)
@@ -73,15 +71,6 @@ def test_auto_increment_runs_through_the_channels(bench):
     assert bench.get(LED0 + 2, 3) == [51, 51, 51]
 
 
-def test_all_channels_at_once_and_what_cannot_be_read(bench):
-    bench.wake()
-    bench.set(ALL_LED, *MIDDLE)
-    assert all(bench.pulse_us(channel) > 1490 for channel in range(16))
-    assert bench.get(ALL_LED, 4) == [0] * 4
-    bench.set(ALL_LED, 0, 0, 0, 0x10)
-    assert not any(bench.pulse_us(channel) for channel in range(16))
-
-
 def test_boards_have_their_own_registers_and_strangers_are_not_there(bench):
     bench.wake()
     assert bench.get(MODE1, address=0x41) == [0x11]
@@ -90,47 +79,3 @@ def test_boards_have_their_own_registers_and_strangers_are_not_there(bench):
     assert caught.value.errno == errno.EREMOTEIO
     with pytest.raises(ValueError, match="different addresses"):
         build_bridge((0x40, 0x40), lambda: 0.0)
-
-
-class CircuitPythonI2C:
-    """What Adafruit's library asks of a bus, over smbus2's messages."""
-
-    def __init__(self, bus):
-        self.bus = bus
-
-    def try_lock(self):
-        return True
-
-    def unlock(self):
-        pass
-
-    def writeto(self, address, buffer, *, start=0, end=None):
-        self.bus.i2c_rdwr(i2c_msg.write(address, bytes(buffer[start:end])))
-
-    def writeto_then_readfrom(
-        self, address, out, into, *, out_start=0, out_end=None, in_start=0, in_end=None
-    ):
-        in_end = len(into) if in_end is None else in_end
-        read = i2c_msg.read(address, in_end - in_start)
-        self.bus.i2c_rdwr(i2c_msg.write(address, bytes(out[out_start:out_end])), read)
-        into[in_start:in_end] = bytes(read)
-
-
-def test_adafruits_library_finds_a_board_that_does_as_a_real_one(bench, monkeypatch):
-    # It needs only names of Blinka, for its annotations.
-    names = dict.fromkeys(("I2C", "ReadableBuffer", "WriteableBuffer", "I2CDeviceDriver"), object)
-    for module in ("busio", "circuitpython_typing", "circuitpython_typing.device_drivers"):
-        monkeypatch.setitem(sys.modules, module, SimpleNamespace(**names))
-    adafruit = pytest.importorskip(
-        "adafruit_pca9685",
-        reason="pip install --no-deps adafruit-circuitpython-pca9685, -busdevice and -register",
-    )
-    monkeypatch.setattr("time.sleep", bench.wait)
-    board = adafruit.PCA9685(CircuitPythonI2C(bench.bus), address=ADDRESS)
-    board.frequency = 50
-    assert bench.get(PRESCALE) == [121]
-    board.channels[3].duty_cycle = round(0.075 * 0xFFFF)
-    assert bench.pulse_us(3) == pytest.approx(1500, abs=8)
-    assert board.channels[3].duty_cycle == pytest.approx(0.075 * 0xFFFF, abs=16)
-    board.channels[3].duty_cycle = 0
-    assert not any(bench.pulse_us(channel) for channel in range(16))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mixed_rig import mixed_rig, mixed_text
+from mixed_rig import mixed_text
 
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.parameters import (
@@ -19,11 +19,8 @@ from gazerig.config.parameters import (
     value_of,
 )
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
-from gazerig.drivers.errors import SetupError
 from gazerig.params import Declaration, declarations
-from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.run.buses import bus_ports
 
 DESK = shipped_path("rigs", "desk")
 
@@ -102,11 +99,6 @@ def test_rules_between_sections(old: str, new: str, place: str, rule: str, tmp_p
 # Rigs with other joints and other buses than the desk's: valid files, and the result
 
 
-@pytest.fixture
-def mixed(tmp_path: Path) -> Rig:
-    return mixed_rig(tmp_path)
-
-
 def faults(tmp_path: Path, text: str) -> str:
     file = tmp_path / "wrong.yaml"
     file.write_text(text, encoding="utf-8")
@@ -160,19 +152,7 @@ def test_what_cannot_be_is_said(tmp_path: Path, old: str, new: str, says: str) -
     assert says in said, said
 
 
-def test_ports_are_named_by_their_bus(mixed: Rig) -> None:
-    assert bus_ports(mixed, None)["tilt"] == "/dev/ttyACM1"
-    given = bus_ports(mixed, "/dev/x,neck=/dev/y")
-    assert (given[""], given["neck"], given["tilt"]) == ("/dev/x", "/dev/y", "/dev/ttyACM1")
-    with pytest.raises(SetupError, match="expected PORT, neck=PORT, tilt=PORT"):
-        bus_ports(mixed, "lids=/dev/z")
-    assert bus_ports(load_rig("maker"), "/dev/z") == {"": "/dev/z"}
-
-
 # --- Knobs: every parameter of a rig by its key, with the rules and words of its file
-
-
-LENS = {"size_px": (640, 480), "focal_px": (500.0, 500.0)}
 
 
 @pytest.fixture(scope="module")
@@ -201,26 +181,6 @@ def test_all_have_words_and_structure_waits_for_the_next_start(
     for parameter in knobs:
         assert parameter.description, parameter.key
         assert parameter.kind != "choice" or parameter.choices, parameter.key
-
-
-def test_entries_and_groups_come_and_go(desk_rig: Rig) -> None:
-    rule: dict[str, Value] = {"look_at": "hand", "salience": 1.0}
-    other = apply_changes(
-        desk_rig,
-        {
-            "gaze.top_down.rules.point": rule,
-            "face_parts_mm.N": (1, 2, 3),
-            "park_deg.neck_yaw": 3.0,
-            "camera.lens": {**LENS, "centre_px": (320.0, 240.0)},
-        },
-    )
-    assert other.face_parts_mm == {"N": (1.0, 2.0, 3.0)}
-    assert value_of(other, "gaze.top_down.rules.point.salience") == 1.0
-    assert apply_changes(desk_rig, differences(desk_rig, other)) == other
-    assert apply_changes(other, differences(other, desk_rig)) == desk_rig
-    flat = differences(desk_rig, other)
-    assert flat["gaze.top_down.rules.point.look_at"] == "hand"
-    assert flat["camera.lens.focal_px"] == (500.0, 500.0)
 
 
 @settings(max_examples=30, deadline=None)

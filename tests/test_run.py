@@ -194,26 +194,6 @@ def test_an_unknown_key_of_a_joint_is_the_only_error(
     assert "left_eye_pan.zero_stepp: unknown key; did you mean 'zero_step'" in line
 
 
-MINIMAL = DESK.with_name("minimal.yaml")
-
-
-def test_ranges_in_radians_get_a_hint(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    path, text = tmp_path / "my.yaml", MINIMAL.read_text(encoding="utf-8")
-    for degrees, radians in (("35", "1.57"), ("30", "0.52")):
-        text = text.replace(f"min_deg: -{degrees}, max_deg: {degrees}",
-                            f"min_deg: -{radians}, max_deg: {radians}")  # fmt: skip
-    path.write_text(text, encoding="utf-8")
-    assert typed("check", str(path)) == 0
-    hint = "degrees? these look like radians"
-    assert f"min_deg and max_deg of all joints: no angle is above 1.57: {hint}" in " ".join(
-        capfd.readouterr().err.split()
-    )
-    # One joint with a usual range shows that they are degrees.
-    path.write_text(text.replace("-0.52, max_deg: 0.52", "-30, max_deg: 30"), encoding="utf-8")
-    assert typed("check", str(path)) == 0
-    assert hint not in capfd.readouterr().err
-
-
 def test_a_shell_sees_that_line_and_that_exit_code() -> None:
     done = gazerig("run", "--no-page", "--mock", "--scene", "circus", timeout=30)
     one_line_and_exit_code_2(done.returncode, done.stderr, "circus")

@@ -30,9 +30,7 @@ from recorded_run import STARTED, Recorded, assembly, exact, info_for
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Detections
-from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Bodies, Face, Percept
-from gazerig.robot.loop.loop import Tick
 from gazerig.robot.loop.tick import MeasuredJoints, TorqueEnabled
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.robot.model.control_source import ControlState, TrackState
@@ -74,8 +72,7 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
         summary = reader.get_summary()
         assert summary is not None and summary.statistics is not None
         assert {s.name for s in summary.schemas.values()} >= {
-            "foxglove.CompressedImage", "foxglove.FrameTransforms", "foxglove.JointStates",
-            "foxglove.Log", "gazerig.Tick",
+            "foxglove.CompressedImage", "foxglove.JointStates", "foxglove.Log", "gazerig.Tick",
         }  # fmt: skip
         assert all(s.encoding == "jsonschema" for s in summary.schemas.values())
         assert all(chunk.compression == "zstd" for chunk in summary.chunk_indexes)
@@ -98,53 +95,9 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
         np.frombuffer(base64.b64decode(seen[fmt.FRAME]["data"]), np.uint8), cv2.IMREAD_COLOR
     )
     assert pixels is not None and pixels.shape[:2] == (40, 60)
-    assert count[fmt.FRAME] == 6 and count[fmt.HEALTH] == 2
-    assert seen[fmt.HEALTH]["tx_bytes"] > 0 and seen[fmt.HEALTH]["lost_ticks"] == 0
+    assert count[fmt.FRAME] == 6
     states = {one["name"]: one["position"] for one in seen[fmt.JOINT_STATES]["joints"]}
     assert tuple(states) == GAZE_JOINTS
-    frames = {one["child_frame_id"] for one in seen[fmt.TRANSFORMS]["transforms"]}
-    assert frames == {"head", "left_eye", "right_eye", "gaze_point"}
-
-
-def sent_to_viewers(recorded: Recorded, topic: str) -> list[tuple[Tick, dict[str, Any]]]:
-    """Return the messages of a topic, each with the tick that it is of."""
-    start_ns = STARTED.timestamp() * 1e9
-    of = {round(1e3 * (t.t_s - recorded.ticks[0].t_s)): t for t in recorded.ticks}
-    with recorded.path.open("rb") as file:
-        return [
-            (of[round((message.log_time - start_ns) / 1e6)], json.loads(message.data))
-            for _, _, message in make_reader(file).iter_messages([topic])
-        ]
-
-
-def vector(of: dict[str, float]) -> list[float]:
-    return [of[axis] for axis in "xyz"]
-
-
-def test_a_viewer_sees_head_and_eyes_as_they_stand_in_space(recorded: Recorded) -> None:
-    from scipy.spatial.transform import Rotation
-
-    turned = 0.0
-    for tick, data in sent_to_viewers(recorded, fmt.TRANSFORMS):
-        frames = {one["child_frame_id"]: one for one in data["transforms"]}
-        ahead = {}
-        for name, one in frames.items():
-            assert one["parent_frame_id"] == "world"
-            quaternion = [one["rotation"][axis] for axis in "xyzw"]
-            ahead[name] = Rotation.from_quat(quaternion).apply((1.0, 0.0, 0.0))
-        pose = tick.pose
-        assert vector(frames["gaze_point"]["translation"]) == pytest.approx(
-            tick.gaze.gaze_point_world_m
-        )
-        assert ahead["head"] == pytest.approx(np.array(pose.R_world_head)[:, 0])
-        for left, name in ((True, "left_eye"), (False, "right_eye")):
-            assert ahead[name] == pytest.approx(line_of_sight(pose, left))
-        assert vector(frames["head"]["translation"]) == pytest.approx(pose.p_world_head_m)
-        places = pose.p_world_eye_left_m, pose.p_world_eye_right_m
-        for name, place in zip(("left_eye", "right_eye"), places, strict=True):
-            assert vector(frames[name]["translation"]) == pytest.approx(place)
-        turned = max(turned, abs(ahead["left_eye"] @ ahead["head"] - 1.0), abs(pose.head_rad[0]))
-    assert turned > 0.05  # the frames differ
 
 
 @pytest.mark.parametrize("odd", [0.25, nan, -inf])

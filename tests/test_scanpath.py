@@ -12,7 +12,6 @@ from present import present
 
 from gazerig.config.load import load, shipped_path
 from gazerig.gaze.scanpath.fit import PartFixation, fit_walk
-from gazerig.gaze.scanpath.models import MarkovWalk
 from gazerig.gaze.scanpath.scanpath import (
     ENTRY_PARTS,
     Scanpath,
@@ -69,28 +68,6 @@ def test_e40_dwell_times() -> None:
         assert times.min() > 0.0
         assert times.mean() == pytest.approx(WALK.dwell_mean_s[part], rel=0.04)
         assert times.std() == pytest.approx(WALK.dwell_sd_s[part], rel=0.10)
-
-
-def test_tempo() -> None:
-    def walk(seed: int, params: ScanpathParams) -> MarkovWalk:
-        return markov_walk(params, WALK, np.random.default_rng(seed))
-
-    slow = walk(5, replace(PRINTED, rate_scale=0.5))
-    quick = walk(5, PRINTED)
-    assert slow.dwell_s(1) == pytest.approx(2.0 * quick.dwell_s(1))
-
-
-def test_walk_waits_for_arrival_and_starts_at_the_right_side() -> None:
-    walk = walker(6)
-    for k in range(100):
-        assert walk.wander(TARGET, PERCEPT, k * 0.1, settled=False).part == "FR"
-
-
-def test_last_known_parts_serve_while_the_face_is_out_of_sight() -> None:
-    walk = walker(8)
-    seen = walk.wander(TARGET, PERCEPT, 0.0, settled=False)
-    unseen = walk.wander(TARGET, Percept(0.1), 0.1, settled=False)
-    assert unseen.p_world_m == seen.p_world_m
 
 
 def test_wrong_shapes_are_named() -> None:
@@ -162,13 +139,6 @@ def test_the_first_rest_on_a_face_begins_when_the_gaze_arrives() -> None:
     moved = walk.wander(TARGET, PERCEPT, until_s, True)
     assert moved.part != entered.part and walk.rests_until_s == inf
     walk.wander(structs.replace(TARGET, kind="away"), PERCEPT, until_s + 0.1, True)
-    assert walk.rests_until_s == -inf
-
-
-def test_a_face_that_is_one_point_is_never_held_by_a_rest() -> None:
-    walk = walker(6, ScanpathParams(model="face_tracking"))
-    walk.wander(TARGET, PERCEPT, 0.0, True)
-    walk.wander(TARGET, PERCEPT, 0.1, True)
     assert walk.rests_until_s == -inf
 
 
@@ -283,12 +253,6 @@ def face_at(away_m: float, speaks: bool = False) -> Face:
         for x, y, z in (PARTS_FACE_M[part] for part in PARTS)
     )
     return Face(3, centre, (0.0, 0.0, 0.0), R, parts, 0.9, speaks=speaks)
-
-
-def test_a_spot_of_ones_own_draws_looks() -> None:
-    high, low = (visited(face_at(0.8), ScanpathParams(spot_height_mm=mm)) for mm in (20.0, -30.0))
-    assert high["LE"] + high["RE"] > low["LE"] + low["RE"] + 0.1
-    assert low["M"] > high["M"] + 0.06
 
 
 def test_parts_of_a_far_face_that_are_close_together_are_one_look() -> None:

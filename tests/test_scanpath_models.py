@@ -133,19 +133,6 @@ def test_whole_visit_merges_refixations() -> None:
     assert merged[n, re] == pytest.approx(3.0 * merged[n, m])
 
 
-def test_a_walk_goes_on_when_its_tempo_is_changed_and_another_model_begins_anew() -> None:
-    path = Scanpath(ScanpathParams(), WALK, np.random.default_rng(1))
-    for k in range(400):
-        before = path.wander(TARGET, PERCEPT, k * 0.01, True, HEAD)
-    until_s = path.rests_until_s
-    path.retune(ScanpathParams(rate_scale=2.0), WALK)
-    after = path.wander(TARGET, PERCEPT, 3.99, True, HEAD)
-    assert (after.part, after.shift, path.rests_until_s) == (before.part, before.shift, until_s)
-    path.retune(ScanpathParams(model="simple"), WALK)
-    simple = path.wander(TARGET, PERCEPT, 4.0, True, HEAD)
-    assert (simple.part, simple.shift) == ("N", before.shift + 1)
-
-
 def test_row_sums_are_reported_as_printed() -> None:
     assert WALK.row_sums == pytest.approx((0.9, 0.8, 1.1, 1.1, 0.9, 1.0, 1.0, 0.9))
     assert row_sums_note(WALK) == (

@@ -10,7 +10,7 @@ from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.loop.loop import Tick
-from gazerig.robot.run import run_rig
+from gazerig.robot.run import surroundings
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.run import Run
 from gazerig.sim_mock.scenes.scene import Thing
@@ -33,7 +33,7 @@ class Room(EmptyScene):
 
 def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]:
     """Run a rig with all of the head in each glance around."""
-    patch.setattr(run_rig, "load_scene", lambda name, seed: room)
+    patch.setattr(surroundings, "load_scene", lambda name, seed: room)
     rig = load_rig("desk")
     head = replace(rig.gaze.head, eye_only_range_deg=6.0)
     rig = replace(

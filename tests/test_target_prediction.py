@@ -119,33 +119,6 @@ def test_a_swing_that_stops_is_given_up_within_a_quarter_of_its_period() -> None
     assert k * FRAME_S <= 0.25 / 1.5 + FRAME_S
 
 
-def test_a_glance_elsewhere_does_not_forget_a_swing() -> None:
-    path = swing(1.5)
-    prediction = shown(path, 3.0)
-    end_s = 3.0
-    for k in range(1, 16):
-        prediction.record_target(at(0.0, 0.0, end_s + k * FRAME_S, name=2), EYE, FAST)
-    assert prediction.sine is None
-    t = end_s + 16 * FRAME_S
-    prediction.record_target(target(path, t), EYE, FAST)
-    assert prediction.sine is not None
-    assert path(t) + y_of(prediction.displacement(t + AGE_S)) == pytest.approx(
-        path(t + AGE_S), abs=0.01
-    )
-    prediction.record_target(at(0.0, 0.0, t + 1.0, name=2), EYE, FAST)
-    prediction.record_target(target(path, t + 4.0), EYE, FAST)
-    assert prediction.sine is None  # that was too long ago
-
-
-def test_noise_of_the_tracker_does_not_hide_a_swing() -> None:
-    path = swing(1.0)
-    prediction = shown(path, 4.0, noise_m=0.004)
-    sine = prediction.sine
-    assert sine is not None
-    assert sine.w_rad_s == pytest.approx(2.0 * pi, rel=0.03)
-    assert sine.size_m == pytest.approx(0.1, rel=0.05)
-
-
 @settings(deadline=None, max_examples=10)
 @given(
     st.lists(st.tuples(st.floats(-2, 2), st.floats(-5, 5)), min_size=2, max_size=60),

@@ -66,63 +66,35 @@ class JpegSlot:
 Floats = NDArray[np.float64]
 Row = tuple[float, float, float]
 _ENTRIES = 512  # 2.5 s at 200 Hz
-_WIDTH = 13  # time, the rotation's nine numbers, the position
+_WIDTH = 10  # time, the rotation's nine numbers
 _MARGIN = 8  # oldest entries that the writer may be overwriting
 # A frame can be younger than the newest pose by a tick or two.
 _NEWEST_SERVES_S = 0.05
 
 
-class TimedPose(NamedTuple):
-    """Rotation (three rows) and position [m] of the head in the world at a time [s]."""
-
-    t_s: float
-    R_world_head: tuple[Row, Row, Row]
-    p_world_head_m: Row
-
-
 class PoseBuffer:
-    """Poses of the camera or the head over the last few seconds; one process writes."""
+    """Rotations of the camera over the last few seconds; one process writes."""
 
     def __init__(self) -> None:
         self._count = _CONTEXT.RawValue("q", 0)
-        self._first_s = _CONTEXT.RawValue("d", 0.0)
         self._entries = _CONTEXT.RawArray("d", _ENTRIES * _WIDTH)
 
-    def record(
-        self, t_s: float, R: Sequence[Sequence[float]], p_m: Sequence[float] = (0.0, 0.0, 0.0)
-    ) -> None:
-        """Record an orientation (three rows) and a position; times must ascend."""
+    def record(self, t_s: float, R: Sequence[Sequence[float]]) -> None:
+        """Record an orientation (three rows); times must ascend."""
         x, y, z = R
         count = self._count.value
-        if count == 0:
-            self._first_s.value = t_s
         start = count % _ENTRIES * _WIDTH
-        self._entries[start : start + _WIDTH] = [t_s, *x, *y, *z, *p_m]
+        self._entries[start : start + _WIDTH] = [t_s, *x, *y, *z]
         self._count.value = count + 1
-
-    @property
-    def first_s(self) -> float:
-        """Return the time of the first pose, seconds; 0 before it."""
-        return float(self._first_s.value)
-
-    def newest(self) -> TimedPose | None:
-        """Return the newest pose, None before the first."""
-        count = self._count.value
-        if count == 0:
-            return None
-        start = (count - 1) % _ENTRIES * _WIDTH
-        t_s, *v = self._entries[start : start + _WIDTH]
-        rows = (v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8])
-        return TimedPose(t_s, rows, (v[9], v[10], v[11]))
 
     def rotation_at(self, t_s: float) -> Floats | None:
         """Return the rotation (3, 3) at a time; None if it is not stored."""
-        # The complete entries in the order of time: (n, 13).
+        # The complete entries in the order of time: (n, 10).
         before = int(self._count.value)
         entries = np.frombuffer(self._entries, np.float64).reshape(_ENTRIES, _WIDTH).copy()
         after = int(self._count.value)
         first = 0 if after <= _ENTRIES - _MARGIN else after - _ENTRIES + _MARGIN
-        known = entries[np.arange(first, before) % _ENTRIES, :10]
+        known = entries[np.arange(first, before) % _ENTRIES]
         if not len(known) or t_s < known[0, 0] or t_s > known[-1, 0] + _NEWEST_SERVES_S:
             return None
         mean = [np.interp(t_s, known[:, 0], column) for column in known[:, 1:].T]

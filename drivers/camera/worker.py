@@ -26,7 +26,6 @@ class CameraWorker:
         parts: Source and detectors; nothing starts yet.
         now_s: The host's monotonic clock; for a process picklable, as all share its zero.
         recovery: Times of reopening a lost camera.
-        tell: Called with the time of each call of ``latest``, None for none.
         in_thread: Whether the parts run in a thread of this process, for those of a program, which
             exist only there; otherwise they run in a process, which cannot delay the control loop.
 
@@ -38,7 +37,6 @@ class CameraWorker:
         parts: CameraParts,
         now_s: Callable[[], float],
         recovery: CameraRecovery = RECOVERY,
-        tell: Callable[[float], None] | None = None,
         in_thread: bool = False,
     ) -> None:
         self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
@@ -46,7 +44,6 @@ class CameraWorker:
         self._frames: CaptureLoop | CaptureProcess = make(
             parts, now_s, recovery, self._events.append
         )
-        self._tell = tell
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._newest: Detections | None = None
@@ -76,8 +73,6 @@ class CameraWorker:
         Raises:
             CameraError: the source is lost permanently, or detection has failed.
         """
-        if self._tell is not None:
-            self._tell(now_s)
         if self._failure is not None:
             raise detection_error(self._failure) from self._failure
         return self._newest

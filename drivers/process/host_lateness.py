@@ -55,10 +55,6 @@ class HostLateness:
         late = self.cause(now_s, since_s)
         return f"{fault}: {late}; {NOT_THE_BUS}" if late else f"{fault}: {remedy}"
 
-    def was_late_since(self, begin_s: float) -> bool:
-        """Return whether an answer was late since ``begin_s``."""
-        return self._last_s >= begin_s
-
     def record_own_silence(self, silent_s: float, until_s: float) -> None:
         """Record that this computer has sent nothing for ``silent_s`` seconds."""
         if until_s - self._silent_until_s >= AFTERMATH_S or silent_s > self._silent_s:
@@ -70,6 +66,6 @@ class HostLateness:
         begin_s = min(since_s, now_s - AFTERMATH_S)
         if self._silent_until_s > begin_s:
             return f"this computer was late: it sent nothing for {self._silent_s:.2f} s"
-        if self.was_late_since(begin_s):
+        if self._last_s >= begin_s:
             return "this computer was busy, or the emulator was suspended: answers arrived late"
         return ""

@@ -38,11 +38,6 @@ WATCHDOG_S = 0.2
 """Silence after which servos with a watchdog stop by themselves."""
 
 
-def watchdog_units(family: Family) -> int:
-    """Return the armed value of Bus Watchdog, 0 for a family without one."""
-    return ceil(WATCHDOG_S / family.watchdog_unit_s) if family.watchdog_unit_s else 0
-
-
 def enable(
     line: Transactions, setups: Mapping[int, "ServoConfig"], ids: Sequence[int]
 ) -> tuple[tuple[int, ...], dict[int, float]]:
@@ -62,7 +57,9 @@ def enable(
         ServoMissing: a servo does not answer or rejects its goal.
         ServoFault: a servo refuses its torque, or would move in the wrong direction.
     """
-    family, watchdog = line.family, watchdog_units(line.family)
+    family = line.family
+    unit_s = family.watchdog_unit_s  # 0 for a family without a watchdog
+    watchdog = ceil(WATCHDOG_S / unit_s) if unit_s else 0
     if not ids:
         return (), {}
     if watchdog:

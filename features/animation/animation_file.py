@@ -7,7 +7,6 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.features.animation import bottango, gltf_reader, servo_positions, table
 from gazerig.features.animation.animation import LARGEST, ImportedAnimation, JointMap
-from gazerig.robot.run.track_file import radians_hint
 
 
 def read_animation(
@@ -50,8 +49,7 @@ def read_animation(
         found = servo_positions.read(path, data, rig, names, centre_deg)
     else:
         series = table.read_table(path, data, fps, names)
-        hint = radians_hint(abs(angles).max() for _, angles in series.values())
-        found = ImportedAnimation(series, (hint,) if hint else (), poses=False)
+        found = ImportedAnimation(series, (), poses=False)
     if not found.series:
         raise SetupError(
             f"{path} moves no joint of {rig.name}: {'; '.join(found.notes) or 'no keys'}: {names.hint()}"

@@ -19,7 +19,6 @@ from gazerig.robot.cli.options import (
     NoBrowserOption,
     OakOption,
     PortOption,
-    complete_shipped,
     run_option,
 )
 from gazerig.robot.cli.progress import progress_bar
@@ -39,7 +38,6 @@ StudyArgument = Annotated[
     typer.Argument(
         metavar="STUDY",
         help=f"A study's YAML file, or a shipped one: {', '.join(shipped_names('studies', HOME))}.",
-        autocompletion=complete_shipped("studies", HOME),
     ),
 ]
 

@@ -1,121 +1,38 @@
-"""Commands that move the face of a rig in another terminal: expressions, levels, tracks."""
+"""Commands that move the face of a rig in another terminal: tracks and speech."""
 
-import contextlib
 import sys
 from collections.abc import Mapping
-from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from gazerig.drivers.sound.params import KINDS
-from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.options import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import (
-    NO_TRACK,
-    Express,
-    Play,
-    ReadMenus,
-    Say,
-    SayPiece,
-    SetLevel,
-    Tracks,
-)
+from gazerig.robot.model.commands import NO_TRACK, Play, Say, SayPiece, Tracks
 from gazerig.robot.net.client import RobotClient
 
 app = typer.Typer()
 _PIECE_S = 0.04
-_SET_EVERY_S = 0.1
-"""Interval of setting; a level that is not set for half a second falls to 0."""
-
-
-@app.command()
-def express(
-    expression: Annotated[
-        str | None,
-        typer.Argument(help="Name in the rig's table; without it, all expressions are listed."),
-    ] = None,
-    strength: Annotated[
-        float,
-        typer.Option(
-            "--strength", min=0.0, max=1.0, help="Strength: 1 as in the table, 0 no effect."
-        ),
-    ] = 1.0,
-    pid: PidOption = None,
-) -> None:
-    """Move the running head's face to an expression, or list the expressions."""
-    with clear_errors(), RobotClient.connect(pid, "gazerig ctl express") as rig:
-        if expression is None:
-            there = rig.ask(ReadMenus(), dict[str, tuple[str, ...]]).get("expression", ())
-            say(", ".join(there) or "this rig has no table expressions")
-            return
-        rig.send(Express(expression, strength))
-        say(f"{expression} is active" + (f", strength {strength:g}" if strength != 1.0 else ""))
-
-
-@app.command()
-def level(
-    name: Annotated[str, typer.Argument(help="A level of the rig's table, such as mouth.")],
-    value: Annotated[float, typer.Argument(min=0.0, max=1.0)],
-    seconds: Annotated[
-        float, typer.Option(min=0.0, help="Keep it for S seconds; otherwise until Ctrl-C.")
-    ] = inf,
-    pid: PidOption = None,
-) -> None:
-    """Set a level, such as the opening of a jaw, while this command runs; then it falls to 0."""
-    clock = RealClock()
-    end_s = clock.now_s() + seconds
-    with clear_errors(), RobotClient.connect(pid, "gazerig ctl level") as rig:
-        with contextlib.suppress(KeyboardInterrupt):
-            while True:
-                rig.send(SetLevel(name, value))
-                if clock.now_s() >= end_s:
-                    break
-                clock.sleep_until(min(end_s, clock.now_s() + _SET_EVERY_S))
-        rig.send(SetLevel(name, 0.0))
 
 
 @app.command()
 def play(
     track: Annotated[
-        str | None, typer.Argument(help="A track, e.g. nod; none ends all tracks.")
+        str | None,
+        typer.Argument(help="A track, e.g. nod; none ends all tracks; without it, all are listed."),
     ] = None,
-    speed: Annotated[
-        float,
-        typer.Option(
-            "--speed", min=MIN_SPEED, max=MAX_SPEED, help="Speed factor; 1 is the original speed."
-        ),
-    ] = 1.0,
-    count: Annotated[
-        int,
-        typer.Option(
-            "--count",
-            min=0,
-            max=MAX_COUNT,
-            help="Number of repetitions; 0: as the track defines.",
-        ),
-    ] = 0,
-    start: Annotated[
-        str, typer.Option("--from", metavar="S|CUE", help="Start at a time or a cue.")
-    ] = "0",
-    loop: Annotated[bool, typer.Option("--loop", help="Repeat it until it is ended.")] = False,
-    listed: Annotated[bool, typer.Option("--list", help="List the tracks.")] = False,
     pid: PidOption = None,
 ) -> None:
     """Play a track on the running head, or list all tracks with their fit to this rig."""
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
-        if track is None or listed:
+        if track is None:
             for one in rig.ask(Tracks(), tuple[dict[str, Any], ...]):
                 say(_track_line(one))
             return
-        from_s: float | str = start
-        with contextlib.suppress(ValueError):
-            from_s = float(start)
-        name = "" if track == NO_TRACK else track
-        say(rig.send(Play(name, speed, count, from_s, loop)).text())
+        say(rig.send(Play("" if track == NO_TRACK else track)).text())
 
 
 @app.command(name="say")
@@ -128,7 +45,6 @@ def say_aloud(
             "signed, 16 bits, one channel.",
         ),
     ],
-    volume: Annotated[float, typer.Option(min=0.0, max=1.0, help="Factor on the volume.")] = 1.0,
     rate: Annotated[int, typer.Option(help="Rate of the samples from standard input, Hz.")] = 16000,
     pid: PidOption = None,
 ) -> None:
@@ -143,7 +59,7 @@ def say_aloud(
             return
         if Path(what).suffix.lower() in KINDS and Path(what).is_file():
             what = str(Path(what).absolute())
-        say(rig.send(Say(what, volume)).text())
+        say(rig.send(Say(what)).text())
 
 
 def _track_line(track: Mapping[str, Any]) -> str:

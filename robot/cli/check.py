@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from gazerig.config.rig import Rig
 
 app = typer.Typer()
-_SMALLEST_DEG = 4.0
-"""Larger than pi: ranges of joints in radians are within."""
 
 
 @app.command()
@@ -24,7 +22,7 @@ def check(rig: RigArgument = "desk") -> None:
 
         loaded = load_rig(rig)
         say(good_text(rig, loaded))
-        for finding in (*_find_radians(loaded), *weight_findings(loaded)):
+        for finding in weight_findings(loaded):
             say(f"{rig}: {finding}")
         for line in _track_lines(loaded):
             say(line)
@@ -33,15 +31,6 @@ def check(rig: RigArgument = "desk") -> None:
 def good_text(name: str, rig: "Rig") -> str:
     """Return one line about a rig without faults."""
     return f"{name}: valid: rig {rig.name!r}, {len(rig.joints)} joints, profile {rig.profile}"
-
-
-def _find_radians(rig: "Rig") -> Iterator[str]:
-    """Return a hint if the ranges of the joints look like radians."""
-    from gazerig.robot.run.track_file import radians_hint
-
-    ends = [end for one in rig.joints.values() for end in (one.min_deg, one.max_deg)]
-    if hint := radians_hint(ends, _SMALLEST_DEG):
-        yield f"min_deg and max_deg of all joints: {hint}"
 
 
 def _track_lines(rig: "Rig") -> Iterator[str]:

@@ -3,14 +3,13 @@
 import contextlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from enum import StrEnum
-from math import degrees, inf, radians
+from math import degrees
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any, cast, get_args
+from typing import Annotated, Any
 
+import msgspec
 import typer
-from msgspec import structs
 from typer.core import TyperGroup
 
 from gazerig.config.faults import ConfigError
@@ -19,24 +18,19 @@ from gazerig.params import unknown_text
 from gazerig.robot.cli import animation
 from gazerig.robot.cli.options import PidOption
 from gazerig.robot.cli.terminal import FAULT, clear_errors, confirm, say
-from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import (
-    FAR_M,
+    AnyCommand,
     Ask,
     Character,
+    Command,
     Fault,
     Look,
     LookAt,
-    LookAtDirection,
-    LookAtInHead,
     LookAtPerson,
-    LookAtPixel,
     Parameters,
     ReadMenus,
     Revert,
     Save,
-    Talk,
-    TalkOrder,
     Unsaved,
 )
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
@@ -51,11 +45,9 @@ app = typer.Typer()
 app.add_typer(ctl)
 ctl.add_typer(animation.app)
 
-_CONTROL_CHECK_S = 0.2
 _LAST_MESSAGES = 5
 _NEGATIVE = {"ignore_unknown_options": True}
 """Click settings: -3 is a number, not an option."""
-_TalkState = StrEnum("_TalkState", {name: name for name in get_args(TalkOrder)})  # type: ignore[misc]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
@@ -73,27 +65,17 @@ def connect(pid: str | None, who: str = "") -> Iterator[RobotClient]:
         yield rig
 
 
-def complete_key(incomplete: str) -> list[str]:
-    """Complete a key of the running rig."""
-    with contextlib.suppress(DriverError), RobotClient.connect() as rig:
-        return list(rig.get(incomplete))
-    return []
-
-
 @ctl.command()
-def rigs(as_json: JsonOption = False) -> None:
+def rigs() -> None:
     """List the running rigs: name, rig, process, address of the page with its token."""
     with clear_errors():
-        found = []
-        for rig in connect_to_all():
+        found = connect_to_all()
+        for rig in found:
             with rig:
                 now = rig.status()
-                found.append({key: now.get(key) for key in ("name", "rig", "pid", "page")})
-    if as_json:
-        print(json.dumps(found, indent=2))
-        return
-    for row in found:
-        print("  ".join(str(value) for value in row.values() if value is not None))
+                print(
+                    *(now[key] for key in ("name", "rig", "pid", "page") if now.get(key)), sep="  "
+                )
     if not found:
         say("no rig is running: start one with gazerig run ...")
 
@@ -102,30 +84,17 @@ def rigs(as_json: JsonOption = False) -> None:
 def get(
     prefix: Annotated[
         str,
-        typer.Argument(
-            metavar="KEY", help="A key, or the start of keys.", autocompletion=complete_key
-        ),
+        typer.Argument(metavar="KEY", help="A key, or the start of keys."),
     ] = "",
-    differs: Annotated[
-        bool, typer.Option("--differs", help="Only values that differ from the defaults.")
-    ] = False,
-    as_json: JsonOption = False,
     pid: PidOption = None,
 ) -> None:
     """Show the running rig's parameters: value, unit, default; * marks unsaved values."""
     with connect(pid) as rig:
         values = rig.get(prefix)
-        found = [
-            param
-            for param in rig.ask(Parameters(prefix), tuple[Parameter, ...])
-            if not differs or _value_text(values[param.key]) != _value_text(param.default)
-        ]
+        found = rig.ask(Parameters(prefix), tuple[Parameter, ...])
         if not values:
             raise SetupError(f"{prefix}: no key begins with it; gazerig ctl get lists all")
         unsaved = {change.key for change in rig.ask(Unsaved(), tuple[ParamChange, ...])}
-    if as_json:
-        print(json.dumps({param.key: values[param.key] for param in found}, indent=2))
-        return
     _print_lines(_table(found, values, unsaved))
     if len(found) == 1:
         print(_rule_text(found[0]))
@@ -246,54 +215,39 @@ def look(
     where: Annotated[
         list[str],
         typer.Argument(
-            metavar="X Y Z | person N | pixel X Y | direction YAW PITCH | free",
-            help="Metres ahead, left and up of the neck; a person's number; a pixel of the frame; "
-            "degrees to the left and up; or free.",
+            metavar="X Y Z | person N | free",
+            help="Metres ahead, left and up of the neck; a person's number; or free.",
         ),
     ],
-    head: Annotated[
-        bool,
-        typer.Option("--head", help="X Y Z or YAW PITCH are relative to the present head pose."),
-    ] = False,
-    distance: Annotated[
-        float | None, typer.Option(metavar="M", help="Distance of a pixel or direction, metres.")
-    ] = None,
-    stay: Annotated[
-        bool,
-        typer.Option("--stay", help="Return immediately; the head looks there until: look free."),
-    ] = False,
-    seconds: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="Look there for S seconds; otherwise until Ctrl-C."),
-    ] = None,
     pid: PidOption = None,
 ) -> None:
-    """Make the running head look at a target while this command runs, or look freely again."""
-    with clear_errors():
-        command = read_look(where, head, distance)
-        with RobotClient.connect(pid, "gazerig ctl look") as rig:
-            if command == LookAt(None):
-                rig.send(LookAt(None))
-                say("it looks freely")
-                return
-            reply = rig.send(structs.replace(command, stay=stay))
-            until = "Ctrl-C" if seconds is None else f"{seconds:g} s have passed"
-            say(f"{reply.text()}, until: {'gazerig ctl look free' if stay else until}")
-            if stay:
-                return
-            # Until Ctrl-C or until another client controls the gaze.
-            clock = RealClock()
-            end_s = clock.now_s() + (inf if seconds is None else seconds)
-            with contextlib.suppress(KeyboardInterrupt):
-                while rig.in_control and clock.now_s() < end_s:
-                    clock.sleep_until(min(end_s, clock.now_s() + _CONTROL_CHECK_S))
-            if rig.in_control:
-                rig.send(LookAt(None))
-                say("it looks freely")
-                return
-            now = rig.status()
-            stopped = f"it was stopped: {now['stopped']}" if now["stopped"] else "it looks freely"
-            say(f"controlled by {now['controlled_by']}" if now["controlled_by"] else stopped)
+    """Make the running head look at a target from now on, or look freely again."""
+    with connect(pid, "look") as rig:
+        command = read_look(where)
+        if command == LookAt(None):
+            rig.send(command)
+            say("it looks freely")
+        else:
+            say(f"{rig.send(command).text()}, until: gazerig ctl look free")
+
+
+@ctl.command()
+def do(
+    command: Annotated[
+        str,
+        typer.Argument(
+            metavar="JSON", help="As programs send it: docs/connect-your-program.md lists all."
+        ),
+    ],
+    pid: PidOption = None,
+) -> None:
+    """Send any command to the running head, as JSON; "stay": true keeps it after this one."""
+    with connect(pid, "do") as rig:
+        try:
+            read: Command = msgspec.json.decode(command, type=AnyCommand)
+        except ValueError as error:
+            raise SetupError(f"{command}: {error}") from None
+        say(rig.send(read).text() or "done")
 
 
 @ctl.command()
@@ -342,31 +296,6 @@ def resume(
             )
         rig.resume(confirmed=True)
         say("torque is on; it continues slowly")
-
-
-@ctl.command()
-def talk(
-    state: Annotated[_TalkState, typer.Argument(help="What the voice agent does from now on.")],
-    person: Annotated[
-        int | None, typer.Option(metavar="N", help="Number of the partner or addressee.")
-    ] = None,
-    seconds: Annotated[
-        float | None, typer.Option(metavar="S", help="speaking: time until the planned end.")
-    ] = None,
-    text: Annotated[
-        str,
-        typer.Option(help="speaking: the text; without --seconds the end is estimated from it."),
-    ] = "",
-    pid: PidOption = None,
-) -> None:
-    """Report what a voice agent does, so that the running head looks as a partner; idle ends it."""
-    with connect(pid, "talk") as rig:
-        order = cast(TalkOrder, state.value)
-        rig.send(Talk(order, person, seconds, text, stay=True))
-        now = rig.status()
-        conversation, ends_s = now["conversation"], now["conversation"]["ends_s"]
-        planned = "" if ends_s is None else f", planned end in {ends_s - now['t_s']:.1f} s"
-        say(f"conversation: {conversation['state']}{planned}")
 
 
 @ctl.command(context_settings=_NEGATIVE)
@@ -421,43 +350,25 @@ def read_value(key: str, text: str) -> Any:
     return held["value"]
 
 
-def read_look(words: Sequence[str], head: bool = False, distance_m: float | None = None) -> Look:
-    """Return the gaze target of the arguments.
-
-    Args:
-        words: X Y Z in metres, "person" N, "pixel" X Y, "direction" YAW PITCH in degrees, "free".
-        head: Whether a point or direction is relative to the present head pose.
-        distance_m: Distance of a pixel or direction.
+def read_look(words: Sequence[str]) -> Look:
+    """Return the gaze target of the arguments: X Y Z in metres, "person" N, or "free".
 
     Raises:
         SetupError: the words are not a target.
     """
-    kind, numbers = (words[0], words[1:]) if words[0] in _NUMBERS else ("point", words)
     try:
-        found = tuple(map(float, numbers))
-        if len(found) != _NUMBERS[kind] or (kind == "person" and found[0] % 1.0):
-            raise ValueError
+        match words:
+            case ["free"]:
+                return LookAt(None)
+            case ["person", number]:
+                return LookAtPerson(int(number), stay=True)
+            case [x, y, z]:
+                return LookAt((float(x), float(y), float(z)), stay=True)
     except ValueError:
-        raise SetupError(
-            f"{' '.join(words)}: give X Y Z in metres (ahead, left, up), person N, pixel X Y, "
-            "direction YAW PITCH in degrees (left, up), or free"
-        ) from None
-    if kind == "free":
-        return LookAt(None)
-    if kind == "person":
-        return LookAtPerson(int(found[0]))
-    if kind == "pixel":
-        return LookAtPixel((found[0], found[1]), distance_m)
-    if kind == "direction":
-        angles = (radians(found[0]), radians(found[1]))
-        far_m = FAR_M if distance_m is None else distance_m
-        return LookAtDirection(angles, "head" if head else "world", far_m)
-    point = (found[0], found[1], found[2])
-    return LookAtInHead(point) if head else LookAt(point)
-
-
-_NUMBERS = {"point": 3, "person": 1, "pixel": 2, "direction": 2, "free": 0}
-"""Kinds of targets, and the number of their numbers."""
+        pass
+    raise SetupError(
+        f"{' '.join(words)}: give X Y Z in metres (ahead, left, up), person N, or free"
+    )
 
 
 def state_lines(now: Mapping[str, Any]) -> list[str]:
@@ -475,22 +386,12 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
         *lines,
         *([f"controlled by {now['controlled_by']}"] if now["controlled_by"] else []),
         f"looks at: {gaze['target']} - {gaze['reason']} ({gaze['phase']})",
-        *_talk_lines(now),
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
         *(f"camera: {text}" for text in now.get("camera", ())),
         f"joints in deg: {joints}",
         f"not saved: {_count_text(unsaved)}; gazerig ctl save saves" if unsaved else "all saved",
         *(f"said: {text}" for text in now["said"][-_LAST_MESSAGES:]),
     ]
-
-
-def _talk_lines(now: Mapping[str, Any]) -> list[str]:
-    """Return a line with the state of the conversation, none without one."""
-    talk = now["conversation"]
-    if talk["state"] == "idle":
-        return []
-    partner = f" with person {talk['partner']}" if talk["partner"] is not None else ""
-    return [f"conversation: {talk['state']}{partner}, reported by {talk['who'] or 'a client'}"]
 
 
 def _table(found: Iterable[Parameter], values: dict[str, Any], unsaved: set[str]) -> Iterator[str]:

@@ -21,30 +21,21 @@ def describe(
             help="Folder to write to; default: the rig's name with _description, in this folder."
         ),
     ] = None,
-    mjcf: Annotated[bool, typer.Option("--mjcf", help="Write MJCF, for MuJoCo.")] = False,
-    urdf: Annotated[
-        bool, typer.Option("--urdf", help="Write URDF, for ROS, Foxglove and most simulators.")
-    ] = False,
-    glb: Annotated[
-        bool, typer.Option("--glb", help="Write binary glTF, for browsers and Blender.")
-    ] = False,
     force: ForceOption = False,
 ) -> None:
-    """Write a rig as a robot description: MJCF, URDF and glTF with meshes, or one of them."""
+    """Write a rig as a robot description: MJCF, URDF and glTF, with meshes."""
     with clear_errors(rig):
         from gazerig.config.schema import load_rig
-        from gazerig.robot.description.files import FORMATS, description_files, file_name
+        from gazerig.robot.description.files import description_files, file_name
         from gazerig.robot.run.rig_description import description_of
 
         loaded = load_rig(rig)
         description = description_of(loaded)
-        asked = dict(zip(FORMATS, (mjcf, urdf, glb), strict=True))
-        wanted = [name for name, one in asked.items() if one] or list(FORMATS)
         folder = out or Path(f"{file_name(description.name)}_description")
         if folder.exists() and not folder.is_dir():
             raise SetupError(f"{folder} is a file: name a folder to write to")
         make_folder(folder)
-        files = description_files(description, wanted)
+        files = description_files(description)
         paths = {folder / name: data for name, data in files.items()}
         refuse_existing(*paths, force=force)
         for path in {path.parent for path in paths}:

@@ -13,16 +13,9 @@ from gazerig.robot.run.doors import load_door
 app = typer.Typer()
 
 
-def complete_door(incomplete: str) -> list[str]:
-    """Complete the name of a door."""
-    return [one.name for one in registrations(DOOR) if one.name.startswith(incomplete)]
-
-
 @app.command()
 def door(
-    name: Annotated[
-        str | None, typer.Argument(help="Name of the door.", autocompletion=complete_door)
-    ] = None,
+    name: Annotated[str | None, typer.Argument(help="Name of the door.")] = None,
     address: Annotated[
         str, typer.Argument(metavar="ADDRESS", help="Address of the neighbour; see docs/talk.md.")
     ] = "",

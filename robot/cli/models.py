@@ -47,7 +47,6 @@ def fetch_models(
         typer.Argument(
             metavar="[NAME]...",
             help=f"Names: {', '.join(_NAMES)}; default: all.",
-            autocompletion=lambda incomplete: [n for n in _NAMES if n.startswith(incomplete)],
         ),
     ] = None,
     folder: Annotated[

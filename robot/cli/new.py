@@ -117,18 +117,17 @@ def new(
     file: Annotated[Path, typer.Argument(help="The YAML file to write.")] = Path("myrig.yaml"),
     board: Annotated[
         str | None,
-        typer.Option(help=f"{', '.join(BOARDS)}.", autocompletion=lambda: list(BOARDS)),
+        typer.Option(help=f"{', '.join(BOARDS)}."),
     ] = None,
     joints: Annotated[
         str | None,
         typer.Option(
             help=f"{', '.join(MECHANISMS)}; or names of joints: eyes_pan,eyes_tilt,jaw.",
-            autocompletion=lambda: list(MECHANISMS),
         ),
     ] = None,
     camera: Annotated[
         str | None,
-        typer.Option(help=f"{', '.join(CAMERAS)}.", autocompletion=lambda: list(CAMERAS)),
+        typer.Option(help=f"{', '.join(CAMERAS)}."),
     ] = None,
     eyes_mm: Annotated[
         float | None,
@@ -251,7 +250,7 @@ def joints_of(text: str) -> tuple[str, ...]:
 def _lines(new: NewRig, board: _Board) -> Iterator[str]:
     usual = {name: _TABLES.joints.get(name, _Joint()) for name in new.joints}
     there = "no board yet: only with --mock" if new.board == "none" else "`gazerig scan` lists it"
-    yield f"# A head of {len(new.joints)} servos. All keys, with units and ranges: docs/parameters.md."
+    yield f"# A head of {len(new.joints)} servos. The shipped rig desk.yaml explains the keys."
     yield f"name: {format_value(new.name)}"
     yield "profile: robot"
     port = format_value(new.port or board.port)

@@ -10,7 +10,6 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from gazerig.config.shipped_files import shipped_names
-from gazerig.drivers.errors import PluginError
 from gazerig.robot.cli.terminal import RigArgument
 from gazerig.robot.run.options import Option, RunOptions
 
@@ -28,28 +27,6 @@ PidOption = Annotated[
 ]
 
 
-def complete_shipped(kind: str, home: Path | None = None) -> Callable[[str], list[str]]:
-    """Return the completion function for names of a kind of shipped file, e.g. "characters"."""
-    return lambda incomplete: [
-        name for name in shipped_names(kind, home) if name.startswith(incomplete)
-    ]
-
-
-def complete_world(incomplete: str) -> list[str]:
-    """Complete a world with physics; without that feature there is none."""
-    from gazerig.robot.run.surroundings import world
-
-    try:
-        return [name for name in world().names() if name.startswith(incomplete)]
-    except PluginError:
-        return []
-
-
-_COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
-    "world": complete_world,
-    **{name: complete_shipped(f"{name}s") for name in ("scene", "profile", "character")},
-    "rules": complete_shipped("rules"),
-}
 _HINTS = get_type_hints(RunOptions, include_extras=True)
 
 
@@ -68,7 +45,6 @@ def run_option(name: str, is_shown: bool = True) -> Any:
         min=about.low,
         max=about.high,
         hidden=not is_shown,
-        autocompletion=_COMPLETIONS.get(name),
     )
 
 

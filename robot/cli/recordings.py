@@ -1,15 +1,14 @@
 """Commands rerun and export, for recorded runs."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.robot.cli.progress import Console, progress_bar
-from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, complete_rig, say
+from gazerig.robot.cli.progress import progress_bar
+from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, say
 
 if TYPE_CHECKING:
     from gazerig.robot.loop.tick import Tick
@@ -20,22 +19,10 @@ app = typer.Typer(add_completion=False)
 Recording = Annotated[
     Path, typer.Argument(metavar="FILE", help="A recording of gazerig run --record.")
 ]
-_EVENTS = ("saccade", "fixation", "pursuit", "blink")
 
 
 @app.command()
-def rerun(
-    file: Recording,
-    rig: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="RIG",
-            help="A rig instead of the recorded one.",
-            autocompletion=complete_rig,
-        ),
-    ] = None,
-    character: Annotated[str | None, typer.Option(help="Another character.")] = None,
-) -> None:
+def rerun(file: Recording) -> None:
     """Run a recording's input through the present models: same input, same bytes."""
     with clear_errors():
         from gazerig.robot.recording.read import RunRecording, report_bad_contents
@@ -44,17 +31,10 @@ def rerun(
         recording = RunRecording(file)
         with report_bad_contents(file), progress_bar() as tell:
             on_tick = _progress(tell, "running again", recording.duration_s)
-            result = run_again(recording, rig, character, on_tick)
-        for line in result.notes:
+            result = run_again(recording, on_tick)
+        for line in (*result.notes, agreement_text(result)):
             say(line)
-        say(agreement_text(result))
-        table = Table("", "recorded", "run again", title=f"{file.name} run again")
-        for name, was, now in compare_figures(result.recorded_figures, result.rerun_figures):
-            table.add_row(name, was, now, style=None if was == now else "bold")
-        Console().print(table)
-    # Results must be identical only if nothing has changed.
-    is_changed = rig is not None or character is not None
-    if not (result.is_same or is_changed):
+    if not result.is_same:
         raise typer.Exit(FAULT)
 
 
@@ -66,13 +46,7 @@ def export(
 ) -> None:
     """Export a run as CSV for eye-tracking tools: samples and events, degrees, + left and + up."""
     with clear_errors():
-        from gazerig.robot.recording.export_csv import csv_files, write_csv
-        from gazerig.robot.recording.gaze_angles import (
-            ESTIMATED,
-            collect_gaze_angles,
-            find_intervals,
-            label_samples,
-        )
+        from gazerig.robot.recording.export_csv import GazeExport, csv_files
         from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
         recording = RunRecording(file)
@@ -80,19 +54,16 @@ def export(
         refuse_existing(*csv_files(stem), force=force)
         if recording.note:
             say(recording.note)
+        gaze = GazeExport()
         with report_bad_contents(file), progress_bar() as tell:
             on_tick = _progress(tell, "reading", recording.duration_s)
-            trace = collect_gaze_angles(_watch(recording.ticks(), on_tick))
-            labels = label_samples(trace)
-            stretches = find_intervals(trace, labels)
-        say("\n".join(map(str, write_csv(trace, labels, stretches, stem, force))))
-        counts = (f"{sum(s.event == kind for s in stretches)} {kind}s" for kind in _EVENTS)
-        say(
-            f"{len(trace.time_s)} samples in {trace.time_s[-1]:.1f} s, {', '.join(counts)}; labels "
-            f"are the plan's, {1e3 * labels.lag_s:.0f} ms later, as the eyes follow it"
-        )
-        if trace.estimated:
-            say(f"{', '.join(trace.estimated)}: {ESTIMATED}")
+            for tick in recording.ticks():
+                gaze.update(tick)
+                on_tick(tick)
+        summary = gaze.write(stem, force)
+        say("\n".join(map(str, (*csv_files(stem), summary))))
+        if gaze.estimated:
+            say(f"estimated from commands, not measured: {', '.join(gaze.estimated)}")
 
 
 def agreement_text(result: "Rerun") -> str:
@@ -109,29 +80,6 @@ def agreement_text(result: "Rerun") -> str:
     return text
 
 
-def compare_figures(
-    was: Mapping[str, object], now: Mapping[str, object]
-) -> Iterator[tuple[str, str, str]]:
-    """Return the figures of two runs side by side: name and both values as text."""
-    both = _flat_figures(was), _flat_figures(now)
-    for name in both[0] | both[1]:
-        yield name, both[0].get(name, "-"), both[1].get(name, "-")
-
-
-def _flat_figures(figures: Mapping[str, object], within: str = "") -> dict[str, str]:
-    """Return figures and figures of figures by name as text."""
-    found: dict[str, str] = {}
-    for key, value in figures.items():
-        name = within + key.replace("_", " ")
-        if isinstance(value, Mapping):
-            found |= _flat_figures(value, f"{name} ")
-        elif isinstance(value, list | tuple):
-            found[name] = f"{len(value)} of them"
-        elif value is not None:
-            found[name] = f"{value:.4g}" if isinstance(value, float) else str(value)
-    return found
-
-
 def _progress(
     tell: Callable[[str, float], None], text: str, total_s: float
 ) -> Callable[["Tick"], None]:
@@ -144,9 +92,3 @@ def _progress(
         tell(text, min(1.0, (tick.t_s - start_s[0]) / total_s) if total_s else 1.0)
 
     return on_tick
-
-
-def _watch(ticks: Iterable["Tick"], on_tick: Callable[["Tick"], None]) -> Iterator["Tick"]:
-    for tick in ticks:
-        on_tick(tick)
-        yield tick

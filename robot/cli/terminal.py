@@ -21,13 +21,11 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Annotated, Any, NamedTuple, NoReturn
 
 import typer
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError, extra_hint
 from gazerig.drivers.process.visible_text import VisibleStream, visible
 from gazerig.drivers.process.work_queue import WorkQueue
@@ -141,18 +139,11 @@ _writer = LineWriter(_STDERR)
 atexit.register(_writer.flush, _FLUSH_S)
 
 
-def complete_rig(incomplete: str) -> list[str]:
-    """Complete a rig: a shipped name, or a YAML file here."""
-    here = sorted(str(path) for path in Path(".").glob("*.yaml"))
-    return [name for name in (*shipped_names("rigs"), *here) if name.startswith(incomplete)]
-
-
 RigArgument = Annotated[
     str,
     typer.Argument(
         metavar="RIG",
         help="A rig's YAML file, or the name of a shipped rig.",
-        autocompletion=complete_rig,
     ),
 ]
 

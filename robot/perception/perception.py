@@ -37,6 +37,8 @@ from gazerig.robot.perception.tracker import Tracker, correct_velocity
 
 # A camera that turned farther than this between two frames shows another part of the same room.
 _COS_SAME_VIEW = cos(radians(5.0))
+# A ball in flight comes faster than this; a hand that carries something past the camera does not.
+_COMES_M_S = 1.0
 
 
 class Perception:
@@ -132,7 +134,7 @@ class Perception:
             [
                 track
                 for track, here in zip(in_sight, inside, strict=True)
-                if track.counts and (here or track.seen_s == t_s)
+                if track.counts and (here or (track.seen_s == t_s and _stays_beyond_edge(track)))
             ]
         )
         self._percept = Percept(
@@ -207,6 +209,12 @@ class Perception:
             signs and signs.mouth_opening_m,
             track.is_alive and track.speech.speaks(t_s) if signs else None,
         )
+
+
+def _stays_beyond_edge(track: BodyTrack) -> bool:
+    """Return whether a body with its middle beyond the picture counts: a patch must come fast."""
+    comes_m_s = -dot(track.filter.v_m_s, track.filter.view)
+    return track.detection.kind != UNNAMED or comes_m_s > _COMES_M_S
 
 
 def _in_picture(p_camera_m: list[Vec3], lens: Intrinsics, found: Detections) -> list[bool]:

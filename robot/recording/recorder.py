@@ -5,9 +5,7 @@ of the loop in batches. The process outlives this program until it has closed th
 """
 
 import os
-import secrets
 import select
-import shutil
 import subprocess
 from collections import deque
 from collections.abc import Callable
@@ -20,20 +18,18 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.drivers.process import child_process
 from gazerig.drivers.process.work_queue import WorkQueue
-from gazerig.drivers.types import BusHealth, Detections
+from gazerig.drivers.types import Detections
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.tick import BodyRecord, MeasuredJoints, Tick
 from gazerig.robot.loop.tick_stream import LIVE_S, SIMULATED_S, TickBatch, TickStream, encode
 from gazerig.robot.recording import writer
 from gazerig.robot.recording.body_playback import JointRecorder
-from gazerig.robot.recording.run_format import Health
 from gazerig.robot.recording.run_info import RunEnd, RunInfo
 
 QUEUE_BYTES = 64_000_000
 """Limit of the queue: some minutes of a run; frames get half of it, half a minute of a webcam's."""
 _DIED = "its writer has died"
 _TIMEOUT_S = 15.0
-_HEALTH_S = 1.0
 _EARLY_S = 1e-3  # a frame may be this early, as times are rounded
 
 
@@ -175,9 +171,8 @@ class Recorder:
             patient: Whether to wait for a slow writer, as in simulated time.
             urdf: Description of the rig for viewers; "" for none.
         """
-        self._path, self._target = path, Path(os.path.realpath(path))
+        self._path = path
         self._info, self._urdf = info, urdf
-        self._health: Callable[[], BusHealth] = lambda: BusHealth(0, 0, {})
         self._over = over
         self._patient = patient
         self._link: WriterLink | None = None
@@ -188,8 +183,6 @@ class Recorder:
         self.stream.sinks.add("the recording", self._take)
         self._last_s: float | None = None
         self._seconds: float | None = None
-        self._checked_s = -inf
-        self._temporary: Path | None = None
         self._failure_reported = False
         self.lost = 0
 
@@ -199,10 +192,7 @@ class Recorder:
         Raises:
             SetupError: The file exists or cannot be created.
         """
-        if self._over and self._path.is_file():
-            beside = f".{self._target.name[:80]}-{secrets.token_hex(4)}"
-            self._temporary = self._target.with_name(beside)
-        path, over = self._temporary or self._path, self._over
+        path, over = self._path, self._over
         refuse_existing(path, force=over)
         try:
             flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if over else os.O_EXCL)
@@ -217,21 +207,8 @@ class Recorder:
             os.close(file_fd)
         self._link.post(writer.BEGIN, encode((self._info, self._urdf)))
 
-    def begin(self) -> None:
-        """Replace an older recording; call it when the run has started.
-
-        Raises:
-            OSError: The replacement failed; the older recording stays.
-        """
-        if self._temporary is None:
-            return
-        shutil.copymode(self._target, self._temporary)
-        os.replace(self._temporary, self._target)
-        self._temporary = None
-
     def wrap_body(self, body: Body) -> Body:
         """Return a body that wraps a robot's body and records its readings."""
-        self._health = body.bus.health
         return JointRecorder(body, self._body_records.append)
 
     def wrap_stop(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
@@ -259,16 +236,11 @@ class Recorder:
         self.stream.append(tick, dt_s, before)
         if self._frames.is_due(tick.detections):
             self._post_frame(tick.detections)
-        if self._link is not None and tick.t_s - self._checked_s >= _HEALTH_S:
-            self._checked_s = tick.t_s
-            self.stream.flush()
-            sent, received, errors = self._health()
-            health = Health(sent, received, dict(errors), self.lost)
-            self._link.post(writer.HEALTH, encode(health))
-            self._link.listen()
 
     def _take(self, batch: TickBatch) -> bool:
         """Send ticks to the writer; return False if they are lost."""
+        if self._link is not None:
+            self._link.listen()
         if self._link is None or self._link.failed:
             return True  # the failure is reported; no remaining receiver could miss a percept
         if self._link.post(writer.TICKS, batch.data):
@@ -309,12 +281,9 @@ class Recorder:
             self._link.post(writer.END, encode(end))
             self._link.close()
         if self._link is None or self._last_s is None:
-            if self._temporary is not None:
-                self._temporary.unlink(missing_ok=True)
-                return f"nothing was recorded: {self._path} is unchanged"
             # Otherwise it belongs to another program, or is a device.
-            if self._link is not None and self._target.is_file():
-                self._target.unlink()
+            if self._link is not None and self._path.is_file():
+                self._path.unlink()
             return f"nothing was recorded: {self._path} was not created"
         closed = self._link.closed
         if closed is None:

@@ -28,7 +28,7 @@ from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.run_info import PROFILE, RunEnd, RunInfo, as_text, started_ns
 
-BEGIN, TICKS, FRAME, HEALTH, END = b"b", b"t", b"f", b"h", b"e"
+BEGIN, TICKS, FRAME, END = b"b", b"t", b"f", b"e"
 """Kinds of messages. Bodies are MessagePack; for TICKS see ``tick_stream.TickBatch``."""
 PREFIX = struct.Struct("<cII")
 """Kind, length of the body and length of a frame's pixels, before both."""
@@ -115,8 +115,6 @@ class RunWriter:
                 self._posed_s = self._at_s
                 names = tick.guard_result.joints
                 self.add(fmt.JOINT_STATES, self._at_s, fmt.joint_states(names, tick.joints, now))
-                poses = fmt.transforms(tick.pose, tick.gaze.gaze_point_world_m, now)
-                self.add(fmt.TRANSFORMS, self._at_s, poses)
 
     def write_frame(self, frame: Frame, pixels: bytes) -> None:
         """Write a camera image as JPEG."""
@@ -126,10 +124,6 @@ class RunWriter:
         exposed = self._time(frame.captured_s - first_s)
         picture = fmt.CompressedImage(exposed, frame.captured_s, jpeg.tobytes())
         self.add(fmt.FRAME, self._at_s, picture)
-
-    def write_health(self, health: fmt.Health) -> None:
-        """Write the counts of the bus."""
-        self.add(fmt.HEALTH, self._at_s, health)
 
     def add(self, topic: str, at_s: float, message: object) -> None:
         """Append a message to the present chunk; do nothing after a failure.
@@ -214,8 +208,6 @@ def write(messages: Iterator[Message | None], writer: RunWriter, clock: Clock) -
             writer.write_ticks(body)
         elif kind == FRAME:
             writer.write_frame(decode(body, Frame), pixels)
-        elif kind == HEALTH:
-            writer.write_health(decode(body, fmt.Health))
         now_s = clock.now_s()
         if now_s - flushed_s >= _FLUSH_S:
             flushed_s = now_s

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from functools import partial
 from math import radians
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -14,13 +14,12 @@ from gazerig.drivers.camera import camera_plugins
 from gazerig.drivers.camera.browser_source import FIELD_DEG, BrowserSource
 from gazerig.drivers.camera.capture_loop import CameraParts, Motion
 from gazerig.drivers.camera.orientation import FrameOrientation
-from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.camera.shared_slots import JpegSlot, PoseBuffer, TimedPose
-from gazerig.drivers.camera.source import FrameSource, Shot
+from gazerig.drivers.camera.shared_slots import JpegSlot, PoseBuffer
+from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.errors import PluginError, SetupError
 from gazerig.drivers.plugins import CAMERA, CameraPlugin, find, is_ours, load
-from gazerig.drivers.types import Camera, DetectedFace, FaceDetector, ImageArray, MovingBlob
+from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Mat3, Vec3
@@ -36,7 +35,6 @@ from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from gazerig.drivers.camera.file_player import FilePlayer
-    from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera
 
 HeadPose = Callable[[float], tuple[Mat3, Vec3]]
 """Function that returns rotation and position [m] of the head in the world at a time [s]."""
@@ -82,7 +80,7 @@ def place_camera(
         rig: Defines the camera.
         options: Select its source.
         kinematics: Kinematics of the head.
-        in_process: Whether another process reads the camera and needs its rotation.
+        in_process: Whether frames are analysed, which needs the rotation of the camera.
     """
     what, params, notes = options.camera_source, rig.camera, tuple[str, ...]()
     filmed = options.video is not None or options.replay is not None
@@ -219,17 +217,16 @@ def true_head_pose(steps: Callable[[], dict[str, float]], rig: Rig, head: Kinema
 
 
 def scene_camera(
-    rig: Rig, view: CameraView, options: RunOptions, now_s: Callable[[], float],
-    own: FaceDetector | None, scene: Scene, head: HeadPose, rng: np.random.Generator,
+    rig: Rig, view: CameraView, options: RunOptions, own: FaceDetector | None, scene: Scene,
+    head: HeadPose, rng: np.random.Generator,
 ) -> Camera:  # fmt: skip
     """Return a camera on a simulated scene: its detections are computed, or its frames drawn.
 
     Args:
         rig: Parameters of camera and detectors.
         view: Placement of the camera.
-        options: Whether frames are drawn, and whether time is simulated.
-        now_s: The host's clock.
-        own: A program's own detector, which exists only in this process.
+        options: Whether frames are drawn.
+        own: A program's own detector.
         scene: The scene in front of the camera.
         head: True pose of the head.
         rng: Random numbers of the camera's noise.
@@ -238,127 +235,11 @@ def scene_camera(
     params, locate = FrameParams(horizontal_field_deg=field_deg), view.locate
     if not options.pixels:
         return SceneCamera(params, scene, view.mount, head, rng, locate)
-    detector = detector_of(rig, own)
-    if options.fast:
-        from gazerig.sim_mock.cameras.rendered import PixelCamera
-
-        motion = SyntheticMotion(rig.motion)
-        drawn = DrawnScene(scene)
-        return PixelCamera(params, drawn, view.mount, head, detector(), rng, motion, locate)
-    poses = PoseBuffer()
-    draw = partial(scene_pixels, scene, view.mount, field_deg, rng)
-    parts = CameraParts(
-        partial(DrawnSource, draw, poses), detector, view.motion(rig.motion), locate
-    )
-    return CameraWorker(
-        parts, now_s, tell=lambda t_s: poses.record(t_s, *head(t_s)), in_thread=own is not None
-    )
-
-
-def scene_pixels(
-    scene: Scene, mount: CameraMount, field_deg: float, rng: np.random.Generator, head: HeadPose
-) -> "PixelCamera":
-    """Return the camera that draws a scene, for its own process."""
     from gazerig.sim_mock.cameras.rendered import PixelCamera
 
-    params = FrameParams(horizontal_field_deg=field_deg, latency_ms=0.0)
-    return PixelCamera(params, DrawnScene(scene), mount, head, NoFaces(), rng)
-
-
-class NoFaces:
-    """Detector that finds no faces: the camera's process detects them later."""
-
-    def find(self, bgr: ImageArray) -> tuple[DetectedFace, ...]:
-        """Return no faces."""
-        return ()
-
-
-class SyntheticMotion:
-    """Motion detector of drawn frames, whose rotation of the camera is known."""
-
-    def __init__(self, params: MotionParams) -> None:
-        from gazerig.drivers.vision.motion import detector  # with OpenCV
-
-        self._enabled, self._vision = params.enabled, detector
-        self._detector = detector.MotionDetector(params)
-        self._before: Mat3 | None = None
-
-    def __call__(self, shot: "Exposure", lens: Intrinsics) -> tuple[MovingBlob, ...]:
-        """Find motion since the previous frame; empty if disabled."""
-        R, before = shot.R_world_camera, self._before
-        self._before = R
-        if not self._enabled:
-            return ()
-        turned = None
-        if before is not None and self._detector.before_s is not None:
-            turned = self._vision.relative_rotation(np.array(R), np.array(before))
-        return self._detector.find(shot.image, shot.captured_s, lens, turned)
-
-
-class NewestHeadPose(Protocol):
-    """Newest pose of the head in the camera's process; ``first_s``: start of the scene."""
-
-    @property
-    def first_s(self) -> float: ...  # noqa: D102
-
-    def newest(self) -> TimedPose | None: ...  # noqa: D102
-
-
-_LOOK_S = 0.002
-
-
-class DrawnSource:
-    """Source of a scene's frames, drawn from the newest pose of the head.
-
-    The control loop only sends the pose. The camera's process draws and detects, so that neither
-    can delay a tick.
-
-    Args:
-        make: Returns the drawing camera, given the head's pose.
-        poses: Poses of the head.
-    """
-
-    def __init__(self, make: "Callable[[HeadPose], PixelCamera]", poses: NewestHeadPose) -> None:
-        self._camera, self._poses = make(self._head_pose), poses
-        self._now: TimedPose | None = None
-        self._number = 0
-        self._due_s = 0.0
-
-    def open(self) -> None:
-        """Start with the first frame."""
-        self._camera.open()
-        self._number = 0
-
-    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Draw the next frame, from the newest pose; None if ``stop`` was set."""
-        while not stop.is_set():
-            newest, wait_s = self._poses.newest(), self._due_s - now_s()
-            if newest is None or wait_s > 0.0:
-                stop.wait(max(wait_s, _LOOK_S))
-                continue
-            self._now = newest
-            if self._number == 0:
-                self._camera.latest(self._poses.first_s)  # the time of the scene starts here
-            found = self._camera.latest(newest.t_s)
-            if found is None or found.image is None or found.number == self._number:
-                stop.wait(_LOOK_S)
-                continue
-            self._number = found.number
-            self._due_s = max(now_s(), newest.t_s + 1.0 / self._camera.rate_hz)
-            return Shot(found.captured_s, found.number, found.image)
-        return None
-
-    def events(self) -> tuple[str, ...]:
-        """Return no events: a drawn camera has none."""
-        return ()
-
-    def close(self) -> None:
-        """Free the renderer; safe to call twice."""
-        self._camera.close()
-
-    def _head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
-        assert self._now is not None  # ``take`` waits for the first pose
-        return self._now.R_world_head, self._now.p_world_head_m
+    detector, motion = detector_of(rig, own), view.motion(rig.motion)()
+    drawn = DrawnScene(scene)
+    return PixelCamera(params, drawn, view.mount, head, detector(), rng, motion, locate)
 
 
 # --- a browser's camera

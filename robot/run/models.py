@@ -6,7 +6,6 @@ import numpy as np
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
-from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import ATTENTION, AttentionPlugin, create, find, is_ours, load
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp
@@ -114,6 +113,4 @@ def with_rule(rig: Rig, own: TargetChooser) -> TargetChooser:
         return own
     rule = create(ATTENTION, name, load(ATTENTION, name, AttentionPlugin), rig.gaze.plugins[name])
     label = find(ATTENTION, name).label
-    if not callable(getattr(rule, "choose", None)):
-        raise PluginError(f"{label} created a {type(rule).__name__}, which has no method choose")
     return RuleChooser(rule, own, label)

@@ -65,7 +65,7 @@ class RunObservers:
         self._status: StatusLine | None = None
         self._parts: list[tuple[str, Callable[[], object], Callable[[], object]]] = []
         if run.recorder is not None:
-            self._parts.append(("the recording", run.recorder.begin, self._close_recording))
+            self._parts.append(("the recording", lambda: None, self._close_recording))
         if not options.fast:
             self._server = self._make_server()
             self._parts.append(("the remote control", self._server.open, self._server.close))
@@ -77,7 +77,11 @@ class RunObservers:
                 self._parts.append(("the page", self._page.open, self._page.close))
             doors = DoorProcesses(run.rig.doors, os.getpid(), say)
             self._parts.append(("the doors", doors.open, doors.close))
-        self._parts.append(("the voice", lambda: None, run.voice.close))
+        has_sound = not options.fast and any(
+            one.sound for one in run.tracks.all_tracks(limits(run.rig.joints))
+        )
+        opened = run.voice.open if has_sound else lambda: None
+        self._parts.append(("the voice", opened, run.voice.close))
 
     def _make_server(self) -> LiveServer:
         run, options = self._run, self._run.options

@@ -82,7 +82,7 @@ class RunOptions:
     video: Annotated[Path | None, Option("Film or image, in a loop.", "FILE")] = None
     replay: Annotated[Path | None, Option("Recording of --record-camera, in a loop.", "FILE", name="camera-recording")] = None
     record_camera: Annotated[Path | None, Option("Record every frame of the camera: FILE.mcap.", "FILE")] = None
-    pixels: Annotated[bool, Option("Draw the scene, and detect faces and motion in it.", is_shown=False)] = False
+    pixels: Annotated[bool, Option("Draw the scene, and detect in it; needs --fast.", is_shown=False)] = False
     no_pictures: Annotated[bool, Option("Compute what the camera of a world sees, without pictures.", is_shown=False)] = False
     rig: str = "desk"
     name: Annotated[str | None, Option("Name of this head for gazerig ctl --rig.", "NAME")] = None
@@ -206,10 +206,6 @@ class RunOptions:
             unknown_text("--bus", str(bus), BUSES),
         )
         yield (
-            bus is not None and self.port is not None,
-            f"--bus {bus} and --port exclude each other: servos at a port are real",
-        )
-        yield (
             bus is not None and not mock,
             f"--bus {bus} needs --mock: it selects the replacement of the rig's servos",
         )
@@ -240,16 +236,16 @@ class RunOptions:
             "--world with --bus ideal needs --fast: ideal servos have no real time",
         )
         yield (
-            world and self.pixels,
-            "--world and --pixels exclude each other: a world is rendered in any case",
-        )
-        yield (
             self.no_pictures and not world,
             "--no-pictures needs --world: pictures of a scene are drawn only with --pixels",
         )
         yield (
             self.pixels and scene is None,
-            "--pixels draws a scene: it cannot be used with a film or a camera",
+            "--pixels draws a scene: it cannot be used with a world, a film or a camera",
+        )
+        yield (
+            self.pixels and not self.fast,
+            "a scene is drawn in simulated time only: add --fast, or use --world in real time",
         )
         yield (
             self.fast and self.seconds is None and scene is None and not world,

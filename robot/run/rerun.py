@@ -1,8 +1,6 @@
 """Rerun of a recorded run: its percepts, times, commands and seed with the present models.
 
-With the recorded configuration and code every command is bit-identical, and the joint angles are
-the recorded ones. After a change the recorded angles would belong to other commands, so emulated
-servos follow the commands instead (ideal ones if they were ideal).
+The joint angles are the recorded ones. With the recorded code every command is bit-identical.
 """
 
 from collections.abc import Callable
@@ -14,18 +12,16 @@ from typing import NamedTuple
 
 from msgspec import structs
 
-from gazerig.config.load import ConfigError, find_file, load
+from gazerig.config.load import ConfigError, load
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import track_files
-from gazerig.config.schema import load_rig
-from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.drivers.errors import SetupError
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.loop import Tick
 from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import MeasuredJoints
 from gazerig.robot.recording.body_playback import NoCamera, PlaybackBody, PlaybackPerception
 from gazerig.robot.recording.read import BadRecording, RunRecording
-from gazerig.robot.run.figures import Summary
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.run import Run
 from gazerig.robot.run.session import prepare_shutdown
@@ -39,7 +35,6 @@ class Rerun(NamedTuple):
     first_difference_s: time of the first difference from the first tick, None if all agree;
     difference: what differs there, "" if all agree
     sent_bytes_same: whether the bytes on the emulated bus are the same too, None if unknown
-    recorded_figures, rerun_figures: the figures of both (gazerig.robot.run.figures)
     notes: further messages for the user
     """
 
@@ -48,8 +43,6 @@ class Rerun(NamedTuple):
     first_difference_s: float | None
     difference: str
     sent_bytes_same: bool | None
-    recorded_figures: dict[str, object]
-    rerun_figures: dict[str, object]
     notes: tuple[str, ...]
 
     @property
@@ -58,41 +51,28 @@ class Rerun(NamedTuple):
         return self.agreeing_ticks == self.ticks
 
 
-def rerun(
-    recording: RunRecording,
-    rig: str | None = None,
-    character: str | None = None,
-    on_tick: Callable[[Tick], None] | None = None,
-) -> Rerun:
+def rerun(recording: RunRecording, on_tick: Callable[[Tick], None] | None = None) -> Rerun:
     """Run a recording again.
 
     Args:
         recording: The recorded run.
-        rig: Another rig, by name or path; None: as recorded.
-        character: Applied to it, by name or path.
         on_tick: Receives every tick of the new run.
 
     Raises:
-        gazerig.config.load.ConfigError: the rig or character is invalid.
         SetupError: the recording cannot be read or contains no tick.
     """
     with TemporaryDirectory(prefix="gazerig-rerun-") as folder:
-        present = load_rig(rig, character) if rig is not None else None
-        options = RunOptions(True, True, recording.info.seed, bus=recording.info.bus)
         played: list[PlaybackBody] = []
 
         def wrap(body: Body) -> Body:
             played[:] = [PlaybackBody(body)]
             return played[0]
 
-        run = Run(
-            present or _recorded_rig(recording, character, Path(folder)),
-            options,
-            camera=NoCamera(),
-            wrap_body=wrap if rig is None and character is None else None,
-        )
+        options = RunOptions(True, True, recording.info.seed, bus=recording.info.bus)
+        rig = _recorded_rig(recording, Path(folder))
+        run = Run(rig, options, camera=NoCamera(), wrap_body=wrap)
         try:
-            return _rerun(recording, run, played[0] if played else None, on_tick)
+            return _rerun(recording, run, played[0], on_tick)
         finally:
             run.close()
 
@@ -100,7 +80,7 @@ def rerun(
 def _rerun(
     recording: RunRecording,
     run: Run,
-    body: PlaybackBody | None,
+    body: PlaybackBody,
     on_tick: Callable[[Tick], None] | None,
 ) -> Rerun:
     """Run all ticks again and compare them."""
@@ -109,44 +89,26 @@ def _rerun(
     first = next(moments, None)
     if first is None:
         raise SetupError(f"{recording.path} contains no tick: nothing can be run again")
-    names, recorded = run.robot.body.names, first.tick.guard_result.joints
-    if names != recorded:
-        notes.append(
-            f"the rig has the joints {', '.join(names)}, the recording {', '.join(recorded)}"
-        )
     began_s = first.tick.t_s - first.dt_s
     starts = [one.t_s for one in first.before if isinstance(one, MeasuredJoints)]
     if not starts:
-        notes.append("the start of the run is not in the recording: it begins")
+        notes.append("the start of the run is not in the recording")
     perception = PlaybackPerception(run.view.mount, run.view.params.horizontal_field_deg)
     run.robot.perception = perception
     run.clock.sleep_until(starts[0] if starts else began_s)
-    if body is not None:
-        body.play(first)
+    body.play(first)
     run.robot.start(run.clock)
-    was_summary, summary = Summary(), Summary()
     ticks = agreeing = 0
-    first_s, difference, ended = None, "", ""
+    first_s, difference = None, ""
     for moment in chain((first,), moments):
         was = moment.tick
         run.clock.sleep_until(was.t_s)
-        if body is not None:
-            body.play(moment)
+        body.play(moment)
         perception.percept = was.percept
         for command in was.commands:
-            try:
-                run.robot.replay_command(command)
-            except ValueError as error:
-                notes.append(f"a command could not be given again: {error}")
-        try:
-            tick = run.robot.tick(was.t_s, moment.dt_s)
-        except DriverError as error:
-            ended = f"fault: {error}"
-            break
-        if body is not None:  # events of bus and camera belong to the recorded computer
-            tick = structs.replace(tick, events=was.events)
-        was_summary.update(was)
-        summary.update(tick)
+            run.robot.replay_command(command)
+        # Events of bus and camera belong to the recorded computer.
+        tick = structs.replace(run.robot.tick(was.t_s, moment.dt_s), events=was.events)
         if on_tick is not None:
             on_tick(tick)
         ticks += 1
@@ -154,22 +116,13 @@ def _rerun(
         agreeing += not differs
         if differs and first_s is None:
             first_s, difference = was.t_s - first.tick.t_s, differs
-        if tick.guard_result.level == "torque_off" and not tick.stopped and body is None:
-            ended = f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
-            break
     end = recording.end
-    if not ended and end.ran_s is not None:
+    if end.ran_s is not None:
         run.clock.sleep_until(began_s + end.ran_s)
-    if body is not None:
-        body.stop_playback()
+    body.stop_playback()
     prepare_shutdown(run, lambda line: None, Interrupts()).shut_down()
-    if ended:
-        notes.append(f"the new run ended early: {ended}")
     same = run.bus.sent_bytes_digest() == end.tx_sha256 if end.tx_sha256 else None
-    return Rerun(
-        ticks, agreeing, first_s, difference, same, was_summary.figures(), summary.figures(),
-        tuple(notes),
-    )  # fmt: skip
+    return Rerun(ticks, agreeing, first_s, difference, same, tuple(notes))
 
 
 def _difference(was: Tick, now: Tick) -> str:
@@ -190,8 +143,8 @@ def _decisions(tick: Tick) -> dict[str, str]:
     }
 
 
-def _recorded_rig(recording: RunRecording, character: str | None, folder: Path) -> Rig:
-    """Return the recorded rig, with another character if one is given.
+def _recorded_rig(recording: RunRecording, folder: Path) -> Rig:
+    """Return the recorded rig.
 
     Its walk and tracks are the recorded ones, as their files may have changed since then, or be on
     another computer.
@@ -204,19 +157,15 @@ def _recorded_rig(recording: RunRecording, character: str | None, folder: Path) 
         first = error.faults[0]
         raise BadRecording(
             f"{recording.path} was made with a configuration that this version does not support "
-            f"({first.key}: {first.rule}): give another rig"
+            f"({first.key}: {first.rule})"
         ) from None
-    walk = rig.gaze.scanpath.transition_matrix
-    if character is not None:
-        rig = load(find_file("characters", character), Rig, defaults=(whole,))
     if info.tracks_yaml:
         kept = _write_text(info.tracks_yaml, folder / "tracks.yaml")
         (folder / "tracks").mkdir()
         rig = replace(rig, track_files=track_files(kept, folder / "tracks"))
-    scanpath = rig.gaze.scanpath
-    if info.walk_yaml and scanpath.transition_matrix == walk:
+    if info.walk_yaml:
         file = str(_write_text(info.walk_yaml, folder / "walk.yaml"))
-        scanpath = replace(scanpath, transition_matrix=file)
+        scanpath = replace(rig.gaze.scanpath, transition_matrix=file)
         rig = replace(rig, gaze=replace(rig.gaze, scanpath=scanpath))
     return rig
 

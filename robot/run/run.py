@@ -15,7 +15,6 @@ from gazerig.config.rig_files import RigLayers
 from gazerig.config.shipped_files import shipped_names
 from gazerig.config.tracks import tracks_of
 from gazerig.drivers.camera.source import FrameSource
-from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.gaze.scanpath.scanpath import row_sums_note
 from gazerig.robot.dashboard.feed.rig_feed import ShownRig
@@ -92,7 +91,7 @@ class Run:
 
     Raises:
         gazerig.config.load.ConfigError: the walk that the rig names is invalid.
-        SetupError: a film, model file or part of a program cannot be used.
+        SetupError: a film or model file cannot be used.
     """
 
     def __init__(
@@ -109,16 +108,11 @@ class Run:
         # Rig, models and camera
         self.options = options
         self.rig = rig = with_options(rig, options)
-        _refuse_without("camera", camera, "take" if hasattr(camera, "take") else "latest")
-        _refuse_without("detector", detector, "find")
-        _refuse_without("attention", rule, "choose")
         random = random_generators(options.seed)
         self.models = models = GazeModels(rig, random)
         drawn = options.pixels or (options.world is not None and not options.no_pictures)
         in_process = options.scene is None and options.world is None
-        self.view, notes = place_camera(
-            rig, options, models.kinematics, in_process or (drawn and not options.fast)
-        )
+        self.view, notes = place_camera(rig, options, models.kinematics, in_process or drawn)
         self._messages: list[str] = []
         with ExitStack() as opened:
             # Bus and surroundings
@@ -146,7 +140,7 @@ class Run:
                 if steps is not None:
                     head = true_head_pose(steps, rig, rig_kinematics(rig))
                 seen = scene_camera(
-                    rig, view, options, now_s, detector, self.scene, head, random["camera"]
+                    rig, view, options, detector, self.scene, head, random["camera"]
                 )
             else:
                 seen = real_camera(rig, view, options, now_s, detector)
@@ -169,7 +163,8 @@ class Run:
             wrap_body = self.recorder.wrap_body if self.recorder is not None else wrap_body
             attention = chooser or with_rule(rig, models.attention)
             if rule is not None:
-                attention = RuleChooser(rule, attention, _label("attention", rule))
+                label = f"attention {type(rule).__name__} of the program"
+                attention = RuleChooser(rule, attention, label)
             self.tracks = _tracks(rig, models, options.rig)
             self.robot = Robot(
                 wrap_body(self.body) if wrap_body is not None else self.body,
@@ -212,8 +207,8 @@ class Run:
                 self.robot.report,
             )
             self._opened = opened.pop_all()
-        # A shipped walk is reported only if verbose.
         shipped = rig.gaze.scanpath.transition_matrix in shipped_names("scanpaths")
+        # A shipped walk is reported only if verbose.
         note = row_sums_note(models.walk) if options.verbose or not shipped else None
         self.notes = (*notes, *([note] if note is not None else []), *park_notes(rig))
 
@@ -328,18 +323,3 @@ def _recorder(rig: Rig, options: RunOptions) -> "Recorder":
     assert options.record is not None
     shown = urdf(description_of(rig), looks=False).xml
     return Recorder(options.record, run_info(rig, options), options.force, options.fast, shown)
-
-
-def _label(what: str, part: object) -> str:
-    """Return the name of a program's part for messages."""
-    return f"{what} {type(part).__name__} of the program"
-
-
-def _refuse_without(what: str, part: object, method: str) -> None:
-    """Refuse a part of a program that lacks a method.
-
-    Raises:
-        SetupError: it has no such method.
-    """
-    if part is not None and not callable(getattr(part, method, None)):
-        raise SetupError(f"{_label(what, part)} has no method {method}")

@@ -4,7 +4,6 @@ The world is a feature, found by the entry point ``world`` of the group ``gazeri
 """
 
 from collections.abc import Callable
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
@@ -53,30 +52,8 @@ def load_scene(name_or_path: str, seed: int = 0) -> FacesScene:
             f"--scene {name_or_path}: unknown; scenes: {', '.join(scene_names())}; "
             "or give the path of a script (.yaml)"
         )
-    script = _read(*script_file(KIND, name_or_path))
+    script = load(find_file(KIND, name_or_path), SceneScript, checks=(faults,))
     return FacesScene(Path(name_or_path).stem, script, seed)
-
-
-def script_file(
-    kind: str, name_or_path: str, home: Path | None = None
-) -> tuple[Path, tuple[int, int, int] | None]:
-    """Return the path of a script, and the version of its content, None if it cannot be read.
-
-    Raises:
-        gazerig.config.load.ConfigError: no shipped script has this name.
-    """
-    path = find_file(kind, name_or_path, home)
-    try:
-        facts = path.stat()
-    except OSError:
-        return path, None
-    return path, (facts.st_ino, facts.st_mtime_ns, facts.st_size)
-
-
-@lru_cache(maxsize=8)
-def _read(path: Path, version: tuple[int, int, int] | None) -> SceneScript:
-    """Read a script, with a cache, as a run requests it several times."""
-    return load(path, SceneScript, checks=(faults,))
 
 
 def scene_of(options: RunOptions) -> Scene | None:

@@ -4,7 +4,7 @@ Such angles come from recordings and from animation programs.
 """
 
 import contextlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -118,21 +118,6 @@ def fit_to_rig(rig: Rig, name: str, track: Track) -> TrackReply:
     """
     fit = TrackFit(rig.names, lid_spans(rig), face_tables(rig))
     return fit.motion(name, track, limits(rig.joints))[1]
-
-
-def radians_hint(angles_deg: Iterable[float], below: float = 1.0) -> str:
-    """Return a hint if all angles are so small that they may be in radians, otherwise "".
-
-    It is no fault: a sway, or a mechanism with tiny motion, may have such angles in degrees.
-
-    Args:
-        angles_deg: The angles.
-        below: Size that one of them must have.
-    """
-    largest = max(map(abs, angles_deg), default=0.0)
-    if not 0.0 < largest < below:
-        return ""
-    return f"no angle is above {largest:.3g}: degrees? these look like radians (1 rad is 57.3 deg)"
 
 
 def _frames(

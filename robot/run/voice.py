@@ -9,10 +9,8 @@ the position that is really heard corrects the track's clock. In simulated time 
 import contextlib
 import tempfile
 import threading
-from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 from msgspec import structs
@@ -58,18 +56,11 @@ _OPEN_S = 2.0
 _REPLY_S = 1.0
 _ABANDONED_S = 5.0
 _KEPT_FILES = 8
+"""Number of texts whose sounds are kept; the newest ones may still be waiting."""
 _SMOOTHING_LAG = 0.6
 """Delay of a level that is set fifty times a second, as a share of its smoothing time."""
 _LEAD_IN_S = 0.05
 """Silence before a text, in which the loudspeaker starts."""
-
-
-class _Stream(NamedTuple):
-    """A stream that is being said."""
-
-    mouth: Mouth
-    rate_hz: int
-    channels: int
 
 
 class RunVoice:
@@ -98,14 +89,13 @@ class RunVoice:
         self._player: SoundPlayer | None = None
         self._device = ""
         self._lock = threading.RLock()
-        self._opener: threading.Thread | None = None
-        self._fault = ""
         self._closed = False
         self._played: TrackState | None = None
         self._watched_s = self._fed_s = 0.0
         self._over = False
-        self._stream: _Stream | None = None
-        self._files = deque[Any]()
+        self._mouth: Mouth | None = None
+        self._texts = tempfile.TemporaryDirectory(prefix="gazerig-voice-")
+        self._count = 0
 
     # --- speech
 
@@ -178,12 +168,10 @@ class RunVoice:
 
     def _write(self, pcm: bytes, rate_hz: int) -> str:
         """Write samples to a file that exists until the run ends, or some texts later."""
-        file = tempfile.NamedTemporaryFile(prefix="gazerig-voice-", suffix=".wav")  # noqa: SIM115
-        self._files.append(file)
-        if len(self._files) > _KEPT_FILES:
-            self._files.popleft().close()
-        write_wav(Path(file.name), pcm, rate_hz)
-        return file.name
+        self._count += 1
+        path = Path(self._texts.name) / f"{self._count % _KEPT_FILES}.wav"
+        write_wav(path, pcm, rate_hz)
+        return str(path)
 
     def _open_loudspeaker(self, device: str) -> None:
         """Open a loudspeaker, so that the sound begins with the motion.
@@ -196,11 +184,7 @@ class RunVoice:
         with self._lock:
             if self._closed:
                 raise SoundError("the run has ended")
-            if self._player is not None and self._device != device:
-                self._player.close()
-                self._player = None
-            self._device = device
-            player = self._player = self._player or SoundPlayer(device)
+            player = self._player_on(device)
             player.prepare()
         end_s = self._clock.now_s() + _OPEN_S
         while not player.is_open and self._clock.now_s() < end_s:
@@ -209,6 +193,24 @@ class RunVoice:
                 failed = [one.reason for one in player.events() if one.kind == "failed"]
             if failed:
                 raise SoundError(failed[0])
+
+    def open(self) -> None:
+        """Start the sound's process, which takes longer than a tick.
+
+        Raises:
+            SetupError: it cannot be started.
+        """
+        with self._lock:
+            self._player_on(self._rig().sound.device).prepare()
+
+    def _player_on(self, device: str) -> SoundPlayer:
+        """Return the player of a loudspeaker instead of that of another one."""
+        if self._player is not None and self._device != device:
+            self._player.close()
+            self._player = None
+        self._device = device
+        self._player = self._player or SoundPlayer(device)
+        return self._player
 
     # --- streams
 
@@ -229,7 +231,7 @@ class RunVoice:
             SoundError: too much is waiting, the format is not possible, or nothing can be played.
             ValueError: the head does not accept the speech.
         """
-        if self._stream is None:
+        if self._mouth is None:
             if not 0.0 <= volume <= 1.0:
                 raise SoundError(f"the volume is {volume:g}: give 0..1")
             if not volume and not self._level:
@@ -239,20 +241,15 @@ class RunVoice:
         with self._lock:
             if (player := self._player) is None:
                 raise SoundError("the run has ended")
-            stream = self._stream or self._start_stream(player, rate_hz, channels, volume)
-            if (rate_hz, channels) != (stream.rate_hz, stream.channels):
-                raise SoundError(
-                    f"the stream has {stream.channels} channels at {stream.rate_hz} Hz: "
-                    "finish it before another one"
-                )
+            mouth = self._mouth or self._start_stream(player, rate_hz, channels, volume)
             player.feed(pcm, now_s)
             self._fed_s = now_s
-            stream.mouth.add(_mono(pcm, channels))
+            mouth.add(_mono(pcm, channels))
             return player.ahead_s(now_s)
 
     def _start_stream(
         self, player: SoundPlayer, rate_hz: int, channels: int, volume: float
-    ) -> _Stream:
+    ) -> Mouth:
         check_format(rate_hz, channels)
         ticket = self._command(Speak(_STREAM, _STREAM_TRACK_S, self._level))
         reply = ticket.wait(_REPLY_S) if ticket is not None else None
@@ -261,13 +258,13 @@ class RunVoice:
         self._played = TrackState(reply.track.number, SPEECH, sound=_STREAM)
         heard_s = self._clock.now_s() + STREAM_DELAY_S
         player.open_stream(rate_hz, channels, heard_s, volume * self._rig().sound.volume)
-        self._stream = _Stream(Mouth(rate_hz), rate_hz, channels)
-        return self._stream
+        self._mouth = Mouth(rate_hz)
+        return self._mouth
 
     def finish(self) -> None:
         """Mark the end of the stream; what has arrived is said."""
         with self._lock:
-            if self._stream is not None and self._player is not None:
+            if self._mouth is not None and self._player is not None:
                 self._player.finish_stream()
 
     # --- the loop's thread
@@ -275,7 +272,7 @@ class RunVoice:
     def update(self, tick: Tick) -> None:
         """Let the sound follow the tracks of a tick, and their clock the sound.
 
-        It never waits: while another thread opens the loudspeaker, the next tick is followed.
+        It never waits: while another thread uses the loudspeaker, the next tick is followed.
         """
         if self._fast or not self._lock.acquire(blocking=False):
             return
@@ -287,11 +284,7 @@ class RunVoice:
             self._lock.release()
 
     def _follow(self, tick: Tick) -> None:
-        player, played, opener = self._player, self._played, self._opener
-        if opener is not None and not opener.is_alive():
-            self._opener, fault, self._fault = None, self._fault, ""
-            if fault:
-                raise SoundError(fault)
+        player, played = self._player, self._played
         if player is not None and played is not None:
             for event in player.events():
                 self._handle(event, tick)
@@ -301,16 +294,14 @@ class RunVoice:
         if played is not None and (wanted is None or wanted.number != played.number):
             if player is not None and not _has_finished(played, tick):
                 player.stop()
-            self._played = self._stream = None
+            self._played = self._mouth = None
         if wanted is None:
             return
         if wanted.sound == _STREAM:
-            if player is not None and self._stream is not None:
-                self._follow_stream(self._stream, player)
-        elif player is None or self._device != self._rig().sound.device or self._opener:
-            self._open_aside()
+            if player is not None and self._mouth is not None:
+                self._follow_stream(self._mouth, player)
         else:
-            self._follow_sound(player, wanted, tick)
+            self._follow_sound(self._player_on(self._rig().sound.device), wanted, tick)
 
     def _handle(self, event: SoundEvent, tick: Tick) -> None:
         if event.kind == "failed":
@@ -319,30 +310,16 @@ class RunVoice:
             self._report("the stream has stalled: the mouth closes until it continues")
         elif event.kind == "ended":
             self._over = True
-            if self._stream is not None:
-                self._stream = None
+            if self._mouth is not None:
+                self._mouth = None
                 self._try(EndTrack(SPEECH))
 
     def _fail(self, reason: str, tick: Tick) -> None:
         """Report a failure once, and end the track of the sound."""
         self._report(reason)
-        self._over, self._stream = True, None
+        self._over, self._mouth = True, None
         if (failed := self._played or _sounding_track(tick)) is not None:
             self._try(EndTrack(failed.name))
-
-    def _open_aside(self) -> None:
-        """Open the loudspeaker of a track in another thread, as it takes longer than a tick."""
-        if self._opener is not None:
-            return
-
-        def open_device() -> None:
-            try:
-                self._open_loudspeaker(self._rig().sound.device)
-            except SetupError as error:
-                self._fault = str(error)
-
-        self._opener = threading.Thread(target=open_device, name="loudspeaker", daemon=True)
-        self._opener.start()
 
     def _follow_sound(self, player: SoundPlayer, wanted: TrackState, tick: Tick) -> None:
         """Start the sound of a track, or let the track follow it."""
@@ -365,7 +342,7 @@ class RunVoice:
             until_s = max(0.0, tick.t_s + 1.0 / self._rig().loop.rate_hz - now_s)
             self._try(SyncTrack(wanted.number, track_s + error_s + until_s, "sound"))
 
-    def _follow_stream(self, stream: _Stream, player: SoundPlayer) -> None:
+    def _follow_stream(self, mouth: Mouth, player: SoundPlayer) -> None:
         """Open the mouth by the part of the stream that will be heard when it has moved."""
         now_s, rig, level = self._clock.now_s(), self._rig(), self._level
         if now_s - self._watched_s < _WATCH_S:
@@ -377,7 +354,7 @@ class RunVoice:
         if level and heard_s is not None:
             ahead_s = rig.levels[level].smoothing_ms / 1e3 * _SMOOTHING_LAG + 0.5 * _WATCH_S
             ahead_s += (rig.gaze.oculomotor.eye_lag_ms - rig.sound.latency_ms) / 1e3
-            self._try(SetLevel(level, stream.mouth.opening_at(heard_s + ahead_s)))
+            self._try(SetLevel(level, mouth.opening_at(heard_s + ahead_s)))
 
     @property
     def _level(self) -> str:
@@ -391,7 +368,7 @@ class RunVoice:
 
     def stop(self) -> None:
         """Stop all sound, as the head parks."""
-        self._played = self._stream = None
+        self._played = self._mouth = None
         if self._player is not None:
             self._player.stop()
 
@@ -402,8 +379,7 @@ class RunVoice:
             if self._player is not None:
                 self._player.close()
             self._player = None
-            for file in self._files:
-                file.close()
+        self._texts.cleanup()
 
 
 def _sounding_track(tick: Tick) -> TrackState | None:

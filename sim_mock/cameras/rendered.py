@@ -6,32 +6,19 @@ the lens, blur of a turning head, distances.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 
-from gazerig.drivers.camera.capture_loop import Locate
+from gazerig.drivers.camera.capture_loop import Locate, Motion
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBlob
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import Detections, FaceDetector, ImageArray
 from gazerig.drivers.vision.clothing import add_clothing
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.scene import PinholeView, SceneView
 from gazerig.sim_mock.cameras.frame_times import FrameParams, FrameTimes
-
-
-class Exposure(NamedTuple):
-    """One exposed frame, (h, w, 3) BGR, and the true rotation of its camera."""
-
-    captured_s: float
-    image: ImageArray
-    R_world_camera: Mat3
-
-
-FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
-"""Finds motion since the previous exposure."""
-
 
 _NOISE_GREY = 3.0
 """Standard deviation of the read-out noise, grey values."""
@@ -61,7 +48,7 @@ class PixelCamera:
         head_pose: Callable[[float], tuple[Mat3, Vec3]],
         detector: FaceDetector,
         rng: np.random.Generator,
-        find_motion: FindMotion | None = None,
+        find_motion: Motion | None = None,
         locate: Locate | None = None,
         lens: Intrinsics | None = None,
         begins_s: float | None = None,
@@ -95,10 +82,11 @@ class PixelCamera:
         R, p_m = self._mount.pose(*self._head_pose(now_s))
         scene_s = self._times.next_frame_s(now_s)
         if scene_s is not None:
-            shot = Exposure(now_s, self._expose(scene_s, R, p_m), R)
-            blobs = () if self._find_motion is None else self._find_motion(shot, self.lens)
-            faces, _ = add_clothing(shot.image, self._detector.find(shot.image))
-            found = Detections(now_s, self._times.number, *self._size_px, faces, blobs, shot.image)
+            image, number = self._expose(scene_s, R, p_m), self._times.number
+            shot = Shot(now_s, number, image, lens=self.lens)
+            blobs = () if self._find_motion is None else self._find_motion(shot)
+            faces, _ = add_clothing(image, self._detector.find(image))
+            found = Detections(now_s, number, *self._size_px, faces, blobs, image)
             self._times.send(found.locate_in_camera(self._locate))
         return self._times.arrived(now_s)
 

@@ -270,18 +270,22 @@ def later(run: Started) -> None:
 
 
 def kill_reader(run: Started) -> None:
-    """The other end of the pipe goes away; then a request to end."""
+    """The other end of the pipe goes away, which is a request to end; then another one."""
     assert run.reader is not None
     run.reader.kill()
     run.reader.wait()
-    later(run)
+    later_unless_ended(run)
 
 
 def broken_pipe(run: Started) -> None:
     """The reader of standard error goes away, which is a request to end; then another one."""
     assert run.process.stderr is not None
     run.process.stderr.close()
-    # A second request would skip the parking, and a limp head sinks after it.
+    later_unless_ended(run)
+
+
+def later_unless_ended(run: Started) -> None:
+    """Request the end of a run that goes on: a second request skips the parking."""
     if not wait_until(lambda: run.process.poll() is not None, 6.0):
         later(run)
 

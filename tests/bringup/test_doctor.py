@@ -633,32 +633,22 @@ def test_a_board_is_recognised_before_anything_could_move_it(board):
 # --- servos of each kind hear the other's packets and are left as they are
 
 
-def memory(servo):
-    return bytes(servo.memory.bytes[:80])
-
-
-def test_no_packet_changes_dynamixel_servos():
-    chain = build_dynamixel([ServoSpec(i, "xl330-m077") for i in (1, 2, 253 - 1)], lambda: 0.0)
-    for servo in chain.servos:
-        servo.memory.set("return_delay_time", 77)
-    before = [memory(servo) for servo in chain.servos]
+@pytest.mark.parametrize(
+    ("build", "model", "ids", "kind"),
+    [
+        (build_dynamixel, "xl330-m077", (1, 2, 252), "dynamixel"),
+        (build_feetech, "sts3215", (1, 49, 253), "feetech"),
+    ],
+)
+def test_no_packet_changes_servos_of_either_kind(build, model, ids, kind):
+    chain = build([ServoSpec(i, model, 1900 + i) for i in ids], lambda: 0.0)
+    before = [bytes(servo.memory.bytes[:56]) for servo in chain.servos]
     places = chain.positions_steps()
     line = Line(chain)
     rounds = line.search(kinds=("feetech",), thorough=True) + line.search(thorough=True)
     assert {one.kind for one in rounds} == set(ORDER)
-    assert bytes.fromhex("FFFF0104020009") in line.sent  # an STS packet went over the line
-    assert [memory(servo) for servo in chain.servos] == before
-    assert chain.positions_steps() == places
-    assert not any(one.has_answer for one in rounds if one.kind == "feetech")
-
-
-def test_no_packet_changes_sts_servos():
-    chain = build_feetech([ServoSpec(i, "sts3215", 1900 + i) for i in (1, 49, 253)], lambda: 0.0)
-    before = [chain[i].read(0, 56) for i in (1, 49, 253)]
-    places = chain.positions_steps()
-    rounds = Line(chain).search(thorough=True)
     found = {(one.kind, servo.id) for one in rounds if one.answers for servo in one.answers.found}
-    assert found == {("feetech", 1), ("feetech", 49), ("feetech", 253)}
-    assert [chain[i].read(0, 56) for i in (1, 49, 253)] == before
+    assert found == {(kind, i) for i in ids}
+    assert bytes.fromhex("FFFF0104020009") in line.sent  # an STS packet went over the line
+    assert [bytes(servo.memory.bytes[:56]) for servo in chain.servos] == before
     assert chain.positions_steps() == places
-    assert not any(one.has_answer for one in rounds if one.kind == "dynamixel")

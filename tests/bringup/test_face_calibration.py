@@ -8,7 +8,6 @@ import pytest
 from fakes.runs import simulated
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from gazerig.config.schema import Rig
 from gazerig.features.bringup.calibration.face_steering import (
@@ -90,18 +89,6 @@ def chosen(made: FaceSteering, t_s: float, *faces: Face, captured_s: float | Non
 # --- whom it looks at
 
 
-def test_the_part_goes_with_the_face_and_the_head_with_its_centre() -> None:
-    made = steering()
-    chosen(made, 0.0, face(1, 1.0))
-    assert made.press("left") is None
-    for yaw in (2.6, 3.1, 3.6):
-        there = face(1, 0.9, 0.2, yaw)
-        target = chosen(made, 0.1, there)
-        expected = point_world_m((0.0, 5.0, 0.0), there.p_world_m, there.R_world_face)
-        assert target.p_world_m == pytest.approx(expected)
-        assert target.centre_world_m == there.p_world_m and target.part == "N"
-
-
 def test_a_stale_picture_shows_nobody_and_keys_wait() -> None:
     made = steering()
     chosen(made, 1.0, face(1, 1.0))
@@ -161,15 +148,3 @@ def test_both_eyes_meet_the_true_place_of_the_part_on_the_face(
         steered.press("enter")
         ticks(made, steered, 0.1)
         assert part in steered.state.adjusted_parts and steered.state.part != part
-
-
-def test_an_enter_is_refused_while_the_eyes_are_elsewhere(made: Run, steered: FaceSteering) -> None:
-    made.robot.start(made.clock)
-    tick = ticks(made, steered, 1.0)
-    # Eyes that are measured elsewhere, whatever their command.
-    aside = replace(tick.pose, eye_left_rad=(0.3, 0.0))
-    steered.update(replace(tick, pose=aside))
-    why = steered.press("enter")
-    assert why is not None and "not taken" in why and steered.state.part == "N"
-    steered.update(tick)
-    assert steered.press("enter") is None and steered.state.part == "LE"

@@ -1,27 +1,8 @@
 """A servo steered at a terminal: keys as they are pressed, lines of a file, and numbers."""
 
-from pathlib import Path
-from typing import Any
-
-import pytest
-from command_line import answers_in
 from commands_started import OnTerminal
-from stand_in import StandIn
 
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
-
-
-def test_lines_move_a_servo_until_enter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    moves: list[float] = []
-    servo: Any = StandIn()
-    servo.place_us = 1500.0
-    servo.aim = moves.append
-    servo.live = lambda: "here"
-    lines = answers_in(tmp_path, "+40", "-12.5", "1480", "left", "nan", "")
-    TerminalPerson(Lines(Path(lines)), lambda: None, False).steer("move it", servo)
-    assert moves == [1540.0, 1487.5, 1480.0]
-    assert capsys.readouterr().err.count("moves it by so many us") == 2
 
 
 def test_keys_steer_a_hobby_servo_at_the_terminal(rigs: dict[str, str]) -> None:

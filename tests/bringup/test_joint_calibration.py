@@ -45,10 +45,42 @@ EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 STS = JointParams(3, "sts3215", -35.0, 35.0, 300.0, 20000.0)
 
 
-class Bench:
-    """One emulated servo, and a person with a script."""
+class Person:
+    """A person at a calibration, with a script.
+
+    "+40" and "1480" steer, "" is Enter while steering and the proposed number at a question.
+    """
+
+    def __init__(self, *script: str) -> None:
+        self.script, self.said = list(script), list[str]()
+
+    def next(self, question: str) -> str:
+        self.said.append(question)
+        if not self.script:
+            raise CalibrationStopped("stopped by you")
+        return self.script.pop(0)
+
+    def tell(self, line: str) -> None:
+        self.said.append(line)
+
+    def wait(self, question: str, live: Callable[[], str]) -> None:
+        raise AssertionError(question)
+
+    def steer(self, question: str, servo: HobbyServoAccess) -> None:
+        while answer := self.next(question):
+            servo.aim(float(answer) + (servo.place_us if answer[0] in "+-" else 0.0))
+            servo.live()
+
+    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        live()
+        return float(self.next(question) or proposed)
+
+
+class Bench(Person):
+    """One emulated servo, and a person who turns it."""
 
     def __init__(self, joint: JointParams, start: int = 2100) -> None:
+        super().__init__()
         self.clock = SimulatedClock()
         physics = Physics(stop_low_steps=-1e9, stop_high_steps=1e9)
         spec = ServoSpec(joint.id, joint.model, start, physics=physics)
@@ -59,8 +91,6 @@ class Bench:
         self.kind = servo_kind(joint.model)
         self.registers = Transactions(self.port, self.kind.family)
         self.id = joint.id
-        self.script: list[int] = []
-        self.said: list[str] = []
         self.joint = SmartServoAccess("left_eye_pan", joint, self.port, self.clock.now_s)
 
     def get(self, register: str) -> int:
@@ -75,28 +105,15 @@ class Bench:
         self.port.faults.command(text.format(id=self.id))
         self.clock.sleep_until(self.clock.now_s() + 0.1)
 
-    # gazerig.features.bringup.calibration.joint_procedure.Operator
-
-    def tell(self, line: str) -> None:
-        self.said.append(line)
-
     def wait(self, question: str, live: Callable[[], str]) -> None:
-        self.said.append(question)
-        if not self.script:
-            raise CalibrationStopped("stopped by you")
-        left = self.script.pop(0)
+        """Turn the joint as the script has it."""
+        left = int(self.next(question))
         while left:
             step = max(-100, min(100, left))
             self.chain.find_servo(self.id).turn(step)
             left -= step
             self.clock.sleep_until(self.clock.now_s() + 0.04)
             live()
-
-    def steer(self, question: str, servo: HobbyServoAccess) -> None:
-        raise AssertionError(question)
-
-    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        raise AssertionError(question)
 
 
 TURN = 4096
@@ -173,7 +190,7 @@ def test_what_is_found_is_what_is_there_or_it_is_refused(
 
 def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> None:
     bench = Bench(STS, 3900)
-    bench.script = [600, -1200, 600]
+    bench.script = ["600", "-1200", "600"]
     with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* --set-middle"):
         calibrate_by_hand(bench.joint, bench, 2.0)
     offset = bench.joint.set_middle()
@@ -182,7 +199,7 @@ def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> Non
     assert [bench.get(name) for name in ("position_offset", "lock", "torque_enable")] == [
         offset, 1, 0,
     ]  # fmt: skip
-    bench.script = [600, -1200, 600]
+    bench.script = ["600", "-1200", "600"]
     found = calibrate_by_hand(bench.joint, bench, 2.0)
     assert found.zero_step == pytest.approx(2048, abs=4) and found.max_deg > 45.0
 
@@ -225,20 +242,15 @@ def test_a_servo_in_another_mode_or_with_an_offset_is_not_calibrated() -> None:
 # --- measured by eye
 
 
-class LinkageBench:
-    """The maker's board, one of its servos, and a person with a script.
-
-    Answers: "+40" and "1480" steer, "" is Enter while steering and the proposed number
-    at a question for one.
-    """
+class LinkageBench(Person):
+    """The maker's board, one of its servos, and a person who measures it."""
 
     def __init__(self, name: str, *answers: str) -> None:
+        super().__init__(*answers)
         made = EmulatedRig(load_rig("maker"))
         rig, self.clock, self.port = made.rig, made.clock, made.ports[""]
         self.board: Any = made.devices[""]
         self.why: str | None = None
-        self.answers = list(answers)
-        self.said: list[str] = []
         self.channel = rig.joints[name].id
         self.hobby = HobbyServoAccess(
             name,
@@ -265,31 +277,6 @@ class LinkageBench:
             return calibrate_by_marks(self.hobby, self, margin)
         finally:
             self.hobby.disable()
-
-    # gazerig.features.bringup.calibration.joint_procedure.Operator
-
-    def tell(self, line: str) -> None:
-        self.said.append(line)
-
-    def wait(self, question: str, live: Callable[[], str]) -> None:
-        raise AssertionError(question)
-
-    def steer(self, question: str, servo: HobbyServoAccess) -> None:
-        self.said.append(question)
-        while answer := self._next():
-            servo.aim(float(answer) + (servo.place_us if answer[0] in "+-" else 0.0))
-            servo.live()
-
-    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        self.said.append(question)
-        live()
-        answer = self._next()
-        return float(answer) if answer else proposed
-
-    def _next(self) -> str:
-        if not self.answers:
-            raise CalibrationStopped("stopped by you")
-        return self.answers.pop(0)
 
 
 def test_eyes_are_measured_and_their_pulses_end() -> None:
@@ -332,7 +319,7 @@ def test_it_moves_slowly_and_never_outside_the_pulses_of_a_servo() -> None:
 @pytest.mark.parametrize("why", ["SIGINT", "q"])
 def test_whoever_ends_it_gets_a_limp_servo(why: str) -> None:
     bench = LinkageBench("eyes_pan", "", "1700")
-    bench.answers += [""] if why == "SIGINT" else []
+    bench.script += [""] if why == "SIGINT" else []
     if why == "SIGINT":
         bench.tell = lambda line: setattr(bench, "why", why)  # type: ignore[method-assign]
     with pytest.raises(CalibrationStopped):

@@ -11,9 +11,7 @@ from gazerig.config.schema import load_rig
 from gazerig.config.tracks import load_track
 from gazerig.features.bringup.hand_recording import record_live
 from gazerig.robot.loop.head_state import HeadState
-from gazerig.robot.model.track_fit import TrackFit
-from gazerig.robot.run.rig_limits import lid_spans, limits
-from gazerig.robot.run.track_file import TOLERANCE_DEG, write_track
+from gazerig.robot.run.track_file import write_track
 
 TURN = """description: the neck turns
 owns: [neck]
@@ -73,8 +71,3 @@ def test_a_puppeteered_jaw_becomes_a_track_of_its_own(tmp_path: Path) -> None:
     write_track(rig, path, found.series, "puppeteered", owned=True)
     track = load_track(path)
     assert track.owns == ("jaw",)
-    fit = TrackFit(rig.names, lid_spans(rig))
-    motion, _ = fit.motion("x", track, limits(rig.joints))
-    played = np.degrees(motion.sample_at(times + 0.02 - motion.position_at(0.0))[0])
-    (column,) = np.flatnonzero(np.ptp(played, axis=0) > 1.0)
-    assert np.abs(played[:, column] - angles).max() < TOLERANCE_DEG + 0.8

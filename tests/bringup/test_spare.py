@@ -177,19 +177,6 @@ def test_a_spare_of_another_model_is_named(tmp_path: Path, writes: list[Write]) 
         assert is_refused(chain, writes, "servo 1 (xl330-m077) answers at 57600 bit/s and is none")
 
 
-@every
-def test_two_spares_are_named_and_none_is_used(
-    tmp_path: Path, name: str, writes: list[Write]
-) -> None:
-    model = "sts3215" if name == "feetech" else "xc330-m288"
-    more = ServoSpec(20, model, 300), ServoSpec(21, model, 700)
-    with chain_of(tmp_path, name, *more, command="lose 7") as chain:
-        for servo_id in (20, 21):
-            chain.renew(chain.setups[6]._replace(id=servo_id))
-        named = f"error {YAW}: does not answer"
-        assert is_refused(chain, writes, named, "connect one of them alone and run gazerig setup")
-
-
 def test_a_servo_whose_answer_was_lost_is_not_replaced(tmp_path: Path) -> None:
     with chain_of(tmp_path, "desk") as chain:
         kind, baud = chain.kind, chain.baud

@@ -17,9 +17,10 @@ import pytest
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, scale, sub, yaw_pitch
-from gazerig.robot.loop.tick import Tick
+from gazerig.gaze.types import body_name
+from gazerig.robot.loop.tick import Tick, cyclopean_direction
 from gazerig.robot.model.commands import Value
-from gazerig.robot.recording.gaze_angles import GazeAngles, GazeAnglesBuilder, target_text
+from gazerig.robot.recording.export_csv import GazeExport
 from gazerig.robot.run import surroundings
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.run_rig import with_options
@@ -58,7 +59,7 @@ class MeasuredRun:
         nan where there is none
     head_m: (n, 3) position of the midpoint of the eyes in the world
     clock_s: (n,) time of the scene; turn: (n,) reported state of conversation
-    angles: what exports are made of; trace: what the report is made of (both of the whole run)
+    export: what tables are made of; trace: what the report is made of (both of the whole run)
     """
 
     t_s: np.ndarray
@@ -82,7 +83,7 @@ class MeasuredRun:
     part: np.ndarray
     head_m: np.ndarray
     truth: dict[str, np.ndarray]
-    angles: GazeAngles
+    export: GazeExport
     trace: GazeTrace
 
     @property
@@ -210,12 +211,12 @@ class _Columns:
 
     def __init__(self) -> None:
         self._rows: defaultdict[str, list[Any]] = defaultdict(list)
-        self._angles = GazeAnglesBuilder()
+        self._export = GazeExport()
         self._start_s: float | None = None
 
     def update(self, tick: Tick) -> None:
         """Add a tick."""
-        self._angles.update(tick)
+        self._export.update(tick)
         if self._start_s is None:
             self._start_s = tick.t_s
         pose, target, gaze = tick.pose, tick.target, tick.gaze
@@ -227,6 +228,7 @@ class _Columns:
             "t_s": tick.t_s - self._start_s,
             "clock_s": tick.t_s,
             "turn": tick.conversation.state,
+            "gaze_deg": yaw_pitch(cyclopean_direction(tick)),
             "eyes_deg": np.mean((pose.eye_left_rad, pose.eye_right_rad), axis=0),
             "eyes_goal_deg": [[commanded[at(name)] for name in eye] for eye in _EYES],
             "head_deg": [measured[at(name)] for name in _NECK],
@@ -240,7 +242,7 @@ class _Columns:
             "shift": target.shift,
             "target_m": point,
             "target_deg": yaw_pitch(sub(point, pose.p_world_head_m)),
-            "target_name": target_text(target),
+            "target_name": body_name(target.kind, target.id),
             "part": target.part or "",
             "head_m": pose.p_world_head_m,
         }
@@ -249,14 +251,12 @@ class _Columns:
 
     def gathered(self, scene: Scene, trace: GazeTrace) -> MeasuredRun:
         """Return the columns."""
-        angles = self._angles.trace()
         columns: dict[str, Any] = {name: np.array(rows) for name, rows in self._rows.items()}
         for name in [name for name in columns if name.endswith("_deg")]:
             columns[name] = np.degrees(columns[name])
         return MeasuredRun(
-            gaze_deg=angles.cyclopean_deg,
             truth=_truth(scene, columns["clock_s"].tolist()),
-            angles=angles,
+            export=self._export,
             trace=trace,
             **columns,
         )

@@ -14,9 +14,6 @@ from typing import NamedTuple
 import numpy as np
 from human.measured_run import MeasuredRun
 
-from gazerig.robot.recording.export_csv import write_csv
-from gazerig.robot.recording.gaze_angles import find_intervals, label_samples
-
 NOISE_DEG = 0.02
 """Standard deviation of each sample, as of a tower-mounted tracker (0.01 to 0.05)."""
 
@@ -58,10 +55,9 @@ Judge = Callable[[Exported], np.ndarray]
 
 def exported(run: MeasuredRun) -> Exported:
     """Write a run as the product's CSV files, and read them with a tracker's noise."""
-    labels = label_samples(run.angles)
     with TemporaryDirectory() as folder:
         stem = Path(folder) / "run"
-        write_csv(run.angles, labels, find_intervals(run.angles, labels), stem)
+        run.export.write(stem)
         samples = _read(stem.with_name("run_samples.csv"))
         events = _read(stem.with_name("run_events.csv"))
     time_s = _column(samples, "time_s")

@@ -180,19 +180,3 @@ def test_the_smaller_of_two_overlapping_parts_is_meant() -> None:
     assert boxes.part_at(30.0, 30.0) == "RE"
     assert boxes.part_at(30.0, 70.0) == "FR"
     assert boxes.part_at(130.0, 70.0) is None
-
-
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("N: [0, 0, 1, 1]", "at least two parts are needed"),
-        ("N: [0, 0, 1, 1]\nM: [3, 3, 2, 4]", "M: .* needs x0 < x1"),
-        ("N: [0, 0, 1, 1]\nEAR: [3, 3, 2, 4]", "EAR"),
-        ("N: [0, 0, left, 1]", r"Expected `float`, got `str` - at `\$\[...\]\[2\]`"),
-    ],
-)
-def test_rectangles_that_are_none_are_refused(tmp_path: Path, text: str, why: str) -> None:
-    (tmp_path / "parts.yaml").write_text(text)
-    with pytest.raises(SetupError, match=why) as caught:
-        PartBoxes.read(tmp_path / "parts.yaml")
-    assert "\n" not in str(caught.value) and "parts.yaml" in str(caught.value)

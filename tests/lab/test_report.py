@@ -265,11 +265,6 @@ def test_following_is_no_saccade_and_hides_none(slow_deg_s: float) -> None:
     assert sizes == pytest.approx([4.0 + moved, 6.0 - moved, 8.0 + moved], abs=0.6)
 
 
-def test_noise_makes_no_saccade() -> None:
-    noise = np.random.default_rng(1).normal(0.0, 0.03, 2000)
-    assert jumps(noise, 200.0) == []
-
-
 BLINK_S = 0.075, 0.035, 0.175
 
 

@@ -11,19 +11,9 @@ from gazerig.config.faults import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError, install_command
 from gazerig.features.world.run.run_world import world_of
-from gazerig.robot.cli.run import start_text
 from gazerig.robot.run.options import RunOptions
 
 ASKED = RunOptions(mock=True, world="living-room")
-
-
-def test_a_world_is_what_is_looked_at() -> None:
-    found = ASKED.check_and_complete()
-    assert (found.world, found.scene, found.camera_source) == ("living-room", None, None)
-    assert "a world, living-room" in start_text(found)
-    assert (
-        replace(ASKED, fast=True).check_and_complete().seconds is None
-    )  # a whole round, as of a scene
 
 
 @pytest.mark.parametrize(

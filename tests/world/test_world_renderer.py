@@ -103,25 +103,6 @@ def test_a_point_lands_where_the_programs_own_lens_says(
     assert np.abs(landed(seen, pixels) - pixels).max() < 0.5
 
 
-def test_the_head_that_carries_the_camera_does_not_see_itself() -> None:
-    mujoco = import_mujoco()
-    from gazerig.features.world.renderer import Renderer, RendererParams
-
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><worldbody><body name="head" pos="1 0 0"><body pos="0 0 0">'
-        '<geom type="sphere" size=".2" rgba="1 1 1 1"/></body></body></worldbody></mujoco>'
-    )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    params = RendererParams(shadow_px=0)
-    for hidden, lit in (((), True), (("head",), False)):
-        renderer = Renderer(model, *SIZE, params, hidden)
-        assert bool(renderer.render(data, LENS, *POSES[0]).any()) == lit
-        renderer.close()
-    with pytest.raises(ValueError, match="no body 'skull'"):
-        Renderer(model, *SIZE, params, ["skull"])
-
-
 # --- The default detector finds the faces of a world's people
 
 

@@ -25,7 +25,6 @@ from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rerun import rerun
 from gazerig.robot.run.run import Run
 from gazerig.robot.run.run_rig import with_options
-from gazerig.robot.run.session import Session
 from gazerig.sim_mock.pty.line import BusSettings
 
 simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
@@ -50,18 +49,6 @@ def test_without_a_renderer_the_run_ends_with_the_reason_and_the_remedy(
     monkeypatch.setenv("MUJOCO_GL", "none")
     with pytest.raises(NoRenderer, match=r"No module named 'mujoco\.none'.*--no-pictures"):
         Run(load_rig("desk"), replace(FAST, no_pictures=False))
-
-
-def test_a_recorded_run_can_be_done_again_to_the_same_bytes(tmp_path: Path) -> None:
-    file = tmp_path / "run.mcap"
-    figures = Session(
-        Run(load_rig("desk"), replace(FAST, record=file)), lambda: None, lambda line: None
-    ).run()
-    recording = RunRecording(file)
-    assert recording.info.scene == "living-room" and "no pictures" in recording.info.eyes
-    again = rerun(recording)
-    assert again.is_same and again.sent_bytes_same, again.difference
-    assert again.ticks == figures["ticks"]
 
 
 # --- The world of the emulator's process, and the camera that looks into it from another one

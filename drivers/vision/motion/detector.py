@@ -300,11 +300,6 @@ def _is_cut(group: PixelGroup, shape: tuple[int, ...]) -> bool:
     return min(x, y) <= _CUT_PX or x + width >= across or y + height >= down
 
 
-def relative_rotation(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -> Floats:
-    """Return R_now_before of two orientations of the camera in the world, (3, 3) each."""
-    return np.asarray(np.transpose(R_world_now) @ R_world_before, np.float64)
-
-
 def _shrink_by_noise(value: float, sd: float) -> float:
     """Shrink a measurement towards 0 by its noise; one within the noise is 0.
 

@@ -38,7 +38,7 @@ from gazerig.features.bringup.cli.ports import JsonOption, MockOption
 from gazerig.features.bringup.servo_kinds import KINDS, servo_kind
 from gazerig.features.bringup.servo_setup import Answers, search_rate
 from gazerig.robot.cli.options import DEFAULT_RIG
-from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, complete_suggestions, say
+from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_suggestions, say
 
 app = typer.Typer()
 
@@ -71,7 +71,6 @@ def scan(
         typer.Argument(
             metavar="RIG",
             help="Search the ports of this rig; default: the only port, with --mock rig desk.",
-            autocompletion=complete_rig,
         ),
     ] = None,
     port: Annotated[str | None, typer.Option(help="Serial port; default: the only one.")] = None,

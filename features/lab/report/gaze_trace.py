@@ -34,7 +34,6 @@ from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.loop.tick import Tick, cyclopean_direction
 from gazerig.robot.model.commands import Ask
 from gazerig.robot.model.types import GAZE_JOINTS, order_joints
-from gazerig.robot.recording.gaze_angles import Basis, basis_of
 
 PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""
@@ -114,10 +113,10 @@ class JointBasis:
         """Return the styles that select notes of the bands."""
         return frozenset(("eyes parallel",) if "eyes_pan" in self.names else ())
 
-    def basis(self, group: str) -> Basis:
+    def basis(self, group: str) -> str:
         """Return the basis of a section of the report: its lids, or eyes and neck."""
-        lids = group == LIDS
-        return basis_of(self.names, self.estimated, lambda name: name.endswith("_lid") == lids)
+        kinds = {name.endswith("_lid") for name in self.estimated}
+        return "estimated" if (group == LIDS) in kinds else "measured"
 
 
 @dataclass(frozen=True)

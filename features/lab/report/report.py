@@ -19,7 +19,6 @@ from gazerig.features.lab.report.figures import COLOURS, DRAWINGS, Drawing, Show
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.measures import judge_run
 from gazerig.features.lab.report.statistics import MeasureResult
-from gazerig.robot.recording.gaze_angles import ESTIMATED
 from gazerig.robot.recording.read import RunRecording, report_bad_contents
 from gazerig.robot.recording.run_info import RunInfo
 
@@ -61,7 +60,8 @@ class ReportedRun:
         if joints.estimated:
             return (
                 f"Not all of this is measured: the servos of {', '.join(joints.estimated)} have no "
-                f"feedback. Results that depend on them are {ESTIMATED}; their sections are marked. "
+                "feedback. Results that depend on them are estimated from commands and known servo "
+                "speeds, not measured; their sections are marked. "
                 "Real eyes may lag, stick or swing without an effect on the verdicts."
             )
         return ""

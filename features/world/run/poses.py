@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from gazerig.drivers.camera.shared_slots import TimedPose
 from gazerig.features.world.state_file import StateReader, WorldState
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.clock import Clock
@@ -14,6 +13,14 @@ if TYPE_CHECKING:
     from gazerig.features.world.physics import World
 
 _ABSENT = dict.fromkeys((*NECK, *LOWER_NECK), 0.0)
+
+
+class TimedPose(NamedTuple):
+    """Rotation (three rows) and position [m] of the head in the world at a time [s]."""
+
+    t_s: float
+    R_world_head: Mat3
+    p_world_head_m: Vec3
 
 
 class RigInState(NamedTuple):

@@ -12,14 +12,19 @@ from gazerig.drivers.camera.worker import CameraWorker
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
 from gazerig.features.world.run.run_world import RunWorld
-from gazerig.features.world.run.sight import LATENCY_MS, ComputedCamera, RenderedWorld
+from gazerig.features.world.run.sight import (
+    LATENCY_MS,
+    ComputedCamera,
+    RenderedSource,
+    RenderedWorld,
+)
 from gazerig.features.world.serve import SentWorld
 from gazerig.features.world.shapes import SpecShapes
 from gazerig.features.world.world_spec import state_file
 from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.run.buses import RunBus, guarded_rig_bus, ideal_run_bus, in_process_run_bus
-from gazerig.robot.run.cameras import CameraView, DrawnSource, SyntheticMotion
+from gazerig.robot.run.cameras import CameraView
 from gazerig.robot.run.emulated import emulated_lines
 from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.options import RunOptions
@@ -61,15 +66,11 @@ class RigRoom:
             return ComputedCamera(world.scene, view.mount, field_deg, poses, rng, locate)
         rendered = RenderedWorld(world.spec, view.mount, view.params, rng, world.camera, poses)
         if isinstance(poses, SimulatedPoses):
+            motion = view.motion(rig.motion)()
             return rendered.pixels(
-                poses.head,
-                detector(),
-                LATENCY_MS,
-                SyntheticMotion(rig.motion),
-                locate,
-                poses.begin_s,
+                poses.head, detector(), LATENCY_MS, motion, locate, poses.begin_s
             )
-        source = partial(DrawnSource, rendered.served_pixels, poses)
+        source = partial(RenderedSource, rendered, poses)
         parts = CameraParts(source, detector, view.motion(rig.motion), locate)
         return CameraWorker(parts, self.clock.now_s)
 

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 from importlib.util import find_spec
 from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from gazerig.config.load import load
+from gazerig.config.load import find_file, load
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.world.figure import Figures
@@ -20,7 +20,7 @@ from gazerig.features.world.world_spec import WorldSpec
 from gazerig.robot.run.emulated import BOARDS, CHAINS, STOP_BEYOND_DEG, start_angles_rad
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_limits import bus_names
-from gazerig.robot.run.surroundings import refuse_missing_rules, script_file
+from gazerig.robot.run.surroundings import refuse_missing_rules
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import SceneScript, WorldCameraParams
 
@@ -129,14 +129,9 @@ def world_scene(name_or_path: str, seed: int) -> WorldScene:
     name = Path(name_or_path).stem
     if mjcf_of(name_or_path) is not None:
         return WorldScene(name, Figures(SceneScript(people={}), seed))
-    script = _read(*script_file("worlds", name_or_path, HOME))
+    path = find_file("worlds", name_or_path, HOME)
+    script = load(path, SceneScript, checks=CHECKS)
     return WorldScene(name, Figures(script, seed))
-
-
-@lru_cache(maxsize=2)
-def _read(path: Path, version: tuple[int, int, int] | None) -> SceneScript:
-    """Return a script; it is read only once, although a run requests it several times."""
-    return load(path, SceneScript, checks=CHECKS)
 
 
 def mjcf_of(name_or_path: str) -> Path | None:

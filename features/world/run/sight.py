@@ -5,21 +5,24 @@ detects faces and motion in the picture; the control loop needs neither MuJoCo n
 ``--no-pictures`` detections are computed instead, like those of a scene.
 """
 
+import threading
+from collections.abc import Callable
 from math import radians
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from gazerig.drivers.camera.capture_loop import Locate
-from gazerig.drivers.types import Detections, FaceDetector
+from gazerig.drivers.camera.capture_loop import Locate, Motion
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, ImageArray
 from gazerig.features.world.gl_context import render_in_calling_thread
-from gazerig.features.world.run.poses import SimulatedPoses, WorldPoses
+from gazerig.features.world.run.poses import SimulatedPoses, TimedPose, WorldPoses
 from gazerig.features.world.world_spec import WorldSpec
-from gazerig.gaze.types import Mat3
+from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.scene import PinholeView
-from gazerig.robot.run.cameras import HeadPose, NoFaces
+from gazerig.robot.run.cameras import HeadPose
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Scene
@@ -27,7 +30,7 @@ from gazerig.sim_mock.scenes.script import WorldCameraParams
 
 if TYPE_CHECKING:
     from gazerig.robot.model.scene import SceneView
-    from gazerig.sim_mock.cameras.rendered import FindMotion, PixelCamera
+    from gazerig.sim_mock.cameras.rendered import PixelCamera
 
 LATENCY_MS = 60.0
 """Delay from the exposure of a picture to its arrival in simulated time."""
@@ -80,21 +83,12 @@ class RenderedWorld(NamedTuple):
     params: WorldCameraParams
     poses: WorldPoses | SimulatedPoses
 
-    def served_pixels(self, head: HeadPose) -> "PixelCamera":
-        """Return the camera that renders the world of another process in its own process.
-
-        Raises:
-            NoRenderer: nothing on this machine can render.
-        """
-        render_in_calling_thread()
-        return self.pixels(head, NoFaces())
-
     def pixels(
         self,
         head: HeadPose,
         detector: FaceDetector,
         latency_ms: float = 0.0,
-        find_motion: "FindMotion | None" = None,
+        find_motion: Motion | None = None,
         locate: Locate | None = None,
         begins_s: float | None = None,
     ) -> "PixelCamera":
@@ -138,3 +132,68 @@ class RenderedWorld(NamedTuple):
             model.rig.R_world_base,
             model.rig.p_world_base_m,
         )
+
+
+class _NoFaces:
+    """Detector that finds no faces: the camera's process detects them later."""
+
+    def find(self, bgr: ImageArray) -> tuple[DetectedFace, ...]:
+        """Return no faces."""
+        return ()
+
+
+_LOOK_S = 0.002
+
+
+class RenderedSource:
+    """Source of a world's frames in real time, rendered from the newest pose of the head.
+
+    The camera's process renders and detects, so that neither can delay a tick.
+
+    Args:
+        world: Renders the frames.
+        poses: Poses of the head.
+    """
+
+    def __init__(self, world: "RenderedWorld", poses: WorldPoses) -> None:
+        render_in_calling_thread()
+        self._camera, self._poses = world.pixels(self._head_pose, _NoFaces()), poses
+        self._now: TimedPose | None = None
+        self._number = 0
+        self._due_s = 0.0
+
+    def open(self) -> None:
+        """Start with the first frame."""
+        self._camera.open()
+        self._number = 0
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        """Draw the next frame, from the newest pose; None if ``stop`` was set."""
+        while not stop.is_set():
+            newest, wait_s = self._poses.newest(), self._due_s - now_s()
+            if newest is None or wait_s > 0.0:
+                stop.wait(max(wait_s, _LOOK_S))
+                continue
+            self._now = newest
+            if self._number == 0:
+                self._camera.latest(self._poses.first_s)  # the time of the scene starts here
+            found = self._camera.latest(newest.t_s)
+            if found is None or found.image is None or found.number == self._number:
+                stop.wait(_LOOK_S)
+                continue
+            self._number = found.number
+            self._due_s = max(now_s(), newest.t_s + 1.0 / self._camera.rate_hz)
+            return Shot(found.captured_s, found.number, found.image)
+        return None
+
+    def events(self) -> tuple[str, ...]:
+        """Return no events: a rendered camera has none."""
+        return ()
+
+    def close(self) -> None:
+        """Free the renderer; safe to call twice."""
+        self._camera.close()
+
+    def _head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
+        assert self._now is not None  # ``take`` waits for the first pose
+        return self._now.R_world_head, self._now.p_world_head_m
