@@ -31,7 +31,7 @@ from websockets.typing import Origin
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.dashboard.door import page_door
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
-from gazerig.robot.model.commands import Jog, LookAt
+from gazerig.robot.model.commands import Jog, LookAt, Resume
 from gazerig.robot.net.client import RobotClient
 
 ROOT = Path(__file__).parents[1]
@@ -139,7 +139,7 @@ def free(rig: Rig) -> Iterator[None]:
     time.sleep(0.1)  # the limits of rates fill again, by ten messages
     if rig.client.status()["stopped"]:
         time.sleep(2.1)
-        rig.client.resume(confirmed=True)
+        rig.client.send(Resume(confirmed=True))
     rig.client.send(LookAt(None))
     rig.client.send(Jog(()))
 

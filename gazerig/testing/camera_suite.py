@@ -78,7 +78,10 @@ def of_source(
 
 
 class CameraSuite:
-    """For a class with a fixture ``bench``: rising frame numbers and times, sound frames, opening again, an absent device."""
+    """Rising frame numbers and times, sound frames, opening again, an absent device.
+
+    A class defines the fixture ``bench``, which returns a ``CameraBench``.
+    """
 
     @pytest.fixture
     def camera(self, bench: CameraBench) -> Iterator[Camera]:

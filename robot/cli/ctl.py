@@ -29,8 +29,10 @@ from gazerig.robot.model.commands import (
     LookAtPerson,
     Parameters,
     ReadMenus,
+    Resume,
     Revert,
     Save,
+    Stop,
     Unsaved,
 )
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
@@ -265,7 +267,7 @@ def stop(
         for rig in rigs:
             try:
                 with rig:
-                    rig.stop(why)
+                    rig.send(Stop(why))
             except DriverError as error:
                 failed = True
                 say(f"{rig.pid}: NOT KNOWN TO HAVE STOPPED, press the emergency stop: {error}")
@@ -294,7 +296,7 @@ def resume(
                 "Torque will be switched on and the head will move. Is no hand in the mechanism?",
                 abort=True,
             )
-        rig.resume(confirmed=True)
+        rig.send(Resume(confirmed=True))
         say("torque is on; it continues slowly")
 
 

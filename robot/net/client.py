@@ -35,7 +35,6 @@ from gazerig.robot.model.commands import (
     ReadStatus,
     Renew,
     Request,
-    Resume,
     Set,
     State,
     Stop,
@@ -302,26 +301,6 @@ class RobotClient:
             except OSError:
                 raise self._lost() from None
         return reply
-
-    def stop(self, why: str = "requested by another program") -> None:
-        """Switch the torque off immediately; when this returns, the loop has done it.
-
-        Raises:
-            ConnectionLost, RequestRejected: it may not have stopped: press the emergency stop.
-        """
-        self.send(Stop(why))
-
-    def resume(self, confirmed: bool = False) -> None:
-        """Switch the torque on at the present angles, and continue slowly.
-
-        Args:
-            confirmed: Whether a person has confirmed that no hand is in the mechanism; needed if
-                another client stopped the rig.
-
-        Raises:
-            RequestRejected: a servo or a rule of stops refuses it; the torque stays off.
-        """
-        self.send(Resume(confirmed))
 
     def _end_heartbeat(self) -> None:
         heartbeat, self._heartbeat = self._heartbeat, None

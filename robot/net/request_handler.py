@@ -68,10 +68,6 @@ FIXED = "these parameters cannot be changed while the rig runs"
 class ParamAccess(Protocol):
     """The parameters of a running rig, such as ``gazerig.robot.run.live.ParamStore``."""
 
-    @property
-    def version(self) -> int:
-        """Return the number of changes."""
-
     def parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters."""
 
@@ -171,7 +167,6 @@ class RequestHandler:
         self._params, self._paths = params, paths
         self._voice, self._menus, self._tracks = voice, menus, tracks
         self._fault, self._changing = fault, changing
-        self._unsaved = -1, 0
 
     def answer(self, message: object, peer: str = "") -> dict[str, object]:
         """Execute one request; return {"ok": result} or {"refused": every broken rule}.
@@ -243,8 +238,6 @@ class RequestHandler:
             return self._say_piece(request)
         params, paths = self._params, self._paths
         if params is None:
-            if isinstance(request, Get | Parameters | Unsaved | Characters):
-                return {} if isinstance(request, Get) else ()
             raise ValueError(FIXED)
         match request:
             case Parameters(prefix):
@@ -294,11 +287,8 @@ class RequestHandler:
         return self._voice
 
     def _status(self) -> dict[str, object]:
-        params = self._params
-        version = params.version if params is not None else 0
-        if version != self._unsaved[0]:  # count once for a program that polls
-            self._unsaved = version, len(params.unsaved()) if params is not None else 0
-        about = {**self._about, **self._changing(), "version": version, "unsaved": self._unsaved[1]}
+        unsaved = len(self._params.unsaved()) if self._params is not None else 0
+        about = {**self._about, **self._changing(), "unsaved": unsaved}
         if (tick := self._feed.newest) is None:
             return {**about, "ticks": 0, "stopped": "", "said": ()}
         return {

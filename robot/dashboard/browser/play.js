@@ -1,14 +1,12 @@
-// Panel: play tracks; those that play are on a timeline with cues.
+// Panel: play tracks; those that play have a bar, with their cues.
 
-import { prepare } from "/rig/charts.js";
 import { choices, onChoices } from "/rig/choices.js";
-import { buttons, checkbox, make, note, slider } from "/rig/elements.js";
+import { buttons, checkbox, heading, make, note, slider } from "/rig/elements.js";
 import { order } from "/rig/orders.js";
 import { spaced } from "/rig/words.js";
 
 const NONE = "none"; // ends all tracks
 const FINISHED = "finished"; // the end reason of a track at its own end
-const BAR = 7, TOP = 32, HIGH = TOP + BAR + 22;
 
 export default {
   drawer: "play",
@@ -29,19 +27,27 @@ export default {
     return ({ state }) => {
       const playing = state.tracks.filter((track) => !track.end_reason);
       row?.show(playing.at(-1)?.name ?? NONE);
-      draw(timeline, state.tracks);
+      const { tracks } = state;
+      timeline.replaceChildren(...(tracks.length ? tracks.flatMap(rows) : [note("no track plays")]));
     };
   },
 };
 
-function draw(place, tracks) {
-  if (!tracks.length) return place.replaceChildren(note("no track plays"));
-  const [canvas, ...notes] = tracks.flatMap((track, i) => {
-    const drawn = place.querySelectorAll("canvas")[i] ?? make("canvas", { className: "track" });
-    return [drawn, ...remarks(track)];
-  });
-  place.replaceChildren(canvas, ...notes);
-  tracks.forEach((track, i) => drawTrack(place.querySelectorAll("canvas")[i], track));
+/** One track: its name and time, bar, joints that it owns, and cues. */
+function rows(track) {
+  const { name, speed, loop, position_s, duration_s, owns } = track;
+  const at_s = Math.max(0, position_s);
+  const bar = make("progress", { className: "track", max: Math.max(duration_s, 1e-3), value: at_s });
+  bar.setAttribute("aria-label", spaced(name));
+  const cues = (choices.tracks[name]?.cues ?? []).map(([cue, cue_s]) => `${cue} at ${cue_s.toFixed(1)} s`);
+  return [
+    heading(spaced(name) + (speed !== 1 ? `, speed ${speed}` : "") + (loop ? ", loop" : ""),
+      `${at_s.toFixed(1)} of ${duration_s.toFixed(1)} s`),
+    bar,
+    note(owns?.length ? `owns ${owns.map(spaced).join(", ")}` : "owns no joint"),
+    ...(cues.length ? [note(`cues: ${cues.join(", ")}`)] : []),
+    ...remarks(track),
+  ];
 }
 
 function remarks({ name, who, limited, end_reason }) {
@@ -50,36 +56,4 @@ function remarks({ name, who, limited, end_reason }) {
   if (limited) texts.push(limited);
   if (end_reason && end_reason !== FINISHED) texts.push(`ended: ${end_reason}`);
   return texts.map((text) => note(`${spaced(name)}: ${text}`));
-}
-
-/** One track: its name and time, bar with cues, and joints that it owns. */
-function drawTrack(canvas, track) {
-  canvas.setAttribute("role", "img");
-  canvas.setAttribute("aria-label", `${spaced(track.name)} at ${track.position_s.toFixed(1)} s`);
-  const ready = prepare(canvas, HIGH);
-  if (!ready) return;
-  const { pen, width, colour } = ready, ink = pen.fillStyle;
-  const info = choices.tracks[track.name];
-  const lasts_s = Math.max(track.duration_s, 1e-3);
-  const across = (s) => Math.min(Math.max(s / lasts_s, 0), 1) * (width - 2);
-  pen.fillText(spaced(track.name) + (track.speed !== 1 ? `, speed ${track.speed}` : "")
-    + (track.loop ? ", loop" : ""), 0, 13);
-  pen.textAlign = "right";
-  pen.fillText(`${Math.max(0, track.position_s).toFixed(1)} of ${track.duration_s.toFixed(1)} s`, width, 13);
-  pen.textAlign = "left";
-  const bar = TOP, x = across(track.position_s);
-  pen.fillStyle = colour("line-grid");
-  pen.fillRect(0, bar, width, BAR);
-  pen.fillStyle = colour("level-ok");
-  pen.fillRect(0, bar, x, BAR);
-  pen.fillStyle = ink;
-  for (const [name, at_s] of info?.cues ?? []) {
-    pen.fillRect(across(at_s), bar - 4, 1, BAR + 4);
-    pen.fillText(name, Math.min(across(at_s) + 3, width - pen.measureText(name).width), bar - 4);
-  }
-  pen.fillStyle = colour("text");
-  pen.fillRect(x, TOP - 2, 2, BAR + 4);
-  const owns = track.owns?.length ? `owns ${track.owns.map(spaced).join(", ")}` : "owns no joint";
-  pen.fillStyle = ink;
-  pen.fillText(owns, 0, HIGH - 6, width);
 }
