@@ -485,22 +485,6 @@ class Fault(Request, frozen=True):
     text: str
 
 
-Layer = Literal["sight"]
-Viewpoint = Literal["face", "both", "over its shoulder", "from above"]
-
-
-class ShowView(Request, frozen=True):
-    """Choose what the page's view of the head shows; the page does it, not the rig.
-
-    Attributes:
-        layers: Layers for all browsers, None for no change: lines of sight.
-        look_from: Viewpoint of this browser, None for no change.
-    """
-
-    layers: tuple[Layer, ...] | None = None
-    look_from: Viewpoint | None = None
-
-
 Question = (
     Hello | ReadStatus | State | ReadMenus | Tracks | Parameters | Get | Unsaved | Characters
 )  # fmt: skip

@@ -87,7 +87,6 @@ class RunObservers:
         return LiveServer(
             run.robot,
             run.params,
-            run.clock,
             {"rig": options.rig, "name": options.name or rig_name(options.rig), "pid": os.getpid()},
             self._say,
             run.bus.inject_fault,
