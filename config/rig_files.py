@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 
 from gazerig.config.load import find_file, shipped_path
 from gazerig.config.parameters import flatten_changes
-from gazerig.config.rig import Rig
 from gazerig.config.save import save
-from gazerig.config.schema import layers_of, load_rig, refusal
+from gazerig.config.schema import load_rig, refusal
 from gazerig.config.shipped_files import file_in_folders, is_path
 from gazerig.robot.model.parameter import SavedFile
 
@@ -44,18 +43,9 @@ class RigLayers(NamedTuple):
     profile: str | None
 
 
-def read_all(layers: RigLayers) -> tuple[Rig, tuple[Path, ...]]:
-    """Return a rig and its files, its own first.
-
-    Raises:
-        gazerig.config.load.ConfigError: see gazerig.config.schema.load_rig.
-    """
-    return load_rig(*layers), tuple(layers_of(*layers))
-
-
 def save_layers(
     layers: RigLayers, to: str | None, wanted: Mapping[str, Any], now: datetime
-) -> tuple[SavedFile, tuple[Path, ...]]:
+) -> SavedFile:
     """Write values into a rig's file; character and profile must not override any of them.
 
     Args:
@@ -63,9 +53,6 @@ def save_layers(
         to: A new file for a copy with the values; None: the rig's own.
         wanted: Values by dotted key.
         now: Time for the backup's name.
-
-    Returns:
-        The written file, and the present files of the rig.
 
     Raises:
         gazerig.config.load.ConfigError: see gazerig.config.save.save; or ``to`` exists or is not a
@@ -78,8 +65,7 @@ def save_layers(
             raise refusal("", rule, to)
         layers, own, source = layers._replace(name=to), Path(to), own
     check = partial(load_rig, character=layers.character, profile=layers.profile)
-    saved = save(own, wanted, now, check, source)
-    return saved, tuple(layers_of(*layers))
+    return save(own, wanted, now, check, source)
 
 
 class AllowedFolder:

@@ -77,7 +77,6 @@ class DoorLink:
         self._last: TurnOrder | None = None
         self._news = asyncio.Event()
         self._reported: set[str] = set()
-        self._running: asyncio.Task[None] | None = None
 
     def now_s(self) -> float:
         """Return the present time, s."""
@@ -101,18 +100,6 @@ class DoorLink:
     def report_again(self) -> None:
         """Forget what was reported, after a connection that worked."""
         self._reported.clear()
-
-    def start(self) -> None:
-        """Run in the background of the running event loop, unless it does so already."""
-        if self._running is None:
-            self._running = asyncio.ensure_future(self.run())
-
-    async def close(self) -> None:
-        """End ``start``, and disconnect from the head."""
-        if self._running is not None:
-            self._running.cancel()
-            await asyncio.gather(self._running, return_exceptions=True)
-            self._running = None
 
     async def run(self) -> None:
         """Pass orders on for ever."""
@@ -173,15 +160,6 @@ class DoorLink:
             wait_s = min(2.0 * wait_s, LONGEST_WAIT_S)
 
 
-def connect(head: int | str | None, who: str) -> Any:
-    """Connect to a running head by process id or name; None if only one runs.
-
-    Raises:
-        gazerig.NotFound: it does not run, or several do.
-    """
-    return gazerig.connect(name=None if head is None else str(head), who=who)
-
-
 def _perform(head: Any, order: TurnOrder) -> str:
     """Send an order to the head; return why the head refuses it, "" if it does not."""
     given = {name: value for name, value in order._asdict().items() if value not in (None, "")}
@@ -233,7 +211,12 @@ class Door:
             say(f"listening on {bind}: every program on this network can steer the conversation")
 
         link = DoorLink(
-            lambda: connect(head, f"door {self.name}"), say, address or self.address, bind
+            lambda: gazerig.connect(
+                name=None if head is None else str(head), who=f"door {self.name}"
+            ),
+            say,
+            address or self.address,
+            bind,
         )
         try:
             asyncio.run(self._serve(link, ends_with_input))

@@ -1,21 +1,19 @@
 """Door to LiveKit Agents: the attribute ``lk.agent.state`` of the agent in a room.
 
-As a program of its own, the door joins the room with LIVEKIT_URL and LIVEKIT_TOKEN of its
-environment, subscribes to the agent's sound only, which moves the mouth, and publishes nothing. In
-the agent's program one line is enough: ``follow(session)``. Both are read by the names of their
-fields, so they fit several versions; the package ``livekit`` is only needed to join a room.
+The door joins the room with LIVEKIT_URL and LIVEKIT_TOKEN of its environment, subscribes to the
+agent's sound only, which moves the mouth, and publishes nothing. Its events are read by the names
+of their fields, so they fit several versions.
 """
 
 import asyncio
-import logging
 import os
 from collections.abc import AsyncIterator, Callable, Mapping
 from typing import Any
 
 import gazerig
-from gazerig.doors.door import Door, DoorLink, connect
+from gazerig.doors.door import Door, DoorLink
 from gazerig.doors.spoken_sound import MouthSound
-from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
+from gazerig.doors.turn_taking import Orders, TurnTaking
 
 ATTRIBUTE = "lk.agent.state"
 RATE_HZ = 16_000
@@ -26,27 +24,14 @@ _URL, _TOKEN = "LIVEKIT_URL", "LIVEKIT_TOKEN"
 
 
 class LiveKit:
-    """States of an agent and its user as orders."""
+    """States of an agent as orders."""
 
     def __init__(self) -> None:
-        self.talk = TurnTaking("listening", reports_silence=True)
+        self.talk = TurnTaking("listening")
 
     def take(self, message: Mapping[str, Any], now_s: float) -> Orders:
-        """Return the orders for changed states.
-
-        Args:
-            message: ``lk.agent.state``, or "user": the state of ``user_state_changed``.
-            now_s: Present time, s.
-
-        Raises:
-            UnknownMessage: the state is unknown.
-        """
+        """Return the orders for changed attributes of the agent; unknown states are ignored."""
         talk = self.talk
-        match message:
-            case {"user": "speaking"}:
-                return talk.partner_speaks()
-            case {"user": _}:
-                return talk.resume(now_s)
         match message.get(ATTRIBUTE):
             case "thinking":
                 return talk.end_speech() + talk.partner_pauses()
@@ -56,35 +41,7 @@ class LiveKit:
                 return talk.end_speech() or talk.partner_speaks()
             case "initializing" | "idle" | "":
                 return talk.end()
-            case None:
-                return ()
-            case other:
-                raise UnknownMessage(f"{ATTRIBUTE} {other!r} is unknown and ignored")
-
-
-def follow(session: Any, head: int | str | None = None, link: DoorLink | None = None) -> DoorLink:
-    """Let a running head take part in an ``AgentSession``; return the connection to the head.
-
-    Args:
-        session: The session, before or after its start, in a running event loop.
-        head: Process id or name of the head; None if only one runs on this computer.
-        link: Connection to the head; None for a new one.
-    """
-    log = logging.getLogger("gazerig").warning
-    used = link or DoorLink(lambda: connect(head, "LiveKit"), log)
-    states = LiveKit()
-
-    def take(message: Mapping[str, Any]) -> None:
-        try:
-            used.send(states.take(message, used.now_s()))
-        except UnknownMessage as error:
-            used.report(str(error))
-
-    session.on("agent_state_changed", lambda event: take({ATTRIBUTE: str(event.new_state)}))
-    session.on("user_state_changed", lambda event: take({"user": str(event.new_state)}))
-    session.on("close", lambda event: take({ATTRIBUTE: "idle"}))
-    used.start()
-    return used
+        return ()
 
 
 async def follow_room(
@@ -105,10 +62,7 @@ async def follow_room(
     states, closed, moving = LiveKit(), asyncio.Event(), set[asyncio.Task[None]]()
 
     def take(message: Mapping[str, str]) -> None:
-        try:
-            link.send(states.take(message, link.now_s()))
-        except UnknownMessage as error:
-            link.report(str(error))
+        link.send(states.take(message, link.now_s()))
 
     def change(attributes: Mapping[str, str], participant: Any) -> None:
         """Follow changed attributes, and subscribe to the sound of an agent."""

@@ -79,8 +79,8 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
 }
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 
-A command is a ``gazerig.robot.cli.command_list.CommandEntry``, surroundings a subclass of
-``gazerig.robot.run.surroundings.Surroundings``, a door a ``gazerig.doors.door.Door``.
+A command is a ``gazerig.robot.cli.command_list.CommandEntry``, surroundings
+``gazerig.features.world.run.surroundings.WorldSurroundings``, a door a ``gazerig.doors.door.Door``.
 """
 
 OUR_PACKAGE = "gazerig"

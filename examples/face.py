@@ -21,13 +21,13 @@ def feel(head: gazerig.Head) -> None:
         head.express(mood)
         head.sleep(1.0)
         print(mood, "jaw", round(head.joints["jaw"].measured_deg, 1), "deg")
-    head.converse("talk")
+    head.speaking()
     widest_deg = 0.0
     for loudness in LOUDNESS:
         head.level("mouth", float(loudness))
         head.sleep(0.02)
         widest_deg = max(widest_deg, head.joints["jaw"].measured_deg)
-    head.converse("none")
+    head.idle()
     print(f"speaking: jaw up to {widest_deg:.1f} deg")
 
 

@@ -7,14 +7,12 @@ moving fist. Own bodies are therefore excluded.
 
 from math import atan2, radians, sqrt
 
-from gazerig.gaze.angles import angles_of, compose, direction, rotate, rotate_back, rotation, sub
-from gazerig.gaze.types import Angles2, Angles3, BodyRows, GazeState, Mat3, Vec3
+from gazerig.gaze.angles import compose, direction, rotate, rotate_back, rotation, sub
+from gazerig.gaze.types import Angles2, BodyRows, GazeState, Mat3, Vec3
 
 FIELD_DEG = (100.0, 60.0, 60.0, 75.0)
 """Extent of an eye's field from its line of sight towards temple and nose, up and down."""
 _TEMPORAL, _NASAL, _UP, _DOWN = map(radians, FIELD_DEG)
-OWN = "own"
-"""Kind of bodies that belong to the robot itself and are never targets."""
 
 
 def visible_bodies(bodies: BodyRows, state: GazeState) -> dict[int, str]:
@@ -28,11 +26,8 @@ def visible_bodies(bodies: BodyRows, state: GazeState) -> dict[int, str]:
     return {
         id: kind
         for id, p, kind in zip(bodies.ids, bodies.p_world_m, bodies.kinds, strict=True)
-        if kind != OWN
-        and (
-            _is_inside(p, state.p_world_eye_left_m, left, left=True)
-            or _is_inside(p, state.p_world_eye_right_m, right, left=False)
-        )
+        if _is_inside(p, state.p_world_eye_left_m, left, left=True)
+        or _is_inside(p, state.p_world_eye_right_m, right, left=False)
     }
 
 
@@ -53,11 +48,6 @@ def eye_axes(state: GazeState, left: bool) -> Mat3:
     """Return R_world_eye of one eye: x along its line of sight, y left, z up."""
     angles: Angles2 = state.eye_left_rad if left else state.eye_right_rad
     return compose(state.R_world_head, rotation((angles[0], angles[1], 0.0)))
-
-
-def head_in_space(state: GazeState) -> Angles3:
-    """Return the head's (yaw, pitch, roll) in the world: the neck's if no lower neck is bent."""
-    return state.head_rad if state.base_rad == (0.0, 0.0) else angles_of(state.R_world_head)
 
 
 def line_of_sight(state: GazeState, left: bool) -> Vec3:

@@ -237,7 +237,6 @@ class GazeState(Struct, frozen=True, gc=False):
     p_world_eye_left_m, p_world_eye_right_m: centres of rotation of the eyes
     lid_left, lid_right: opening of the upper lids, 0 shut .. 1 open
     lower_left, lower_right: opening of the lower lids
-    base_rad, base_rate_rad_s: (yaw, pitch) of a lower neck, which carries the neck, and their rates
     """
 
     head_rad: Angles3
@@ -252,8 +251,6 @@ class GazeState(Struct, frozen=True, gc=False):
     lid_right: float
     lower_left: float = 1.0
     lower_right: float = 1.0
-    base_rad: Angles2 = (0.0, 0.0)
-    base_rate_rad_s: Angles2 = (0.0, 0.0)
 
 
 class LimitedAngle(Struct, frozen=True, gc=False):
@@ -299,11 +296,11 @@ class GazeCommand(Struct, frozen=True, gc=False):
 class HeadGeometry(Protocol):
     """Kinematics that the oculomotor models need (gazerig.robot.model.kinematics)."""
 
-    def head_pose(self, head_rad: Angles3, base_rad: Angles2 = (0.0, 0.0)) -> tuple[Mat3, Vec3]:
-        """Return R_world_head and p_world_head_m for angles of the neck and a lower neck."""
+    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
+        """Return R_world_head and p_world_head_m for angles of the neck."""
         ...
 
-    def neck_angles_to(self, p_world_m: Vec3, base_rad: Angles2 = (0.0, 0.0)) -> Angles2:
+    def neck_angles_to(self, p_world_m: Vec3) -> Angles2:
         """Return the neck yaw and pitch that point the head's x axis through a point."""
         ...
 

@@ -110,11 +110,9 @@ class AsyncHead:
     release_joints = _order(Head.release_joints)
     play = _order(Head.play)
     end_track = _order(Head.end_track)
-    sync_track = _order(Head.sync_track)
     say = _order(Head.say)
     express = _order(Head.express)
     level = _order(Head.level)
-    converse = _order(Head.converse)
     listening = _order(Head.listening)
     thinking = _order(Head.thinking)
     speaking = _order(Head.speaking)
@@ -124,11 +122,11 @@ class AsyncHead:
     wink = _order(Head.wink)
     stop = _order(Head.stop)
     resume = _order(Head.resume)
-    get = _call(RemoteHead.get)
-    set = _call(RemoteHead.set)
-    save = _call(RemoteHead.save)
-    revert = _call(RemoteHead.revert)
-    menus = _call(RemoteHead.menus)
+    get = _call(Head.get)
+    set = _call(Head.set)
+    save = _call(Head.save)
+    revert = _call(Head.revert)
+    menus = _call(Head.menus)
 
     async def state(self) -> HeadState:
         """Return the newest tick of the control loop."""

@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import degrees
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.errors import Refused
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.types import Angles3, Target, Vec3
+from gazerig.gaze.types import Angles3, GazeCommand, Target, Vec3
 from gazerig.params import unknown_text
-from gazerig.robot.loop.reachability import look_reply, reached_joints
 from gazerig.robot.model.commands import LookAt, check_command
-from gazerig.robot.model.reply import JointReply
+from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.types import JointState
 from gazerig.robot.run.models import GazeModels, random_generators, rig_kinematics
 from gazerig.robot.run.rig_limits import limits
@@ -25,15 +25,11 @@ class JointSolution:
         joints_rad: angles by name; lids are open, joints that gaze does not move are at 0.
         reachable: both eyes meet the point within a degree.
         error_deg: angle between the point and the line of sight of the worse eye.
-        seen_m: the point at the target's distance that the eyes really look at, world frame.
-        limited: the joints that keep the eyes from the point, with their ranges and the reason.
     """
 
     joints_rad: Mapping[str, float]
     reachable: bool
     error_deg: float
-    seen_m: Vec3
-    limited: tuple[JointReply, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,17 +77,15 @@ def inverse(rig: Rig | str, point_m: tuple[float, float, float]) -> JointSolutio
     models = GazeModels(found, random_generators(0))
     kinematics, oculomotor = models.kinematics, models.oculomotor
     target = Target(point_m, (0.0, 0.0, 0.0), 0.0, "point", -1, 1.0, True, None, 1, "asked for")
-    ranges = limits(found.joints)
-    reply = look_reply(target, oculomotor, kinematics, ranges)
-    angles = reached_joints(oculomotor.reachable_gaze(target), kinematics, ranges)
-    assert reply.done_m is not None
-    return JointSolution(
-        dict(zip(kinematics.names, angles, strict=True)),
-        reply.error_deg <= 1.0,
-        reply.error_deg,
-        reply.done_m,
-        reply.limited,
-    )
+    head, (left, right) = oculomotor.resting_gaze(target)
+    gaze = GazeCommand(head, left, right, 1.0, 1.0, "fixate", False, point_m, 0, 0, 0)
+    rows = zip(kinematics.inverse(gaze), limits(found.joints), strict=True)
+    angles = tuple([min(max(angle, one.low_rad), one.high_rad) for angle, one in rows])
+    at_rest = (0.0,) * len(angles)
+    pose = kinematics.forward(JointState(angles, at_rest, at_rest, ()))
+    error_deg = degrees(gaze_error(point_m, pose, not kinematics.one_pan))
+    joints_rad = dict(zip(kinematics.names, angles, strict=True))
+    return JointSolution(joints_rad, error_deg <= 1.0, error_deg)
 
 
 def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:

@@ -5,8 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from math import radians
 from pathlib import Path
-from types import TracebackType
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from gazerig.drivers.sound.params import KINDS
 from gazerig.errors import HeadEnded, Refused
@@ -26,6 +25,7 @@ from gazerig.robot.model.commands import (
     EndTrack,
     Express,
     Frame,
+    Get,
     Jog,
     LookAt,
     LookAtDirection,
@@ -34,18 +34,27 @@ from gazerig.robot.model.commands import (
     LookAtPixel,
     MoveOpponent,
     Play,
+    ReadMenus,
+    Request,
     Resume,
+    Revert,
+    Save,
     Say,
+    SayPiece,
+    Set,
     SetLevel,
     Stop,
-    SyncTrack,
     Talk,
     Value,
+    as_value,
 )
+from gazerig.robot.model.parameter import SavedFile
 from gazerig.robot.model.reply import CommandReply, Outcome, Progress, command_outcome
 
 STREAM_AHEAD_S = 1.0
 """Length of a stream that is sent before it is heard."""
+_ACCEPTS_S = 1.0
+"""Time in which the head must accept an order."""
 
 
 class Order:
@@ -54,13 +63,10 @@ class Order:
     Args:
         host: the head.
         read_reply: returns the reply once the head has accepted the order, None before.
-        within_s: time in which the head must accept it, seconds.
     """
 
-    def __init__(
-        self, host: "Head", read_reply: Callable[[], CommandReply | None], within_s: float = 1.0
-    ) -> None:
-        self._host, self._read_reply, self._within_s = host, read_reply, within_s
+    def __init__(self, host: "Head", read_reply: Callable[[], CommandReply | None]) -> None:
+        self._host, self._read_reply = host, read_reply
         self._reply: CommandReply | None = None
         self._outcome: Outcome | None = None
         self._why = ""
@@ -77,10 +83,10 @@ class Order:
         """
         reply = self._accepted_reply()
         if reply is None:
-            self._host._pause(lambda: self._accepted_reply() is not None, self._within_s)
+            self._host._pause(lambda: self._accepted_reply() is not None, _ACCEPTS_S)
             reply = self._accepted_reply()
         if reply is None:
-            raise HeadEnded(f"the head has not accepted the order within {self._within_s:g} s")
+            raise HeadEnded(f"the head has not accepted the order within {_ACCEPTS_S:g} s")
         return reply
 
     @property
@@ -108,9 +114,6 @@ class Order:
 
     def wait(self, timeout_s: float | None = 10.0) -> Outcome:
         """Wait until the order has ended; step a head in simulated time until then.
-
-        For a point that is out of reach this returns as soon as the reply arrives; the head is then
-        still moving.
 
         Args:
             timeout_s: seconds by the head's own clock; None: without limit.
@@ -168,12 +171,7 @@ class Head(ABC):
         """Start the head, or connect to it."""
 
     @abstractmethod
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Park and switch off a head of this program, or disconnect from another program's."""
 
     # Gaze
@@ -296,15 +294,6 @@ class Head(ABC):
         """End a track, or all; its joints return to gaze."""
         return self._send(EndTrack(track))
 
-    def sync_track(self, number: int, position_s: float) -> Order:
-        """Give the position of a track by a clock of yours, at most some ten times per second.
-
-        Args:
-            number: ``Order.reply.track.number`` of its ``play``.
-            position_s: position at which it should be now.
-        """
-        return self._send(SyncTrack(number, position_s))
-
     def express(self, expression: str, strength: float = 1.0) -> Order:
         """Blend to an expression of the rig's table, and keep it.
 
@@ -372,22 +361,11 @@ class Head(ABC):
         self._say_piece(b"", rate_hz, channels, volume, last=True)
         return Order(self, CommandReply)
 
-    @abstractmethod
     def _say_piece(
         self, piece: bytes, rate_hz: int, channels: int, volume: float, last: bool = False
     ) -> float:
         """Say a piece of a stream; return the length that has not been heard, s."""
-
-    def converse(self, mode: str) -> Order:
-        """Look away and blink as speakers or listeners do.
-
-        Args:
-            mode: "none", "talk", "listen" or "think".
-
-        Raises:
-            Refused: the mode is unknown.
-        """
-        return self._send(Ask("conversation", mode))
+        return float(self._ask(SayPiece(piece, rate_hz, channels, last, volume), float))
 
     # Conversation
 
@@ -413,9 +391,8 @@ class Head(ABC):
         return self._send(Talk("thinking", person, stay=self._stay))
 
     def speaking(
-        self, person: int | None = None, *, seconds: float | None = None, text: str = "",
-        words: Iterable[tuple[str, float]] = (), sound: Path | str = "",
-    ) -> Order:  # fmt: skip
+        self, person: int | None = None, *, seconds: float | None = None, text: str = ""
+    ) -> Order:
         """Look as a speaker does, from now on; report it when the sound begins.
 
         A long turn begins averted, and the gaze returns to the partner before the planned end.
@@ -423,17 +400,13 @@ class Head(ABC):
 
         Args:
             person: as in ``listening``: the addressee.
-            seconds: time until the planned end; None: from ``words``, or estimated from ``text``.
+            seconds: time until the planned end; None: estimated from ``text``.
             text: what is spoken.
-            words: (word, start in seconds from now) pairs.
-            sound: path of the sound file that is spoken.
 
         Raises:
             Refused: a value is invalid.
         """
-        return self._send(
-            Talk("speaking", person, seconds, text, tuple(words), str(sound), self._stay)
-        )
+        return self._send(Talk("speaking", person, seconds, text, self._stay))
 
     def interrupt(self) -> Order:
         """Return to the face at once and listen: the partner has interrupted speech or thought."""
@@ -476,11 +449,10 @@ class Head(ABC):
 
     # Parameters
 
-    @abstractmethod
     def get(self, prefix: str = "") -> Mapping[str, Value]:
         """Return the present values of all keys of the rig that start with a prefix."""
+        return {key: as_value(value) for key, value in self._ask(Get(prefix), dict).items()}
 
-    @abstractmethod
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
         """Apply values at dotted keys, all of them or none.
 
@@ -490,22 +462,33 @@ class Head(ABC):
         Raises:
             Refused: rules are broken; the message names all of them.
         """
+        return tuple(self._ask(Set(dict(changes)), tuple))
 
-    @abstractmethod
     def save(self, path: Path | str | None = None) -> Path:
         """Write the present values into the rig's file, or into another one; return its path.
 
         Raises:
             Refused: the file cannot be written, or is a file of the program.
         """
+        whole = None if path is None else str(Path(path).expanduser().absolute())
+        saved: SavedFile = self._ask(Save(whole), SavedFile)
+        return saved.path
 
-    @abstractmethod
     def revert(self) -> tuple[str, ...]:
         """Restore the values of the rig's file; return a line for each change."""
+        return tuple(self._ask(Revert(), tuple))
 
-    @abstractmethod
     def menus(self) -> Mapping[str, tuple[str, ...]]:
         """Return behaviours, conversation modes and lid states; the active one is the first."""
+        return dict(self._ask(ReadMenus(), dict[str, tuple[str, ...]]))
+
+    @abstractmethod
+    def _ask(self, request: Request, kind: Any) -> Any:
+        """Send a request; return its result, which has the given type.
+
+        Raises:
+            Refused: a rule forbids it.
+        """
 
     # State
 

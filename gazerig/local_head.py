@@ -5,10 +5,8 @@ import logging
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from functools import partial
-from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from gazerig.config.faults import ConfigError
@@ -22,8 +20,9 @@ from gazerig.robot.loop.head_state import HeadEvent, HeadState, head_state
 from gazerig.robot.loop.loop import TickLoop
 from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.model.commands import Command, Say, Value, set_client
+from gazerig.robot.model.commands import Command, Request, Say, set_client
 from gazerig.robot.model.reply import Progress
+from gazerig.robot.net.request_handler import RequestHandler
 from gazerig.robot.run.run import Run
 from gazerig.robot.run.session import Session
 
@@ -65,30 +64,10 @@ class LocalHead(Head):
             raise HeadEnded("the control loop is not running")
         return head_state(tick)
 
-    def get(self, prefix: str = "") -> Mapping[str, Value]:
-        """Return the present values of all keys of the rig that start with a prefix."""
+    def _ask(self, request: Request, kind: Any) -> Any:
+        self._active_run()
         with _raising_refused():
-            return self._active_run().params.get(prefix)
-
-    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
-        """Apply values at dotted keys from the next tick on, all of them or none."""
-        with _raising_refused():
-            return self._active_run().params.set(changes)
-
-    def save(self, path: Path | str | None = None) -> Path:
-        """Write the present values into the rig's file, or into another one; return its path."""
-        whole = None if path is None else Path(path).expanduser().absolute()
-        with _raising_refused():
-            return self._active_run().params.save(whole).path
-
-    def revert(self) -> tuple[str, ...]:
-        """Restore the values of the rig's file; return a line for each change."""
-        with _raising_refused():
-            return self._active_run().params.revert()
-
-    def menus(self) -> Mapping[str, tuple[str, ...]]:
-        """Return behaviours, conversation modes and lid states; the active one is the first."""
-        return self._active_run().robot.menus()
+            return self._requests.perform(request)
 
     def _progress(self) -> Progress:
         return self._feed.progress()
@@ -115,20 +94,14 @@ class LocalHead(Head):
             raise Error(f"use the head in a with block: with gazerig.open({self.rig!r}) as head:")
         return self._made
 
-    def _say_piece(
-        self, piece: bytes, rate_hz: int, channels: int, volume: float, last: bool = False
-    ) -> float:
-        if last:
-            self._active_run().voice.finish()
-            return 0.0
-        with _raising_refused():
-            return self._active_run().voice.feed(piece, rate_hz, channels, volume)
-
     def _make_run(self) -> Run:
         if self._made is not None:
             raise Error("a head can be used in one with block only: open another")
-        self._made = self._make()
-        return self._made
+        self._made = run = self._make()
+        self._requests = RequestHandler(
+            run.robot.command, self._feed, {}, run.params, voice=run.voice, menus=run.robot.menus
+        )
+        return run
 
 
 class RunningHead(LocalHead):
@@ -144,25 +117,14 @@ class RunningHead(LocalHead):
         closing: the block has ended, and waits until the head has parked.
     """
 
-    def __init__(
-        self,
-        rig: str,
-        make: Callable[[], Run],
-        say: Callable[[str], None] | None = None,
-    ) -> None:
-        super().__init__(rig, make, say)
-        self._interrupts = Interrupts(also=self._abandonment_reason, signals=False)
-        self._owner = threading.current_thread()
-        self._started, self._finished = threading.Event(), threading.Event()
-        self._failure: BaseException | None = None
-        self._pid = os.getpid()
-        self.closing = False
-        self._ended_by = ""
-
     def __enter__(self) -> Self:
         """Switch the torque on at the present joint angles; return after the first tick."""
-        self._owner = threading.current_thread()
-        run = self._make_run()
+        run = self._make_run()  # first: a second block changes nothing of the first
+        self._owner, self._pid = threading.current_thread(), os.getpid()
+        self._interrupts = Interrupts(also=self._abandonment_reason, signals=False)
+        self._started, self._finished = threading.Event(), threading.Event()
+        self._failure: BaseException | None = None
+        self.closing, self._ended_by = False, ""
         # Not a daemon thread, so that the interpreter waits for parking before it exits.
         self._thread = threading.Thread(
             target=self._run, args=(run,), name=f"head {self.rig}", daemon=False
@@ -179,12 +141,7 @@ class RunningHead(LocalHead):
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Park, switch the torque off, and wait until that is done.
 
         Raises:
@@ -192,11 +149,11 @@ class RunningHead(LocalHead):
             KeyboardInterrupt: Ctrl-C was pressed in the meantime.
             SystemExit: SIGTERM or SIGHUP arrived in the meantime.
         """
-        raised = self._close()
-        if error is not None:
+        by_signal = self._close()
+        if raised[1] is not None:
             return
-        if raised is not None:
-            raise raised
+        if by_signal is not None:
+            raise by_signal
         if self._ended.startswith("fault"):
             raise HeadEnded(f"the head has ended: {self._ended}") from self._failure
 
@@ -297,18 +254,13 @@ class SimulatedHead(LocalHead):
             self._stack = stack.pop_all()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Park and switch off, in simulated time."""
         fault = self._ended
         self._session.stopped_by = self._ended = fault or _ENDED
         # An error of the program's own block is not a fault of the head.
         self._stack.close()
-        if fault and error is None:
+        if fault and raised[1] is None:
             raise HeadEnded(f"the head has ended: {fault}")
 
     @property

@@ -1,14 +1,11 @@
 """A head that runs in another program of the same user."""
 
-from collections.abc import Mapping
-from pathlib import Path
-from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from gazerig.errors import HeadEnded
 from gazerig.head import Head, Order
 from gazerig.robot.loop.head_state import HeadEvent, HeadState
-from gazerig.robot.model.commands import Command, Revert, Value, as_value
+from gazerig.robot.model.commands import Command, Request, Revert, Set
 from gazerig.robot.model.reply import Progress
 from gazerig.robot.net.client import RequestRejected, RobotClient
 
@@ -35,12 +32,7 @@ class RemoteHead(Head):
         """Return the head itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Give up control and disconnect."""
         self._client.close()
 
@@ -52,30 +44,12 @@ class RemoteHead(Head):
             raise HeadEnded("the head has just started: its loop is not running yet")
         return state
 
-    def get(self, prefix: str = "") -> Mapping[str, Value]:
-        """Return the present values of all keys of the rig that start with a prefix."""
-        return {key: as_value(value) for key, value in self._client.get(prefix).items()}
-
-    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
-        """Apply values at dotted keys, all of them or none."""
-        return self._client.set_many(changes)
-
-    def save(self, path: Path | str | None = None) -> Path:
-        """Write the present values into the rig's file, or into another one; return its path."""
-        return self._client.save(path).path
-
-    def revert(self) -> tuple[str, ...]:
-        """Restore the values of the rig's file; return a line for each change."""
-        return self._client.change(Revert())
-
-    def menus(self) -> Mapping[str, tuple[str, ...]]:
-        """Return behaviours, conversation modes and lid states; the active one is the first."""
-        return self._client.menus()
-
-    def _say_piece(
-        self, piece: bytes, rate_hz: int, channels: int, volume: float, last: bool = False
-    ) -> float:
-        return self._client.say_piece(piece, rate_hz, channels, last, volume)
+    def _ask(self, request: Request, kind: Any) -> Any:
+        if isinstance(request, Set):
+            return self._client.set_many(request.changes)
+        if isinstance(request, Revert):
+            return self._client.change(request)
+        return self._client.ask(request, kind)
 
     def _progress(self) -> Progress:
         state = self.state

@@ -17,7 +17,6 @@ from websockets.sync.connection import Connection
 from gazerig.robot.dashboard.door.page_door import PageDoor
 from gazerig.robot.dashboard.door.viser_server import open_server
 from gazerig.robot.loop.events import TickFeed
-from gazerig.robot.model.commands import ShowView
 
 PATIENCE_S = 20.0
 TOKEN = "what-only-the-terminal-shows"
@@ -31,14 +30,13 @@ DONE: dict[str, Any] = {"ok": {"notes": []}}
 class Rig:
     """A door with a server behind it, and the requests through it.
 
-    asked, stops: what has reached the rig; views: what was chosen for the view
+    asked, stops: what has reached the rig
     answer: what the rig answers to a request; it may wait
     """
 
     def __init__(self, host: str, folder: Path) -> None:
         self.asked: list[dict[str, Any]] = []
         self.stops: list[dict[str, Any]] = []
-        self.views: list[tuple[ShowView, str]] = []
         self.answer: Callable[[dict[str, Any]], dict[str, Any]] = lambda asked: DONE
         listener = socket.create_server((host, 0))
         port = listener.getsockname()[1]
@@ -52,7 +50,6 @@ class Rig:
         self.feed = TickFeed()
         self.door = PageDoor(
             host, listener, inside, [theirs for _, theirs in pairs], TOKEN, self.feed,
-            lambda view, browser: self.views.append((view, browser)),
             lambda jpeg: self.take_picture(jpeg),
         )  # fmt: skip
         self.door.open()

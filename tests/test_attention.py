@@ -119,13 +119,6 @@ def bodies(*rows: Row) -> Bodies:
     return percept(0.0, *rows).bodies
 
 
-def test_ones_own_body_is_not_looked_at_however_it_moves() -> None:
-    fist = body(2, "own", (0.4, 0.1, -0.1), (0.0, 3.0, 0.0))
-    model = attention()
-    assert look(model, 0.0, FACE, fist).kind == "face"
-    assert look(attention(), 0.0, fist).kind == "rest"
-
-
 def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
     model = BottomUp(BottomUpParams(form="literal", reference=9.0))
     seen = bodies(body(1, "x", (5, 3, 0), (1, 2, 0)), body(2, "x", (1, 0, 0), (1, 2, 0)))

@@ -19,9 +19,9 @@ class Video4Linux(Capture):
 
     def __init__(self, file):
         super().__init__()
-        self.file, self.lose, self.restore = file, file.unlink, file.touch
+        self.file, self.lose = file, file.unlink
         self.stated_hz = 30.0
-        self.restore()
+        file.touch()
 
     def isOpened(self):  # noqa: N802
         return self.file.exists()
@@ -35,10 +35,7 @@ class TestWebcam(CameraSuite):
     @pytest.fixture
     def bench(self, tmp_path):
         device: Any = Video4Linux(tmp_path / "video0")
-        return of_source(
-            lambda: Webcam(device.file, capture=lambda name: device),
-            device.lose, device.restore,
-        )  # fmt: skip
+        return of_source(lambda: Webcam(device.file, capture=lambda name: device), device.lose)
 
 
 @pytest.mark.parametrize("pixels", [False, True])

@@ -8,8 +8,9 @@ from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
 from gazerig.config.rig_files import AllowedFolder, RigLayers
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.model.parameter import SavedFile
-from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
+from gazerig.robot.net.request_handler import RequestHandler
 from gazerig.robot.run.live import ParamStore
 
 
@@ -73,8 +74,7 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     rig.write_text(Path("config/rigs/desk.yaml").read_text())
     made = simulated(str(rig))
     tuning = ParamStore(made.rig, lambda _: None, RigLayers(str(rig), None, None))
-    pulse = LoopMonitor(made.clock)
-    handler = RequestHandler(made.robot.command, pulse, {}, tuning, paths=tuning.confined)
+    handler = RequestHandler(made.robot.command, TickFeed(), {}, tuning, paths=tuning.confined)
     hear = handler.answer
     before = sorted(os.listdir(tmp_path))
     for asked in (

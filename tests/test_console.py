@@ -26,9 +26,7 @@ def test_a_browser_is_opened_only_where_somebody_sees_it(
 
 def test_a_fault_of_many_joints_is_told_once() -> None:
     said: list[str] = []
-    stale = {"stale joints": {"times": 3, "seconds": 1.6}}
+    stale = {"stale joints": 3}
     figures = {"joint_faults": dict.fromkeys("abcdefghi", stale), "stopped_by": "seconds"}
     assert report_faults(figures, said.append)
-    assert said == ["the run had faults: 9 joints stale joints (1.6 s, 3 times)"]
-    assert report_faults({**figures, "ticks": 900, "overruns": 300}, said.append)
-    assert said[1] == f"{said[0]}; the computer was too busy: 25% of ticks came late"
+    assert said == ["the run had faults: 9 joints stale joints (3 times)"]

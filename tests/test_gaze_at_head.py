@@ -30,7 +30,7 @@ AT_EYES = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
 class Neck(StandIn):
     """A head that never moves."""
 
-    def head_pose(self, head_rad: Angles3, base_rad: Angles2 = (0.0, 0.0)) -> tuple[Mat3, Vec3]:
+    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
         return LEVEL, (0.0, 0.0, 0.0)
 
 

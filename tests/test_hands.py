@@ -72,7 +72,7 @@ def frames(scene: Scene, start_s: float, end_s: float) -> Iterator[Frame]:
         drawn, DrawnScene(later), mount, lambda t_s: head, detector, rng, motion, locate
     )
     perception = Perception(mount, field)
-    neck: Any = SimpleNamespace(head_pose=lambda head_rad, base_rad=(0.0, 0.0): head)
+    neck: Any = SimpleNamespace(head_pose=lambda head_rad: head)
     poses = PoseHistory(neck)
     for number in range(round(30.0 * (end_s - start_s))):
         t_s = number / 30.0 + 1e-6

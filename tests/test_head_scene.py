@@ -16,7 +16,7 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.feed.rig_feed import ShownHead
 from gazerig.robot.dashboard.view.head_view import HeadView, head_dimensions
-from gazerig.robot.dashboard.view.viewpoints import FACE, View, named_view
+from gazerig.robot.dashboard.view.viewpoint import View, face_view
 from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh, stored_shape
 from gazerig.robot.description.people import head, part_of, torso
 from gazerig.robot.run.models import rig_kinematics
@@ -50,7 +50,7 @@ def drawn(seen: View, points_m: Floats, aspect: float) -> Floats:
     right = np.cross(ahead, (0.0, 0.0, 1.0))
     right /= np.linalg.norm(right)
     away = points_m - eye
-    half_height = np.tan(0.5 * seen.field_rad(aspect)) * (away @ ahead)
+    half_height = np.tan(0.5 * seen.fov_rad) * (away @ ahead)
     return np.stack(
         (away @ right / (half_height * aspect), away @ np.cross(right, ahead) / half_height), axis=1
     )
@@ -68,7 +68,7 @@ def test_the_head_fills_most_of_the_canvas_and_is_all_in_sight(name: str, aspect
     shot = at_rest(name)
     unit = head_dimensions(shot).interocular_m
     points = skin_and_cap() * unit + shot.tick.pose.p_world_head_m
-    on_canvas = drawn(named_view(FACE, shot), points, aspect)
+    on_canvas = drawn(face_view(shot), points, aspect)
     low, high = on_canvas.min(axis=0), on_canvas.max(axis=0)
     assert 0.60 <= 0.5 * (high[1] - low[1]) <= 0.8
     assert np.abs(on_canvas).max() < 1.0

@@ -27,7 +27,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_a_shipped_template_is_what_new_writes(name: str) -> None:
-    assert typed("new", f"{name}.yaml", *TEMPLATES[name], "--eyes-mm", "62") == 0
+    assert typed("new", f"{name}.yaml", *TEMPLATES[name]) == 0
     shipped = SHIPPED / "rigs" / f"{name}.yaml"
     assert Path(f"{name}.yaml").read_text("utf-8") == shipped.read_text("utf-8")
 
@@ -35,12 +35,11 @@ def test_a_shipped_template_is_what_new_writes(name: str) -> None:
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_board_with_every_mechanism_and_camera_is_good(board: str) -> None:
     for mechanism, camera in itertools.product(MECHANISMS, CAMERAS):
-        new = NewRig("mine", board, joints_of(mechanism), camera, 55.5)
+        new = NewRig("mine", board, joints_of(mechanism), camera)
         file = Path("mine.yaml")
         file.write_text(rig_text(new), "utf-8")
         rig = load_rig(str(file))
         assert set(rig.joints) == set(new.joints)
-        assert rig.geometry.interocular_mm == 55.5
         assert rig.bus.kind == ("dynamixel" if board == "none" else board)
         assert rig.camera.mount == ("head" if new.has_neck or camera == "none" else "base")
 
@@ -66,16 +65,16 @@ def test_without_a_terminal_what_is_left_out_is_said() -> None:
 def test_on_a_terminal_it_asks_again_until_an_answer_is_one(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    answers = iter(["9", "maestro", "", "oak", "far", "5", "70"])
+    answers = iter(["9", "maestro", "", "oak"])
     asking = f"{typer.prompt.__module__}.visible_prompt_func"
     monkeypatch.setattr(asking, lambda prompt: next(answers))
     monkeypatch.setattr("sys.stdin", type("Tty", (), {"isatty": lambda self: True})())
     assert typed("new", "a.yaml") == 0
     rig = load_rig("a.yaml")
     assert rig.bus.kind == "maestro" and "left_eye_pan" not in rig.joints
-    assert rig.geometry.interocular_mm == 70 and rig.camera.horizontal_field_deg == 69
+    assert rig.camera.horizontal_field_deg == 69
     said = capfd.readouterr()
-    assert "'9' is not a choice" in said.err and "'far' is not a length" in said.err
+    assert "'9' is not a choice" in said.err
     steps = [line.split("  ")[1] for line in said.out.splitlines()[1:5]]
     assert steps == [
         "gazerig run a.yaml --mock",

@@ -127,17 +127,6 @@ def test_control_is_renewed_while_the_browser_in_control_is_there(near: Rig) -> 
         near.answer = lambda asked: DONE
 
 
-def test_the_view_changes_for_the_browser_that_asks(near: Rig) -> None:
-    with near.knock(SOCKET, Cookie=near.named("ana")) as end:
-        you = json.loads(end.recv(timeout=PATIENCE_S))["ok"]["you"]
-        said = answer_to(end, do="show_view", layers=["sight"], look_from="from above")
-        assert "ok" in said
-        (view, browser) = near.views[-1]
-        assert (view.layers, view.look_from, browser) == (("sight",), "from above", you)
-        refused = answer_to(end, do="show_view", layers=["bones"])["refused"]
-        assert "bones" in refused and len(near.views) == 1
-
-
 def test_the_address_that_a_program_is_handed_opens_the_page_once(near: Rig) -> None:
     near.door.admission.one_time_token = "once-and-no-more"
     assert fetch(f"{near.url}/?token=wrong")[0] == 403

@@ -115,7 +115,7 @@ SIZES = {
     "narrow": (1000, 700),
 }
 TABS = ("watch", "steer", "play", "talk", "tune", "health")
-CLICK = ControlSource("person", "ann at 192.168.1.20", "look at 0.9 0.1 0.25", (), -300.0)
+CLICK = ControlSource("person", "ann at 192.168.1.20", "look at 0.9 0.1 0.25")
 STOP = f"STOP was pressed on the page ({YOU})"
 LOST = "the servo bus is lost: /dev/ttyUSB0 is not there"
 HEADLINES = {

@@ -12,7 +12,7 @@ from stand_in import StandIn
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import Clothing, DetectedFace, DetectedPerson, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
-from gazerig.gaze.types import Angles2, Angles3, Mat3, Percept, Vec3
+from gazerig.gaze.types import Angles3, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
@@ -35,7 +35,7 @@ def still_people_count(request: pytest.FixtureRequest, monkeypatch: pytest.Monke
 class Neck(StandIn):
     """A head that turns about the origin."""
 
-    def head_pose(self, head_rad: Angles3, base_rad: Angles2 = (0.0, 0.0)) -> tuple[Mat3, Vec3]:
+    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
         return rotation(head_rad), (0.0, 0.0, 0.0)
 
 

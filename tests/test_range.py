@@ -23,9 +23,7 @@ ASSUMED_M, ASSUMED_SD_M = 2.0, 1.0
 class _Neck(StandIn):
     """A head that turns about a point 10 cm behind and below its camera."""
 
-    def head_pose(
-        self, head_rad: tuple[float, float, float], base_rad: tuple[float, float] = (0.0, 0.0)
-    ) -> tuple[Mat3, Vec3]:
+    def head_pose(self, head_rad: tuple[float, float, float]) -> tuple[Mat3, Vec3]:
         c, s = cos(head_rad[0]), sin(head_rad[0])
         return ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)), (0.1 * c, 0.1 * s, 0.1)
 

@@ -40,7 +40,7 @@ def visitor(half: str) -> dict[str, Any]:
 def test_summary_tells_all_it_promises(visitor: dict[str, Any]) -> None:
     promised = {
         "seconds", "wall_seconds", "ticks", "overruns", "faces_seen", "pictures", "fixations",
-        "saccades", "blinks", "target_share", "part_share", "gaze_error_deg", "limited", "bus",
+        "saccades", "blinks", "target_share", "part_share", "gaze_error_deg", "bus",
         "stopped_by",
     }  # fmt: skip
     assert promised <= set(visitor)

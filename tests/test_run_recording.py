@@ -102,8 +102,8 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
 
 @pytest.mark.parametrize("odd", [0.25, nan, -inf])
 def test_any_tick_comes_back(recorded: Recorded, odd: float, tmp_path: Path) -> None:
-    track = TrackState(2, "nod", 0.5, 1.0, owns=("jaw",), who="somebody", since_s=3.5)
-    lead = ControlState(4, True, False, odd, "", "pointer", "somebody", "look", ("neck_yaw",), 1.5)
+    track = TrackState(2, "nod", 0.5, 1.0, owns=("jaw",), who="somebody")
+    lead = ControlState(4, True, False, odd, "", "pointer", "somebody", "look", ("neck_yaw",))
     face = Face(3, (odd, 0.0, 1.0), (0.0,) * 3, ((1.0, 0.0, 0.0),) * 3, ((odd,) * 3,) * 8, 0.5)
     bodies = Bodies((3, 9), ("face", "hand"), *(np.full((2, 3), odd),) * 3, np.array([odd, 1.0]),
                     np.full((2, 6, 6), odd))  # fmt: skip
@@ -205,11 +205,9 @@ def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path) ->
         tmp_path: "is not a file",
         tmp_path / "text": "is not a recording: make one with gazerig run --record",
         tmp_path / "empty": "is not a recording",
-        written(tmp_path / "camera", "gazerig-camera-1"): "a recording of a camera, not of a run",
+        written(tmp_path / "camera", "gazerig-camera-1"): "not a recording of a run",
         written(tmp_path / "newer", "gazerig-run-9"): "of format 9, .* reads 2: use the version",
-        written(
-            tmp_path / "other", "ros2"
-        ): r"not a recording of gazerig \(its profile is 'ros2'\)",
+        written(tmp_path / "other", "ros2"): r"not a recording of a run \(its profile is 'ros2'\)",
         written(tmp_path / "bare", PROFILE): "it contains nothing of a run",
     }
     for path, words in wrong.items():

@@ -45,7 +45,7 @@ def test_what_rich_sends_stays_and_what_a_name_holds_does_not():
     "words",
     [
         ("check", f"/nowhere/{EVIL}.yaml"),
-        ("import", f"/nowhere/{EVIL}.csv"),
+        ("import", "desk", f"/nowhere/{EVIL}.csv"),
         ("rerun", f"/nowhere/{EVIL}.mcap"),
         ("run", "--mock", "--no-page", "--video", f"/nowhere/{EVIL}.avi"),
         (EVIL,),

@@ -241,7 +241,7 @@ def test_other_programs_say_files_and_streams(folder: Path) -> None:
             pieces = [speech(0.2)[i : i + 1280] for i in range(0, 6400, 1280)]
             assert head.say(pieces, rate_hz=RATE).wait() == "arrived"
             with pytest.raises(Refused, match="whole frames"):
-                head._client.say_piece(b"a", RATE)
+                head._say_piece(b"a", RATE, 1, 1.0)
             wait_for(lambda: not [one for one in here.state.tracks if one.is_playing])
         assert asyncio.run(say(os.getpid())) == "arrived"
 

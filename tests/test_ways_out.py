@@ -279,8 +279,7 @@ def test_a_joint_that_does_not_move_is_said_counted_and_in_the_exit_code(
     figures = ran("desk", said, 15.0, jam)
     about = [line for line in said if "neck_yaw: not moving" in line]
     assert about and about[0].endswith("not moving: held") and len(about) <= 4
-    count = figures["joint_faults"]["neck_yaw"]["not moving"]
-    assert count["times"] >= 1 and count["seconds"] > 1.0
+    assert figures["joint_faults"]["neck_yaw"]["not moving"] >= 1
     last: list[str] = []
     assert report_faults(figures, last.append)
     assert "neck_yaw not moving" in last[0]

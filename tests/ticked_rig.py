@@ -10,11 +10,12 @@ from fakes.runs import ticks
 from typer.testing import CliRunner
 
 from gazerig.robot.cli.ctl import app
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.track_choices import TrackInfo
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.net.client import RobotClient
-from gazerig.robot.net.request_handler import LoopMonitor, RequestHandler
+from gazerig.robot.net.request_handler import RequestHandler
 from gazerig.robot.run.run import Run
 
 
@@ -22,7 +23,7 @@ class TickedRig:
     """A rig that ticks once whenever a command comes, and its connection in one object."""
 
     def __init__(self, made: Run) -> None:
-        self.made, self.pulse = made, LoopMonitor(made.clock)
+        self.made, self.pulse = made, TickFeed()
         self.commands: list[Command] = []
         self.handler = RequestHandler(
             self.command, self.pulse, {}, menus=self.menus, tracks=self.tracks
@@ -61,7 +62,7 @@ def connected(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
     """Yield a rig that every client connects to."""
     made = started()
     rig = TickedRig(made)
-    monkeypatch.setattr(LoopMonitor, "wait_for_commands", lambda *_, **__: True)
+    monkeypatch.setattr(TickFeed, "wait_for_ticks", lambda *_, **__: True)
     monkeypatch.setattr(
         RobotClient, "connect", lambda pid=None, who="": RobotClient(rig, 1)  # type: ignore[arg-type]
     )  # fmt: skip

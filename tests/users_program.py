@@ -6,8 +6,7 @@ import gazerig
 def follow(head: gazerig.Head, seconds: float) -> str:
     order = head.look_at(1.0, 0.2, 0.3, for_s=seconds)
     outcome: gazerig.Outcome = order.wait(5.0)
-    for joint in order.reply.limited:
-        print(joint.joint, joint.reason)
+    print(order.why)
     for person in head.people:
         head.look_at_person(person.id)
         print(person.parts_m["left eye"])

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from math import dist, exp, hypot, inf
 
 from gazerig.gaze.angles import add, angle_between, norm, scale, sub, transpose
-from gazerig.gaze.field_of_view import OWN
 from gazerig.gaze.types import BodyRows, Face, Percept, Vec3
 
 NEAREST, WAVING, LOOKING, NEWEST = "nearest", "waving", "looking", "newest"
@@ -133,7 +132,7 @@ class Persons:
         self.parts, self.raised = {}, set()
         moving: set[int] = set()
         for row, id in enumerate(rows.ids):
-            if faces and id not in faces and rows.kinds[row] != OWN:
+            if faces and id not in faces:
                 p, v = rows.p_world_m[row], rows.v_world_m_s[row]
                 reach_m = _ARM_M / 2.0 if id in percept.bodies.cut_off else _ARM_M
                 low_of = self._update_part(id, p, faces, p_world_eye_m, reach_m)

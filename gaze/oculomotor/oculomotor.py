@@ -6,7 +6,6 @@ vestibulo-ocular reflex), and vergence follows from each eye's own geometry.
 """
 
 from math import radians
-from typing import NamedTuple
 
 import numpy as np
 
@@ -55,23 +54,6 @@ _SWING_RAD = radians(12.0)
 """The head stays at the centre of smaller swings, and pursues larger ones."""
 
 
-class ReachableGaze(NamedTuple):
-    """Final position of head and eyes for a point, and the required eye angles.
-
-    facing_rad, head_rad: (yaw, pitch, roll) that face it, and those of the head at rest
-    required_eyes_rad, eyes_rad: required left and right (yaw, pitch) there, and the clipped ones
-    too_near: the point is nearer than the eyes can converge
-    base_rad: (yaw, pitch) of a lower neck meanwhile
-    """
-
-    facing_rad: Angles3
-    head_rad: Angles3
-    required_eyes_rad: tuple[Angles2, Angles2]
-    eyes_rad: tuple[Angles2, Angles2]
-    too_near: bool
-    base_rad: Angles2 = (0.0, 0.0)
-
-
 class Oculomotor:
     """Composes saccades, following, head and lids.
 
@@ -108,7 +90,6 @@ class Oculomotor:
         self._lids = lids
         self._drift = drift
         self._started = False
-        self._base_rad: Angles2 = (0.0, 0.0)
 
     def retune(
         self,
@@ -150,10 +131,9 @@ class Oculomotor:
             self.reset(t_s, state)
         R_world_head, p_head = self._predict_head(state)
         point, velocity, centre_point, toward, moves = self._predict_target(target, p_head, t_s)
-        self._base_rad = base = state.base_rad
-        facing = centre = self._geometry.neck_angles_to(point, base)
+        facing = centre = self._geometry.neck_angles_to(point)
         if centre_point is not point:
-            centre = self._geometry.neck_angles_to(centre_point, base)
+            centre = self._geometry.neck_angles_to(centre_point)
         ahead = R_world_head[0][0], R_world_head[1][0], R_world_head[2][0]
         aside_rad = angle_between(ahead, toward)
         place, eyes_on = self._gaze, self._geometry.eye_angles_to
@@ -165,7 +145,7 @@ class Oculomotor:
         shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
         soon = None
         if moves and (ahead_s := self._head.foresees_s) > 0.0:
-            soon = self._geometry.neck_angles_to(add(centre_point, scale(velocity, ahead_s)), base)
+            soon = self._geometry.neck_angles_to(add(centre_point, scale(velocity, ahead_s)))
         since_s = t_s - place.onset_s
         head = self._head.step(target, centre, facing, aside_rad, since_s, t_s, soon, both_rad)
         wanted = eyes_on(place.point_m, R_world_head, p_head)
@@ -202,20 +182,16 @@ class Oculomotor:
             lids.lower_right, limited,
         )  # fmt: skip
 
-    def reachable_gaze(self, target: Target) -> ReachableGaze:
-        """Return the final position of head and eyes for a fixed point."""
-        facing = self._geometry.neck_angles_to(target.p_world_m, self._base_rad)
-        p_head = self._geometry.head_pose((*facing, 0.0), self._base_rad)[1]
+    def resting_gaze(self, target: Target) -> tuple[Angles3, tuple[Angles2, Angles2]]:
+        """Return (yaw, pitch, roll) of the head, and both eyes, at rest on a fixed point."""
+        facing = self._geometry.neck_angles_to(target.p_world_m)
+        p_head = self._geometry.head_pose((*facing, 0.0))[1]
         point = keep_min_distance(target.p_world_m, p_head, NEAREST_M)
         both_rad = self._both_eyes_rad(norm(sub(point, p_head)))
         head = self._head.destination_rad(target, facing, both_rad)
-        R_world_head, p_head = self._geometry.head_pose(head, self._base_rad)
-        exact = self._geometry.eye_angles_to(target.p_world_m, R_world_head, p_head)
+        R_world_head, p_head = self._geometry.head_pose(head)
         point = keep_min_distance(target.p_world_m, p_head, NEAREST_M)
-        left, right = self._clip_eyes(self._geometry.eye_angles_to(point, R_world_head, p_head))
-        return ReachableGaze(
-            (*facing, 0.0), head, exact, (left, right), point != target.p_world_m, self._base_rad
-        )
+        return head, self._clip_eyes(self._geometry.eye_angles_to(point, R_world_head, p_head))
 
     @property
     def has_arrived(self) -> bool:
@@ -296,11 +272,8 @@ class Oculomotor:
             state.head_rad,
             state.head_rate_rad_s,
         )
-        base, turning = state.base_rad, state.base_rate_rad_s
-        if turning != (0.0, 0.0):
-            base = base[0] + turning[0] * lag, base[1] + turning[1] * lag
         return self._geometry.head_pose(
-            (yaw + yaw_rate * lag, pitch + pitch_rate * lag, roll + roll_rate * lag), base
+            (yaw + yaw_rate * lag, pitch + pitch_rate * lag, roll + roll_rate * lag)
         )
 
     def _predict_target(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:

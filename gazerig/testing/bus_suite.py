@@ -276,19 +276,6 @@ class BusSuite:
             bus.open()
         bus.close()
 
-    def test_new_limits_count_from_the_next_torque_on(self, bench, bus):
-        middle = (bench.kind.low + bench.kind.high) // 2
-        low, high = middle - 40, middle + 40
-        bus.retune([s._replace(min_steps=low, max_steps=high) for s in bench.setups])
-        bench.run(bus, 1.5, AWAY)
-        assert bench.are_near(bench.true_steps(), AWAY)
-        bus.disable_torque()
-        assert all(low <= goal <= high for goal in bus.enable_torque())
-        bench.run(bus, 1.0, AWAY)
-        assert all(low <= goal <= high for goal in bench.true_goals_steps())
-        with pytest.raises(ValueError, match="ids and models must not change"):
-            bus.retune([s._replace(id=s.id + 1) for s in bench.setups])
-
     # --- absent servos and ports
 
     def test_open_names_the_servo_that_is_missing(self, bench):
@@ -315,20 +302,6 @@ class BusSuite:
         bench.command("clear")
         bench.run_until(bus, _are_healthy)
         assert bench.are_near(bench.true_steps(), START)
-
-    def test_no_read_takes_long_while_nobody_answers(self, bench):
-        bus = bench.hold(give_up_s=2.0)
-        bench.run(bus, 0.5, START)
-        bench.command("lose all")
-        spent = []
-        with pytest.raises(BusLost, match="answered for 2"):
-            for _ in range(1000):
-                began_s = bench.now_s()
-                bus.read(began_s)
-                spent.append(bench.now_s() - began_s)
-                bus.write(bench.steps(START))
-                bench.wait(_TICK_S)
-        assert max(spent) < 0.1
 
     # --- a lost port, a restart
 

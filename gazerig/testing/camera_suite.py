@@ -4,7 +4,7 @@ class TestMyCamera(CameraSuite):
     @pytest.fixture
     def bench(self):
         device = FakeDevice()
-        return of_source(lambda: MySource(device), lose=device.pull, restore=device.plug)
+        return of_source(lambda: MySource(device), lose=device.pull)
 """
 
 import time
@@ -34,14 +34,13 @@ class CameraBench:
         make: creates another camera on the same device.
         now_s: clock of its frames.
         wait: waits for a short time.
-        lose, restore: remove the device and bring it back; None: not possible.
+        lose: removes the device; None: not possible.
     """
 
     make: Callable[[], Camera]
     now_s: Callable[[], float] = time.monotonic  # noqa: TID251 - that of real cameras
     wait: Callable[[], None] = lambda: time.sleep(0.001)  # noqa: TID251 - for its thread
     lose: Callable[[], None] | None = None
-    restore: Callable[[], None] | None = None
 
     def until(self, done: Callable[[], object]) -> None:
         """Wait until a condition is true."""
@@ -70,23 +69,19 @@ class _NoDetections:
 
 
 def of_source(
-    make: Callable[[], FrameSource],
-    lose: Callable[[], None] | None = None,
-    restore: Callable[[], None] | None = None,
+    make: Callable[[], FrameSource], lose: Callable[[], None] | None = None
 ) -> CameraBench:
     """Return the bench of a frame source, which a thread reads as in a run."""
     quickly = CameraRecovery(0.001, 0.005, LONGEST_S)
     parts = CameraParts(make, _NoDetections), CameraBench.now_s, quickly
-    return CameraBench(lambda: CameraWorker(*parts, in_thread=True), lose=lose, restore=restore)
+    return CameraBench(lambda: CameraWorker(*parts, in_thread=True), lose=lose)
 
 
 class CameraSuite:
-    """Rising frame numbers and times, sound frames, loss and recovery."""
+    """Rising frame numbers and times, sound frames, opening again, an absent device.
 
-    @pytest.fixture
-    def bench(self) -> CameraBench:
-        """Return the camera under test."""
-        raise NotImplementedError("define a fixture bench that returns a CameraBench")
+    A class defines the fixture ``bench``, which returns a ``CameraBench``.
+    """
 
     @pytest.fixture
     def camera(self, bench: CameraBench) -> Iterator[Camera]:
@@ -108,7 +103,7 @@ class CameraSuite:
         assert isinstance(frame, Detections) and isfinite(frame.captured_s)
         assert frame.width_px > 0 and frame.height_px > 0
         for face in frame.faces:
-            assert isinstance(face, DetectedFace) and np.isfinite(face.box_px).all()
+            assert np.isfinite(face.box_px).all()
             assert face.landmarks_px.shape == (5, 2) and np.isfinite(face.landmarks_px).all()
         if frame.image is not None:
             assert frame.image.shape == (frame.height_px, frame.width_px, 3)
@@ -134,24 +129,3 @@ class CameraSuite:
             camera.open()
         assert str(caught.value) and "\n" not in str(caught.value)
         camera.close()
-        bench.restore()
-
-    def test_a_device_that_goes_and_comes_back_is_told_of_and_numbers_go_on(self, bench, camera):
-        if bench.lose is None:
-            return
-        before = bench.next_frame(camera)
-        told = list(camera.events())
-
-        def says(word: str) -> bool:
-            camera.latest(bench.now_s())  # as the loop does in every tick
-            told.extend(camera.events())
-            return any(word in line for line in told)
-
-        bench.lose()
-        bench.until(lambda: says("lost"))
-        stands = camera.latest(bench.now_s())
-        bench.restore()
-        after = bench.next_frame(camera, (stands or before).number)
-        assert after.captured_s > before.captured_s
-        bench.until(lambda: says("back"))
-        assert all("\n" not in line for line in told)

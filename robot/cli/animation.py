@@ -11,7 +11,7 @@ from gazerig.drivers.sound.params import KINDS
 from gazerig.robot.cli.options import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import NO_TRACK, Play, Say, Tracks
+from gazerig.robot.model.commands import NO_TRACK, Play, Say, SayPiece, Tracks
 from gazerig.robot.net.client import RobotClient
 
 app = typer.Typer()
@@ -53,9 +53,9 @@ def say_aloud(
         if what == "-":
             clock = RealClock()
             while piece := sys.stdin.buffer.read(2 * round(_PIECE_S * rate)):
-                waits_s = rig.say_piece(piece, rate) - 1.0
+                waits_s = rig.ask(SayPiece(piece, rate), float) - 1.0
                 clock.sleep_until(clock.now_s() + max(0.0, waits_s))
-            rig.say_piece(b"", rate, last=True)
+            rig.ask(SayPiece(b"", rate, last=True), float)
             return
         if Path(what).suffix.lower() in KINDS and Path(what).is_file():
             what = str(Path(what).absolute())

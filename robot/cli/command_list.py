@@ -6,7 +6,7 @@ points, those of the core are in commands.json.
 """
 
 from collections import UserDict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,6 @@ import typer
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import COMMAND, SHIPPED, Registration, find, registrations
 
-Examples = tuple[tuple[str, str], ...]
-"""Arguments of ``gazerig``, and their purpose."""
-
 
 class CommandEntry(msgspec.Struct, frozen=True):
     """One command in the list; the object of an entry point of the group ``gazerig.command``.
@@ -28,13 +25,13 @@ class CommandEntry(msgspec.Struct, frozen=True):
         module: Module whose ``app``, a ``typer.Typer``, contains the command.
         summary: First paragraph of its help.
         panel: Panel of the help that lists it.
-        examples: Examples for its help by its name; for commands of a group by both names.
+        examples: Examples for its help: arguments of ``gazerig``, and their purpose.
     """
 
     module: str
     summary: str
     panel: str = "Tools"
-    examples: Mapping[str, Examples] = {}
+    examples: tuple[tuple[str, str], ...] = ()
 
 
 PANELS = ("Run", "Look back", "Study", "Bring-up", "Tools", "For specialists")
@@ -89,35 +86,9 @@ class Commands(UserDict[str, Any]):
         if isinstance(entry := self.data[name], CommandEntry):
             app = typer.Typer()
             app.add_typer(import_module(entry.module).app)
-            _add_examples(app, entry.examples)
-            self.data[name] = typer.main.get_group(app).commands[name]
-            self.data[name].rich_help_panel = entry.panel
+            command: Any = typer.main.get_group(app).commands[name]
+            command.rich_help_panel = entry.panel
+            examples = (f"gazerig {text}   ({what})" for text, what in entry.examples)
+            command.epilog = "\n\n".join(examples)
+            self.data[name] = command
         return self.data[name]
-
-
-def _add_examples(app: typer.Typer, given: Mapping[str, Examples], within: str = "") -> None:
-    """Add examples to the help of every command of an app.
-
-    Args:
-        app: The app.
-        given: Examples by command; for a feature's group of commands with the group's name.
-        within: Group that contains the app, "" for none.
-    """
-    for command in app.registered_commands:
-        name = command.name or str(getattr(command.callback, "__name__", "")).replace("_", "-")
-        examples = given.get(f"{within} {name}") or given.get(name)
-        if examples:
-            command.epilog = _epilog(examples)
-    for group in app.registered_groups:
-        part = group.typer_instance
-        if part is None:
-            continue
-        title = part.info.name if isinstance(part.info.name, str) else ""
-        if title in given:
-            part.info.epilog = _epilog(given[title])
-        _add_examples(part, given, title or within)
-
-
-def _epilog(examples: Examples) -> str:
-    """Format examples as separate lines of the help."""
-    return "\n\n".join(f"gazerig {text}   ({what})" for text, what in examples)

@@ -28,9 +28,14 @@ from gazerig.robot.model.commands import (
     LookAt,
     LookAtPerson,
     Parameters,
+    ReadMenus,
+    Resume,
     Revert,
+    Save,
+    Stop,
+    Unsaved,
 )
-from gazerig.robot.model.parameter import Parameter
+from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.net.client import RobotClient, connect_to_all
 
 ctl = typer.Typer(
@@ -91,7 +96,7 @@ def get(
         found = rig.ask(Parameters(prefix), tuple[Parameter, ...])
         if not values:
             raise SetupError(f"{prefix}: no key begins with it; gazerig ctl get lists all")
-        unsaved = {change.key for change in rig.unsaved()}
+        unsaved = {change.key for change in rig.ask(Unsaved(), tuple[ParamChange, ...])}
     _print_lines(_table(found, values, unsaved))
     if len(found) == 1:
         print(_rule_text(found[0]))
@@ -113,7 +118,7 @@ def put(
         changes = read_pairs(pairs)
     with connect(pid) as rig:
         notes = rig.set_many(changes)
-        unsaved = len(rig.unsaved())
+        unsaved = len(rig.ask(Unsaved(), tuple[ParamChange, ...]))
     _print_lines(notes)
     if not notes:
         say("all of these values are already active")
@@ -132,7 +137,8 @@ def save(
 ) -> None:
     """Write changed values into the rig's YAML; comments stay, the old file is kept as a backup."""
     with connect(pid) as rig:
-        saved = rig.save(path)
+        whole = str(path.expanduser().absolute()) if path is not None else None
+        saved = rig.ask(Save(whole), SavedFile)
     _print_lines(map(str, saved.changes))
     if not saved.changes:
         say(f"{saved.path} already contains all values: nothing to save")
@@ -182,7 +188,7 @@ def ask(
             rig.send(Ask(menu, choice))
             say(f"{menu} {choice} is active")
             return
-        menus = rig.menus()
+        menus = rig.ask(ReadMenus(), dict[str, tuple[str, ...]])
         if menu is not None and menu not in menus:
             raise SetupError(unknown_text("menu", menu, menus))
         shown = menus if menu is None else {menu: menus[menu]}
@@ -221,10 +227,11 @@ def look(
     with connect(pid, "look") as rig:
         command = read_look(where)
         if command == LookAt(None):
-            rig.look_freely()
+            rig.send(command)
             say("it looks freely")
         else:
-            say(f"{rig.send(command).text()}, until: gazerig ctl look free")
+            rig.send(command)
+            say("it looks there, until: gazerig ctl look free")
 
 
 @ctl.command()
@@ -261,7 +268,7 @@ def stop(
         for rig in rigs:
             try:
                 with rig:
-                    rig.stop(why)
+                    rig.send(Stop(why))
             except DriverError as error:
                 failed = True
                 say(f"{rig.pid}: NOT KNOWN TO HAVE STOPPED, press the emergency stop: {error}")
@@ -290,7 +297,7 @@ def resume(
                 "Torque will be switched on and the head will move. Is no hand in the mechanism?",
                 abort=True,
             )
-        rig.resume(confirmed=True)
+        rig.send(Resume(confirmed=True))
         say("torque is on; it continues slowly")
 
 

@@ -20,7 +20,6 @@ from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
 
 app = typer.Typer()
 
-_EYES_MM = 62.0
 _BOARD, _JOINTS, _CAMERA = "none", "eyes-lids", "webcam"
 """Defaults if there is no option and nobody can be asked."""
 
@@ -95,16 +94,12 @@ class NewRig(NamedTuple):
 
     board, camera: keys of BOARDS and CAMERAS
     joints: names, in the order of their ids
-    eyes_mm: distance between the eye centres
-    port: serial port or I2C bus; empty: the usual one of the board
     """
 
     name: str
     board: str
     joints: tuple[str, ...]
     camera: str
-    eyes_mm: float = 62.0
-    port: str = ""
 
     @property
     def has_neck(self) -> bool:
@@ -129,11 +124,6 @@ def new(
         str | None,
         typer.Option(help=f"{', '.join(CAMERAS)}."),
     ] = None,
-    eyes_mm: Annotated[
-        float | None,
-        typer.Option(min=10, max=500, help=f"Distance between the eye centres: {_EYES_MM:g}."),
-    ] = None,
-    port: Annotated[str, typer.Option(help="Port of the board; default: its usual one.")] = "",
     force: ForceOption = False,
 ) -> None:
     """Write a new rig's YAML from a few answers, check it, and print the next command."""
@@ -148,10 +138,7 @@ def new(
             "joints", joints, mechanisms, _JOINTS, others=True,
         )  # fmt: skip
         seen = _choose("Which camera does the head use?", "camera", camera, CAMERAS, _CAMERA)
-        if eyes_mm is None and sys.stdin.isatty():
-            question = "What is the distance between the eyes, in mm?"
-            eyes_mm = typer.prompt(question, f"{_EYES_MM:g}", value_proc=_read_length, err=True)
-        rig = NewRig(file.stem, chosen, joints_of(wanted), seen, eyes_mm or _EYES_MM, port)
+        rig = NewRig(file.stem, chosen, joints_of(wanted), seen)
         from gazerig.config.schema import load_rig
 
         write_file(file, rig_text(rig), force)
@@ -202,15 +189,6 @@ def _choose(
     return str(typer.prompt(text, str(names.index(usual) + 1), value_proc=read, err=True))
 
 
-def _read_length(answer: str) -> float:
-    try:
-        if 10.0 <= (value := float(answer)) <= 500.0:
-            return value
-    except ValueError:
-        pass
-    raise typer.BadParameter(f"{answer!r} is not a length from 10 to 500 mm")
-
-
 def next_steps(rig: NewRig, file: str) -> Iterable[str]:
     """Return the next commands for a new rig file, as lines."""
     named = quote(file)
@@ -253,14 +231,14 @@ def _lines(new: NewRig, board: _Board) -> Iterator[str]:
     yield f"# A head of {len(new.joints)} servos. The shipped rig desk.yaml explains the keys."
     yield f"name: {format_value(new.name)}"
     yield "profile: robot"
-    port = format_value(new.port or board.port)
+    port = format_value(board.port)
     yield f"bus: {{kind: {board.kind}, port: {port}}}  # port: {there}"
     yield "# Measure in mm: the eyes' centres ahead of and above the neck's pitch axis (or the table)."
     height, ahead, above = (70, 38, 55) if new.has_neck else (0, 0, 90)
     yield "geometry:"
     yield (
         f"  {{pitch_axis_height_mm: {height}, eyes_ahead_mm: {ahead}, eyes_above_mm: {above}, "
-        f"interocular_mm: {new.eyes_mm:g}}}"
+        "interocular_mm: 62}"
     )
     yield f"joints:  # id: {board.id_comment}; `gazerig calibrate` measures zero, sign and range of each"
     for number, (name, joint) in enumerate(usual.items(), board.first_id):

@@ -3,13 +3,10 @@
 from collections.abc import Callable
 from dataclasses import fields
 from inspect import Parameter, Signature
-from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_type_hints
 
 import typer
-from typer.core import TyperCommand, TyperOption
 
-from gazerig.config.shipped_files import shipped_names
 from gazerig.robot.cli.terminal import RigArgument
 from gazerig.robot.run.options import Option, RunOptions
 
@@ -72,29 +69,3 @@ def add_run_options(command: F) -> F:
             )
     command.__signature__ = Signature(declared)  # type: ignore[attr-defined]
     return command
-
-
-class RigCommand(TyperCommand):
-    """A command whose first argument RIG may be omitted although others follow.
-
-    ``gazerig jog my.yaml neck_yaw 10`` and, for the shipped rig, ``gazerig jog neck_yaw 10``.
-    """
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Insert the default rig if the arguments name none."""
-        positional = [one for one in self.params if not isinstance(one, TyperOption)]
-        if positional and positional[0].name == "rig" and len(positional) > 1:
-            args = args if self._names_rig(ctx, args, positional) else [DEFAULT_RIG, *args]
-        return list(super().parse_args(ctx, args))
-
-    def _names_rig(self, ctx: Any, args: list[str], positional: list[Any]) -> bool:
-        """Return whether the first argument is a rig: it looks like one, or is one too many."""
-        options = [one for one in self.params if isinstance(one, TyperOption)]
-        parser = TyperCommand(self.name, params=list(options)).make_parser(ctx)
-        _, given, _ = parser.parse_args(list(args))
-        first = given[0] if given else ""
-        folder = "/" in first and not Path(first).suffix
-        named = first in shipped_names("rigs") or folder or first.endswith((".yaml", ".yml"))
-        if not all(one.nargs == 1 for one in positional):
-            return named
-        return named or len(given) >= len(positional)

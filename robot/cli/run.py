@@ -23,7 +23,7 @@ from gazerig.robot.cli.terminal import (
     status,
 )
 from gazerig.robot.dashboard.door.token_file import hide_token
-from gazerig.robot.loop.joint_faults import fault_text
+from gazerig.robot.loop.joint_faults import joints_text
 from gazerig.robot.run.options import RunOptions, level_text, parse_camera
 
 app = typer.Typer()
@@ -107,21 +107,16 @@ def start_text(asked: RunOptions) -> str:
 
 def report_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
     """Return whether a run had faults, and print the joints that were stopped by them."""
-    alike: dict[tuple[str, int, float], list[str]] = {}
+    alike: dict[str, list[str]] = {}
     for joint, reasons in figures["joint_faults"].items():
-        for reason, count in reasons.items():
-            key = reason, count["times"], round(count["seconds"], 1)
-            alike.setdefault(key, []).append(joint)
-    held = [fault_text(joints, *key) for key, joints in alike.items()]
-    if held:
-        from gazerig.robot.loop.timing import BUSY_SHARE
-
-        late, ticks = figures.get("overruns", 0), figures.get("ticks", 0)
-        share = late / (late + ticks) if late else 0.0
-        busy = f"; the computer was too busy: {share:.0%} of ticks came late"
-        say(f"the run had faults: {'; '.join(held)}{busy if share >= BUSY_SHARE else ''}")
+        for reason, times in reasons.items():
+            text = reason if times == 1 else f"{reason} ({times} times)"
+            alike.setdefault(text, []).append(joint)
+    if alike:
+        held = [f"{joints_text(joints)} {text}" for text, joints in alike.items()]
+        say(f"the run had faults: {'; '.join(held)}")
     failed = str(figures["stopped_by"]).startswith("fault") or "torque_off_unconfirmed" in figures
-    return bool(held) or failed
+    return bool(alike) or failed
 
 
 def has_desktop(environ: Mapping[str, str], terminal: bool) -> bool:

@@ -103,8 +103,7 @@ class Page:
         self._server = open_server(inside)
         self._scene = HeadScene(self._server)
         self.door = PageDoor(
-            host, listener, inside, ends, token, self._feed.ticks, self._scene.change,
-            self._send_picture,
+            host, listener, inside, ends, token, self._feed.ticks, self._send_picture,
         )  # fmt: skip
         self._panels = PackagePanels()
         self._beat_s = self._run_s = -inf

@@ -1,6 +1,6 @@
 """The description of a rig: a tree of links from the dimensions and joints in its YAML. Pure.
 
-The neck turns yaw, pitch, roll about axes through one point, on a lower neck if the rig has one.
+The neck turns yaw, pitch, roll about axes through one point.
 The head carries eyes that pan and tilt about their centres, lids that turn about an axis through
 both eyes' centres, and any other joints of the rig. Angles are those of the rig's joints,
 with their signs (robot/model/kinematics.py).
@@ -42,7 +42,7 @@ from gazerig.robot.description.parts import (
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import OPTICAL, CameraParams
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.kinematics import LIDS, LOWER_NECK, NECK, GeometryParams, LidEnds
+from gazerig.robot.model.kinematics import LIDS, NECK, GeometryParams, LidEnds
 from gazerig.robot.model.types import further_joints
 from gazerig.robot.model.weight import MassParams
 
@@ -140,8 +140,7 @@ class _Builder:
             if name in rig.joints and name in rig.lids:
                 self._add_lid(name)
         for name in further_joints(rig.joints):
-            if name not in LOWER_NECK:
-                self._add_face_part(name)
+            self._add_face_part(name)
         self._links.insert(first, self._head(neck, place, self._links[first:]))
         camera = rig.camera
         angles = radians(camera.yaw_deg), radians(camera.pitch_deg), radians(camera.roll_deg)
@@ -168,9 +167,7 @@ class _Builder:
         """Add base and neck; return the link that carries the head, and the head's place in it."""
         geometry, joints = self._rig.geometry, self._rig.joints
         pivot = geometry.pitch_axis_height_mm / 1e3
-        lower = geometry.lower_pitch_axis_height_mm / 1e3
-        chain = [(name, lower) for name in LOWER_NECK if name in joints]
-        chain += [(name, pivot) for name in NECK if name in joints]
+        chain = [(name, pivot) for name in NECK if name in joints]
         head_m = add((0.0, 0.0, pivot), self._eyes_m)
         self._add_base(head_m, chain[0][1] if chain else None)
         parent, at = BASE, 0.0

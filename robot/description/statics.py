@@ -16,11 +16,8 @@ from gazerig.robot.description.links import (
 )
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 from gazerig.robot.model.weight import MovingBody, weight_nm
 
-NECK_JOINTS = (*LOWER_NECK, *NECK)
-"""Joints that carry the head."""
 STRONG_SHARE = 1.0 / 3.0
 """Fraction of the stall torque above which a servo becomes hot while it holds."""
 

@@ -4,12 +4,12 @@ Without ``stay`` the control needs a heartbeat; if it is missing, the gaze model
 Times are those of the ticks and heartbeats are commands, so a repeated run times out as recorded.
 """
 
-from math import degrees
+from math import degrees, radians
 
 from msgspec.structs import replace
 
 from gazerig.gaze.angles import add, scale
-from gazerig.gaze.types import ORDERED, Face, GazeState, Percept, Target, Vec3
+from gazerig.gaze.types import ORDERED, Face, GazeCommand, GazeState, Percept, Target, Vec3
 from gazerig.robot.model.commands import (
     HEARTBEAT_S,
     ControlCommand,
@@ -28,6 +28,10 @@ from gazerig.robot.model.types import JointAngles
 
 GONE_S = 2.0
 """A control that follows a person ends when the person has not been visible for this time."""
+
+
+_SETTLED_S, _AT_REST_RAD_S = 0.5, radians(5.0)
+"""A head that turns slower than this, this long after a command, rests."""
 
 
 class Lease:
@@ -78,7 +82,7 @@ class ClientControl:
         self._look: Look = LookAt(None)
         self._lease = Lease()
         self._until_s: float | None = None
-        self._seen_s = 0.0
+        self._seen_s = self._started_s = 0.0
         self._shifts = 0
 
     @property
@@ -130,7 +134,7 @@ class ClientControl:
             if not self.has_target:
                 self.end(f"{command.who or 'a client'} has released the joints")
             elif self.state.active:  # the gaze returns to the previous target
-                state = self._new_state(self.state.number, self.state, t_s)
+                state = self._new_state(self.state.number)
                 self.state = replace(state, arrived=self.state.arrived)
             return
         if command.who != self._lease.who:
@@ -191,19 +195,27 @@ class ClientControl:
         )  # fmt: skip
 
     def measure(
-        self, target: Target, pose: GazeState, joints_rad: JointAngles, converges: bool, t_s: float
+        self,
+        target: Target,
+        pose: GazeState,
+        gaze: GazeCommand,
+        joints_rad: JointAngles,
+        converges: bool,
+        t_s: float,
     ) -> ControlState:
         """Return the state of the control after a tick.
 
         Args:
             target: Gaze target of this tick.
             pose: Measured poses of head and eyes.
+            gaze: Gaze command of this tick.
             joints_rad: Measured joint angles.
             converges: Whether each eye pans separately.
             t_s: Time of the tick.
         """
         if not self.state.active:
             return self.state
+        limited = ""
         if self.pose_rad:
             rows = zip(self._names, self.pose_rad, joints_rad, strict=True)
             error = max([abs(held - now) for name, held, now in rows if name in self._jogged])
@@ -211,16 +223,20 @@ class ClientControl:
             since_s = max(0.0, t_s - target.at_s)
             point = add(target.p_world_m, scale(target.v_world_m_s, since_s))
             error = gaze_error(point, pose, converges)
+            rests = max(map(abs, pose.head_rate_rad_s)) < _AT_REST_RAD_S
+            if error > ARRIVED_RAD and rests and t_s - self._started_s > _SETTLED_S:
+                limited = _limits_text(gaze, error)
         arrived = self.state.arrived or error <= ARRIVED_RAD
-        self.state = replace(self.state, arrived=arrived, error_rad=error)
+        self.state = replace(self.state, arrived=arrived, error_rad=error, limited=limited)
         return self.state
 
     def _start(self, command: ControlCommand, before: ControlState, t_s: float) -> None:
         self._lease.start(command.who, command.stay, t_s)
+        self._started_s = t_s
         self._until_s = None if command.for_s is None else t_s + command.for_s
-        self.state = self._new_state(before.number + 1, before, t_s)
+        self.state = self._new_state(before.number + 1)
 
-    def _new_state(self, number: int, before: ControlState, t_s: float) -> ControlState:
+    def _new_state(self, number: int) -> ControlState:
         """Return the state of a control that begins or changes its target."""
         pointer = isinstance(self._look, LookAt) and self._look.pointer
         state = ControlState(
@@ -230,14 +246,22 @@ class ClientControl:
             who=self._lease.who,
             description=_look_text(self._look),
             joints=tuple(self._jogged),
-            since_s=t_s,
         )
         if self._jogged:
             angles = (f"{name} at {degrees(a):.1f} deg" for name, a in self._jogged.items())
             state = replace(state, description=", ".join(angles))
-        if before.active and (before.kind, before.who) == (state.kind, state.who):
-            state = replace(state, since_s=before.since_s)
         return state
+
+
+def _limits_text(gaze: GazeCommand, error_rad: float) -> str:
+    """Return how far a gaze is off its point and the angles that limit it, "" without any."""
+    if not gaze.limited:
+        return ""
+    ends = (
+        f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
+        for one in gaze.limited
+    )
+    return f"{degrees(error_rad):.0f} deg off: {', '.join(ends)}"
 
 
 def _look_text(command: Look) -> str:

@@ -16,7 +16,6 @@ from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
 from gazerig.params import unknown_text
 from gazerig.robot.loop.client_control import ClientControl
 from gazerig.robot.loop.conversation import Conversation
-from gazerig.robot.loop.reachability import jog_reply, look_reply
 from gazerig.robot.loop.stop import StopControl
 from gazerig.robot.model.commands import (
     NO_TRACK,
@@ -46,10 +45,10 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, Ticket
-from gazerig.robot.model.scene import MovableOpponent
 from gazerig.robot.model.types import JointAngles
 
 if TYPE_CHECKING:
+    from gazerig.features.world.opponent_motion import Opponent
     from gazerig.robot.loop.loop import Robot
 
 MAX_WAITING = 64
@@ -144,7 +143,7 @@ class CommandExecutor:
         self.stop = StopControl(robot.body, robot.messages)
         self.conversation = Conversation()
         self.commanded_rad: JointAngles = ()
-        self.opponent: tuple[MovableOpponent, Callable[[], float | None]] | None = None
+        self.opponent: tuple[Opponent, Callable[[], float | None]] | None = None
         self._known: set[int] = set()
         self._taken_over = False
         self.reset()
@@ -322,11 +321,12 @@ class CommandExecutor:
         else:
             point = self._point(command)
             self._change_control(lambda: self.lead.look(command, t_s, point))
-        target, robot = self.lead.chosen_target(None, t_s), self._robot
-        if target is None:  # the gaze is free again
-            return CommandReply()
-        reply = look_reply(target, robot.oculomotor, robot.kinematics, robot.guard.limits)
-        return structs.replace(reply, control_number=self.lead.state.number)
+        return self._control_reply()
+
+    def _control_reply(self) -> CommandReply:
+        """Return a reply with the number of the present control, 0 if the gaze is free."""
+        state = self.lead.state
+        return CommandReply(control_number=state.number if state.active else 0)
 
     def _point(self, command: Look) -> Vec3 | None:
         """Return the point in the world to look at, None to free the gaze.
@@ -369,9 +369,7 @@ class CommandExecutor:
         self._change_control(lambda: self.lead.jog(command, self.commanded_rad, t_s))
         if command.angles_rad:
             robot.guard.start_gently()  # a slider may jump from end to end
-        number = self.lead.state.number * self.lead.state.active
-        reply = jog_reply(command, robot.body.names, robot.guard.limits)
-        return structs.replace(reply, control_number=number)
+        return self._control_reply()
 
     def _change_control(self, change: Callable[[], None]) -> None:
         """Change the client in control; the models start slowly if they take over joints."""

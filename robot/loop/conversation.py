@@ -9,14 +9,10 @@ from gazerig.robot.model.control_source import (
     ConversationState,
 )
 
-_LAST_WORD_S = 0.4
-"""Assumed duration of the last word."""
-_GIVEN, _TIMED, _ESTIMATED = 0.9, 0.8, 0.3
-"""Confidence of a planned end: given in seconds, from word times, from the length of a text."""
-_OVERRUN_S, _OVERRUN_SHARE = 5.0, 0.5
-"""Speech that is not ended ends this time after its planned end, plus this share of its length."""
-_LONGEST_S = {"thinking": 60.0, "speaking": 600.0}
-"""Longest time in a state without a planned end and without a new report."""
+_GIVEN, _ESTIMATED = 0.9, 0.3
+"""Confidence of a planned end: given in seconds, and from the length of a text."""
+_LONGEST_S = 60.0
+"""Thinking or speaking ends this time after its planned end, or after its last report."""
 _SHOWN_CHARACTERS = 80
 """Length of the text that each tick contains; the command contains the whole."""
 
@@ -51,7 +47,7 @@ class Conversation:
                 f"there is nothing to interrupt: the state is {now.state}; report speaking or "
                 "thinking first"
             )
-        other = self._lease.who if active and not self._comes_from_owner(command) else ""
+        other = self._lease.who if active and self._lease.who != command.who else ""
         person = command.person if command.person is not None or not active else now.partner
         self._lease.start(command.who, command.stay, t_s)
         self._reported_s = t_s
@@ -67,13 +63,6 @@ class Conversation:
             )
         return f"conversation: {command.who or 'a client'} takes over from {other}" if other else ""
 
-    def _comes_from_owner(self, command: Talk) -> bool:
-        """Return whether a report is of the same client; one that stays may be of a new process."""
-        before, now = self._lease.who, command.who
-        if self._lease.stay and command.stay:
-            before, now = (who.partition(" (process ")[0] for who in (before, now))
-        return before == now
-
     def renew(self, who: str, t_s: float) -> bool:
         """Record a heartbeat; return whether it came from the client of the conversation."""
         return self.active and self._lease.renew(who, t_s)
@@ -85,12 +74,9 @@ class Conversation:
             return ""
         if self._lease.has_lapsed(t_s):
             return "not renewed"
-        if now.ends_s is not None:
-            late_s = _OVERRUN_S + _OVERRUN_SHARE * (now.ends_s - self._reported_s)
-            if t_s - now.ends_s > late_s:
-                return f"{late_s:.0f} s after its planned end; report idle when the speech ends"
-        elif (longest_s := _LONGEST_S.get(now.state)) and t_s - self._reported_s > longest_s:
-            return f"no report for {longest_s:g} s; report the next state, or the same again"
+        late_s = t_s - max(now.ends_s or 0.0, self._reported_s)
+        if now.state in ("thinking", "speaking") and late_s > _LONGEST_S:
+            return f"no report for {_LONGEST_S:g} s; report the next state, or the same again"
         return ""
 
     def end(self, why: str, t_s: float) -> None:
@@ -102,8 +88,6 @@ def _planned_end(command: Talk, t_s: float) -> tuple[float | None, float]:
     """Return the planned end of speech and its confidence; None and 0 if unknown."""
     if command.seconds is not None:
         return t_s + command.seconds, _GIVEN
-    if command.words:
-        return t_s + max([start_s for _, start_s in command.words]) + _LAST_WORD_S, _TIMED
     if text := command.text.strip():
         return t_s + len(text) / CHARACTERS_PER_S, _ESTIMATED
     return None, 0.0

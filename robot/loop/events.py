@@ -1,19 +1,21 @@
 """Events of a run: found in consecutive ticks, kept for other threads, and grouped as text."""
 
 import re
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import takewhile
 
 from gazerig.gaze.types import ORDERED, Target
 from gazerig.robot.loop.client_control import GONE_S
-from gazerig.robot.loop.head_state import EventKind, HeadEvent
+from gazerig.robot.loop.head_state import EventKind, HeadEvent, HeadReport, head_state
 from gazerig.robot.loop.tick import Tick, target_name
 from gazerig.robot.model.control_source import FINISHED
 from gazerig.robot.model.reply import Progress
 
 _MOST_EVENTS, _MOST_MESSAGES = 2000, 100
 """Number of stored events, and of messages besides."""
+_LOOK_S = 0.002
 _SERVO = re.compile(r"servo (\d+)")
 _REGISTER = re.compile(r": .+ (-?\d+ -> -?\d+|set)$")
 
@@ -38,6 +40,7 @@ class TickFeed:
         self._messages: deque[HeadEvent] = deque(maxlen=_MOST_MESSAGES)
         self._seen_s: dict[int, float] = {}
         self._joining: deque[Callable[[Progress], bool]] = deque()
+        self._never = threading.Event()
         self._followers: list[Callable[[Progress], bool]] = []
 
     def update(self, tick: Tick) -> None:
@@ -73,6 +76,19 @@ class TickFeed:
         """Return the stored events with numbers above ``after``, the oldest first."""
         newest_first = reversed(list(self._events))  # a copy, because the loop may append meanwhile
         return (*takewhile(lambda event: event.number > after, newest_first),)[::-1]
+
+    def report(self, after: int) -> HeadReport:
+        """Return the newest tick, None before the first, and events numbered above ``after``."""
+        state = head_state(self.newest) if self.newest is not None else None
+        return HeadReport(state, self.events(after), self.number)
+
+    def wait_for_ticks(self, ticks: int, within_s: float) -> bool:
+        """Wait for a number of ticks; return whether they have come in time."""
+        wanted, waits = self.ticks + ticks, int(within_s / _LOOK_S)
+        while self.ticks < wanted and waits > 0:
+            self._never.wait(_LOOK_S)
+            waits -= 1
+        return self.ticks >= wanted
 
     def messages(self) -> tuple[HeadEvent, ...]:
         """Return the last events of the bus, the camera and programs, the oldest first."""

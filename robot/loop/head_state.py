@@ -32,7 +32,6 @@ from gazerig.robot.model.control_source import (
     TrackState,
     control_sentence,
 )
-from gazerig.robot.model.kinematics import gaze_error
 
 EventKind = Literal[
     "message", "saccade_start", "saccade_landing", "blink", "target", "person_arrived",
@@ -283,17 +282,17 @@ def _gaze(tick: Tick, source: ControlSource) -> tuple[GazeReading, str]:
     name, reason, phase, kind = target_name(target), target.why, str(gaze.phase), target.kind
     part = PART_NAMES[target.part] if target.part is not None else None
     headline = _looks_text(target)
-    sentence = control_sentence(source, tick.t_s)
+    sentence = control_sentence(source)
     if source.kind == "track":
         headline = f"{sentence}, and {headline}"
     elif source.overrides_gaze:
         headline = reason = sentence
         kind, part = source.kind, None
-        if source.kind in ("person", "pointer"):
-            headline = reason = sentence + _distance_text(tick)
-        elif source.kind == "joint":
+        if limited := tick.client_control.limited:
+            headline = reason = f"{sentence}; {limited}"
+        if source.kind == "joint":
             name, phase = f"{' and '.join(source.joints)} held", "held"
-        else:
+        elif source.kind in ("stopped", "parking"):
             name = phase = source.kind
     if guard.level == "torque_off" and source.kind not in ("stopped", "parking"):
         headline = reason = f"the torque is off: {' and '.join(guard.critical_reasons[:1])}"
@@ -333,19 +332,6 @@ def _looks_text(target: Target) -> str:
             return "looks at a moving object"
         case kind:
             return "looks at its point" if kind == ORDERED else f"looks at a {kind}"
-
-
-def _distance_text(tick: Tick) -> str:
-    """Return the gaze's distance from the chosen point, "" if it reaches the point."""
-    limited = tick.gaze.limited
-    if tick.target.kind != ORDERED or not limited:
-        return ""
-    error = degrees(gaze_error(tick.target.p_world_m, tick.pose))
-    ends = (
-        f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
-        for one in limited
-    )
-    return f"; {error:.0f} deg off: {', '.join(ends)}"
 
 
 def _person(face: Face, age_s: float) -> Person:

@@ -3,7 +3,7 @@
 import contextlib
 from collections.abc import Callable
 from math import inf, radians
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gazerig.drivers.camera.capture_loop import CLOSING
 from gazerig.drivers.errors import DriverError
@@ -35,11 +35,13 @@ from gazerig.robot.model.commands import (
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.reply import Ticket
-from gazerig.robot.model.scene import MovableOpponent
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.safety.guard import Guard
+
+if TYPE_CHECKING:
+    from gazerig.features.world.opponent_motion import Opponent
 
 PARK_S = 4.0
 """Longest time for parking before torque is switched off."""
@@ -143,7 +145,7 @@ class Robot:
         self._executor.refuse_impossible(command)
         return self._commands.add(command)
 
-    def set_opponent(self, opponent: MovableOpponent, start_s: Callable[[], float | None]) -> None:
+    def set_opponent(self, opponent: "Opponent", start_s: Callable[[], float | None]) -> None:
         """Let commands move a boxer of the emulated world.
 
         Args:
@@ -212,7 +214,7 @@ class Robot:
         self.guard.reset(t_s, goals)
         joints = self.body.read(t_s)
         pose = self.kinematics.forward(joints)
-        self.poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
+        self.poses.remember(t_s, pose.head_rad, pose.R_world_head)
         self.newest = None
         self.attention.reset(t_s)
         self.conversation_gaze.reset(t_s)
@@ -253,7 +255,7 @@ class Robot:
         lead, stop, conversation = executor.lead, executor.stop, executor.conversation
         joints = self.body.read(t_s)
         pose = self.kinematics.forward(joints)
-        self.poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
+        self.poses.remember(t_s, pose.head_rad, pose.R_world_head)
         if executor.models_took_over():
             self.oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)
@@ -284,7 +286,6 @@ class Robot:
             guard_result = stopped_result(joints, desired, stop.reason, self.body.names)
         else:
             guard_result = self.guard.check(desired, joints, self._frame_age_s(percept, t_s), t_s)
-            self.messages += self.guard.take_reports()
             self.body.write(guard_result.command_rad)
         executor.commanded_rad = guard_result.command_rad
         executor.remember_people(percept)
@@ -294,7 +295,7 @@ class Robot:
         self.newest = Tick(
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events,
             commands, stop.reason,
-            lead.measure(target, pose, joints.position_rad, converges, t_s),
+            lead.measure(target, pose, gaze, joints.position_rad, converges, t_s),
             self.track_choices.states(t_s),
             conversation=conversation.state,
         )  # fmt: skip

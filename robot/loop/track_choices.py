@@ -122,8 +122,6 @@ class TrackChoices:
         track = self._tracks.get(name)
         if track is None:
             raise ValueError(unknown_text("track", name, self.names))
-        if isinstance(track, str):
-            raise ValueError(f"{name}: {track}")
         try:
             if track.sound and not sound_s:
                 sound_s = check_sound(Path(track.sound), MAX_DURATION_S).duration_s
@@ -227,7 +225,7 @@ class TrackChoices:
         state = TrackState(
             self._number, name, voice.position_s(t_s), motion.length_s, motion.rate, rounds == 0,
             fit.owns(track), command.who, track.sound, limited="; ".join(filter(None, limited)),
-            since_s=t_s, volume=track.volume,
+            volume=track.volume,
         )  # fmt: skip
         self._started.append((voice, state))
         return CommandReply(track=reply)

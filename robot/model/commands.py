@@ -50,7 +50,6 @@ _Number = Annotated[int, Meta(ge=0, le=2**53)]
 """Number of a person or a track: every client and recording can hold it."""
 _SpeechTime = Annotated[float, Meta(ge=0.0, le=MAX_SPEECH_S)]
 _ControlTime = Annotated[float, Meta(gt=0.0, le=86_400.0)]
-_TalkTime = Annotated[float, Meta(ge=0.0, le=600.0)]
 
 
 def _verb(class_name: str) -> str:
@@ -242,10 +241,8 @@ class Talk(ClientCommand, frozen=True):
     Attributes:
         state: Present activity; "idle" ends the conversation.
         person: Perception's number of the partner, None if unknown.
-        seconds: Time until the planned end of speaking, s; None: estimated from words or text.
+        seconds: Time until the planned end of speaking, s; None: estimated from the text.
         text: What is spoken.
-        words: (word, start in s after this command) pairs of the speech.
-        sound: Path of the sound file that is spoken.
         stay: As in ControlCommand.
     """
 
@@ -253,14 +250,12 @@ class Talk(ClientCommand, frozen=True):
     person: _Number | None = None
     seconds: Annotated[float, Meta(gt=0.0, le=600.0)] | None = None
     text: _Text = ""
-    words: Annotated[tuple[tuple[_Name, _TalkTime], ...], Meta(max_length=2000)] = ()
-    sound: _Text = ""
     stay: bool = False
 
     @property
     def has_plan(self) -> bool:
         """Return whether it plans a speech, which only belongs to speaking."""
-        return self.seconds is not None or any((self.text, self.words, self.sound))
+        return self.seconds is not None or bool(self.text)
 
 
 class Say(ClientCommand, frozen=True):
@@ -384,9 +379,7 @@ def check_command(command: _C) -> _C:
             "a text without a word is no speech: give the words, or the name of a sound file"
         )
     if isinstance(checked, Talk) and checked.has_plan and checked.state != "speaking":
-        raise ValueError(
-            f"seconds, text, words and sound belong to speaking: omit them for {checked.state}"
-        )
+        raise ValueError(f"seconds and text belong to speaking: omit them for {checked.state}")
     return checked
 
 
@@ -490,22 +483,6 @@ class Fault(Request, frozen=True):
     """Execute a fault command of emulated servos (gazerig emulate)."""
 
     text: str
-
-
-Layer = Literal["sight"]
-Viewpoint = Literal["face", "both", "over its shoulder", "from above"]
-
-
-class ShowView(Request, frozen=True):
-    """Choose what the page's view of the head shows; the page does it, not the rig.
-
-    Attributes:
-        layers: Layers for all browsers, None for no change: lines of sight.
-        look_from: Viewpoint of this browser, None for no change.
-    """
-
-    layers: tuple[Layer, ...] | None = None
-    look_from: Viewpoint | None = None
 
 
 Question = (

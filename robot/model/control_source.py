@@ -15,9 +15,6 @@ CHARACTERS_PER_S = 15.0
 """Rate of speech, for the end of a text without times: about 150 English words a minute."""
 SHOWN_S = 2.0
 """Time for which an ended track is shown."""
-_WORTH_TELLING_S = 1.0
-"""Shorter durations of control are not shown."""
-_MINUTE_S = 60.0
 
 
 class ControlState(Struct, frozen=True):
@@ -34,7 +31,7 @@ class ControlState(Struct, frozen=True):
         who: Name of the client.
         description: Command as text, e.g. "look at 1 0 0.3", "neck_yaw at 17.2 deg".
         joints: Held joints.
-        since_s: Start of the same client's uninterrupted control of this kind.
+        limited: Error of a gaze that rests off its point, and the angles that limit it, else "".
     """
 
     number: int = 0
@@ -46,7 +43,7 @@ class ControlState(Struct, frozen=True):
     who: str = ""
     description: str = ""
     joints: tuple[str, ...] = ()
-    since_s: float = 0.0
+    limited: str = ""
 
     @property
     def client(self) -> str:
@@ -73,7 +70,6 @@ class TrackState(Struct, frozen=True):
         clock: Clock that the position follows.
         end_reason: Reason for its end, ``FINISHED`` at its own end, "" while it plays.
         limited: What the rig's limits changed, "" if nothing.
-        since_s: Time of its start.
         volume: Volume of the sound, 0..1.
         cue: Name of the cue that it has passed last, "" before the first.
         cues: Number of cues that it has passed.
@@ -91,7 +87,6 @@ class TrackState(Struct, frozen=True):
     clock: Literal["loop", "sound", "external"] = "loop"
     end_reason: str = ""
     limited: str = ""
-    since_s: float = 0.0
     volume: float = 1.0
     cue: str = ""
     cues: int = 0
@@ -144,14 +139,12 @@ class ControlSource(Struct, frozen=True):
         who: Name of the client for display, "" for none or unknown.
         description: "look at 1 0 0.3", "neck_yaw at 17.2 deg", a track's name, a stop's reason.
         joints: Held joints, or those that tracks own.
-        since_s: Start of the control on the rig's clock, None if unknown.
     """
 
     kind: ControlKind = "gaze"
     who: str = ""
     description: str = ""
     joints: tuple[str, ...] = ()
-    since_s: float | None = None
 
     @property
     def overrides_gaze(self) -> bool:
@@ -176,44 +169,30 @@ def control_source(
         return ControlSource("parking")
     if lead.active:
         who = lead.who or "a client"
-        return ControlSource(lead.kind, who, lead.description, lead.joints, lead.since_s)
+        return ControlSource(lead.kind, who, lead.description, lead.joints)
     if playing := [track for track in tracks if track.is_playing]:
         # The newest, with a sound if one has it.
         newest = max(playing, key=lambda track: (bool(track.sound), track.number))
         owns = tuple(joint for track in playing for joint in track.owns)
         names = " and ".join(track.name for track in playing)
-        return ControlSource("track", newest.who, names, owns, newest.since_s)
+        return ControlSource("track", newest.who, names, owns)
     return ControlSource()
 
 
-def control_sentence(leader: ControlSource, t_s: float) -> str:
-    """Return the source of control as a sentence, "ann holds neck_yaw at 17.2 deg, for 3 s".
-
-    Args:
-        leader: Source of control.
-        t_s: Present time on the rig's clock.
-    """
+def control_sentence(leader: ControlSource) -> str:
+    """Return the source of control as a sentence, "ann holds neck_yaw at 17.2 deg"."""
     match leader.kind:
         case "gaze":
             return "no client is in control: the head chooses its own targets"
         case "person":
-            text = f"{leader.who} makes it {leader.description}"
+            return f"{leader.who} makes it {leader.description}"
         case "pointer":
-            text = f"it looks at the pointer of {leader.who}"
+            return f"it looks at the pointer of {leader.who}"
         case "joint":
-            text = f"{leader.who} holds {leader.description}"
+            return f"{leader.who} holds {leader.description}"
         case "track":
-            text = f"it plays {leader.description}" + (f" for {leader.who}" if leader.who else "")
-            if leader.joints:
-                count = len(leader.joints)
-                text += f", with {', '.join(leader.joints) if count < 4 else f'{count} joints'}"
+            return f"it plays {leader.description}" + (f" for {leader.who}" if leader.who else "")
         case "stopped":
             return f"stopped: {leader.description}; the torque is off"
         case "parking":
             return "it moves to its parking pose, then the torque goes off"
-    lasted_s = t_s - leader.since_s if leader.since_s is not None else 0.0
-    if lasted_s < _WORTH_TELLING_S:
-        return text
-    if lasted_s < 2.0 * _MINUTE_S:
-        return f"{text}, for {lasted_s:.0f} s"
-    return f"{text}, for {lasted_s / _MINUTE_S:.0f} min"

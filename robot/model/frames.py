@@ -25,15 +25,12 @@ from gazerig.gaze.angles import (
     transpose,
     yaw_pitch,
 )
-from gazerig.gaze.types import Angles2, Angles3, HeadGeometry, Mat3, Vec3
+from gazerig.gaze.types import Angles3, HeadGeometry, Mat3, Vec3
 from gazerig.params import Bounds
 
 OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 """Maps camera optical axes (x right, y down, z forward) to x forward, y left, z up."""
 
-
-NeckAngles = tuple[Angles3, Angles2]
-"""(yaw, pitch, roll) of the neck and (yaw, pitch) of a lower neck, radians."""
 
 MountedOn = Literal["head", "base"]
 
@@ -103,27 +100,25 @@ class PoseHistory:
         self._geometry = geometry
         self._tell = tell
         self._times: deque[float] = deque(maxlen=_TICKS)
-        self._angles: deque[NeckAngles] = deque(maxlen=_TICKS)
+        self._angles: deque[Angles3] = deque(maxlen=_TICKS)
 
     def remember(
         self,
         t_s: float,
         head_rad: Angles3,
-        base_rad: Angles2 = (0.0, 0.0),
         R_world_head: Mat3 | None = None,
     ) -> None:
-        """Record the measured angles of neck and lower neck; times must increase.
+        """Record the measured angles of the neck; times must increase.
 
         Args:
             t_s: Time of the measurement.
             head_rad: (yaw, pitch, roll) of the neck.
-            base_rad: (yaw, pitch) of a lower neck.
             R_world_head: Orientation at these angles, if already computed.
         """
         self._times.append(t_s)
-        self._angles.append((head_rad, base_rad))
+        self._angles.append(head_rad)
         if self._tell is not None:
-            self._tell(t_s, R_world_head or self._geometry.head_pose(head_rad, base_rad)[0])
+            self._tell(t_s, R_world_head or self._geometry.head_pose(head_rad)[0])
 
     def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
         """Return R_world_head and p_world_head_m at a time, from ``angles``.
@@ -131,9 +126,9 @@ class PoseHistory:
         Raises:
             LookupError: The history is empty.
         """
-        return self._geometry.head_pose(*self.angles(t_s))
+        return self._geometry.head_pose(self.angles(t_s))
 
-    def angles(self, t_s: float) -> NeckAngles:
+    def angles(self, t_s: float) -> Angles3:
         """Return the angles at a time, interpolated between ticks.
 
         Before the oldest and after the newest entry that entry's angles are returned.
@@ -151,10 +146,8 @@ class PoseHistory:
             return angles[0]
         t0, t1 = times[after - 1], times[after]
         share = (t_s - t0) / (t1 - t0)
-        (a, base), (b, base_next) = angles[after - 1], angles[after]
-        head = add(a, scale(sub(b, a), share))
-        yaw, pitch = (a + share * (b - a) for a, b in zip(base, base_next, strict=True))
-        return head, (yaw, pitch)
+        a, b = angles[after - 1], angles[after]
+        return add(a, scale(sub(b, a), share))
 
 
 class CameraMount:

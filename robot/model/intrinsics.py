@@ -10,13 +10,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gazerig.drivers.camera.pinhole import Distortion, Intrinsics, intrinsics_of_view
+from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.robot.model.frames import LensParams
 
 Floats = NDArray[np.float64]
 
-# Undistortion is iterative; with strong lenses the usual five rounds leave an error of a pixel.
-_ROUNDS, _LEAST_STEP = 40, 1e-12
 # Two sizes of image show the same field if their shapes differ by no more than rounding.
 _SAME_SHAPE = 0.01
 # Largest distance of the optical axis from the middle, in widths and heights: a camera that uses
@@ -72,8 +70,11 @@ def project(points_camera_m: ArrayLike, intrinsics: Intrinsics) -> Floats:
     i = intrinsics
     plane = p[:, :2] / z
     if i.has_distortion:
-        radial, tangential = _distortion_at(plane, i.distortion)
-        plane = plane * radial + tangential
+        import cv2
+
+        ahead, none = np.column_stack((plane, np.ones(len(p)))), np.zeros(3)
+        bent = cv2.projectPoints(ahead, none, none, np.eye(3), np.array(i.distortion))[0]
+        plane = bent[:, 0].astype(np.float64)
     pixels: Floats = plane * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
     return pixels
 
@@ -85,33 +86,11 @@ def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
     found = np.ones((len(x), 3))
     found[:, 0], found[:, 1] = (x - i.cx_px) / i.fx_px, (y - i.cy_px) / i.fy_px
     if i.has_distortion and x.size:
-        found[:, :2] = _undistort(found[:, :2], i.distortion)
+        import cv2
+
+        # With strong lenses the usual five rounds leave an error of a pixel.
+        rounds = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-12)
+        found[:, :2] = cv2.undistortPointsIter(
+            found[:, None, :2], np.eye(3), np.array(i.distortion), np.eye(3), np.eye(3), rounds
+        )[:, 0]
     return found
-
-
-def _undistort(plane: Floats, distortion: Distortion) -> Floats:
-    """Undistort points of the plane z = 1 by fixed-point iteration.
-
-    Points that the model of the lens cannot produce are returned unchanged.
-    """
-    found = plane
-    for _ in range(_ROUNDS):
-        radial, tangential = _distortion_at(found, distortion)
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            nearer = np.where(radial > 0.0, (plane - tangential) / radial, plane)
-        step = np.abs(nearer - found).max(initial=0.0)
-        found = nearer
-        if step < _LEAST_STEP:
-            break
-    return found
-
-
-def _distortion_at(plane: Floats, distortion: Distortion) -> tuple[Floats, Floats]:
-    """Return the radial factors (n, 1) and tangential shifts (n, 2) at points of the plane."""
-    k1, k2, p1, p2, k3 = distortion
-    x, y = plane[:, :1], plane[:, 1:]
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-    dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-    return radial, np.hstack((dx, dy))

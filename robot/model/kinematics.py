@@ -9,59 +9,21 @@ yaw axis.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import asin, atan2, hypot, pi, sqrt
+from math import asin, atan2, hypot, pi
 from operator import itemgetter
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from gazerig.gaze.angles import (
     add,
     angle_between,
-    compose,
-    dot,
-    norm,
     rotate,
-    rotate_back,
     rotation,
-    scale,
     sub,
 )
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, order_joints
-
-
-class Capsule(NamedTuple):
-    """All points within ``radius_m`` of the line from ``start_m`` to ``end_m``, in one frame."""
-
-    start_m: Vec3
-    end_m: Vec3
-    radius_m: float
-
-    def contains(self, p_m: Vec3) -> bool:
-        """Return whether a point is inside."""
-        axis = sub(self.end_m, self.start_m)
-        along = dot(sub(p_m, self.start_m), axis) / max(dot(axis, axis), 1e-12)
-        nearest = add(self.start_m, scale(axis, min(1.0, max(0.0, along))))
-        return norm(sub(p_m, nearest)) < self.radius_m
-
-    def hit_m(self, p_m: Vec3, direction: Vec3) -> float | None:
-        """Return the distance from an outside point along a unit vector, None without a hit.
-
-        The distance is that to the sphere about the point of the line nearest to the ray.
-        """
-        axis, off = sub(self.end_m, self.start_m), sub(self.start_m, p_m)
-        aa, ad = dot(axis, axis), dot(axis, direction)
-        denominator = aa - ad * ad
-        share = 0.0
-        if denominator > 1e-12:
-            share = (ad * dot(off, direction) - dot(off, axis)) / denominator
-        middle = add(off, scale(axis, min(1.0, max(0.0, share))))
-        along = dot(middle, direction)
-        off2 = dot(middle, middle) - along * along
-        if along <= 0.0 or off2 >= self.radius_m**2:
-            return None
-        return along - sqrt(self.radius_m**2 - off2)
 
 
 @dataclass(frozen=True)
@@ -73,18 +35,13 @@ class GeometryParams:
     eyes_ahead_mm: Annotated[float, Bounds(-500, 500), "distance of the eye centres in front of the pitch axis"]
     eyes_above_mm: Annotated[float, Bounds(-500, 1000), "height of the eye centres above the pitch axis"]
     interocular_mm: Annotated[float, Bounds(10, 500), "distance between the eye centres (Mitake et al., table 1: 61.9)"] = 61.9
-    lower_pitch_axis_height_mm: Annotated[float, Bounds(0, 2000),
-        "height of the pitch axis of a lower neck (lower_neck_yaw, lower_neck_pitch) above the neck base"] = 0.0
     # fmt: on
 
 
-_UPRIGHT = (0.0, 0.0)
 LidEnds = tuple[float, float]
 """Joint angles at which a lid is shut and fully open, radians."""
 
 NECK = ("neck_yaw", "neck_pitch", "neck_roll")
-LOWER_NECK = ("lower_neck_yaw", "lower_neck_pitch")
-"""Two further joints below the neck: expressions and tracks move them, and gaze compensates."""
 LIDS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
 
 
@@ -111,14 +68,13 @@ class Kinematics:
             for side in ("left", "right")
             for axis in ("pan", "tilt")
         ]
-        neck = [place.get(name, absent) for name in (*NECK, *LOWER_NECK)]
+        neck = [place.get(name, absent) for name in NECK]
         lids_at = [place.get(name, absent) for name in LIDS]
         self._angles_of = itemgetter(*neck, *eyes, *lids_at)
         self._rates_of = itemgetter(*neck)
         self._wanted = tuple(GAZE_JOINTS.index(name) for name in self.names if name in GAZE_JOINTS)
         self._further = (0.0,) * (len(self.names) - len(self._wanted))
         self._pivot_m = params.pitch_axis_height_mm / 1e3
-        self._base: Vec3 = (0.0, 0.0, params.lower_pitch_axis_height_mm / 1e3)
         self._ahead_m, self._above_m = params.eyes_ahead_mm / 1e3, params.eyes_above_mm / 1e3
         self._half = params.interocular_mm / 2e3
         # The opening of a missing lid, whose angle is 0, is computed as 1.
@@ -126,12 +82,11 @@ class Kinematics:
         self._shut = tuple(shut for shut, _ in ends)
         self._span = tuple(wide - shut for shut, wide in ends)
 
-    def head_pose(self, head_rad: Angles3, base_rad: Angles2 = _UPRIGHT) -> tuple[Mat3, Vec3]:
+    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
         """Return R_world_head and p_world_head_m (midway between the eyes).
 
         Args:
             head_rad: (yaw, pitch, roll) of the neck.
-            base_rad: (yaw, pitch) of a lower neck that carries it.
         """
         R = rotation(head_rad)
         (a, _, b), (c, _, d), (e, _, f) = R
@@ -141,32 +96,19 @@ class Kinematics:
             c * ahead + d * above,
             self._pivot_m + (e * ahead + f * above),
         )
-        if base_rad == _UPRIGHT:
-            return R, p
-        R_world_base = rotation((*base_rad, 0.0))
-        p = add(self._base, rotate(R_world_base, sub(p, self._base)))
-        return compose(R_world_base, R), p
+        return R, p
 
-    def body_volumes(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Capsule, Capsule]:
-        """Return approximate volumes of head and neck in the world.
+    def pivot_m(self, R_world_head: Mat3, p_world_head_m: Vec3) -> Vec3:
+        """Return the intersection of the neck's pitch and roll axes in the world."""
+        return add(p_world_head_m, rotate(R_world_head, (-self._ahead_m, 0.0, -self._above_m)))
 
-        The head extends from the neck's pitch axis to the point between the eyes, with the eyes'
-        distance as radius. The neck extends from its base to that axis, with half that radius.
-        """
-        pivot = add(p_world_head_m, rotate(R_world_head, (-self._ahead_m, 0.0, -self._above_m)))
-        head = Capsule(pivot, p_world_head_m, 2.0 * self._half)
-        return head, Capsule(self._base, pivot, self._half)
-
-    def neck_angles_to(self, p_world_m: Vec3, base_rad: Angles2 = _UPRIGHT) -> Angles2:
+    def neck_angles_to(self, p_world_m: Vec3) -> Angles2:
         """Return the neck yaw and pitch at which the head's x axis passes through a point.
 
         The axis passes above the pivot by the arm's height, so the pitch is that of the point
         minus the angle of that height. A point nearer to the pivot than the height cannot be
         faced; the result is then the pitch of its direction.
         """
-        if base_rad != _UPRIGHT:
-            back = rotate_back(rotation((*base_rad, 0.0)), sub(p_world_m, self._base))
-            p_world_m = add(self._base, back)
         x, y, z = p_world_m
         z -= self._pivot_m
         level = hypot(x, y)
@@ -210,19 +152,19 @@ class Kinematics:
     def forward(self, joints: JointState) -> GazeState:
         """Return the poses of head and eyes at measured joints."""
         (
-            yaw, pitch, roll, base_yaw, base_pitch,
+            yaw, pitch, roll,
             pan_left, tilt_left, pan_right, tilt_right,
             upper_left, upper_right, lower_left, lower_right,
         ) = self._angles_of((*joints.position_rad, 0.0))  # fmt: skip
         rates = self._rates_of((*joints.velocity_rad_s, 0.0))
-        head, base = (yaw, pitch, roll), (base_yaw, base_pitch)
-        R, p_head = self.head_pose(head, base)
+        head = (yaw, pitch, roll)
+        R, p_head = self.head_pose(head)
         x, y, z = p_head
         half, shut, span = self._half, self._shut, self._span
         aside_x, aside_y, aside_z = R[0][1] * half, R[1][1] * half, R[2][1] * half
         return GazeState(
             head,
-            rates[:3],
+            rates,
             (pan_left, tilt_left),
             (pan_right, tilt_right),
             R,
@@ -233,8 +175,6 @@ class Kinematics:
             _share((upper_right - shut[1]) / span[1]),
             _share((lower_left - shut[2]) / span[2]),
             _share((lower_right - shut[3]) / span[3]),
-            base,
-            rates[3:],
         )
 
     def inverse(self, command: GazeCommand, further_rad: JointAngles = ()) -> JointAngles:
@@ -259,11 +199,6 @@ class Kinematics:
             *head,
         )
         return (*[angles[i] for i in self._wanted], *(further_rad or self._further))
-
-    def further_rad(self, base_rad: Angles2) -> JointAngles:
-        """Return the angles of the joints that gaze does not move: 0 except for a lower neck."""
-        lower = dict(zip(LOWER_NECK, base_rad, strict=True))
-        return tuple(lower.get(name, 0.0) for name in self.names[len(self._wanted) :])
 
 
 def _share(value: float) -> float:

@@ -1,7 +1,6 @@
-"""Emulated scenes: their picture, and a boxer whom a person can move."""
+"""Pictures of emulated scenes."""
 
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import ImageArray
@@ -34,31 +33,3 @@ class SceneView(Protocol):
 
     def close(self) -> None:
         """Free the renderer's resources; safe to call twice."""
-
-
-class MovableOpponent(Protocol):
-    """A boxer; its times are those of the scene."""
-
-    @property
-    def spans_s(self) -> Sequence[tuple[float, float]]:
-        """Return the times in which a person moved it, (start, end)."""
-
-    def move(self, p_m: Vec3, t_s: float) -> None:
-        """Move the leading fist to a point."""
-
-    def update(self, t_s: float) -> None:
-        """Advance the motion to a time."""
-
-
-@runtime_checkable
-class BoxingScene(Protocol):
-    """A scene that may have such a boxer."""
-
-    @property
-    def opponent(self) -> MovableOpponent | None:
-        """Return the boxer, None without one."""
-
-
-def has_opponent(scene: object) -> bool:
-    """Return whether a scene, or its shapes, has a boxer that a person can move."""
-    return isinstance(scene, BoxingScene) and scene.opponent is not None

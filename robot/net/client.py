@@ -7,7 +7,7 @@ with RobotClient.connect() as rig:
     rig.set_many({"gaze.lids.blinks_per_min": 12.0})
     print(rig.send(LookAt((1.0, 0.3, 0.0))).text())
     print(rig.status()["headline"])
-    rig.save("/home/me/my.yaml")
+    rig.ask(Save("/home/me/my.yaml"), SavedFile)
 """
 
 import contextlib
@@ -32,24 +32,18 @@ from gazerig.robot.model.commands import (
     Get,
     Hello,
     LookAt,
-    ReadMenus,
     ReadStatus,
     Renew,
     Request,
-    Resume,
-    Save,
-    SayPiece,
     Set,
     State,
     Stop,
     Talk,
-    Unsaved,
     Value,
     check_command,
     set_client,
     verb,
 )
-from gazerig.robot.model.parameter import ParamChange, SavedFile
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.net.socket_io import (
     ANSWER_BYTES,
@@ -278,25 +272,6 @@ class RobotClient:
             raise RequestRejected(f"only finite numbers, text and lists: {error}") from None
         return self.change(Set(dict(changes)))
 
-    def unsaved(self) -> tuple[ParamChange, ...]:
-        """Return the present values that differ from the rig's file."""
-        return self.ask(Unsaved(), tuple[ParamChange, ...])
-
-    def save(self, path: Path | str | None = None) -> SavedFile:
-        """Write the present values to the rig's own file, or to another file on this computer."""
-        whole = None if path is None else str(Path(path).expanduser().absolute())
-        return self.ask(Save(whole), SavedFile)
-
-    def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return the choices of ``Ask``: menu -> choices, the present one first."""
-        return self.ask(ReadMenus(), dict[str, tuple[str, ...]])
-
-    def say_piece(
-        self, pcm: bytes, rate_hz: int, channels: int = 1, last: bool = False, volume: float = 1.0
-    ) -> float:
-        """Say a piece of a stream; return the length that has not been heard, s."""
-        return self.ask(SayPiece(pcm, rate_hz, channels, last, volume), float)
-
     @property
     def in_control(self) -> bool:
         """Return whether this connection renews a manual control that the rig still follows."""
@@ -326,30 +301,6 @@ class RobotClient:
             except OSError:
                 raise self._lost() from None
         return reply
-
-    def look_freely(self) -> None:
-        """Let the head choose its targets again."""
-        self.send(LookAt(None))
-
-    def stop(self, why: str = "requested by another program") -> None:
-        """Switch the torque off immediately; when this returns, the loop has done it.
-
-        Raises:
-            ConnectionLost, RequestRejected: it may not have stopped: press the emergency stop.
-        """
-        self.send(Stop(why))
-
-    def resume(self, confirmed: bool = False) -> None:
-        """Switch the torque on at the present angles, and continue slowly.
-
-        Args:
-            confirmed: Whether a person has confirmed that no hand is in the mechanism; needed if
-                another client stopped the rig.
-
-        Raises:
-            RequestRejected: a servo or a rule of stops refuses it; the torque stays off.
-        """
-        self.send(Resume(confirmed))
 
     def _end_heartbeat(self) -> None:
         heartbeat, self._heartbeat = self._heartbeat, None

@@ -4,18 +4,16 @@
 {"do": "set", "changes": {"loop.rate_hz": 1e9}}    ->  {"refused": "... wanted 20 to 1000 ..."}
 """
 
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from msgspec import structs
 
 from gazerig.errors import Error
 from gazerig.robot.loop.events import TickFeed
-from gazerig.robot.loop.head_state import HeadReport, head_state
+from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.loop.track_choices import TrackInfo
-from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import (
     Character,
     Characters,
@@ -34,22 +32,26 @@ from gazerig.robot.model.commands import (
     Say,
     SayPiece,
     Set,
-    Speak,
     State,
     Stop,
     Tracks,
     Unsaved,
-    Value,
     as_value,
     read_request,
     set_client,
 )
-from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.net.socket_io import VERSION
 
+if TYPE_CHECKING:
+    from gazerig.config.rig_files import AllowedFolder
+    from gazerig.robot.run.live import ParamStore
+    from gazerig.robot.run.voice import RunVoice
+
 _TAKEN_UP_S = 1.0
 """Timeout of the loop's execution, s; a servo that answers late delays it by some 50 ms."""
+_READ_BY_TICKS = 2
+"""Ticks after which commands are read: the present one may have read them already."""
 _WORDS = 20
 """Number of recent messages in the status."""
 
@@ -59,74 +61,9 @@ _HANGS = (
     "starts or ends; use the emergency stop if anything moves"
 )
 
-
 REFUSALS = (ValueError, OSError, Error)
 """Exceptions that refuse a request; the message is for the user."""
 FIXED = "these parameters cannot be changed while the rig runs"
-
-
-class ParamAccess(Protocol):
-    """The parameters of a running rig, such as ``gazerig.robot.run.live.ParamStore``."""
-
-    @property
-    def version(self) -> int:
-        """Return the number of changes."""
-
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Return all parameters."""
-
-    def get(self, prefix: str) -> Mapping[str, Value]:
-        """Return the present values whose keys start with ``prefix``."""
-
-    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
-        """Apply values from the next tick on; return notes for the user."""
-
-    def unsaved(self) -> Sequence[ParamChange]:
-        """Return the present values that are not in the file."""
-
-    def save(self, path: Path | None = None) -> SavedFile:
-        """Write the present values to a file."""
-
-    def revert(self) -> tuple[str, ...]:
-        """Restore the values of the file; return notes for the user."""
-
-    def characters(self) -> Sequence[str]:
-        """Return the available characters."""
-
-    def apply_character(self, name: str) -> tuple[str, ...]:
-        """Apply another character to the rig; return notes for the user."""
-
-    def files(self) -> tuple[Path, ...]:
-        """Return the files in use: the rig's file and its overlays."""
-
-    def reload(self, path: Path) -> tuple[str, ...]:
-        """Apply the contents of a file; on errors change nothing and raise with all of them."""
-
-
-class PathGuard(Protocol):
-    """Rules for the files that a client may name (``config.rig_files.AllowedFolder``)."""
-
-    def check_file(self, given: str, kind: str = "") -> str:
-        """Return a shipped name or an absolute path; raise if it is not allowed."""
-
-    def check_changes(self, changes: Mapping[str, object]) -> None:
-        """Raise if a value names a file that is not allowed."""
-
-
-class Speaker(Protocol):
-    """The voice of a head (``gazerig.robot.run.voice.RunVoice``)."""
-
-    def prepare(self, command: Say, confined: bool = False, /) -> Speak:
-        """Return the command that says a file or a text; raise if it cannot be said.
-
-        confined: only files in the folders of sounds
-        """
-
-    def feed(self, pcm: bytes, rate_hz: int, channels: int, volume: float, /) -> float:
-        """Say a piece of a stream; return the length that has not been heard, s."""
-
-    def finish(self) -> None:
-        """Mark the end of the stream."""
 
 
 def accept_only_stops(command: CommandTaker, reason: str) -> CommandTaker:
@@ -140,58 +77,6 @@ def accept_only_stops(command: CommandTaker, reason: str) -> CommandTaker:
     return take
 
 
-class LoopMonitor:
-    """Newest tick, and whether the loop is running.
-
-    Args:
-        clock: Clock of the loop.
-
-    Attributes:
-        update: Stores the newest tick, for the loop.
-    """
-
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
-        self._feed = TickFeed()
-        self.update = self._feed.update
-        self._never = threading.Event()
-
-    def wait_for_commands(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
-        """Wait until all previous changes are applied; return whether they are.
-
-        Args:
-            within_s: Timeout, s.
-            ticks: Ticks to wait for; the present one may have read the commands already, the next
-                one has not.
-        """
-        wanted = self._feed.ticks + ticks
-        waits = int(within_s / 0.002)
-        while self._feed.ticks < wanted and waits > 0:
-            self._never.wait(0.002)
-            waits -= 1
-        return self._feed.ticks >= wanted
-
-    def state(self, after: int) -> HeadReport:
-        """Return the newest tick, None before the first, and events numbered above ``after``."""
-        tick = self._feed.newest
-        state = head_state(tick) if tick else None
-        return HeadReport(state, self._feed.events(after), self._feed.number)
-
-    def status(self) -> dict[str, object]:
-        """Return the state of the head with the loop's ticks and the last messages."""
-        tick = self._feed.newest
-        if tick is None:
-            return {"ticks": 0, "stopped": "", "said": ()}
-        state = head_state(tick)
-        return {
-            **structs.asdict(state),
-            "ticks": self._feed.ticks,
-            "age_s": self._clock.now_s() - tick.t_s,
-            "camera": tick.camera_conditions,
-            "said": [event.text for event in self._feed.messages()[-_WORDS:]],
-        }
-
-
 class RequestHandler:
     """Executes requests of other programs; answers {"ok": ...} or {"refused": ...}.
 
@@ -200,11 +85,9 @@ class RequestHandler:
 
     Args:
         command: Queues a command for the next tick.
-        pulse: State of the loop.
+        feed: Newest tick and events of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         params: The parameters, None if they cannot be read or changed.
-        fixed: Reason why parameters cannot be changed.
-        saved: Called with each written file.
         voice: Says sounds and texts; None if the head has no voice.
         menus: Returns the menus.
         tracks: Returns the available tracks.
@@ -216,24 +99,21 @@ class RequestHandler:
     def __init__(
         self,
         command: CommandTaker,
-        pulse: LoopMonitor,
+        feed: TickFeed,
         about: Mapping[str, object],
-        params: ParamAccess | None = None,
+        params: "ParamStore | None" = None,
         *,
-        fixed: str = FIXED,
-        saved: Callable[[Path], None] = lambda path: None,
-        voice: Speaker | None = None,
+        voice: "RunVoice | None" = None,
         menus: Callable[[], Mapping[str, tuple[str, ...]]] = dict,
         tracks: Callable[[], Sequence[TrackInfo]] = tuple,
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
-        paths: PathGuard | None = None,
+        paths: "AllowedFolder | None" = None,
     ) -> None:
-        self._command, self._pulse, self._about = command, pulse, dict(about)
-        self._params, self._fixed, self._saved, self._paths = params, fixed, saved, paths
+        self._command, self._feed, self._about = command, feed, dict(about)
+        self._params, self._paths = params, paths
         self._voice, self._menus, self._tracks = voice, menus, tracks
         self._fault, self._changing = fault, changing
-        self._unsaved = -1, 0
 
     def answer(self, message: object, peer: str = "") -> dict[str, object]:
         """Execute one request; return {"ok": result} or {"refused": every broken rule}.
@@ -269,21 +149,17 @@ class RequestHandler:
             case ReadStatus():
                 return {"ok": self._status()}
             case State(after):
-                return {"ok": self._pulse.state(after)}
+                return {"ok": self._feed.report(after)}
             case Fault(text):
                 if self._fault is None:
                     raise ValueError(REAL)
                 return {"ok": self._fault(text)}
-            case ReadMenus():
-                return {"ok": self._menus()}
             case Tracks():
                 return {"ok": self._tracks()}
-            case SayPiece():
-                return {"ok": self._say_piece(request)}
             case Command():
                 done: object = self._command(self._speech(request))
             case _:
-                done = self._handle_params(request)
+                done = self.perform(request)
         if isinstance(done, Ticket):
             reply = done.wait(_TAKEN_UP_S)
             if reply is None:
@@ -292,18 +168,24 @@ class RequestHandler:
                 return {"refused": reply.refused, "reply": reply}
             return {"ok": {"notes": (), "reply": reply}}
         if isinstance(request, Command | Set | Revert | Character):
-            if not self._pulse.wait_for_commands():
+            if not self._feed.wait_for_ticks(_READ_BY_TICKS, _TAKEN_UP_S):
                 raise ValueError(_HANGS)
             return {"ok": {"notes": done or ()}}
         return {"ok": done}
 
-    def _handle_params(self, request: Request) -> object:
-        """Return the answer to a question, or the notes for the user of a change."""
+    def perform(self, request: Request) -> object:
+        """Return the answer to a question, or the notes of a change that the loop has not read.
+
+        Raises:
+            one of REFUSALS: a rule forbids it.
+        """
+        if isinstance(request, ReadMenus):
+            return self._menus()
+        if isinstance(request, SayPiece):
+            return self._say_piece(request)
         params, paths = self._params, self._paths
         if params is None:
-            if isinstance(request, Get | Parameters | Unsaved | Characters):
-                return {} if isinstance(request, Get) else ()
-            raise ValueError(self._fixed)
+            raise ValueError(FIXED)
         match request:
             case Parameters(prefix):
                 return [one for one in params.parameters() if one.key.startswith(prefix)]
@@ -323,9 +205,7 @@ class RequestHandler:
                 file = Path(path).expanduser() if path else None
                 if file is not None and not file.is_absolute():
                     raise ValueError(f"{path}: give the absolute path; the rig has its own folder")
-                saved = params.save(file)
-                self._saved(saved.path)
-                return saved
+                return params.save(file)
             case Revert():
                 return params.revert()
             case Character(name):
@@ -348,18 +228,23 @@ class RequestHandler:
             voice.finish()
         return ahead_s
 
-    def _require_voice(self) -> Speaker:
+    def _require_voice(self) -> "RunVoice":
         if self._voice is None:
             raise ValueError("this head has no voice")
         return self._voice
 
     def _status(self) -> dict[str, object]:
-        params = self._params
-        version = params.version if params is not None else 0
-        if version != self._unsaved[0]:  # count once for a program that polls
-            self._unsaved = version, len(params.unsaved()) if params is not None else 0
-        about = {**self._about, **self._changing(), "version": version, "unsaved": self._unsaved[1]}
-        return {**about, **self._pulse.status()}
+        unsaved = len(self._params.unsaved()) if self._params is not None else 0
+        about = {**self._about, **self._changing(), "unsaved": unsaved}
+        if (tick := self._feed.newest) is None:
+            return {**about, "ticks": 0, "stopped": "", "said": ()}
+        return {
+            **about,
+            **structs.asdict(head_state(tick)),
+            "ticks": self._feed.ticks,
+            "camera": tick.camera_conditions,
+            "said": [event.text for event in self._feed.messages()[-_WORDS:]],
+        }
 
 
 def is_stop(message: object) -> bool:

@@ -31,7 +31,7 @@ it. A patch in the direction of a part of the head is that part, unless its meas
 differs.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import hypot, inf
@@ -39,11 +39,10 @@ from typing import NamedTuple
 
 from gazerig.drivers.types import Located
 from gazerig.gaze.angles import add, dot, norm, perpendicular, scale, sub, unit
-from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.model.kinematics import Capsule
+from gazerig.gaze.types import Vec3
 from gazerig.robot.perception.track import UNNAMED
 
-HAND, OWN = "hand", "own"
+HAND = "hand"
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 Known = tuple[Vec3, Vec3 | None]
 """Position of a face in the world, and its velocity, None if unknown."""
@@ -98,10 +97,6 @@ _DEEP_M = 0.5
 # Speed across the view relative to a person below which a patch moves along: at least this, or this
 # fraction of the person's.
 _ALONG_WITH_M_S, _ALONG_WITH_SHARE = 0.3, 0.5
-# Tolerance of the depth of a part of the head, in addition to two standard deviations.
-_MARGIN_M = 0.05
-OwnParts = Callable[[Mat3, Vec3], Sequence[Capsule]]
-"""Returns the parts of the head in the world for a pose."""
 
 
 @dataclass(slots=True)
@@ -566,34 +561,3 @@ def _moves_along(thing: Located, p_face: Vec3, v_face: Vec3 | None, p_camera: Ve
         v = scale(v, norm(sub(p_face, p_camera)) / max(norm(way), 1e-6))
     across = norm(perpendicular(sub(v, v_face), unit(way)))
     return across < max(_ALONG_WITH_M_S, _ALONG_WITH_SHARE * norm(v_face))
-
-
-def label_own_body(
-    things: list[Located], parts: Sequence[Capsule], p_camera: Vec3
-) -> list[Located]:
-    """Return the things, with the kind OWN for parts of the robot's own body.
-
-    Args:
-        things: moving things of a frame.
-        parts: parts of the head at the exposure. A part around the camera is not visible.
-        p_camera: position of the camera.
-    """
-    seen = [part for part in parts if not part.contains(p_camera)]
-    return [
-        thing._replace(kind=OWN)
-        if thing.kind == UNNAMED and any(_is_part(thing, part, p_camera) for part in seen)
-        else thing
-        for thing in things
-    ]
-
-
-def _is_part(thing: Located, part: Capsule, p_camera: Vec3) -> bool:
-    """Return whether a thing is a part of the head."""
-    way = sub(thing.p_m, p_camera)
-    hit_m = part.hit_m(p_camera, unit(way))
-    if hit_m is None:
-        return False
-    if not thing.depth_measured:
-        return True
-    margin_m = _MARGIN_M + 2.0 * thing.along_sd_m
-    return hit_m - margin_m < norm(way) < hit_m + 2.0 * part.radius_m + margin_m

@@ -20,9 +20,7 @@ from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, FrameLocator
 from gazerig.robot.perception.hands import (
     Hands,
-    OwnParts,
     known_faces,
-    label_own_body,
     without_own_motion,
 )
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
@@ -50,7 +48,6 @@ class Perception:
         parts_face_m: measured positions of one person's face parts in the face frame, instead of
             the average ones (Nakamoto & Tsuruno 3.7).
         lens: calibrated lens, used for frames with the aspect ratio of the calibration.
-        own_parts: positions of the robot's own head and neck; None: they count as other things.
     """
 
     def __init__(
@@ -59,10 +56,8 @@ class Perception:
         horizontal_field_deg: float,
         parts_face_m: Mapping[str, Vec3] | None = None,
         lens: LensParams | None = None,
-        own_parts: OwnParts | None = None,
     ) -> None:
         self._mount = mount
-        self._own_parts = own_parts
         own = parts_face_m or {}
         self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
         self._locator = FrameLocator(lens, radians(horizontal_field_deg))
@@ -107,8 +102,6 @@ class Perception:
         people = [track for track in self._tracks if track.is_person]
         carried: list[tuple[int, Located]] = []
         if things or palms or self._hands.resting:
-            if self._own_parts is not None:
-                things = label_own_body(things, self._own_parts(R_head, p_head), p)
             tracked = [
                 (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
                 for t in people

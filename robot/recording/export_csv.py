@@ -27,7 +27,7 @@ import numpy as np
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import output_file
 from gazerig.gaze.angles import angle_between, sub, unit, yaw_pitch
-from gazerig.gaze.field_of_view import head_in_space, line_of_sight
+from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Floats, Vec3, body_name
 from gazerig.robot.loop.tick import Tick, cyclopean_direction
 
@@ -74,7 +74,7 @@ class GazeExport:
         right = _LOST if lost_right else line_of_sight(pose, left=False)
         angles = (degrees(a) for way in (gaze, left, right) for a in yaw_pitch(way))
         lids = pose.lid_left, pose.lid_right, pose.lower_left, pose.lower_right
-        joints = zip(_JOINTS, (*map(degrees, head_in_space(pose)), *lids), strict=True)
+        joints = zip(_JOINTS, (*map(degrees, pose.head_rad), *lids), strict=True)
         known = {*tick.guard_result.joints}.difference(missing)
         own = (value if name in known else nan for name, value in joints)
         self._samples.append((tick.t_s, *angles, *own))

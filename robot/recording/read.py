@@ -24,7 +24,6 @@ from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, read_text
 
 _CURE = "make one with gazerig run --record"
-_CAMERA = "gazerig-camera-"
 _RUN = PROFILE.rstrip("0123456789")
 _LARGEST = 64 << 20  # bytes of a record; the writer's have about 1 MB, more is damage
 _LONGEST_GAP_S = 3600.0  # between two ticks; more is damage
@@ -164,19 +163,13 @@ class RunRecording:
         """Reject a file that is not a recording of a run."""
         if profile == PROFILE:
             return
-        if profile.startswith(_CAMERA):
-            raise BadRecording(
-                f"{self.path} is a recording of a camera, not of a run: play it with "
-                "gazerig run --camera-recording"
-            )
         if profile.startswith(_RUN):
             raise BadRecording(
                 f"{self.path} is of format {profile.removeprefix(_RUN)}, this program reads "
                 f"{FORMAT}: use the version of gazerig that recorded it"
             )
         raise BadRecording(
-            f"{self.path} is not a recording of gazerig (its profile is {profile!r}): make one with "
-            "gazerig run --record"
+            f"{self.path} is not a recording of a run (its profile is {profile!r}): {_CURE}"
         )
 
 

@@ -24,7 +24,7 @@ from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory, fixed_mount
-from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
+from gazerig.robot.model.kinematics import NECK, Kinematics
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.motion_source import MotionSource
 from gazerig.robot.run.options import RunOptions
@@ -103,31 +103,13 @@ def detector_of(rig: Rig, own: FaceDetector | None) -> MakeDetector:
     return partial(face_detector, rig.detector) if own is None else lambda: own
 
 
-def own_camera(
-    rig: Rig, view: CameraView, camera: Camera | FrameSource, options: RunOptions,
-    now_s: Callable[[], float], detector: MakeDetector,
-) -> Camera:  # fmt: skip
-    """Return the camera of a program, with the rig's detectors if it returns frames.
-
-    Raises:
-        SetupError: it returns frames in simulated time.
-    """
-    if not camera_plugins.is_source(camera):
-        return cast(Camera, camera)
-    if options.fast:
-        raise SetupError(
-            f"camera {type(camera).__name__} of the program returns frames in real time: in "
-            "simulated time return detections"
-        )
-    parts = _parts(rig, view, partial(cast, FrameSource, camera), detector)
-    return CameraWorker(parts, now_s, in_thread=True)
-
-
 def real_camera(
     rig: Rig, view: CameraView, options: RunOptions, now_s: Callable[[], float],
-    own: FaceDetector | None = None,
+    own: FaceDetector | None = None, camera: Camera | FrameSource | None = None,
 ) -> Camera:  # fmt: skip
-    """Return the camera of a film, a recording, a webcam, an OAK-D or a package.
+    """Return the camera of a film, a recording, a webcam, an OAK-D, a package or a program.
+
+    The rig's detectors analyse its frames; one that returns detections is used as it is.
 
     Args:
         rig: Parameters of camera and detectors.
@@ -135,34 +117,34 @@ def real_camera(
         options: Select the camera.
         now_s: The host's clock.
         own: A program's own detector, which exists only in this process.
+        camera: A program's own camera, which exists only in this process.
 
     Raises:
-        SetupError: a film, recording or model file cannot be used.
+        SetupError: a film, recording or model file cannot be used, or a program's camera returns
+            frames in simulated time.
     """
-    detector = detector_of(rig, own)
-    source = _source(rig, options)
-    parts = _parts(rig, view, source, detector)
-    if options.fast:
-        from gazerig.sim_mock.cameras.video import FilmCamera
-
-        film = cast("FilePlayer", source())
-        motion = view.motion(rig.motion)()
-        return FilmCamera(
-            film, detector(), _FILM_DELAY_S, 0.0, motion, view.locate, parts.orientation
-        )
-    if isinstance(options.camera, str) and not is_ours(CAMERA, options.camera):
-        camera = source()
-        if not camera_plugins.is_source(camera):
-            return cast(Camera, camera)
-    recorded = parts._replace(record=options.record_camera)
-    return CameraWorker(recorded, now_s, in_thread=own is not None)
-
-
-def _parts(
-    rig: Rig, view: CameraView, source: Callable[[], FrameSource], detector: MakeDetector
-) -> CameraParts:
+    source = _source(rig, options) if camera is None else partial(cast, FrameSource, camera)
+    is_package = isinstance(options.camera, str) and not is_ours(CAMERA, options.camera)
+    if camera is not None or is_package:
+        made = source()
+        if not camera_plugins.is_source(made):
+            return cast(Camera, made)
+    detector, motion = detector_of(rig, own), view.motion(rig.motion)
     orientation = FrameOrientation(view.params.rotation, view.params.mirrored)
-    return CameraParts(source, detector, view.motion(rig.motion), view.locate, orientation)
+    if not options.fast:
+        parts = CameraParts(
+            source, detector, motion, view.locate, orientation, options.record_camera
+        )
+        return CameraWorker(parts, now_s, in_thread=own is not None or camera is not None)
+    if camera is not None:
+        raise SetupError(
+            f"camera {type(camera).__name__} of the program returns frames in real time: in "
+            "simulated time return detections"
+        )
+    from gazerig.sim_mock.cameras.video import FilmCamera
+
+    film = cast("FilePlayer", source())
+    return FilmCamera(film, detector(), _FILM_DELAY_S, 0.0, motion(), view.locate, orientation)
 
 
 def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
@@ -195,13 +177,11 @@ def true_head_pose(steps: Callable[[], dict[str, float]], rig: Rig, head: Kinema
     Its mechanics are those of the rig at the start, even if parameters change later.
     """
     pairs = rig.couplings.values()
-    necks = (*NECK, *LOWER_NECK)
     linkages = {
         name: rig.joints[name].make_linkage()
-        for name in {*necks, *(joint for pair in pairs for joint in pair.joints)}
-        & rig.joints.keys()
+        for name in {*NECK, *(joint for pair in pairs for joint in pair.joints)} & rig.joints.keys()
     }
-    absent, angles_of = dict.fromkeys(necks, 0.0), itemgetter(*necks)
+    absent, angles_of = dict.fromkeys(NECK, 0.0), itemgetter(*NECK)
 
     def now(_: float) -> tuple[Mat3, Vec3]:
         at, angles = steps(), absent.copy()
@@ -210,8 +190,7 @@ def true_head_pose(steps: Callable[[], dict[str, float]], rig: Rig, head: Kinema
         for pair in pairs:
             first, second = pair.joints
             angles[first], angles[second] = pair.joint_rad((angles[first], angles[second]))
-        yaw, pitch, roll, lower_yaw, lower_pitch = angles_of(angles)
-        return head.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
+        return head.head_pose(angles_of(angles))
 
     return now
 

@@ -1,6 +1,6 @@
 """Figures of a run, collected tick by tick and returned as one JSON object at the end."""
 
-from collections import Counter, defaultdict, deque
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 from math import degrees, inf, radians
 
@@ -13,8 +13,6 @@ from gazerig.robot.loop.tick import Tick
 
 _FIXATION_RAD_S = radians(40.0)
 """Largest speed of a fixation; 30 is usual, and a servo step in 20 ms is already 4.4 deg/s."""
-_EVENTS_KEPT = 100
-"""Number of newest values stored; a rig that runs for weeks must not fill the memory."""
 _PERIOD_S = 0.02
 """Least time between two samples of the gaze, as those of an eye tracker at 50 Hz."""
 
@@ -25,8 +23,6 @@ class Summary:
     def __init__(self) -> None:
         self._target_s: defaultdict[str, float] = defaultdict(float)
         self._part_s: defaultdict[str, float] = defaultdict(float)
-        self._limited: Counter[str] = Counter()
-        self._events: deque[tuple[float, str]] = deque(maxlen=_EVENTS_KEPT)
         # Counts by thousandths of a degree: a list would grow while the rig runs.
         self._errors_mdeg: Counter[int] = Counter()
         self._first_s: float | None = None
@@ -39,10 +35,6 @@ class Summary:
         if self._first_s is None:
             self._first_s = tick.t_s
         self._last = tick
-        for event in tick.events:
-            self._events.append((tick.t_s - self._first_s, event))
-        for reason in tick.guard_result.reasons:
-            self._limited[reason.partition(": ")[2]] += 1
         if tick.t_s - self._sampled_s >= _PERIOD_S - 1e-9:
             self._sample(tick)
 
@@ -80,8 +72,6 @@ class Summary:
                 "median": _percentile_deg(self._errors_mdeg, 50.0),
                 "p95": _percentile_deg(self._errors_mdeg, 95.0),
             },
-            "limited": dict(sorted(self._limited.items())),
-            "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
         }
 
 

@@ -27,7 +27,7 @@ from gazerig.config.parameters import (
     values,
 )
 from gazerig.config.rig import Rig
-from gazerig.config.rig_files import AllowedFolder, RigLayers, read_all, save_layers
+from gazerig.config.rig_files import AllowedFolder, RigLayers, save_layers
 from gazerig.config.save_text import format_value
 from gazerig.config.schema import NO_CHARACTER, load_rig, load_walk
 from gazerig.config.shipped_files import is_path
@@ -64,14 +64,13 @@ class _Rigs(NamedTuple):
 
     saved: rig of the files, with the options; rig: the present one
     in_effect: the one that the running parts have
-    layers: requested files; files: the present ones
+    layers: requested files
     """
 
     saved: Rig
     rig: Rig
     in_effect: Rig
     layers: RigLayers
-    files: tuple[Path, ...]
 
     @property
     def present_layers(self) -> RigLayers:
@@ -107,9 +106,8 @@ class ParamStore:
     ) -> None:
         self._command, self._now = command, now
         self._changing = threading.Lock()
-        read, files = read_all(layers)
-        self._options = differences(read, rig)
-        self._rigs = _Rigs(rig, rig, rig, layers, files)
+        self._options = differences(load_rig(*layers), rig)
+        self._rigs = _Rigs(rig, rig, rig, layers)
         self._defaults = load_rig(rig.name if rig.name in shipped_names("rigs") else "desk")
         self.version = 0
         self.confined = AllowedFolder(rig_folder(layers.name))
@@ -124,10 +122,6 @@ class ParamStore:
         """Return the present character, "none" without one."""
         rigs = self._rigs
         return rigs.present_layers.character or rigs.rig.character or NO_CHARACTER
-
-    def files(self) -> tuple[Path, ...]:
-        """Return the files in use: the rig's, and those that override it."""
-        return self._rigs.files
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters in the order of the file."""
@@ -205,11 +199,11 @@ class ParamStore:
             self._reload()
             rigs, to = self._rigs, str(path) if copied else None
             wanted = differences(rigs.saved, rigs.rig)
-            saved, files = save_layers(rigs.present_layers, to, wanted, self._now())
+            saved = save_layers(rigs.present_layers, to, wanted, self._now())
             layers = rigs.layers._replace(name=to or rigs.layers.name)
             if "character" in wanted:
                 layers = layers._replace(character=None)
-            self._rigs = rigs._replace(saved=rigs.rig, layers=layers, files=files)
+            self._rigs = rigs._replace(saved=rigs.rig, layers=layers)
             self.version += 1
             return saved
 
@@ -228,18 +222,8 @@ class ParamStore:
         """
         return self.set({"character": None if name in (NO_CHARACTER, "") else name})
 
-    def reload(self, path: Path | None = None) -> tuple[str, ...]:
-        """Apply the present values of the files; unsaved values stay unless the files changed them.
-
-        path: the edited file; all files are read
-
-        Raises:
-            gazerig.config.load.ConfigError: lists every fault; nothing changes.
-        """
-        with self._changing:
-            return self._reload()
-
-    def _reload(self) -> tuple[str, ...]:
+    def _reload(self) -> None:
+        """Read the files again; unsaved values stay unless the files changed them."""
         before = self._rigs
         rigs = _read(before, self._options)
         edited = differences(before.saved, rigs.saved)
@@ -250,7 +234,7 @@ class ParamStore:
             for key, value in differences(before.saved, before.rig).items()
             if key not in edited
         }
-        return self._apply(rigs, apply_changes(rigs.saved, kept))
+        self._apply(rigs, apply_changes(rigs.saved, kept))
 
     def _apply(self, rigs: _Rigs, rig: Rig) -> tuple[str, ...]:
         """Apply a checked rig, and return the changes."""
@@ -271,5 +255,4 @@ class ParamStore:
 
 def _read(rigs: _Rigs, options: Mapping[str, Value]) -> _Rigs:
     """Return the state with the files' present values under the options; the rig stays."""
-    saved, files = read_all(rigs.present_layers)
-    return rigs._replace(saved=apply_changes(saved, options), files=files)
+    return rigs._replace(saved=apply_changes(load_rig(*rigs.present_layers), options))

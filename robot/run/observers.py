@@ -22,7 +22,6 @@ from gazerig.robot.loop.tick_stream import Observers, TickStream, failure_text
 from gazerig.robot.loop.timing import LoopTiming, busy_text
 from gazerig.robot.model.commands import Talk
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.scene import has_opponent
 from gazerig.robot.net.client import rig_name
 from gazerig.robot.net.live_server import LiveServer
 from gazerig.robot.net.topics import JointInfo, RigInfo, RunState
@@ -88,7 +87,6 @@ class RunObservers:
         return LiveServer(
             run.robot,
             run.params,
-            run.clock,
             {"rig": options.rig, "name": options.name or rig_name(options.rig), "pid": os.getpid()},
             self._say,
             run.bus.inject_fault,
@@ -118,7 +116,7 @@ class RunObservers:
             run.rig.name,
             str(run.params.path),
             options.mock,
-            has_opponent(shapes),
+            shapes is not None and shapes.opponent is not None,
             "" if computed else str(detector_status(run.rig.detector)),
             level_text(options.computer) if options.computer is not None else "",
             dict(zip(names, map(_joint_info, limits(run.rig.joints)), strict=True)),
@@ -159,10 +157,6 @@ class RunObservers:
         if self._server is not None:
             observers.add("the remote control", self._server.update)
         observers.add("the voice", self._run.voice.update)
-
-    def busy_message(self) -> str:
-        """Return a message if the computer is too busy, "" if not or if time is simulated."""
-        return busy_text(self._timing.figures())
 
     def show_parking(self, tick: Tick) -> None:
         """Show a tick of the motion to the parking pose, which is not recorded."""
@@ -226,30 +220,27 @@ class SceneAgent:
 
     def __init__(self, run: Run) -> None:
         self._run, self._scene = run, run.scene
-        self._acts: tuple[AgentAct, ...] = getattr(run.scene, "agent", ())
-        self._start_s: float | None = None
-        self._next = 0
+        self._done = 0
         self._seen: dict[int, Vec3] = {}
 
     def update(self, tick: Tick) -> None:
         """Report what has become due at the newest tick."""
         scene: Any = self._scene
-        if self._start_s is None:
-            begun_s = self._run.scene_start_s()
-            self._start_s = tick.t_s if begun_s is None else begun_s
+        acts: tuple[AgentAct, ...] = scene.agent
+        start_s = self._run.scene_start_s()
+        if start_s is None:
+            return
         if tick.percept is not None:
             self._seen |= {face.id: face.p_world_m for face in tick.percept.faces}
-        since_s = tick.t_s - self._start_s
-        while self._next < len(self._acts) and since_s >= self._acts[self._next].at_s:
-            act = self._acts[self._next]
-            self._next += 1
+        rounds, since_s = divmod(tick.t_s - start_s, scene.round_s)
+        due = int(rounds) * len(acts) + sum(act.at_s <= since_s for act in acts)
+        while self._done < due:
+            act = acts[self._done % len(acts)]
+            self._done += 1
             person = self._person_id(scene.face(act.person, since_s)) if act.person else None
             self._run.robot.command(
                 Talk(act.state, person, act.seconds, act.text, who="mock agent", stay=True)
             )
-        if scene.round_s and since_s >= scene.round_s and self._next == len(self._acts):
-            self._start_s += scene.round_s
-            self._next = 0
 
     def _person_id(self, place: Vec3) -> int | None:
         """Return perception's number of the person last seen at a place, None without one."""

@@ -96,8 +96,6 @@ class RunOptions:
     profile: Annotated[str | None, Option("Style of gaze: robot, mitake, nakamoto.", "NAME|FILE")] = None
     rules: Annotated[str | None, Option("Rules instead of the rig's: boxing ...", "NAME|FILE")] = None
     scanpath: Annotated[str | None, Option("Face scanpath: markov, simple, face_tracking, random.", "NAME", is_shown=False)] = None
-    saccade: Annotated[str | None, Option("Saccades: human, min_jerk, literal_frame.", "NAME", is_shown=False)] = None
-    behaviour: Annotated[str | None, Option("Initial behaviour, one of the rules.", "NAME", is_shown=False)] = None
     conversation: Annotated[str | None, Option("Initial state of a conversation: talk, listen, think.", "NAME", is_shown=False)] = None
     page: Annotated[str | None, Option("Address of the live page; 0.0.0.0:8080 serves others.", "HOST:PORT")] = None
     token_file: Annotated[Path | None, Option("File with the page's token; created if missing.", "FILE", is_shown=False)] = None

@@ -10,12 +10,12 @@ from gazerig.config.rig import Rig
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import Description
 from gazerig.robot.description.statics import (
-    NECK_JOINTS,
     STRONG_SHARE,
     Statics,
     moving_bodies,
 )
 from gazerig.robot.loop.sag import SagCompensation
+from gazerig.robot.model.kinematics import NECK
 from gazerig.robot.model.types import order_joints
 from gazerig.robot.model.weight import GEAR_FRICTION
 from gazerig.robot.run.rig_limits import lid_ends, park_rad
@@ -44,14 +44,14 @@ def shape_of(rig: Rig) -> RigShape:
 
 def statics_of(rig: Rig) -> Statics:
     """Return the torques that the servos of a rig's neck hold at rest, all other joints at 0."""
-    joints = {name: joint for name, joint in rig.joints.items() if name in NECK_JOINTS}
+    joints = {name: joint for name, joint in rig.joints.items() if name in NECK}
     pairs = [pair for pair in rig.couplings.values() if {*pair.joints} <= {*joints}]
     return Statics(moving_bodies(description_of(rig), joints), joints, pairs)
 
 
 def sag_compensation(rig: Rig) -> SagCompensation | None:
     """Return what makes up for the sag of a rig's neck; None without a neck."""
-    if rig.joints.keys().isdisjoint(NECK_JOINTS):
+    if rig.joints.keys().isdisjoint(NECK):
         return None
     return SagCompensation(statics_of(rig), order_joints(rig.joints))
 

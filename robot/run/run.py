@@ -25,7 +25,6 @@ from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClock
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.frames import CameraParams, fixed_mount
-from gazerig.robot.model.scene import BoxingScene
 from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
@@ -36,7 +35,6 @@ from gazerig.robot.run.cameras import (
     HeadPose,
     browser_worker,
     detector_of,
-    own_camera,
     place_camera,
     real_camera,
     scene_camera,
@@ -58,11 +56,12 @@ from gazerig.robot.run.rig_limits import (
     park_rad,
 )
 from gazerig.robot.run.run_rig import run_info, with_options
-from gazerig.robot.run.surroundings import RunRoom, refuse_missing_rules, scene_of, world
+from gazerig.robot.run.surroundings import refuse_missing_rules, scene_of, world
 from gazerig.robot.run.voice import RunVoice
 from gazerig.robot.safety.guard import Guard
 
 if TYPE_CHECKING:
+    from gazerig.features.world.run.rig_room import RigRoom
     from gazerig.robot.recording.recorder import Recorder
 
 
@@ -115,7 +114,7 @@ class Run:
             # Bus and surroundings
             self.clock: Clock = SimulatedClock() if options.fast else RealClock()
             self.scene = scene_of(options)
-            self.room: RunRoom | None = None
+            self.room: RigRoom | None = None
             if options.world is not None:
                 self.room = world().open(rig, options, self.clock)
                 self.scene, self.clock = self.room.scene, self.room.clock
@@ -126,7 +125,7 @@ class Run:
             # Camera
             now_s, view = self.clock.now_s, self.view
             if camera is not None:
-                seen = own_camera(rig, view, camera, options, now_s, detector_of(rig, detector))
+                seen = real_camera(rig, view, options, now_s, detector, camera)
             elif self.room is not None:
                 seen = self.room.camera(
                     rig, options, view, random["camera"], detector_of(rig, detector)
@@ -172,7 +171,6 @@ class Run:
                     view.params.horizontal_field_deg,
                     face_parts_m(rig),
                     view.params.lens,
-                    models.kinematics.body_volumes,
                 ),
                 view.poses,
                 attention,
@@ -187,8 +185,8 @@ class Run:
                 PixelToWorld(view.mount, view.poses, lambda: self.camera_params),
                 self._messages,
             )
-            if isinstance(self.scene, BoxingScene) and self.scene.opponent and self.room:
-                self.robot.set_opponent(self.scene.opponent, self.room.start_s)
+            if self.room is not None and (opponent := self.room.world.scene.opponent) is not None:
+                self.robot.set_opponent(opponent, self.room.start_s)
             # What people use while it runs
             self.browser: BrowserCamera | None = None
             if options.mock and not options.fast:
@@ -304,7 +302,7 @@ class Run:
 
 
 def _tracks(rig: Rig, models: GazeModels) -> TrackChoices:
-    """Return the tracks of a rig, those in the folder beside its file included."""
+    """Return the tracks of a rig."""
     return TrackChoices(
         tracks_of(rig.track_files),
         models.animation.tracks,

@@ -42,7 +42,6 @@ def with_options(rig: Rig, options: RunOptions) -> Rig:
         rate_hz = min(level.rate_hz, rig.loop.rate_hz)
     changes: dict[str, Value] = {
         "gaze.scanpath.model": options.scanpath,
-        "gaze.saccade.profile": options.saccade,
         "loop.rate_hz": rate_hz,
     }
     scene = scene_of(options)

@@ -84,7 +84,7 @@ class Session:
         with contextlib.ExitStack() as closed_last:
             closed_last.callback(run.close)
             people = RunObservers(run, self._say, self._status, self._browse)
-            faults = JointFaults(self._say, people.busy_message)
+            faults = JointFaults(self._say)
             observers = self._observers(people, faults)
             _choose(run)
             recorder, begun = run.recorder, False
@@ -113,7 +113,6 @@ class Session:
                     people.close(count.stopped_by)
                 elif recorder is not None:
                     recorder.close("it could not start")
-            faults.close()
             self._figures = self._collect_figures(count, faults)
             if recorder is not None and recorder.unwritten is not None:
                 self._figures["not_written"] = str(recorder.unwritten)
@@ -171,23 +170,21 @@ class Session:
             "faces_seen": perception.frames_with_face,
             "pictures": perception.frames,
             **(self._summary.figures() if self._summary is not None else {}),
-            "joint_faults": faults.figures(),
+            "joint_faults": faults.counts,
             "bus": bus,
             "stopped_by": count.stopped_by,
         }
 
 
 def _choose(run: Run) -> None:
-    """Make the choices of the command line.
+    """Choose the state of a conversation that the command line names.
 
     Raises:
-        SetupError: there is no such choice.
+        SetupError: there is no such state.
     """
     try:
-        for menu in ("behaviour", "conversation"):
-            choice = getattr(run.options, menu)
-            if choice is not None:
-                run.robot.ask(menu, choice)
+        if run.options.conversation is not None:
+            run.robot.ask("conversation", run.options.conversation)
     except ValueError as error:
         raise SetupError(str(error)) from error
 

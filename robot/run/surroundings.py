@@ -3,9 +3,8 @@
 The world is a feature, found by the entry point ``world`` of the group ``gazerig.surroundings``.
 """
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, cast
 
 from gazerig.config.load import find_file, load
 from gazerig.config.shipped_files import is_path, shipped_names
@@ -18,14 +17,7 @@ from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import SceneScript
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from gazerig.config.rig import Rig
-    from gazerig.drivers.types import Camera, FaceDetector
-    from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
-    from gazerig.robot.model.clock import Clock
-    from gazerig.robot.run.buses import RunBus
-    from gazerig.robot.run.cameras import CameraView
+    from gazerig.features.world.run.surroundings import WorldSurroundings
 
 KIND = "scenes"
 """Folder of the shipped scenes."""
@@ -82,71 +74,10 @@ def refuse_missing_rules(rules: TopDownParams, scene: Scene, option: str) -> Non
         )
 
 
-class RunRoom(Protocol):
-    """The world of one run; the rig's emulated servos are in it."""
-
-    @property
-    def scene(self) -> Scene:
-        """Return the people and things in it."""
-
-    @property
-    def clock(self) -> "Clock":
-        """Return the clock of the run."""
-
-    @property
-    def run_bus(self) -> "RunBus":
-        """Return the bus of the rig's servos; its ``close`` ends the world."""
-
-    def camera(
-        self,
-        rig: "Rig",
-        options: RunOptions,
-        view: "CameraView",
-        rng: "np.random.Generator",
-        detector: "Callable[[], FaceDetector]",
-    ) -> "Camera":
-        """Return the rig's camera; called only once.
-
-        Args:
-            rig: Rig with the parameters of detectors.
-            options: Options of the run.
-            view: Placement of the camera.
-            rng: Random numbers of its noise.
-            detector: Creates the face detector.
-        """
-
-    def start_s(self) -> float | None:
-        """Return the start of its script on the clock of the ticks, None before it."""
-
-    def shapes(self) -> "WorldShapes | None":
-        """Return its appearance for the page, None if it is not shown."""
-
-
-class Surroundings(Protocol):
-    """The feature that makes worlds."""
-
-    def scene(self, options: RunOptions) -> Scene:
-        """Return the people and things in the world of a run; nothing is started.
-
-        Raises:
-            SetupError: the world cannot be used.
-        """
-
-    def open(self, rig: "Rig", options: RunOptions, clock: "Clock") -> RunRoom:
-        """Return the world of a run, with the rig's emulated servos in it.
-
-        Raises:
-            SetupError: the world cannot be used.
-        """
-
-    def names(self) -> tuple[str, ...]:
-        """Return the names for shell completion of ``--world``."""
-
-
-def world() -> Surroundings:
+def world() -> "WorldSurroundings":
     """Return the feature that makes worlds.
 
     Raises:
         PluginError: it cannot be imported.
     """
-    return cast(type[Surroundings], find(SURROUNDINGS, "world").load())()
+    return cast("type[WorldSurroundings]", find(SURROUNDINGS, "world").load())()

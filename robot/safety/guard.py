@@ -125,16 +125,6 @@ class Guard:
         """Return the present limits; new ones replace them as soon as joints keep them."""
         return tuple(self._limits)
 
-    def take_reports(self) -> list[str]:
-        """Return a line for each joint that has become warm since the last call."""
-        if not self._health.warmed:
-            return []
-        found, self._health.warmed = self._health.warmed, []
-        return [
-            f"{self._names[i]} is warm, {celsius:.0f} deg C: slower until it cools; stops at {hot:.0f}"
-            for i, celsius, hot in found
-        ]
-
     def check(
         self, desired_rad: JointAngles, joints: JointState, frame_age_s: float, t_s: float
     ) -> GuardResult:

@@ -48,8 +48,6 @@ class JointHealth:
         share: Part of its speed and acceleration that each joint may use, 0 .. 1.
         why: Reason for that part, per joint.
         held: Reason for a complete stop, per joint.
-        warmed: Joints that have become warm since this was cleared, with their temperature and the
-            one at which they stop, deg C.
     """
 
     def __init__(self, limits: tuple[JointLimit, ...]) -> None:
@@ -67,8 +65,6 @@ class JointHealth:
         self._heated = [0.0] * count  # (load^2 - continuous load^2) times seconds
         self._outside_s = [0.0] * count
         self._hot = [False] * count
-        self._warm = [False] * count
-        self.warmed: list[tuple[int, float, float]] = []
         self._overloaded = [False] * count
         self._no_volts = [False] * count
         self._seen: tuple[object, object] = ((), ())
@@ -106,10 +102,6 @@ class JointHealth:
         warm = self._limits[i].hottest_c - WARM_C
         hot = self._limits[i].hottest_c - HOT_C
         self._hot[i] = celsius >= (hot - _COOLER_C if self._hot[i] else hot)
-        was_warm = self._warm[i]
-        self._warm[i] = celsius >= (warm - _COOLER_C if was_warm else warm)
-        if self._warm[i] and not was_warm:
-            self.warmed.append((i, celsius, hot))
         return min(max((hot - celsius) / (hot - warm), 0.0), 1.0)
 
     def _load(self, i: int, load: float | None, dt_s: float) -> float:

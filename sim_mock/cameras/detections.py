@@ -16,7 +16,7 @@ from gazerig.gaze.angles import add, dot, norm, rotate, rotate_back, rotation, s
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount
-from gazerig.sim_mock.cameras.frame_times import FrameParams, FrameTimes
+from gazerig.sim_mock.cameras.frame_times import Begin, FrameParams, FrameTimes
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 _FARTHEST_FACE_M = 4.0
@@ -43,7 +43,7 @@ class SceneCamera:
         head_pose: true rotation (3, 3) and position [m] of the head in the world at a time [s].
         rng: random numbers of the noise.
         locate: converts detections from pixels to the camera's axes; None: no conversion.
-        begins_s: start of the scene; None: at the first call of ``latest``.
+        begin: returns the start of the scene; None: at the first call of ``latest``.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class SceneCamera:
         head_pose: Callable[[float], tuple[Mat3, Vec3]],
         rng: np.random.Generator,
         locate: Locate | None = None,
-        begins_s: float | None = None,
+        begin: Begin | None = None,
     ) -> None:
         self._params = params
         self._scene = scene
@@ -62,7 +62,7 @@ class SceneCamera:
         self._head_pose = head_pose
         self._rng = rng
         self._locate = locate
-        self._times = FrameTimes(params, begins_s)
+        self._times = FrameTimes(params, begin)
         self._lens = params.lens
 
     @property

@@ -1,6 +1,7 @@
 """When a simulated camera exposes its frames, and when their detections arrive."""
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, radians
 
@@ -24,21 +25,25 @@ class FrameParams:
         return intrinsics_of_view(radians(self.horizontal_field_deg), self.width_px, self.height_px)
 
 
+Begin = Callable[[], float | None]
+"""Returns the start of a scene, None before it."""
+
+
 class FrameTimes:
     """Frames at a constant rate that arrive after a constant latency.
 
     Args:
         params: rate and latency.
-        begins_s: start of the scene; None: at the first frame.
+        begin: returns the start of the scene, None before it; None: at the first frame.
 
     Attributes:
         start_s: start of the scene, None before it.
         number: number of the newest frame, from 1.
     """
 
-    def __init__(self, params: FrameParams, begins_s: float | None) -> None:
+    def __init__(self, params: FrameParams, begin: Begin | None) -> None:
         self._rate_hz, self._latency_s = params.rate_hz, params.latency_ms / 1e3
-        self._begins_s = begins_s
+        self._begin = begin
         self.start_s: float | None = None
         self.restart()
 
@@ -46,7 +51,7 @@ class FrameTimes:
         """Begin again with the first frame."""
         self._on_the_way: deque[Detections] = deque()
         self._arrived: Detections | None = None
-        self.start_s, self.number = self._begins_s, 0
+        self.start_s, self.number = None, 0
         self._due_s = -inf
 
     def next_frame_s(self, now_s: float) -> float | None:
@@ -54,7 +59,9 @@ class FrameTimes:
         if now_s < self._due_s:
             return None
         if self.start_s is None:
-            self.start_s = now_s
+            self.start_s = now_s if self._begin is None else self._begin()
+            if self.start_s is None:
+                return None
         # A late call skips the frames that it missed, as a real camera's buffer does.
         due = int((now_s - self.start_s) * self._rate_hz + 1e-6)
         self.number = max(self.number, due) + 1

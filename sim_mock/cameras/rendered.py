@@ -18,7 +18,7 @@ from gazerig.drivers.vision.clothing import add_clothing
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.scene import PinholeView, SceneView
-from gazerig.sim_mock.cameras.frame_times import FrameParams, FrameTimes
+from gazerig.sim_mock.cameras.frame_times import Begin, FrameParams, FrameTimes
 
 _NOISE_GREY = 3.0
 """Standard deviation of the read-out noise, grey values."""
@@ -37,7 +37,7 @@ class PixelCamera:
         find_motion: finds motion, in addition to the faces.
         locate: converts detections from pixels to the camera's axes; None: no conversion.
         lens: lens of the camera, for frames of its size; None: by its field of view.
-        begins_s: start of the scene; None: at the first call of ``latest``.
+        begin: returns the start of the scene; None: at the first call of ``latest``.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class PixelCamera:
         find_motion: Motion | None = None,
         locate: Locate | None = None,
         lens: Intrinsics | None = None,
-        begins_s: float | None = None,
+        begin: Begin | None = None,
     ) -> None:
         self._params = params
         self._view = view
@@ -60,7 +60,7 @@ class PixelCamera:
         self._detector = detector
         self._find_motion = find_motion
         self._locate = locate
-        self._times = FrameTimes(params, begins_s)
+        self._times = FrameTimes(params, begin)
         self._size_px = params.width_px, params.height_px
         self.lens = lens or params.lens
         self._rng = rng
@@ -71,11 +71,6 @@ class PixelCamera:
     def open(self) -> None:
         """Start; the first frame is taken at the first call of ``latest``."""
         self._times.restart()
-
-    @property
-    def rate_hz(self) -> float:
-        """Return the frames per second."""
-        return self._params.rate_hz
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the newest detections that have arrived by ``now_s``."""

@@ -96,7 +96,7 @@ def test_setup_in_steps_with_answers(rig, found, done):
 @pytest.mark.pty
 def test_sigterm_while_jogging_parks_and_lets_go() -> None:
     with served("desk") as desk:
-        process = start("jog", "neck_yaw", "60", "--speed", "15", "--port", desk.ports)
+        process = start("jog", "desk", "neck_yaw", "60", "--speed", "15", "--port", desk.ports)
         hear(process.stderr, "torque on")
         time.sleep(0.3)
         process.send_signal(signal.SIGTERM)
@@ -116,7 +116,7 @@ def test_a_servo_that_does_not_confirm_its_torque_off_is_named(
         return *stop(self), "neck_roll (servo 9): torque-off not confirmed: cut the servo power"
 
     monkeypatch.setattr(ManualControl, "stop", unconfirmed)
-    done = invoked("jog", "left_eye_pan", "-2", "--mock", "--seconds", "0", "--no-park")
+    done = invoked("jog", "desk", "left_eye_pan", "-2", "--mock", "--seconds", "0", "--no-park")
     assert done.code == 1
     assert "torque off on all servos; neck_roll (servo 9): torque-off not confirmed" in done.err
 
@@ -130,7 +130,7 @@ def test_a_servo_that_does_not_confirm_its_torque_off_is_named(
     ],
 )
 def test_nonsense_is_refused_before_the_torque_is_on(joint, angle, says) -> None:
-    done = invoked("jog", joint, angle, "--mock")
+    done = invoked("jog", "desk", joint, angle, "--mock")
     assert done.code == 2 and says in done.err and "torque on" not in done.err
 
 

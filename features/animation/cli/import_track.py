@@ -7,16 +7,15 @@ from typing import Annotated
 import typer
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.cli.options import RigCommand
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
 from gazerig.robot.cli.tracks import FolderOption, print_track_fit
 
 app = typer.Typer()
 
 
-@app.command("import", cls=RigCommand)
+@app.command("import")
 def import_track(
-    rig: RigArgument = "desk",
+    rig: RigArgument,
     *,
     file: Annotated[
         Path,

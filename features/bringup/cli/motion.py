@@ -25,7 +25,6 @@ from gazerig.features.bringup.manual_control import (
     park_slowly,
     refuse_angle,
 )
-from gazerig.robot.cli.options import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.events import group_events
@@ -41,9 +40,9 @@ app = typer.Typer()
 _NEGATIVE = {"ignore_unknown_options": True}
 
 
-@app.command(cls=RigCommand, context_settings=_NEGATIVE)
+@app.command(context_settings=_NEGATIVE)
 def jog(
-    rig: RigArgument = "desk",
+    rig: RigArgument,
     *,
     joint: Annotated[str, typer.Argument(metavar="JOINT", help="A joint, e.g. neck_yaw.")],
     deg: Annotated[float, typer.Argument(metavar="DEG", help="Joint angle in degrees.")],

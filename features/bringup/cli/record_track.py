@@ -31,7 +31,7 @@ from gazerig.features.bringup.hand_recording import (
 )
 from gazerig.features.bringup.telemetry import Monitor
 from gazerig.gaze.track.track import MAX_DURATION_S
-from gazerig.robot.cli.options import PidOption, RigCommand
+from gazerig.robot.cli.options import PidOption
 from gazerig.robot.cli.terminal import (
     INTERRUPTED,
     ForceOption,
@@ -48,9 +48,9 @@ from gazerig.robot.net.client import RobotClient
 app = typer.Typer()
 
 
-@app.command("record-track", cls=RigCommand)
+@app.command("record-track")
 def record_track(
-    rig: RigArgument = "desk",
+    rig: RigArgument,
     *,
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the track.")],
     live: Annotated[

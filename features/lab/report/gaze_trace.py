@@ -29,7 +29,7 @@ from gazerig.gaze.angles import (
     yaw_pitch,
 )
 from gazerig.gaze.attention.conversation import face_extent_deg
-from gazerig.gaze.field_of_view import head_in_space, line_of_sight
+from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.loop.tick import Tick, cyclopean_direction
 from gazerig.robot.model.commands import Ask
@@ -245,7 +245,7 @@ def _row(tick: Tick, mode: int) -> Iterator[float]:
     eye_left, eye_right = pose.eye_left_rad, pose.eye_right_rad
     yield tick.t_s
     yield from map(degrees, (
-        *yaw_pitch(way), *head_in_space(pose), 0.5 * (eye_left[1] + eye_right[1]),
+        *yaw_pitch(way), *pose.head_rad, 0.5 * (eye_left[1] + eye_right[1]),
         *yaw_pitch(rel), *_rates(rel, target.v_world_m_s),
         eye_right[0] - eye_left[0], atan2(y + half, x) - atan2(y - half, x),
         angle_between(line_of_sight(pose, True), sub(point, left)),

@@ -7,20 +7,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from gazerig.features.world.state_file import StateReader, WorldState
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
+from gazerig.robot.model.kinematics import NECK, Kinematics
 
 if TYPE_CHECKING:
     from gazerig.features.world.physics import World
 
-_ABSENT = dict.fromkeys((*NECK, *LOWER_NECK), 0.0)
-
-
-class TimedPose(NamedTuple):
-    """Rotation (three rows) and position [m] of the head in the world at a time [s]."""
-
-    t_s: float
-    R_world_head: Mat3
-    p_world_head_m: Vec3
+_ABSENT = dict.fromkeys(NECK, 0.0)
 
 
 class RigInState(NamedTuple):
@@ -40,8 +32,7 @@ class RigInState(NamedTuple):
         for name in angles.keys() & self.joints.keys():
             angles[name] = float(state.qpos[self.joints[name]])
         yaw, pitch, roll = (angles[name] for name in NECK)
-        lower_yaw, lower_pitch = (angles[name] for name in LOWER_NECK)
-        return self.kinematics.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
+        return self.kinematics.head_pose((yaw, pitch, roll))
 
 
 class WorldPoses:
@@ -64,24 +55,16 @@ class WorldPoses:
         """Return the host's time at the start of the script of the people, None before."""
         return self._file().begin_s
 
-    @property
-    def first_s(self) -> float:
-        """Return the same time, 0 before the start."""
-        return self.begin_s or 0.0
-
-    def newest(self) -> TimedPose | None:
-        """Return the newest pose, None before the first."""
-        newest = self._file().newest()
-        if newest is None:
-            return None
-        self.state = newest
-        return TimedPose(newest.host_s, *self._rig.head(newest))
+    def newest(self) -> WorldState | None:
+        """Return the newest state, None before the first."""
+        self.state = self._file().newest() or self.state
+        return self.state
 
     def head(self, t_s: float) -> tuple[Mat3, Vec3]:
         """Return the current pose of the head; upright before the first state."""
-        newest = self._file().newest()
+        newest = self.newest()
         if newest is None:
-            return self._rig.kinematics.head_pose((0.0, 0.0, 0.0), (0.0, 0.0))
+            return self._rig.kinematics.head_pose((0.0, 0.0, 0.0))
         return self._rig.head(newest)
 
     def _file(self) -> StateReader:

@@ -14,14 +14,13 @@ from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPo
 from gazerig.features.world.run.run_world import RunWorld
 from gazerig.features.world.run.sight import (
     LATENCY_MS,
-    ComputedCamera,
     RenderedSource,
     RenderedWorld,
 )
 from gazerig.features.world.serve import SentWorld
 from gazerig.features.world.shapes import SpecShapes
+from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import state_file
-from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.run.buses import RunBus, guarded_rig_bus, ideal_run_bus, in_process_run_bus
 from gazerig.robot.run.cameras import CameraView
@@ -29,13 +28,14 @@ from gazerig.robot.run.emulated import emulated_lines
 from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_limits import servo_configs
+from gazerig.sim_mock.cameras.detections import SceneCamera
+from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.pty.client import PtyBuses
-from gazerig.sim_mock.scenes.scene import Scene
 
 
 @dataclass(frozen=True)
 class RigRoom:
-    """``RunRoom`` of gazerig.robot.run.surroundings: a world from the view of its rig."""
+    """A world from the view of its rig, whose emulated servos are in it."""
 
     world: RunWorld
     clock: Clock
@@ -43,7 +43,7 @@ class RigRoom:
     head: WorldPoses | SimulatedPoses
 
     @property
-    def scene(self) -> Scene:
+    def scene(self) -> WorldScene:
         """Return the people in the world, in the frame of the rig."""
         return self.world.scene
 
@@ -55,21 +55,28 @@ class RigRoom:
         rng: np.random.Generator,
         detector: Callable[[], FaceDetector],
     ) -> Camera:
-        """Return the rig's camera; arguments as of ``RunRoom.camera``.
+        """Return the rig's camera; called only once.
+
+        Args:
+            rig: Rig with the parameters of detectors.
+            options: Options of the run.
+            view: Placement of the camera.
+            rng: Random numbers of its noise.
+            detector: Creates the face detector.
 
         Raises:
             NoRenderer: nothing on this machine can render.
         """
         world, poses, locate = self.world, self.head, view.locate
         if options.no_pictures:
-            field_deg = view.params.horizontal_field_deg
-            return ComputedCamera(world.scene, view.mount, field_deg, poses, rng, locate)
+            params = FrameParams(horizontal_field_deg=view.params.horizontal_field_deg)
+            return SceneCamera(
+                params, world.scene, view.mount, poses.head, rng, locate, self.start_s
+            )
         rendered = RenderedWorld(world.spec, view.mount, view.params, rng, world.camera, poses)
         if isinstance(poses, SimulatedPoses):
             motion = view.motion(rig.motion)()
-            return rendered.pixels(
-                poses.head, detector(), LATENCY_MS, motion, locate, poses.begin_s
-            )
+            return rendered.pixels(poses.head, detector(), LATENCY_MS, motion, locate)
         source = partial(RenderedSource, rendered, poses)
         parts = CameraParts(source, detector, view.motion(rig.motion), locate)
         return CameraWorker(parts, self.clock.now_s)
@@ -78,13 +85,13 @@ class RigRoom:
         """Return the start time of the script of the people, None before it."""
         return self.head.begin_s
 
-    def shapes(self) -> WorldShapes:
+    def shapes(self) -> SpecShapes:
         """Return the shapes of the world."""
         return SpecShapes(self.world.spec.figures, self.world.spec.mjcf_file)
 
 
 def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> RigRoom:
-    """Return a world with one rig; arguments as of ``Surroundings.open``.
+    """Return a world with one rig; for a run with these options.
 
     Raises:
         SetupError: the world cannot be used; the message gives the reason.

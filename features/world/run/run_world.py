@@ -21,7 +21,6 @@ from gazerig.robot.run.emulated import BOARDS, CHAINS, STOP_BEYOND_DEG, start_an
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_limits import bus_names
 from gazerig.robot.run.surroundings import refuse_missing_rules
-from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import SceneScript, WorldCameraParams
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ class RunWorld(NamedTuple):
     """The world of a run."""
 
     spec: WorldSpec
-    scene: Scene
+    scene: WorldScene
     camera: WorldCameraParams
 
     def computed(self, now_s: Callable[[], float]) -> "World":

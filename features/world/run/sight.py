@@ -14,18 +14,16 @@ import numpy as np
 
 from gazerig.drivers.camera.capture_loop import Locate, Motion
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, ImageArray
+from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray
 from gazerig.features.world.gl_context import render_in_calling_thread
-from gazerig.features.world.run.poses import SimulatedPoses, TimedPose, WorldPoses
+from gazerig.features.world.run.poses import SimulatedPoses, WorldPoses
 from gazerig.features.world.world_spec import WorldSpec
-from gazerig.gaze.types import Mat3, Vec3
+from gazerig.gaze.types import Mat3
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.scene import PinholeView
 from gazerig.robot.run.cameras import HeadPose
-from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
-from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import WorldCameraParams
 
 if TYPE_CHECKING:
@@ -37,37 +35,6 @@ LATENCY_MS = 60.0
 HEAD_LINK = "rig_head"
 """Link of a rig that carries its camera, and is invisible to it."""
 _LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-class ComputedCamera(SceneCamera):
-    """A camera without pictures in a world, from the start of the people's script.
-
-    Args:
-        scene: the people.
-        mount: pose of the camera on the head.
-        field_deg: horizontal field of view.
-        poses: pose of the head, and start of the script.
-        rng: random numbers of the noise.
-        locate: converts detections to the camera's axes.
-    """
-
-    def __init__(
-        self,
-        scene: Scene,
-        mount: CameraMount,
-        field_deg: float,
-        poses: WorldPoses | SimulatedPoses,
-        rng: np.random.Generator,
-        locate: Locate,
-    ) -> None:
-        self._poses = poses
-        params = FrameParams(horizontal_field_deg=field_deg)
-        super().__init__(params, scene, mount, poses.head, rng, locate)
-
-    def latest(self, now_s: float) -> Detections | None:
-        """Return the newest detections that have arrived, None before the start."""
-        self._times.start_s = self._poses.begin_s
-        return None if self.start_s is None else super().latest(now_s)
 
 
 class RenderedWorld(NamedTuple):
@@ -90,7 +57,6 @@ class RenderedWorld(NamedTuple):
         latency_ms: float = 0.0,
         find_motion: Motion | None = None,
         locate: Locate | None = None,
-        begins_s: float | None = None,
     ) -> "PixelCamera":
         """Return the camera after it has rendered one picture; arguments as of ``PixelCamera``.
 
@@ -105,7 +71,8 @@ class RenderedWorld(NamedTuple):
         lens = intrinsics_of_lens(self.camera.lens, radians(field_deg), *size_px)
         view = self._view()
         camera = PixelCamera(
-            params, view, self.mount, head, detector, self.rng, find_motion, locate, lens, begins_s,
+            params, view, self.mount, head, detector, self.rng, find_motion, locate, lens,
+            lambda: self.poses.begin_s,
         )  # fmt: skip
         view.draw(PinholeView(0.0, lens, size_px, _LEVEL, (0.0, 0.0, 0.0)))
         return camera
@@ -157,10 +124,8 @@ class RenderedSource:
 
     def __init__(self, world: "RenderedWorld", poses: WorldPoses) -> None:
         render_in_calling_thread()
-        self._camera, self._poses = world.pixels(self._head_pose, _NoFaces()), poses
-        self._now: TimedPose | None = None
-        self._number = 0
-        self._due_s = 0.0
+        self._camera, self._poses = world.pixels(poses.head, _NoFaces()), poses
+        self._number, self._due_s, self._period_s = 0, 0.0, 1.0 / world.params.rate_hz
 
     def open(self) -> None:
         """Start with the first frame."""
@@ -170,20 +135,14 @@ class RenderedSource:
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Draw the next frame, from the newest pose; None if ``stop`` was set."""
         while not stop.is_set():
-            newest, wait_s = self._poses.newest(), self._due_s - now_s()
-            if newest is None or wait_s > 0.0:
-                stop.wait(max(wait_s, _LOOK_S))
-                continue
-            self._now = newest
-            if self._number == 0:
-                self._camera.latest(self._poses.first_s)  # the time of the scene starts here
-            found = self._camera.latest(newest.t_s)
-            if found is None or found.image is None or found.number == self._number:
-                stop.wait(_LOOK_S)
-                continue
-            self._number = found.number
-            self._due_s = max(now_s(), newest.t_s + 1.0 / self._camera.rate_hz)
-            return Shot(found.captured_s, found.number, found.image)
+            state, wait_s = self._poses.newest(), self._due_s - now_s()
+            if state is not None and wait_s <= 0.0:
+                found = self._camera.latest(state.host_s)
+                if found is not None and found.image is not None and found.number > self._number:
+                    self._number = found.number
+                    self._due_s = max(now_s(), state.host_s + self._period_s)
+                    return Shot(found.captured_s, found.number, found.image)
+            stop.wait(max(wait_s, _LOOK_S))
         return None
 
     def events(self) -> tuple[str, ...]:
@@ -193,7 +152,3 @@ class RenderedSource:
     def close(self) -> None:
         """Free the renderer; safe to call twice."""
         self._camera.close()
-
-    def _head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
-        assert self._now is not None  # ``take`` waits for the first pose
-        return self._now.R_world_head, self._now.p_world_head_m

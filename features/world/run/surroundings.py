@@ -1,12 +1,16 @@
 """Our worlds as surroundings of a run: ``gazerig run --world``."""
 
+from typing import TYPE_CHECKING
+
 from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import shipped_names
 from gazerig.features.world.room import HOME
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.run.options import RunOptions
-from gazerig.robot.run.surroundings import RunRoom
 from gazerig.sim_mock.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from gazerig.features.world.run.rig_room import RigRoom
 
 
 class WorldSurroundings:
@@ -21,7 +25,7 @@ class WorldSurroundings:
 
         return world_scene(str(options.world), options.seed)
 
-    def open(self, rig: Rig, options: RunOptions, clock: Clock) -> RunRoom:
+    def open(self, rig: Rig, options: RunOptions, clock: Clock) -> "RigRoom":
         """Return the requested world with the rig in it."""
         from gazerig.features.world.run.rig_room import open_room
         from gazerig.features.world.run.run_world import world_of

@@ -5,7 +5,6 @@ import { make } from "/rig/elements.js";
 import { limits } from "/rig/words.js";
 
 const NOTICE_MS = 8000, REFUSED_MS = 14_000;
-const LIMITED_EVERY_MS = 3000; // a person who drags something out of reach is told this often
 
 /** Show a message for some seconds; a refusal is read out immediately. */
 export function say(text, refused = false) {
@@ -20,18 +19,13 @@ export function say(text, refused = false) {
   setTimeout(() => node.remove(), refused ? REFUSED_MS : NOTICE_MS);
 }
 
-let limitedAt = -Infinity;
-
 /** Send an order; show what the rig refuses or limits. Return the result, null if refused. */
 export async function order(message) {
   try {
     const result = await ask(message);
     if (result?.reply?.refused) throw new Error(result.reply.refused);
     const limited = result?.reply ? limits(result.reply) : "";
-    if (limited && performance.now() - limitedAt > LIMITED_EVERY_MS) {
-      limitedAt = performance.now();
-      say(limited);
-    }
+    if (limited) say(limited);
     return result ?? {};
   } catch (error) {
     say(error.message, true);

@@ -64,13 +64,6 @@ function listed(parts) {
 
 /** What limits have changed of an order, "" if nothing; reply: a CommandReply. */
 export function limits(reply) {
-  if (reply.track) {
-    const { name, limited } = reply.track;
-    return limited ? `${spaced(name)}: ${spaced(limited)}` : "";
-  }
-  const joints = (reply.joints ?? []).filter((one) => one.reason)
-    .map((one) => `${spaced(one.joint)}: ${one.reason}`).join("; ");
-  if (!reply.asked_m) return joints;
-  const off = degrees(reply.error_rad ?? 0);
-  return off < 1 ? "" : `it looks ${off.toFixed(0)} deg off${joints && `: ${joints}`}`;
+  const { name, limited } = reply.track ?? {};
+  return limited ? `${spaced(name)}: ${spaced(limited)}` : "";
 }

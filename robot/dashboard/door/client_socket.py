@@ -11,11 +11,12 @@ from gazerig.robot.dashboard.door.rig_link import BUSY
 from gazerig.robot.model.commands import COMMANDS, ORDERS, REPEATED, ControlCommand
 from gazerig.robot.model.reply import CommandReply, Progress, command_outcome
 from gazerig.robot.net.excess import STOPPED
-from gazerig.robot.net.openapi import MOST_RATE_HZ
 
 NO_OUTCOME = {name for name, kind in COMMANDS.items() if kind in REPEATED}
 CONTROLS = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))
 """Verbs of the commands that give their client control of gaze or joints."""
+MOST_RATE_HZ = 25.0
+"""Highest rate of states."""
 _MOST_QUEUED, _MOST_OUT = 16, 256
 _REPORT_S = 0.25
 """Time in which dropped messages are counted for one refusal, s."""

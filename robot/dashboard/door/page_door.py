@@ -9,7 +9,6 @@ POST /api/v1/do              one message; an order's answer has its outcome
 GET  /api/v1/state           newest state
 GET  /api/v1/waveform        outline of a track's sound
 GET  /api/v1/webcam          websocket: pictures of a browser's webcam
-GET  /api/v1/openapi.json    description
 """
 
 import asyncio
@@ -59,7 +58,6 @@ from gazerig.robot.model.commands import (
     ORDERS,
     ClientCommand,
     Resume,
-    ShowView,
     State,
     Stop,
     read_request,
@@ -73,7 +71,6 @@ from gazerig.robot.net.excess import (
     TokenBucket,
     find_stop,
 )
-from gazerig.robot.net.openapi import MOST_WAIT_S, WAIT_S, api_description
 from gazerig.robot.net.socket_io import REQUEST_BYTES, VERSION
 from gazerig.robot.net.topics import PanelContent, RigInfo, RunState, ShownPicture
 
@@ -142,7 +139,7 @@ class MessageRefused(ValueError):
 class _Wait(msgspec.Struct):
     """Query of a message: longest wait for its outcome, s."""
 
-    wait_s: Annotated[float, msgspec.Meta(ge=0.0, le=MOST_WAIT_S)] = WAIT_S
+    wait_s: Annotated[float, msgspec.Meta(ge=0.0, le=15.0)] = 10.0
 
 
 class _After(msgspec.Struct):
@@ -233,7 +230,6 @@ class PageDoor:
         ends: Sequence[socket],
         token: str,
         feed: TickFeed,
-        show_view: Callable[[ShowView, str], object],
         picture: TakePicture,
     ) -> None:
         """Prepare to listen.
@@ -245,13 +241,12 @@ class PageDoor:
             ends: connections to the rig, see ``RigLink``
             token: what a client must show
             feed: the newest tick and the last events
-            show_view: changes the view of the head for a browser
             picture: receives pictures of browsers' own cameras; returns False if it does not accept
                 them
         """
         self._listener, self._inside, self._token = listener, inside, token
         port = listener.getsockname()[1]
-        self._feed, self._show_view = feed, show_view
+        self._feed = feed
         self._cookie = f"gazerig_{port}"  # cookies are shared by all ports
         self._name_cookie = f"{self._cookie}_browser"
         self.admission = Admission(host, port, token, self._cookie, _WHERE)
@@ -407,8 +402,6 @@ class PageDoor:
                     if not wave:
                         raise MessageRefused("no track of this name has a sound", 404)
                     return _answer({"ok": wave}, 200)
-                case "GET", "openapi.json":
-                    return _answer(api_description(), 200)
             raise MessageRefused(
                 f"{request.method} {request.path:.60} is not here: version {VERSION} is at {BASE}/",
                 404,
@@ -423,8 +416,7 @@ class PageDoor:
             if tick is None or tick.t_s >= self._replied_s:
                 break
             await asyncio.sleep(_LOOK_S)
-        state = head_state(tick) if tick is not None else None
-        return HeadReport(state, self._feed.events(after), self._feed.number)
+        return self._feed.report(after)
 
     async def _post(self, request: web.Request) -> web.StreamResponse:
         wait_s = parse_query(request, _Wait).wait_s
@@ -478,9 +470,6 @@ class PageDoor:
                     asked = read_request(plain)
                     assert isinstance(asked, State)
                     answer = {"ok": await self._report(asked.after)} | tag
-                case "show_view":
-                    self._show_view(msgspec.convert(plain, ShowView), visitor.browser)
-                    answer = {"ok": {"notes": []}} | tag
                 case _:
                     answer = await self._rig.ask(message)
         except ValueError as error:

@@ -29,8 +29,6 @@ from gazerig.robot.dashboard.door.sockets import (
 )
 from gazerig.robot.net.excess import TokenBucket
 
-BROWSER_HEADER = "X-Gazerig-Browser"
-"""Header with the name of a websocket's browser."""
 TO_BROWSER_BYTES = 1 << 25
 """Longest message to a browser, bytes."""
 FROM_BROWSER_BYTES = 1 << 14
@@ -49,14 +47,6 @@ def open_server(socket_path: Path) -> viser.ViserServer:
     for publish in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(publish)
     return server
-
-
-def browser_of(server: viser.ViserServer, client_id: int) -> str:
-    """Return the name of a client's browser, "" if unknown."""
-    connection = server._websock_server._live_connections.get(client_id)
-    if connection is None or connection.request is None:
-        return ""
-    return connection.request.headers.get(BROWSER_HEADER, "")
 
 
 @contextlib.contextmanager
@@ -132,7 +122,6 @@ class ViewProxy:
             async with self._client.ws_connect(
                 _address("ws", request),
                 protocols=offered,
-                headers={BROWSER_HEADER: who},
                 max_msg_size=TO_BROWSER_BYTES,
                 compress=0,
             ) as inside:

@@ -183,7 +183,7 @@ class RigFeed:
                 self._percept = record.percept
             tick = structs.replace(record.tick, detections=self._found, percept=self._percept)
             self._unanswered.update(tick.joints.missing)
-            self._poses.remember(tick.t_s, tick.pose.head_rad, tick.pose.base_rad)
+            self._poses.remember(tick.t_s, tick.pose.head_rad)
             self._gaze.append((tick.t_s, tick.gaze.gaze_point_world_m))
             self.ticks.update(tick)
 

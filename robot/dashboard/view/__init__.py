@@ -1,1 +1,1 @@
-"""3-D view: the head, people, fields of view, and viewpoints."""
+"""3-D view: the head, people, the world, and the first viewpoint."""

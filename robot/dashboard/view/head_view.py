@@ -1,4 +1,4 @@
-"""Draw the rig's head on the page as measured: the links of its description, and lines of sight."""
+"""Draw the rig's head on the page as measured: the links of its description."""
 
 from math import dist, radians
 
@@ -12,21 +12,13 @@ from gazerig.robot.dashboard.view.glb import FINISHES, FLAT, glow_disc, painted_
 from gazerig.robot.dashboard.view.scene_node import set_pose
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import CAMERA, Description
-from gazerig.robot.description.mesh import Colour
 from gazerig.robot.description.parts import (
     FLOOR_M,
-    SIDES,
     HeadMeasures,
 )
 from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.kinematics import LIDS
 
-_SIGHT: dict[str, Colour] = {
-    "fixate": (48, 190, 120),
-    "saccade": (255, 120, 40),
-    "pursue": (60, 150, 255),
-}
-_AHEAD = np.array((((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),))
 _SHADE = 4.4
 """Radius of the shade below the shoulders, in distances between the eyes."""
 _LIT_OPEN = 0.7
@@ -49,14 +41,12 @@ class HeadView:
         self._description: Description | None = None
         self._root = scene.add_frame("/rig", show_axes=False)
         self._shade = self._add("/shade", painted_glb(glow_disc((20, 24, 34, 140)), FLAT))
-        self._sights: list[viser.LineSegmentsHandle] = []
-        self._colour = _SIGHT["fixate"]
 
     def _add(self, name: str, data: bytes) -> viser.GlbHandle:
         return self._scene.add_glb(name, data, cast_shadow=False, receive_shadow=False)
 
-    def show(self, head: ShownHead, *, sight: bool = False) -> None:
-        """Move all parts to their measured positions; ``sight``: show the lines of sight."""
+    def show(self, head: ShownHead) -> None:
+        """Move all parts to their measured positions."""
         tick, pose, names = head.tick, head.tick.pose, head.rig.kinematics.names
         shape = with_shown_lids(head.rig.shape)
         if shape != self._drawn:  # the geometry has changed
@@ -73,16 +63,6 @@ class HeadView:
                 R = compose(link.R, turn_about(link.joint.axis, angles[link.joint.name]))
                 set_pose(self.links[link.name], link.p_m, quaternion(R))
         self._shade.visible = not self.on_table
-        colour = _SIGHT.get(tick.gaze.phase, _SIGHT["fixate"])
-        for line, p_world_m in zip(self._sights, eyes_m(head), strict=True):
-            if sight:
-                # Their length is the target's distance: they meet at the target only if the eyes
-                # fixate it.
-                line.scale = round(dist(p_world_m, tick.gaze.gaze_point_world_m), 2)
-            line.visible = sight
-            if colour != self._colour:
-                line.colors = np.array(colour, np.uint8)
-        self._colour = colour
 
     def _draw(self, description: Description, shape: RigShape) -> None:
         """Draw a rig instead of the one that is drawn."""
@@ -106,13 +86,6 @@ class HeadView:
                 data = painted_glb(look.painted(), FINISHES[look.finish], np.array(R_lit))
                 handle = self._add(f"{path}/look_{look.name}", data)
                 handle.position, handle.wxyz = look.p_m, quaternion(look.R)
-        self._sights = [
-            self._scene.add_line_segments(
-                f"{paths[f'{side}_eye']}/sight", _AHEAD, self._colour, thickness=2.0,
-                thickness_units="screen", visible=False,
-            )
-            for side in SIDES
-        ]  # fmt: skip
         self._shade.scale = _SHADE * shape.geometry.interocular_mm / 1e3
         (base, *_) = description.links
         if base.visuals:
@@ -146,7 +119,7 @@ def eyes_m(head: ShownHead) -> tuple[Vec3, Vec3]:
 def pivot_m(head: ShownHead) -> Vec3:
     """Return the intersection of the neck's pitch and roll axes, world."""
     pose = head.tick.pose
-    return head.rig.kinematics.body_volumes(pose.R_world_head, pose.p_world_head_m)[0].start_m
+    return head.rig.kinematics.pivot_m(pose.R_world_head, pose.p_world_head_m)
 
 
 def head_dimensions(head: ShownHead) -> HeadMeasures:

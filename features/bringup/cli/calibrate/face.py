@@ -115,7 +115,7 @@ def _calibrate(
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), REST_M, "eyes_pan" not in rig.joints)
     made = Run(exact_gaze(rig), options, chooser=steering)
     about = {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"}
-    door = LiveServer(made.robot, None, made.clock, about, say)
+    door = LiveServer(made.robot, None, about, say)
     session = _CalibrationSession(steering, lines, made.clock.now_s, stopped, door)
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
