@@ -8,10 +8,10 @@ dataclass itself. Every part of the program may import this module; it needs the
 only.
 """
 
-import dataclasses
 import types
 import typing
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
 from difflib import get_close_matches
 from functools import cache
 from typing import Any, Literal
@@ -38,7 +38,7 @@ UNITS: dict[str, str] = {
 _LONGEST_FIRST = sorted(UNITS, key=len, reverse=True)
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Bounds:
     """Inclusive bounds of a number, or of every number in a tuple or mapping."""
 
@@ -54,7 +54,7 @@ class Bounds:
         return schema
 
 
-@dataclasses.dataclass(frozen=True, slots=True, init=False)
+@dataclass(frozen=True, slots=True, init=False)
 class Choices:
     """Allowed values, if a Literal cannot list them."""
 
@@ -68,14 +68,14 @@ class Choices:
         return {"type": "literal", "expected": list(self.values)}
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Unit:
     """Unit of a parameter whose name does not end with it."""
 
     name: str
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Unlisted:
     """Marks a mapping that no file contains."""
 
@@ -90,7 +90,7 @@ Form = Literal[
 _PLAIN: dict[object, Form] = {float: "number", int: "whole", bool: "bool", str: "text"}
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Declaration:
     """A parameter as declared, or an item of one.
 
@@ -132,10 +132,10 @@ class Declaration:
 def declarations(params: type) -> dict[str, Declaration]:
     """Return the declaration of every field of a Params dataclass, by name, in order."""
     hints = typing.get_type_hints(params, include_extras=True)
-    fields = {f.name: hints[f.name] for f in dataclasses.fields(params) if f.init}
+    own = {f.name: hints[f.name] for f in fields(params) if f.init}
     return {
         name: _declaration(hint, Declaration("value", unit=unit_of(name)))
-        for name, hint in fields.items()
+        for name, hint in own.items()
         if Unlisted() not in typing.get_args(hint)
     }
 
@@ -161,38 +161,38 @@ def _declaration(hint: Any, above: Declaration) -> Declaration:
         for note in args[1:]:
             match note:
                 case Bounds():
-                    above = dataclasses.replace(above, low=note.low, high=note.high)
+                    above = replace(above, low=note.low, high=note.high)
                 case Choices():
-                    above = dataclasses.replace(above, choices=note.values)
+                    above = replace(above, choices=note.values)
                 case Unit():
-                    above = dataclasses.replace(above, unit=note.name)
+                    above = replace(above, unit=note.name)
                 case str():
-                    above = dataclasses.replace(above, description=note)
+                    above = replace(above, description=note)
         return _declaration(args[0], above)
     if origin in (typing.Union, types.UnionType):
         optional = type(None) in args
         first, *others = [kind for kind in args if kind is not type(None)]
         made = _declaration(first, above)
         literals = tuple(value for kind in others for value in typing.get_args(kind))
-        return dataclasses.replace(made, optional=optional, choices=(*made.choices, *literals))
-    plain = dataclasses.replace(above, low=None, high=None, choices=())
-    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
-        return dataclasses.replace(plain, form="params", params=hint, unit="")
+        return replace(made, optional=optional, choices=(*made.choices, *literals))
+    plain = replace(above, low=None, high=None, choices=())
+    if isinstance(hint, type) and is_dataclass(hint):
+        return replace(plain, form="params", params=hint, unit="")
     if origin is tuple:
         length = None if args[-1] is ... else len(args)
         if length is not None and len(set(args)) > 1:
             items = tuple([_declaration(kind, above) for kind in args])
-            return dataclasses.replace(plain, form="row", items=items, length=length)
+            return replace(plain, form="row", items=items, length=length)
         inner = _declaration(args[0], above)
-        return dataclasses.replace(plain, form="list", inner=inner, length=length)
+        return replace(plain, form="list", inner=inner, length=length)
     if origin in (dict, Mapping):
-        return dataclasses.replace(plain, form="mapping", inner=_declaration(args[1], above))
+        return replace(plain, form="mapping", inner=_declaration(args[1], above))
     if origin is Literal or above.choices:
-        return dataclasses.replace(plain, form="choice", choices=above.choices or args)
+        return replace(plain, form="choice", choices=above.choices or args)
     if hint in (float, int):
-        return dataclasses.replace(above, form=_PLAIN[hint])
+        return replace(above, form=_PLAIN[hint])
     if hint is object or hint in _PLAIN:
-        return dataclasses.replace(plain, form=_PLAIN.get(hint, "value"))
+        return replace(plain, form=_PLAIN.get(hint, "value"))
     raise TypeError(f"a configuration value cannot have the type {hint}")
 
 
