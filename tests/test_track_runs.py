@@ -10,6 +10,7 @@ import pytest
 from fakes.runs import ticks
 
 import gazerig
+from gazerig import Refused
 from gazerig.config.load import shipped_path
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.loop.tick import Tick
@@ -129,17 +130,25 @@ def test_owned_eyes_and_lids_are_the_track_s_alone(
     assert found[-1].gaze.eye_left_rad != found[-1].gaze.eye_right_rad  # they converge again
 
 
-def test_a_file_in_the_folder_tracks_is_found_without_an_edit(tmp_path: Path) -> None:
+def test_a_file_in_the_folder_tracks_is_found_without_an_edit_or_a_restart(tmp_path: Path) -> None:
     (tmp_path / "tracks").mkdir()
     (tmp_path / "my.yaml").write_text(shipped_path("rigs", "desk").read_text("utf-8"))
-    track = tmp_path / "tracks" / "bow.yaml"
-    track.write_text("description: x\nframes: [{time_s: 0.5, head_pitch_deg: -6.5}]\n")
+    bow = "description: x\nframes: [{{time_s: 0.5, head_pitch_deg: {}}}]\n"
     recording = tmp_path / "run.mcap"
     with gazerig.open(str(tmp_path / "my.yaml"), fast=True, record=recording) as head:
         head.step(1.0)
-        first_deg = head.state.joints["neck_pitch"].commanded_deg
-        head.play("bow")
+        (tmp_path / "tracks" / "late.yaml").write_text(bow.format(-4))
+        head.play("late")
         head.step(0.5)
-        assert head.state.joints["neck_pitch"].commanded_deg < first_deg - 4.0
-    track.unlink()
+        first_deg = head.state.joints["neck_pitch"].commanded_deg
+        (tmp_path / "tracks" / "late.yaml").write_text(bow.format(6.5))
+        head.step(1.0)
+        head.play("late")
+        head.step(0.5)
+        assert head.state.joints["neck_pitch"].commanded_deg > first_deg + 8.0
+        (tmp_path / "tracks" / "bad.yaml").write_text("description: x\nframes: [{time_s: 1}]\n")
+        with pytest.raises(Refused, match=r"bad.yaml:2: .*names no motion"):
+            head.play("bad")
+    for file in (tmp_path / "tracks").iterdir():
+        file.unlink()
     assert rerun(RunRecording(recording)).is_same

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from math import inf, radians
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from msgspec import structs
+
 from gazerig.drivers.camera.capture_loop import CLOSING
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.plugins import describe_error, plugin_error
@@ -29,6 +31,7 @@ from gazerig.robot.model.commands import (
     Command,
     Jog,
     MoveOpponent,
+    Play,
     Tune,
     check_command,
 )
@@ -133,6 +136,8 @@ class Robot:
             refuse_out_of_range(command, self.body.names, self.guard.limits)
         if isinstance(command, MoveOpponent) and self._executor.opponent is None:
             raise ValueError("no opponent to move: the run is in no world with a boxer")
+        if isinstance(command, Play):  # only a recording defines a track
+            command = structs.replace(command, definition=None)
         return self.replay_command(command)
 
     def replay_command(self, command: Command) -> Ticket:

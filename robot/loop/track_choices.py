@@ -1,7 +1,7 @@
 """Tracks of a robot: the available ones, their fit to this rig, and their control."""
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -55,6 +55,8 @@ class TrackChoices:
         player: Plays them.
         fit: Fits them to the rig.
         latency_s: Latency of the joints, by which motion is ahead of its sound.
+        changes: Returns the tracks whose files have changed since the last call, or the fault of
+            a file.
     """
 
     def __init__(
@@ -63,23 +65,35 @@ class TrackChoices:
         player: TrackPlayer,
         fit: TrackFit,
         latency_s: float = 0.0,
+        changes: Callable[[], Mapping[str, Track | str]] = dict,
     ) -> None:
         self.latency_s = latency_s
-        self._tracks, self._player, self._fit = tracks, player, fit
+        self._tracks: dict[str, Track | str] = dict(tracks)
+        self._player, self._fit = player, fit
+        self._changes, self._changed = changes, set[str]()
         self._fitted = lru_cache(_MOST_KEPT)(self._fit_track)
         self._started: list[tuple[PlayingTrack, TrackState]] = []
         self._number = 0
 
     # --- the available ones
 
+    def _known(self) -> dict[str, Track | str]:
+        """Return all tracks, or the faults of their files, as they are now."""
+        if changed := self._changes():
+            self._tracks |= changed
+            self._changed |= changed.keys()
+            self._fitted.cache_clear()
+        return self._tracks
+
     @property
     def names(self) -> tuple[str, ...]:
         """Return the tracks whose joints this rig has. Thread-safe."""
         found = []
-        for name, track in self._tracks.items():
+        for name, track in self._known().items():
             with contextlib.suppress(TrackRefused):
-                self._fit.rows(track)
-                found.append(name)
+                if isinstance(track, Track):
+                    self._fit.rows(track)
+                    found.append(name)
         return tuple(found)
 
     def all_tracks(self, limits: Sequence[JointLimit]) -> tuple[TrackInfo, ...]:
@@ -88,13 +102,15 @@ class TrackChoices:
         Args:
             limits: Limits of the joints.
         """
-        return tuple([self._info(name, track, limits) for name, track in self._tracks.items()])
+        return tuple([self._info(name, track, limits) for name, track in self._known().items()])
 
-    def _info(self, name: str, track: Track, limits: Sequence[JointLimit]) -> TrackInfo:
+    def _info(self, name: str, track: Track | str, limits: Sequence[JointLimit]) -> TrackInfo:
         try:
             motion, reply = self.prepare(Play(name), limits)
         except ValueError as refused:
-            return TrackInfo(name, track.description, refused=str(refused))
+            description = track.description if isinstance(track, Track) else ""
+            return TrackInfo(name, description, refused=str(refused))
+        track = motion.track
         return TrackInfo(
             name, track.description, motion.duration_s, reply.limited, "", self._fit.owns(track),
             track.sound, tuple(track.cues.items()),
@@ -114,6 +130,8 @@ class TrackChoices:
             motion = self._fit.speech(track, level, mouth, duration_s, limits)
             return motion, TrackReply(SPEECH, motion.duration_s)
         name, how = command.track, (command.speed, command.sound_s, tuple(limits))
+        if command.definition is not None:
+            return self._fit.motion(name, command.definition, how[2], *how[:2])
         return self._fitted(name, *how)
 
     def _fit_track(
@@ -122,6 +140,8 @@ class TrackChoices:
         track = self._tracks.get(name)
         if track is None:
             raise ValueError(unknown_text("track", name, self.names))
+        if isinstance(track, str):
+            raise ValueError(f"{name}: {track}")
         try:
             if track.sound and not sound_s:
                 sound_s = check_sound(Path(track.sound), MAX_DURATION_S).duration_s
@@ -135,17 +155,19 @@ class TrackChoices:
         Raises:
             ValueError: It cannot; the message lists the available tracks or cues.
         """
+        self._known()
         if isinstance(command, Speak) or command.track:
             motion, _ = self.prepare(command, limits)
             _start_s(command, motion)
 
     def complete(self, command: Play, limits: Sequence[JointLimit]) -> Play:
-        """Return a command with what a recording needs: the duration of its sound."""
+        """Return a command with what a recording needs: the duration of a sound, a new track."""
         try:
             motion, _ = self.prepare(command, limits)
         except ValueError:  # ``play`` reports it
             return command
-        return structs.replace(command, sound_s=motion.sound_s)
+        new = motion.track if command.track in self._changed else command.definition
+        return structs.replace(command, sound_s=motion.sound_s, definition=new)
 
     # --- playing
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 import msgspec
 from msgspec import Meta, Struct, structs
 
-from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED, Track
 from gazerig.params import unknown_text
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
@@ -201,6 +201,7 @@ class Play(ClientCommand, frozen=True):
         from_s: Position in the track, in s or as the name of a cue, at which it begins.
         loop: Repeat it until it is ended, as a track with ``loop: true`` does.
         sound_s: Duration of its sound, set on execution.
+        definition: The track, set on execution if its file is newer than the run.
     """
 
     track: _Name
@@ -209,6 +210,7 @@ class Play(ClientCommand, frozen=True):
     from_s: _Position | _Name = 0.0
     loop: bool = False
     sound_s: _Position = 0.0
+    definition: Track | None = None
 
 
 class EndTrack(ClientCommand, frozen=True):

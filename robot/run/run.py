@@ -57,6 +57,7 @@ from gazerig.robot.run.rig_limits import (
 )
 from gazerig.robot.run.run_rig import run_info, with_options
 from gazerig.robot.run.surroundings import refuse_missing_rules, scene_of, world
+from gazerig.robot.run.track_file import TrackFolder
 from gazerig.robot.run.voice import RunVoice
 from gazerig.robot.safety.guard import Guard
 
@@ -161,7 +162,7 @@ class Run:
             if rule is not None:
                 label = f"attention {type(rule).__name__} of the program"
                 attention = RuleChooser(rule, attention, label)
-            self.tracks = _tracks(rig, models)
+            self.tracks = _tracks(rig, models, options.rig)
             self.robot = Robot(
                 wrap_body(self.body) if wrap_body is not None else self.body,
                 models.kinematics,
@@ -301,13 +302,14 @@ class Run:
         browser.close()
 
 
-def _tracks(rig: Rig, models: GazeModels) -> TrackChoices:
-    """Return the tracks of a rig."""
+def _tracks(rig: Rig, models: GazeModels, rig_file: str) -> TrackChoices:
+    """Return the tracks of a rig, those in the folder beside its file included."""
     return TrackChoices(
         tracks_of(rig.track_files),
         models.animation.tracks,
         TrackFit(rig.names, lid_spans(rig), face_tables(rig)),
         rig.gaze.oculomotor.eye_lag_ms / 1e3,
+        TrackFolder(rig_file).changes,
     )
 
 

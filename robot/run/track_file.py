@@ -3,14 +3,17 @@
 Such angles come from recordings and from animation programs.
 """
 
+import contextlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gazerig.config.load import ConfigError
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import format_value
+from gazerig.config.shipped_files import is_path
 from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
@@ -29,6 +32,39 @@ _STILL_DEG = 0.01
 
 Series = tuple[Floats, Floats]
 """Times in seconds and angles in degrees of one joint."""
+
+
+class TrackFolder:
+    """Tracks in the folder beside a rig, which are found as soon as they are written.
+
+    Args:
+        rig: Name or path of the rig; one without a file has no folder.
+    """
+
+    def __init__(self, rig: str) -> None:
+        self._folder = Path(rig).expanduser().parent / "tracks" if is_path(rig) else None
+        self._stamps = self._read_stamps()
+
+    def changes(self) -> dict[str, Track | str]:
+        """Return the tracks whose files are new or changed since the last call; or their fault."""
+        before, self._stamps = self._stamps, self._read_stamps()
+        found: dict[str, Track | str] = {}
+        for path, stamp in self._stamps.items():
+            if before.get(path) != stamp:
+                try:
+                    found[track_name(str(path))] = load_track(path)
+                except ConfigError as error:
+                    found[path.stem] = str(error)
+        return found
+
+    def _read_stamps(self) -> dict[Path, tuple[int, int]]:
+        """Return time and size of each file."""
+        found = {}
+        for path in self._folder.glob("*.yaml") if self._folder is not None else ():
+            with contextlib.suppress(OSError):  # it has just been removed
+                status = path.stat()
+                found[path] = status.st_mtime_ns, status.st_size
+        return found
 
 
 def write_track(
