@@ -31,7 +31,7 @@ check: $(VENV)/.installed-dev
 	$(BIN)/lint-imports --no-logo
 
 judge: $(VENV)/.installed-dev # gaze and perception against people; make judge SHORT=1 takes minutes
-	$(BIN)/python tests/judge.py $(if $(SHORT),--short)
+	$(BIN)/python tests/judges/judge.py $(if $(SHORT),--short)
 
 bench: $(VENV)/.installed-dev # four costs, compared with other programs in the same run
 	$(BIN)/python tests/bench/bench.py

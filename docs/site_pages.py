@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FROM_ELSEWHERE = {
     "README.md": "index.md",
     "CHANGELOG.md": "changelog.md",
-    "tests/attack/README.md": "attacks.md",
+    "tests/judges/attack/README.md": "attacks.md",
     "examples/README.md": "examples.md",
 }
 """Pages whose source is not in docs/, and their names on the site."""

@@ -33,7 +33,7 @@ from gazerig.robot.run.models import rig_kinematics  # noqa: E402
 from gazerig.robot.run.options import RunOptions  # noqa: E402
 from gazerig.robot.run.run import Run
 
-sys.path.append(str(Path(__file__).parents[2] / "tests"))
+sys.path.append(str(Path(__file__).parents[2] / "tests" / "helpers"))
 from true_gaze import (  # noqa: E402
     gaze_angles,
     gaze_error_rad,

@@ -11,7 +11,7 @@ import time
 from io import BytesIO
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "helpers"))
 
 from browser import SLOW_DRAWING, Browser, browsing  # noqa: E402
 from PIL import Image  # noqa: E402

@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 TESTS = Path(__file__).parents[2] / "tests"
-sys.path[:0] = [str(TESTS), str(TESTS / "study")]
+sys.path[:0] = [str(TESTS / "helpers"), str(TESTS / "features" / "study")]
 
 from browser import Browser, browsing  # noqa: E402
 from PIL import Image  # noqa: E402

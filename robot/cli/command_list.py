@@ -1,8 +1,8 @@
 """The commands of ``gazerig``: their modules, lines in the list of commands, and examples.
 
 The list is static, because a short command must not import the modules of all others;
-tests/test_cli_start.py compares it with them. Commands of features and packages come from entry
-points, those of the core are in commands.json.
+tests/system/test_cli_start.py compares it with them. Commands of features and packages come from
+entry points, those of the core are in commands.json.
 """
 
 from collections import UserDict

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 TESTS = Path(__file__).parents[1]
-sys.path.insert(0, str(TESTS))
+sys.path[:0] = [str(TESTS / "helpers"), str(TESTS / "judges")]
 MAIN = "from gazerig.robot.cli.entry_point import main; main()"
 RUN = ("run", "desk", "--mock", "--scene", "visitor", "--seed", "0", "--summary", "-")
 FAST = (*RUN, "--fast", "--no-page")

@@ -1,0 +1,297 @@
+"""Tracks from files of animation programs."""
+
+import json
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import invoked
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.config.tracks import load_track
+from gazerig.drivers.errors import SetupError
+from gazerig.features.animation.animation import ImportedAnimation, Series, joint_map
+from gazerig.gaze.track.track import LIMIT_SHARE
+from gazerig.robot.description.links import Link, LinkJoint
+from gazerig.robot.model.track_fit import TrackFit
+from gazerig.robot.run.rig_limits import lid_spans, limits
+from gazerig.robot.run.track_file import write_track
+
+
+def table(folder: Path, text: str) -> Path:
+    path = folder / "table.csv"
+    path.write_text(text)
+    return path
+
+
+def animation(path: Path, given: Sequence[str] = (), **options: Any) -> ImportedAnimation:
+    from gazerig.features.animation.animation_file import read_animation
+
+    rig = load_rig("desk")
+    return read_animation(path, rig, joint_map(rig, given), **options)
+
+
+def read(path: Path, fps: float | None = None) -> dict[str, Series]:
+    return animation(path, fps=fps).series
+
+
+WIDE = "time,neck_pitch,neck_yaw\n0,0,5\n0.5,-8,\n1.0,0,9\n"
+LONG = "joint;time_s;angle\nneck_pitch;0;0\nneck_yaw;0;5\nneck_pitch;.5;-8\nneck_yaw;1;9\nneck_pitch;1;0\n"
+FRAMES = "frame\tneck_pitch\tneck_yaw\n0\t0\t5\n12\t-8\t\n24\t0\t9\n"
+
+
+EXCEL = "\ufeffsep=;\r\n;;\r\n" + WIDE.replace(",", ";").replace(".", ",").replace("\n", "\r\n")
+
+
+@pytest.mark.parametrize("text", [WIDE, LONG, FRAMES, EXCEL, "# from\n\n" + WIDE])
+def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(
+    desk_rig: Rig, text: str, tmp_path: Path
+):
+    path = tmp_path / "mine.yaml"
+    reply = write_track(desk_rig, path, read(table(tmp_path, text), 24.0), "x")
+    assert [(f.time_s, f.head_pitch_deg, f.head_yaw_deg) for f in load_track(path).frames] == [
+        (0.5, -8.0, None),
+        (1.0, 0.0, 4.0),
+    ]
+    assert reply.limited == "" and reply.duration_s == pytest.approx(1.4)
+
+
+BAD = {
+    "when,neck_yaw\n0,1\n": ":1: no column of times",
+    "time,neck_yaw\n0,1\n0.5,nan\n": ":3: neck_yaw: 'nan' is not a number",
+    "time,neck_yaw\n0,1\n0.5,2\n0.4,3\n": ":4: neck_yaw: 0.4 s is not after 0.5 s",
+    "time,tail\n0,1\n1,5\n": "'tail' is no joint: rename it or add --map NAME=JOINT; joints of the rig: left_eye_pan",
+    "time,neck_yaw,neck_yaw\n0,0,1\n": ":1: two columns are named 'neck_yaw': remove one",
+}
+
+
+@pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
+def test_bad_rows_are_named_with_their_line(desk_rig: Rig, text: str, tmp_path: Path):
+    with pytest.raises(SetupError) as caught:
+        read(table(tmp_path, text))
+    assert BAD[text] in str(caught.value)
+
+
+def test_the_command_imports_a_table_for_a_rig(tmp_path: Path):
+    path = table(tmp_path, WIDE)
+    words = ["import", "desk", str(path), "greet", "--folder", str(tmp_path)]
+    done = invoked(*words)
+    assert done.code == 0 and "greet.yaml: on desk greet takes 1.4 s" in done.err
+    assert invoked(*words, "--force", "--map", "neck_yaw=-neck_yaw").code == 0
+    assert "head_yaw_deg: -4.0" in (tmp_path / "greet.yaml").read_text()
+    again = invoked(*words)
+    assert again.code != 0 and "--force" in again.err
+    wrong = invoked(*words[:3], "Greet!", *words[4:])
+    assert wrong.code != 0 and "lower-case letters" in wrong.err
+
+
+def glb(tree: dict[str, Any], binary: bytes = b"") -> bytes:
+    """Return a binary glTF file, written by nothing of ours."""
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    body = struct.pack("<I4s", len(text), b"JSON") + text
+    body += struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def clip(
+    times: list[float],
+    rotations: np.ndarray[Any, Any],
+    interpolation: str = "LINEAR",
+    node: str = "neck_yaw",
+) -> bytes:
+    """Return a file with one node and its rotations x, y, z, w."""
+    clock, values = np.array(times, "<f4").tobytes(), rotations.astype("<f4").tobytes()
+    views = [(0, len(clock)), (len(clock), len(values))]
+    return glb(
+        {
+            "asset": {"version": "2.0"},
+            "nodes": [{"name": node}],
+            "buffers": [{"byteLength": len(clock + values)}],
+            "bufferViews": [{"buffer": 0, "byteOffset": a, "byteLength": n} for a, n in views],
+            "accessors": [
+                {"bufferView": 0, "componentType": 5126, "count": len(times), "type": "SCALAR"},
+                {"bufferView": 1, "componentType": 5126, "count": len(rotations), "type": "VEC4"},
+            ],
+            "animations": [
+                {
+                    "name": "wave",
+                    "channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}],
+                    "samplers": [{"input": 0, "output": 1, "interpolation": interpolation}],
+                }
+            ],
+        },
+        clock + values,
+    )
+
+
+def about(axis: str, degrees: list[float]) -> np.ndarray[Any, Any]:
+    half = np.radians(degrees) / 2.0
+    vector = np.outer(np.sin(half), np.eye(3)["xyz".index(axis)])
+    return np.column_stack([vector, np.cos(half)])
+
+
+def read_bytes(
+    data: bytes, folder: Path, name: str = "wave.glb", **options: Any
+) -> ImportedAnimation:
+    (folder / name).write_bytes(data)
+    return animation(folder / name, **options)
+
+
+def test_gltf_rotations_become_joint_angles(tmp_path: Path):
+    from scipy.spatial.transform import Rotation
+
+    times = [0.0, 0.5, 1.0]
+    angles = [0.0, 150.0, 250.0]
+    yaw = read_bytes(clip(times, about("z", angles)), tmp_path).series["neck_yaw"]
+    assert yaw[1] == pytest.approx(angles, abs=1e-4) and yaw[0] == pytest.approx(times)
+    # A quaternion and its negative are the same rotation.
+    signs = np.array([[1.0], [-1.0], [1.0]])
+    again = read_bytes(clip(times, about("z", [0.0, 150.0, 250.0]) * signs), tmp_path)
+    assert again.series["neck_yaw"][1] == pytest.approx(angles, abs=1e-4)
+    # Pitch is positive upwards: about -y. Blender adds .001 to a name in use.
+    pitch = clip(times, about("y", [0.0, 8.0, 0.0]), node="neck_pitch.001")
+    assert read_bytes(pitch, tmp_path).series["neck_pitch"][1][1] == pytest.approx(-8.0, abs=1e-4)
+    both = Rotation.from_quat(about("z", [0.0, 20.0, 0.0])) * Rotation.from_quat(
+        about("x", [0.0, 5.0, 0.0])
+    )
+    found = read_bytes(clip(times, np.asarray(both.as_quat())), tmp_path)
+    assert found.series["neck_yaw"][1][1] == pytest.approx(20.0, abs=1e-3)
+    assert "5.0 deg about other axes (at 0.50 s)" in found.notes[0]
+
+
+def test_angles_are_relative_to_the_rest_pose_of_a_node():
+    from scipy.spatial.transform import Rotation
+
+    from gazerig.features.animation.gltf_reader import joint_angles
+
+    rest = Rotation.from_rotvec([0.3, -0.8, 0.4])
+    axis = (0.6, 0.0, 0.8)
+    link = Link(
+        "nose", "head", R=rest.as_matrix().tolist(), joint=LinkJoint("nose", axis, -1, 1, 1, 1)
+    )
+    wanted = np.array([0.0, 25.0, -40.0])
+    turned_to = rest * Rotation.from_rotvec(np.outer(wanted, axis), degrees=True)
+    angles, off = joint_angles(link, turned_to.as_quat())
+    assert angles == pytest.approx(wanted, abs=1e-9) and off.max() < 1e-5
+
+
+def test_gltf_splines_are_read(tmp_path: Path):
+    from scipy.spatial.transform import Rotation
+
+    times, angles = [0.0, 1.0, 2.0], [0.0, 20.0, 0.0]
+    keys = about("z", angles)
+    tangents = np.zeros((3, 3, 4))
+    tangents[:, 1] = keys
+    at, curve = read_bytes(clip(times, tangents.reshape(-1, 4), "CUBICSPLINE"), tmp_path).series[
+        "neck_yaw"
+    ]
+    # Without tangents it is the smooth step of Hermite, 3 s^2 - 2 s^3, of the quaternions.
+    s = 0.25
+    mixed = keys[0] + (3.0 * s**2 - 2.0 * s**3) * (keys[1] - keys[0])
+    expected = Rotation.from_quat(mixed).as_euler("ZYX", degrees=True)[0]
+    assert np.interp(0.25, at, curve) == pytest.approx(expected, abs=0.05) and len(at) > 90
+
+
+GOOD = clip([0.0, 0.5, 1.0], about("z", [0.0, 5.0, 0.0]))
+NAN = about("z", [0.0, 5.0, 0.0]) * [[1.0], [np.nan], [1.0]]
+BAD_FILES: dict[str, tuple[bytes, str]] = {
+    "header.glb": (GOOD[:16], "is truncated: 16 bytes"),
+    "half.json": (b'[{"Anim', "Input data was truncated: it is truncated or not a JSON export"),
+    "still.glb": (glb({"asset": {"version": "2.0"}}), "no animation: bake constraints"),
+    "text.gltf": (b"{}", "is no GLB: export glTF as .glb"),
+    "steps.glb": (clip([0.0, 1.0], NAN[[0, 0]], "STEP"), "'STEP', but servos cannot step"),
+    "nan.glb": (clip([0.0, 0.5, 1.0], NAN), "wave, neck_yaw: key 1 is not a number"),
+    "tail.glb": (
+        clip([0.0, 1.0], NAN[[0, 0]], node="tail"),
+        "moves no joint of desk: left out: tail rotation (no joint): rename it",
+    ),
+    "years.glb": (clip([0.0, 2e9], NAN[[0, 0]]), "it takes 2e+09 s; at most 14400 s are read"),
+    "pin.json": (
+        b'[{"Animations": [{"Animation Name": "a", "Animation Commands": "sC,3,0,9,1,1,0,1,1,0"}]}]',
+        "effector '3' is no joint: rename it or add --map NAME=JOINT; joints of the rig: left_eye",
+    ),
+    "words.json": (
+        b'[{"Animations": [{"Animation Name": "a", "Animation Commands": "sC,3,0,9,1,x"}]}]',
+        "a, command 1: 'sC,3,0,9,1,x' is not sC,effector and eight numbers",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_a_bad_file_is_one_message_with_place_and_remedy(name: str, tmp_path: Path):
+    data, message = BAD_FILES[name]
+    with pytest.raises(SetupError) as caught:
+        read_bytes(data, tmp_path, name)
+    text = str(caught.value)
+    assert text.startswith(f"{tmp_path / name}") and message in text and "\n" not in text
+
+
+def test_positions_of_the_blender_add_on_are_those_of_the_servos(desk_rig: Rig, tmp_path: Path):
+    joint = desk_rig.joints["neck_yaw"]
+    steps = [joint.steps(np.radians(angle)) for angle in (0.0, 12.0, -7.0)]
+    file = {"fps": 24, "frames": 3, "servos": {"7": {"name": "neck_yaw", "positions": steps}}}
+    times, angles = read_bytes(json.dumps(file).encode(), tmp_path, "a.json").series["neck_yaw"]
+    assert times == pytest.approx([0.0, 1 / 24, 2 / 24])
+    assert angles == pytest.approx([0.0, 12.0, -7.0])
+    file["servos"] = {"7": {"name": "Bone", "positions": [90, 100, 80]}}
+    found = read_bytes(
+        json.dumps(file).encode(), tmp_path, "a.json", given=["Bone=-neck_yaw"], centre_deg=90.0
+    )
+    assert found.series["neck_yaw"][1] == pytest.approx([0.0, -10.0, 10.0])
+
+
+def test_curves_of_bottango_have_the_handles_of_its_driver(desk_rig: Rig, tmp_path: Path):
+    # github.com/EvanBottango/Bottango, BezierCurve.py, evaluated here at many places.
+    curves = [(0, 800, 4096, 300, 0, 6144, -200, 500), (800, 600, 6144, 100, 0, 2048, -300, 0)]
+
+    def movement(t_ms: float) -> float:
+        start, span, y0, x1, y1, y3, x2, y2 = curves[int(t_ms > 800)]
+        p = np.array(
+            [[start, y0], [start + x1, y0 + y1], [start + span + x2, y3 + y2], [start + span, y3]]
+        )
+        u = np.linspace(0.0, 1.0, 2001)
+        weights = np.array([(1 - u) ** 3, 3 * u * (1 - u) ** 2, 3 * u**2 * (1 - u), u**3])
+        at_ms, y = p.T @ weights
+        return float(np.interp(t_ms, at_ms, y)) / 8192
+
+    lines = "".join(f"sC,neck_yaw,{','.join(map(str, c))},h99\n" for c in curves)
+    file = [{"Animations": [{"Animation Name": n, "Animation Commands": lines} for n in "ab"]}]
+    with pytest.raises(SetupError, match="several animations: add --clip NAME with one of: a, b"):
+        read_bytes(json.dumps(file).encode(), tmp_path, "b.json")
+    found = read_bytes(json.dumps(file).encode(), tmp_path, "b.json", clip="b")
+    times, angles = found.series["neck_yaw"]
+    joint = desk_rig.joints["neck_yaw"]
+    for t in np.linspace(20, 1380, 35):
+        expected = joint.min_deg + movement(t) * (joint.max_deg - joint.min_deg)
+        assert np.interp(t / 1e3, times, angles) == pytest.approx(expected, abs=0.2)
+
+
+def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(
+    desk_rig: Rig, tmp_path: Path
+):
+    times = [0.0, 1.0, 2.0]
+    (tmp_path / "far.glb").write_bytes(clip(times, about("z", [40.0, -20.0, 30.0])))
+    done = invoked("import", "desk", str(tmp_path / "far.glb"), "--folder", str(tmp_path))
+    assert done.code == 0 and "for neck_yaw" in done.err
+    track = load_track(tmp_path / "far.yaml")
+    assert track.owns == ("neck_yaw",)
+    fit, bounds = TrackFit(desk_rig.names, lid_spans(desk_rig)), limits(desk_rig.joints)
+    motion, _ = fit.motion("x", track, bounds)
+    lead_s = 0.02 - motion.position_at(0.0)
+    yaw = np.degrees(motion.sample_at(np.array(times) + lead_s)[0, :, 0])
+    assert yaw == pytest.approx([40.0, -20.0, 30.0], abs=1e-3)
+    most = LIMIT_SHARE * desk_rig.joints["neck_yaw"].limit().accel_rad_s2
+    every = motion.sample_at(np.arange(0.0, motion.duration_s, 0.001))
+    assert np.abs(every[2, :, 0]).max() < 1.002 * most and lead_s < 1.0
+
+
+def test_a_table_moves_the_head_and_the_eyes_stay_on_their_target(desk_rig: Rig, tmp_path: Path):
+    path = table(tmp_path, "time,neck_yaw,left_eye_pan\n0,0,0\n0.5,8,-8\n1.2,0,0\n")
+    write_track(desk_rig, tmp_path / "nod.yaml", read(path), "x")
+    frames = load_track(tmp_path / "nod.yaml").frames
+    assert [frame.head_yaw_deg for frame in frames] == [8.0, 0.0]
+    assert [frame.eyes_yaw_deg for frame in frames] == [None, None]  # the line of sight

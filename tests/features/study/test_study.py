@@ -1,0 +1,269 @@
+"""Designs, sessions, data and reports."""
+
+import json
+import signal
+import time
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from browser import browsing
+from command_line import invoked
+from study_helpers import Program, Start, events, session_of
+
+from gazerig.config.load import ConfigError
+from gazerig.config.shipped_files import shipped_names
+from gazerig.drivers.errors import SetupError
+from gazerig.features.study.analyse import analyse_study
+from gazerig.features.study.design import HOME, load_study, participant_order, williams
+from gazerig.features.study.journal import Journal, StudyFolder
+from gazerig.features.study.report import answers_csv, write_report
+from gazerig.features.study.session import PageEvent
+from gazerig.features.study.simulate import simulate_study
+
+
+@pytest.mark.parametrize("n", range(2, 7))
+def test_orders_balance_positions_and_successors(n: int):
+    rows = williams(n)
+    each = len(rows) // n
+    assert all(set(Counter(column).values()) == {each} for column in zip(*rows, strict=True))
+    successors = Counter(pair for row in rows for pair in pairwise(row))
+    assert len(successors) == n * (n - 1) and set(successors.values()) == {each}
+
+
+def test_pairs_are_seen_in_both_orders(tmp_path: Path):
+    path = tmp_path / "pairs.yaml"
+    path.write_text(
+        "title: Pairs\ntask: pairwise\nquestionnaires: [choice]\nparticipants: 12\n"
+        "conditions: {a: {profile: robot}, b: {profile: mitake}, c: {profile: nakamoto}}\n"
+        "hypotheses: [{measure: choice.alive, better: a, than: b, test: sign}]\n"
+    )
+    study = load_study(str(path))
+    seen = Counter(pair for n in range(1, 13) for pair in participant_order(study.design, n))
+    assert len(seen) == 6 and set(seen.values()) == {6}
+
+
+def faults(path: Path, text: str) -> list[str]:
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load_study(str(path))
+    return [f"{fault.line} {fault.key}" for fault in caught.value.faults]
+
+
+def test_faults_name_line_and_key(study: Path):
+    text = study.read_text()
+    both = text.replace("title: Short", "titel: Short").replace("seconds: 2", "seconds: 1")
+    assert {"1 titel", "5 trials.seconds"} <= set(faults(study, both))
+    assert faults(study, text.replace(".naturalness", ".beauty")) == ["9 hypotheses.0.measure"]
+    assert faults(study, text.replace("than: beta", "than: gamma")) == ["9 hypotheses.0"]
+    assert faults(study, text.replace("{ profile: mitake }", "{}")) == [
+        "3 conditions.alpha", "4 conditions.beta"
+    ]  # fmt: skip
+    study.write_text(text.replace("mitake", "none"))
+    with pytest.raises(SetupError, match=r"conditions\.alpha: .*none"):
+        load_study(str(study))
+
+
+@pytest.mark.parametrize("name", shipped_names("studies", HOME))
+def test_shipped_studies_find_their_effects_in_simulated_answers(name: str, tmp_path: Path):
+    study = load_study(name)
+    folder = StudyFolder(tmp_path / "data")
+    simulate_study(study, folder, 24, 1, effect=1.5)
+    found = analyse_study(folder.path)
+    assert [one.verdict for one in found.decisions] == ["supported"] * len(study.design.hypotheses)
+    page = write_report(found, tmp_path / "report").read_text()
+    assert "simulated participants" in page and page.count("<svg") == len(found.scores)
+    with pytest.raises(SetupError, match="--data"):
+        simulate_study(study, folder, 1, 1)
+
+
+def test_answers_that_do_not_count(study: Path, tmp_path: Path):
+    loaded, folder = load_study(str(study)), StudyFolder(tmp_path / "data")
+    folder.claim(loaded)
+    for number in (1, 2):
+        journal = Journal(folder.participant(number))
+        session = session_of(study, journal)
+        session.handle(PageEvent(session.page, "consent"))
+        while session.place.step != "questions":
+            session.film_fetched()
+            session.handle(
+                PageEvent(session.page, "begin" if session.place.step == "ready" else "seen")
+            )
+        session.handle(PageEvent(session.page, "answer", [4, 5], [900.0, 900.0]))
+        if number == 1:
+            session.handle(PageEvent(session.page, "leave"))
+        else:
+            events(session)
+        journal.close()
+    found = analyse_study(folder.path)
+    assert found.reasons == {"P001": "withdrew", "P002": ""}
+    reasons = [one.left_out for one in found.answers]
+    assert reasons == ["withdrew"] * 2 + [""] * 5
+    assert answers_csv(found).count("\n") == 8
+    assert found.decisions[0].verdict == "too few"
+
+
+@pytest.fixture
+def journal(tmp_path: Path) -> Iterator[Journal]:
+    journal = Journal(tmp_path / "data")
+    yield journal
+    journal.close()
+
+
+def test_pages_do_not_distinguish_conditions(study: Path, journal: Journal):
+    session = session_of(study, journal)
+    assert "difference" not in json.dumps(session.page_json())
+    events_of = events(session)
+    assert events_of == ["consent", *2 * ["ready", "presentation", "questions"], "questions"]
+    assert session.page_json()["debriefing"] == ("It was the difference.",)
+
+
+def test_an_incomplete_last_line_is_dropped(tmp_path: Path, study: Path):
+    journal = Journal(tmp_path / "data")
+    session_of(study, journal)
+    with pytest.raises(SetupError, match="another program"):
+        Journal(tmp_path / "data")
+    journal.close()
+    path = tmp_path / "data" / "journal.jsonl"
+    whole = path.read_bytes()
+    path.write_bytes(whole + b'[{"kind":"Cons')
+    Journal(tmp_path / "data").close()
+    assert path.read_bytes() == whole
+    path.write_bytes(b"nonsense\n" + whole)
+    with pytest.raises(SetupError, match="jsonl:1"):
+        Journal(tmp_path / "data")
+
+
+def test_a_design_does_not_change_after_the_first_participant(study: Path, tmp_path: Path):
+    folder = StudyFolder(tmp_path / "data")
+    folder.claim(load_study(str(study)))
+    journal = Journal(folder.participant(1))
+    session_of(study, journal)
+    journal.close()
+    folder.claim(load_study(str(study)))
+    study.write_text(study.read_text().replace("seconds: 2", "seconds: 2.1"))
+    with pytest.raises(SetupError, match="another design"):
+        folder.claim(load_study(str(study)))
+
+
+@pytest.mark.pty
+def test_a_killed_session_resumes_with_every_answer(study: Path, program: Start):
+    first = program(str(study))
+    assert first.do(first.page(), "consent") == 200
+    assert first.fetch("/film/x")[0] == 404
+    _see_film(first)
+    page = first.page()
+    assert page["step"] == "questions"
+    assert first.do(page, "answer", values=[9, 1], ms=[1.0, 1.0]) == 400
+    assert first.do(page, "answer", values=[2, 5], ms=[1000.0, 1000.0]) == 200
+    first.process.kill()
+    again = program(str(study))
+    assert again.token == first.token
+    assert again.do(page, "answer", values=[1, 1], ms=[1000.0, 1000.0]) == 409
+    _see_film(again)
+    assert again.do(again.page(), "answer", values=[4, 4], ms=[1000.0, 1000.0]) == 200
+    assert again.do(again.page(), "answer", values=["remark"], ms=[1000.0]) == 200
+    assert again.page()["step"] == "end"
+    again.process.send_signal(signal.SIGINT)
+    assert again.process.wait() == 0
+    found = analyse_study(study.parent / "data")
+    assert [one.record.value for one in found.answers] == [2, 5, 4, 4, "remark"]
+
+
+def _see_film(one: Program) -> None:
+    assert one.do(one.page(), "begin") == 200
+    page = one.page()
+    status, film = one.fetch(f"/film/{page['page']}")
+    assert status == 200 and film[:4] == b"\x1aE\xdf\xa3"
+    time.sleep(2.0)
+    assert one.do(page, "seen") == 200
+
+
+@pytest.mark.pty
+def test_a_session_with_a_live_head(tmp_path: Path, program: Start):
+    path = tmp_path / "head.yaml"
+    shipped = (HOME / "studies" / "nakamoto_2.yaml").read_text()
+    path.write_text(shipped.replace("seconds: 30", "seconds: 2"))
+    one = program(str(path), "--mock")
+    assert one.do(one.page(), "consent") == 200
+    for _ in range(2):
+        assert one.do(one.page(), "begin") == 200
+        assert one.page()["step"] == "presentation"
+        assert one.do(one.page(), "seen") == 400  # the clock decides
+        while one.page()["step"] == "presentation":
+            time.sleep(0.1)
+        assert one.do(one.page(), "answer", values=[4, 4], ms=[1000.0, 1000.0]) == 200
+    assert invoked("stop").code == 0
+    assert one.process.wait(30) == 2
+    assert one.process.stderr is not None and "stopped" in one.process.stderr.read()
+    again = program(str(path), "--mock")
+    assert again.do(again.page(), "answer", values=[""], ms=[1000.0]) == 200
+    assert again.page()["step"] == "end"
+    again.process.send_signal(signal.SIGINT)
+    assert again.process.wait(30) == 0
+
+
+@pytest.mark.browser
+def test_a_session_in_chromium_with_the_keyboard(study: Path, program: Start):
+    one = program(str(study))
+    with browsing() as tab:
+
+        def press(key: str) -> None:
+            text = {"text": "\r"} if key == "Enter" else {"text": key} if len(key) == 1 else {}
+            for kind in ("keyDown", "keyUp"):
+                more = text if kind == "keyDown" else {}
+                tab.ask("Input.dispatchKeyEvent", type=kind, key=key, **more)
+
+        def wait_for(words: str) -> None:
+            until = time.monotonic() + 60.0
+            while words not in tab.words():
+                assert time.monotonic() < until, tab.words()
+                time.sleep(0.05)
+
+        tab.go(f"{one.url}/?token={one.token}")
+        wait_for("Before you begin")
+        tab.run("document.getElementById('agree').click()")
+        press("Enter")
+        for _ in range(2):
+            wait_for("Are you ready?")
+            press("Enter")
+            wait_for("Your impression")
+            press("4")
+            tab.ask("Page.reload")  # the draft stays
+            wait_for("Your impression")
+            press("2")
+            press("Enter")
+        wait_for("What struck you")
+        source = tab.ask("Runtime.evaluate", expression="document.documentElement.outerHTML")
+        shown = source["result"]["value"] + "".join(tab.asked_for)
+        assert "alpha" not in shown and "beta" not in shown
+        tab.run("document.querySelector('button.main').click()")
+        wait_for("It was the difference.")
+    found = analyse_study(study.parent / "data")
+    assert [one.record.value for one in found.answers] == [4, 2, 4, 2, ""]
+
+
+@pytest.mark.slow
+def test_films_are_rendered_once(tmp_path: Path):
+    pytest.importorskip("mujoco")
+    from gazerig.drivers.camera.film import Film
+    from gazerig.features.study.film import films
+
+    path = tmp_path / "film.yaml"
+    shipped = (HOME / "studies" / "nakamoto_1.yaml").read_text()
+    path.write_text(shipped.replace("seconds: 30", "seconds: 2"))
+    study = load_study(str(path))
+    try:
+        made = films(study, tmp_path, lambda what, share: None)
+    except SetupError as error:
+        pytest.skip(str(error))
+    for one in made.values():
+        *_, last = Film(one).play_once()
+        assert last.start_s + 0.04 == pytest.approx(2.0, 0.05)
+    assert not any(key in one.name for key, one in made.items())
+    before = [one.stat().st_mtime_ns for one in made.values()]
+    assert films(study, tmp_path, lambda what, share: None) == made
+    assert [one.stat().st_mtime_ns for one in made.values()] == before
+    assert len({one.read_bytes()[-4000:] for one in made.values()}) == 2

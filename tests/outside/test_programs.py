@@ -1,0 +1,532 @@
+"""Programs of the network command a running head: real bytes through HTTP and a websocket."""
+
+import asyncio
+import contextlib
+import json
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+from urllib.parse import urlsplit
+
+import aiohttp
+import pytest
+from branch import Branch, gazerig
+from browser import browsing
+from page_visitor import fetch
+from shown_page import free_port, wait_for
+from slow_rigs import at_rate
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+from websockets.sync.connection import Connection
+from websockets.typing import Origin
+
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.dashboard.door import page_door
+from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
+from gazerig.robot.model.commands import Jog, LookAt, Resume
+from gazerig.robot.net.client import RobotClient
+
+ROOT = Path(__file__).parents[2]
+
+PATIENCE_S = 60.0
+
+
+class Rig(NamedTuple):
+    """A head in another process, with a page."""
+
+    url: str
+    token: str
+    client: RobotClient
+
+    @property
+    def base(self) -> str:
+        return f"{self.url}/api/v1"
+
+    def get(self, path: str, **headers: str) -> tuple[int, Any]:
+        status, _, text = fetch(f"{self.base}{path}", {**self.shown, **headers})
+        return status, json.loads(text)
+
+    def post(self, body: object, query: str = "", **headers: str) -> tuple[int, Any]:
+        data = body if isinstance(body, bytes) else json.dumps(body).encode()
+        status, _, text = fetch(f"{self.base}/do{query}", {**self.shown, **headers}, data)
+        return status, json.loads(text)
+
+    @property
+    def shown(self) -> dict[str, str]:
+        return {"Authorization": f"Bearer {self.token}"}
+
+    def dial(self, query: str = "", origin: str | None = None, token: str = "") -> ClientConnection:
+        address = self.base.replace("http", "ws", 1)
+        return connect(
+            f"{address}/socket?token={token or self.token}{query}",
+            origin=Origin(origin) if origin is not None else None,
+            compression=None,
+            max_size=None,
+            open_timeout=PATIENCE_S,
+            close_timeout=1.0,
+        )
+
+    def ticks(self) -> int:
+        return int(self.client.status()["ticks"])
+
+    def until(self, right: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
+        """Wait until the status is as it should be."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not right(now := self.client.status()):
+            assert time.monotonic() < end_s, now
+            time.sleep(0.02)
+        return now
+
+
+@pytest.fixture(scope="module")
+def rig() -> Iterator[Rig]:
+    folder = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
+    file = at_rate(folder, "desk", 20.0)
+    address = f"127.0.0.1:{free_port()}"
+    with pytest.MonkeyPatch.context() as patch, (folder / "log").open("w") as log:
+        patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        words = (
+            "run",
+            file,
+            "--mock",
+            "--bus",
+            "ideal",
+            "--name",
+            "eva",
+            "--no-browser",
+            "--page",
+            address,
+        )
+        process = Branch(gazerig(*words), stdout=log, stderr=log, env=dict(os.environ), cwd=folder)
+        try:
+            client = reached(process)
+            end_s = time.monotonic() + PATIENCE_S
+            while not (page := client.status()["page"]) or not client.status()["ticks"]:
+                assert time.monotonic() < end_s, (folder / "log").read_text()
+                time.sleep(0.1)
+            parts = urlsplit(page)
+            url = f"{parts.scheme}://{parts.netloc}"
+            yield Rig(url, parts.query.removeprefix("token="), client)
+            client.close()
+        finally:
+            process.terminate()
+            process.wait(PATIENCE_S)
+            shutil.rmtree(folder)
+
+
+def reached(process: subprocess.Popen[Any]) -> RobotClient:
+    end_s = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            return RobotClient.connect("eva", "the test")
+        except DriverError:
+            assert time.monotonic() < end_s and process.poll() is None
+            time.sleep(0.1)
+
+
+@pytest.fixture(autouse=True)
+def free(rig: Rig) -> Iterator[None]:
+    """Leave each test with a head that moves and chooses its targets."""
+    yield
+    time.sleep(0.1)  # the limits of rates fill again, by ten messages
+    if rig.client.status()["stopped"]:
+        time.sleep(2.1)
+        rig.client.send(Resume(confirmed=True))
+    rig.client.send(LookAt(None))
+    rig.client.send(Jog(()))
+
+
+def heard(end: Connection, key: str, value: object = None) -> dict[str, Any]:
+    """Return the next message with a key, and a value if one is given."""
+    stop_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < stop_s:
+        message: dict[str, Any] = json.loads(end.recv(timeout=PATIENCE_S))
+        if key in message and value in (None, message[key]):
+            return message
+    raise TimeoutError(key)
+
+
+def ask(end: Connection, **message: object) -> None:
+    end.send(json.dumps(message))
+
+
+def client(rate_hz: float = 0.0) -> ClientSocket:
+    return ClientSocket(Wishes(rate_hz), Visitor("", "127.0.0.1"), "websocket 1")
+
+
+def client_frame(text: str) -> bytes:
+    """Return a text message of a client, whose mask changes nothing."""
+    return bytes((0x81, 0x80 | len(text))) + bytes(4) + text.encode()
+
+
+LEFT, RIGHT = [1.0, 0.3, 0.3], [1.0, -0.3, 0.3]
+
+
+# Purpose
+
+
+def test_orders_have_outcomes(rig: Rig):
+    status, answer = rig.post({"do": "look_at", "p_world_m": LEFT, "tag": "a"}, "?wait_s=15")
+    assert status == 200 and answer["tag"] == "a" and answer["outcome"] == "arrived"
+    behind = rig.post({"do": "look_at", "p_world_m": [-1, 0.1, 0.3]}, "?wait_s=15")[1]
+    assert behind["outcome"] == "out of reach"
+    assert rig.post({"do": "play", "track": "nod"}, "?wait_s=15")[1]["outcome"] == "arrived"
+    status, answer = rig.post({"do": "look_at_person", "id": 99})
+    assert status == 409 and "99" in answer["refused"] and answer["reply"]["refused"]
+    assert "outcome" not in rig.post({"do": "play", "track": "nod"}, "?wait_s=0")[1]
+    assert "neck_yaw" in rig.post({"do": "status"})[1]["ok"]["joints"]
+
+
+def test_orders_over_the_websocket_have_outcomes_by_tag(rig: Rig):
+    with rig.dial() as end:
+        assert heard(end, "tag", "hello")["ok"] == {
+            "version": 1, "rig": rig.client.status()["rig"], "name": "eva", "pid": rig.client.pid,
+            "you": "a program at 127.0.0.1",
+        }  # fmt: skip
+        ask(end, do="look_at", p_world_m=LEFT, who="a show", tag=1)
+        assert heard(end, "tag", 1)["ok"]["reply"]["control_number"] > 0
+        assert heard(end, "outcome") == {"outcome": "arrived", "why": "", "tag": 1}
+        led = rig.client.status()["controlled_by"]
+        assert led.startswith("a show at 127.0.0.1: look at")
+        time.sleep(1.5)  # renewed as long as it is there
+        assert rig.client.status()["controlled_by"] == led
+        ask(end, do="look_at", p_world_m=RIGHT, tag=2)
+        ask(end, do="look_at", p_world_m=LEFT, tag=3)
+        outcomes = [heard(end, "outcome") for _ in range(2)]
+        assert {one["tag"]: one["outcome"] for one in outcomes} in (
+            {2: "taken over", 3: "arrived"},
+            {2: "arrived", 3: "arrived"},
+        )
+
+
+def test_states_come_at_the_rate_that_was_asked_for(rig: Rig):
+    with rig.dial("&rate_hz=5") as slow, rig.dial("&rate_hz=25&events=true") as quick:
+        for end, rate_hz in ((slow, 5.0), (quick, 25.0)):
+            heard(end, "state")
+            began_s, count = time.monotonic(), 10
+            times = [heard(end, "state")["state"]["t_s"] for _ in range(count)]
+            assert times == sorted(times) and len(set(times)) > 1
+            if end is slow:
+                assert time.monotonic() - began_s > 0.7 * count / rate_hz
+        kinds: set[str] = set()
+        while not {"saccade_start", "saccade_landing", "target"} <= kinds:
+            event = heard(quick, "event")["event"]
+            assert set(event) == {"number", "t_s", "text", "kind", "subject"}
+            kinds.add(event["kind"])
+
+
+# Leaving
+
+
+@pytest.mark.parametrize("leave", ["closed", "killed"])
+def test_who_leaves_while_leading_gives_control_back(rig: Rig, leave: str):
+    end = rig.dial()
+    ask(end, do="jog", angles_rad=[["neck_yaw", 0.1]], tag=1)
+    heard(end, "tag", 1)
+    rig.until(lambda now: now["controlled_by"])
+    if leave == "closed":
+        end.close()
+    else:  # its computer is gone: no more packets, no farewell
+        end.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\0\0\0\0\0\0\0")
+        end.socket.close()
+    rig.until(lambda now: not now["controlled_by"])
+
+
+def test_who_hangs_while_leading_gives_control_back(rig: Rig):
+    """A suspended program answers no ping, though its connection stays open."""
+    parts = urlsplit(rig.url)
+    with socket.create_connection((parts.hostname or "", parts.port or 0)) as end:
+        end.sendall(
+            f"GET /api/v1/socket?token={rig.token} HTTP/1.1\r\nHost: {parts.netloc}\r\n"
+            "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode()
+        )
+        text = json.dumps({"do": "look_at", "p_world_m": LEFT}).encode()
+        end.sendall(bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text)
+        rig.until(lambda now: now["controlled_by"])
+        rig.until(lambda now: not now["controlled_by"])
+
+
+def test_stop_goes_through_and_who_stopped_may_resume(rig: Rig):
+    with rig.dial() as end:
+        ask(end, do="stop", why="a hand", who="a show", tag="s")
+        assert "ok" in heard(end, "tag", "s")
+        assert rig.client.status()["stopped"] == "a hand"
+        time.sleep(2.1)
+        with rig.dial() as other:  # of the same host, and a name can be chosen
+            for number, who in enumerate(("a show", "a show at 127.0.0.1, websocket 1")):
+                time.sleep(1.1 * number)
+                ask(other, do="resume", who=who, tag=number)
+                assert "no hand" in heard(other, "tag", number)["refused"]
+        for query in ("", "?wait_s=0"):
+            status, answer = rig.post({"do": "resume", "who": "a show"}, query)
+            assert status == 409 and 'needs "confirmed": true' in answer["refused"]
+        assert rig.client.status()["stopped"]
+        ask(end, do="resume", who="a show", tag="q")
+        assert "ok" in heard(end, "tag", "q")
+    assert not rig.client.status()["stopped"]
+    assert rig.post({"do": "stop"})[0] == 200
+    assert rig.get("/state")[1]["ok"]["state"]["stopped"]  # not older than the answer
+    assert rig.client.status()["stopped"]
+    time.sleep(2.1)
+    assert rig.post({"do": "resume", "confirmed": False})[0] == 409
+    assert rig.post({"do": "resume", "confirmed": True})[0] == 200
+    assert not rig.client.status()["stopped"]
+
+
+# Bad input
+
+
+DEEP = b'{"do":' + b"[" * 20000 + b"]" * 20000 + b"}"
+BAD = (
+    (b"{", 400, "not JSON"),
+    (DEEP, 400, "nested too deep"),
+    (b'{"do": "status", "tag": [1]}', 400, "tag: a whole number or text"),
+    (b'{"do": "look_at", "p_world_m": [NaN, 0, 0]}', 400, "not JSON"),
+    (b'{"do": "look_at", "p_world_m": [1, 0, 0], "x": 1}', 409, "look_at has p_world_m, pointer"),
+    (b'{"do": "dance"}', 409, "available: hello"),
+    (b'{"do": "save", "path": "/etc/passwd.yaml"}', 409, "only files in"),
+    (b'{"do": "character", "name": "/etc/passwd"}', 409, "and below can be named"),
+    (b'{"do": "set", "changes": {"doors": ["wyoming"]}}', 409, "cannot be set over the network"),
+    (b" " * 70_000, 413, "longer than 65536 bytes"),
+)
+
+
+@pytest.mark.parametrize(("body", "status", "text"), BAD, ids=[text for _, _, text in BAD])
+def test_a_bad_message_gets_one_clear_error(rig: Rig, body: bytes, status: int, text: str):
+    found, answer = rig.post(body)
+    assert found == status and list(answer) in (["refused"], ["refused", "tag"]), answer
+    assert text in answer["refused"] and "\n" not in answer["refused"]
+    with rig.dial() as end:
+        heard(end, "tag", "hello")
+        with contextlib.suppress(UnicodeDecodeError):
+            end.send(body.decode())
+            assert json.loads(end.recv(timeout=PATIENCE_S)) == answer
+        ask(end, do="characters", tag=1)  # the connection goes on
+        assert "shy" in heard(end, "tag", 1)["ok"]
+
+
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        ("/socket?rate_hz=0", "1.0 - at `$.rate_hz`"),
+        ("/socket?rate_hz=nan", "$.rate_hz"),
+        ("/state?after=-1", "$.after"),
+    ],
+)
+def test_a_wrong_query_gets_one_clear_error(rig: Rig, path: str, text: str):
+    status, answer = rig.get(path, Upgrade="websocket", Connection="Upgrade")
+    assert status == 400 and text in answer["refused"]
+
+
+# Allowed visitors
+
+
+def test_without_the_token_nothing_is_answered(rig: Rig):
+    for headers in ({"Authorization": "Bearer wrong"}, {"Authorization": "nonsense"}):
+        status, answer = rig.get("/state", **headers)
+        assert status == 403 and "show the token" in answer["refused"]
+        status, answer = rig.post({"do": "status"}, **headers)
+        assert status == 403 and "gazerig ctl rigs" in answer["refused"]
+    with pytest.raises(InvalidStatus) as refused:
+        rig.dial(token="wrong")
+    assert refused.value.response.status_code == 403
+
+
+def test_a_page_of_another_site_is_refused_even_with_the_token(rig: Rig):
+    status, answer = rig.post({"do": "status"}, Origin="http://elsewhere.example")
+    assert status == 403 and "another origin" in answer["refused"]
+    for origin in ("http://elsewhere.example", "http://localhost:1"):
+        with pytest.raises(InvalidStatus):
+            rig.dial(origin=origin)
+    with rig.dial(origin="null") as own:  # a file that its user has opened and given the token
+        heard(own, "tag", "hello")
+    with pytest.raises(InvalidStatus):
+        rig.dial(origin="null", token="wrong")
+    status, _, _ = fetch(f"{rig.base}/state", {**rig.shown, "Host": "elsewhere.example"})
+    assert status == 403
+
+
+# Floods and slow readers
+
+
+def test_a_flood_is_refused_and_a_stop_of_anybody_goes_through(rig: Rig):
+    """So many at once that most are too many, and so few that the connection stays."""
+    with rig.dial() as flood:
+        heard(flood, "tag", "hello")
+        flood.socket.sendall(280 * client_frame('{"do": "look_at", "p_world_m": [1, 0, 0]}'))
+        ask(flood, do="stop", why="in the flood", tag="s")
+        with rig.dial() as other:
+            ask(other, do="stop", why="another", tag=1)
+            assert "ok" in heard(other, "tag", 1)
+        answers = [json.loads(flood.recv(timeout=PATIENCE_S))]
+        while not ("ok" in answers[-1] and answers[-1].get("tag") == "s"):
+            answers.append(json.loads(flood.recv(timeout=PATIENCE_S)))
+        assert any("too many requests" in one.get("refused", "") for one in answers)
+    ticks = rig.ticks()
+    assert rig.until(lambda now: now["ticks"] > ticks)["stopped"]
+
+
+@pytest.mark.parametrize("message", ['{"do": "set_level", "level": "jaw", "value": 1}', "rubbish"])
+def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(rig: Rig, message: str):
+    with rig.dial() as flood:
+        heard(flood, "tag", "hello")
+        for _ in range(3000):
+            flood.send(message)
+        sent_s = time.monotonic()
+        ask(flood, do="stop", why="at last", tag="s")
+        assert rig.until(lambda now: now["stopped"])["stopped"] == "at last"
+        assert time.monotonic() - sent_s < 20.0  # at most .3 on a quiet machine
+
+
+@pytest.mark.parametrize("stop", ["stop", "st\\u006fp"])
+def test_the_last_message_before_the_end_of_a_burst_may_be_a_stop(rig: Rig, stop: str):
+    with rig.dial() as end:
+        heard(end, "tag", "hello")
+        level = client_frame('{"do": "set_level", "level": "jaw", "value": 1}')
+        end.socket.sendall(3000 * level + client_frame(f'{{"do": "{stop}", "why": "at last"}}'))
+        end.socket.close()
+        assert rig.until(lambda now: now["stopped"])["stopped"] == "at last"
+
+
+def test_who_sends_far_too_much_is_disconnected_after_its_stop(rig: Rig):
+    with rig.dial() as flood:
+
+        def read() -> None:
+            with contextlib.suppress(ConnectionClosed):
+                for _ in flood:
+                    pass
+
+        reader = threading.Thread(target=read)
+        reader.start()
+        began_s, stops = time.monotonic(), False
+        with pytest.raises(ConnectionClosed) as closed:
+            while time.monotonic() < began_s + PATIENCE_S:
+                flood.send("rubbish")
+                if not stops and time.monotonic() > began_s + 1.0:
+                    stops = True
+                    ask(flood, do="stop", why="before the end")
+                time.sleep(0.0005)
+        reader.join()
+    assert closed.value.rcvd is not None and closed.value.rcvd.code == 1008
+    assert closed.value.rcvd.reason.startswith("too many requests: more than 200 refused in 1 s")
+    assert rig.until(lambda now: now["stopped"])["stopped"] == "before the end"
+
+
+def test_a_stop_in_the_buffer_of_a_connection_that_is_closed_is_carried_out(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """It is read late: the computer is busy, and much was sent before it."""
+    monkeypatch.setattr(page_door, "REST_S", 0.02)
+    stop = aiohttp.WSMessage(aiohttp.WSMsgType.TEXT, '{"do": "stop"}', None)
+    end = aiohttp.WSMessage(aiohttp.WSMsgType.CLOSED, None, None)
+    carried_out: list[object] = []
+
+    async def carry_out(frame: object, *rest: object, late: bool) -> None:
+        carried_out.append(frame)
+
+    async def receive(sends: socket.socket) -> None:
+        due_s, frames = asyncio.get_running_loop().time() + 0.07, iter((stop, end))
+
+        async def next_frame() -> aiohttp.WSMessage:
+            await asyncio.sleep(due_s - asyncio.get_running_loop().time())
+            return next(frames)
+
+        excess = page_door.ExcessCount()
+        excess.is_over = True
+        door = SimpleNamespace(_take_frame=carry_out)
+        request = SimpleNamespace(transport=SimpleNamespace(get_extra_info=lambda name: sends))
+        web_socket: Any = SimpleNamespace(receive=next_frame)
+        arguments: Any = (door, web_socket, client(), request, excess)
+        await page_door.PageDoor._receive(*arguments)
+
+    here, there = socket.socketpair()
+    with here, there:
+        asyncio.run(receive(here))
+        assert carried_out == []  # nothing waits in the kernel
+        there.sendall(b"more")
+        asyncio.run(receive(here))
+    assert carried_out == [stop]
+
+
+def test_messages_that_are_dropped_are_refused_together():
+    async def drop() -> list[Any]:
+        program = client()
+        for _ in range(3):
+            program.drop_message()
+        await program.news.wait()
+        return [json.loads(str(text)) for text in iter(program.outgoing, "")]
+
+    (refusal,) = asyncio.run(drop())
+    assert "too many requests" in refusal["refused"] and refusal["messages"] == 3
+
+
+def test_commands_that_wait_are_refused_by_a_stop_and_questions_are_not():
+    async def stop() -> list[Any]:
+        program = client()
+        for message in ({"do": "resume", "tag": 1}, {"do": "status"}, {"do": "look_at"}):
+            program.orders.put_nowait(message)
+        program.refuse_commands()
+        said = [json.loads(str(text)) for text in iter(program.outgoing, "")]
+        return [*said, program.orders.get_nowait(), program.orders.empty()]
+
+    refused = {"refused": "it has been stopped meanwhile"}
+    assert asyncio.run(stop()) == [{**refused, "tag": 1}, refused, {"do": "status"}, True]
+
+
+def test_a_program_too_many_takes_the_place_of_the_oldest(rig: Rig):
+    with contextlib.ExitStack() as stack:
+        first = stack.enter_context(rig.dial())
+        for _ in range(page_door.MOST_CLIENTS):
+            stack.enter_context(rig.dial())
+        with pytest.raises(ConnectionClosed):
+            while True:
+                first.recv(timeout=PATIENCE_S)
+        assert rig.get("/state")[0] == 200
+
+
+# Examples
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("size_px", [(1000, 900), (390, 800)], ids=str)
+def test_the_browser_example_shows_the_head_and_commands_it(
+    rig: Rig, size_px: tuple[int, int], tmp_path: Path
+):
+    file = ROOT / "examples" / "browser.html"
+    assert len(file.read_text(encoding="utf-8").splitlines()) <= 100
+    with browsing(size_px) as browser:
+        browser.go(f"{file.as_uri()}#{rig.url}/?token={rig.token}")
+        wait_for(lambda: "look" in browser.words().splitlines()[0], "the headline")
+        click = "new MouseEvent('click', {clientX: 200, clientY: 150})"
+        browser.run(f"document.querySelector('canvas').dispatchEvent({click})")
+        led = rig.until(lambda now: now["controlled_by"])["controlled_by"]
+        assert led.startswith("browser.html at 127.0.0.1")
+        wait_for(lambda: "look_at 1: " in browser.words(), "the outcome")
+        Path(tmp_path / f"{size_px[0]}.png").write_bytes(browser.photograph())
+        browser.run("document.querySelector('#stop').click()")
+        rig.until(lambda now: now["stopped"])
+        wait_for(lambda: "stopped: browser.html" in browser.words(), "the stop")
+    rig.until(lambda now: not now["controlled_by"])
+
+
+def test_states_after_an_answer_are_not_older():
+    async def follow() -> list[Any]:
+        program, done = client(25.0), {"reply": {"t_s": 5.02}}
+        program.add_state('"before"', 1.0)
+        sent = [program.outgoing()]
+        program.add_state('"older, and not read yet"', 2.0)
+        program.queue_answer({"do": "look_at", "who": ""}, {"ok": done})
+        sent += [*iter(program.outgoing, "")]
+        wanted = [program.wants_state(t_s, 3.0) for t_s in (5.019, 5.02)]
+        return [*(json.loads(str(text)) for text in sent), wanted]
+
+    assert asyncio.run(follow()) == ["before", {"ok": {"reply": {"t_s": 5.02}}}, [False, True]]

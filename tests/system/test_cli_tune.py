@@ -1,0 +1,174 @@
+"""Tuning a running rig from a shell: gazerig ctl get, set, revert, ask, status; gazerig stop."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from branch import Branch
+from command_line import invoked
+from slow_rigs import at_rate
+
+import gazerig
+from gazerig.robot.loop import stop
+
+RATE = "loop.rate_hz"
+
+
+def opened(rig: str) -> gazerig.Head:
+    return gazerig.open(rig, mock=True, bus="ideal", scene="visitor")
+
+
+@pytest.fixture(scope="module")
+def rig() -> Iterator[str]:
+    """Return the file of a rig that runs, in a folder with its socket."""
+    folder = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        patch.setattr(stop, "MIN_HOLD_S", 0.0)
+        patch.setattr(stop, "MIN_RESUME_GAP_S", 0.0)
+        yield at_rate(folder, "desk", 80.0)
+    shutil.rmtree(folder)
+
+
+@pytest.fixture(scope="module")
+def running(rig: str) -> Iterator[gazerig.Head]:
+    with opened(rig) as head:
+        yield head
+
+
+@pytest.fixture
+def head(running: gazerig.Head) -> Iterator[gazerig.Head]:
+    """Return a head whose values, torque and gaze are restored after the test."""
+    yield running
+    running.revert()
+    running.resume(confirmed=True)
+    running.look_freely()
+
+
+pytestmark = pytest.mark.usefixtures("head")
+
+
+def test_get_shows_all_and_marks_what_is_not_saved():
+    everything = invoked("ctl", "get").out.splitlines()
+    assert len(everything) > 200 and everything[0].split() == ["key", "value", "unit", "default"]
+    assert invoked("ctl", "set", RATE, "150").code == 0
+    table = invoked("ctl", "get", "loop").out.splitlines()
+    (row,) = (line for line in table if RATE in line)
+    assert row.split() == ["*", RATE, "150.0", "Hz", "200.0", "next", "start"]
+    alone = invoked("ctl", "get", RATE).out
+    assert "control rate; 20 .. 1000 Hz; changes at the next start" in alone
+
+
+def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it():
+    done = invoked("ctl", "set", RATE, "150", "gaze.scanpath.model", "random")
+    assert done.code == 0, done.err
+    assert sorted(done.out.splitlines()) == [
+        "gaze.scanpath.model = random",
+        f"{RATE} = 150.0 (at the next start)",
+    ]
+    assert "already active" in invoked("ctl", "set", RATE, "150.0").err
+    assert "not saved yet: 2 values" in done.err
+
+
+@pytest.mark.parametrize(
+    ("words", "rule"),
+    [
+        ((RATE, "1e9"), "20 to 1000 Hz"),
+        (("gaze.scanpath.model", "markof"), "did you mean 'markov'?"),
+        ((RATE,), "a value is missing"),
+        ((RATE, "100", RATE, "200"), "duplicate key"),
+        ((RATE, "100\nmore: 1"), "more than one value"),
+    ],
+)
+def test_what_is_wrong_is_refused_with_the_rule_and_exit_code_2(
+    head: gazerig.Head, words: tuple[str, ...], rule: str
+):
+    done = invoked("ctl", "set", *words)
+    assert done.code == 2 and rule in done.err and "Traceback" not in done.err
+    assert done.out == "" and head.get(RATE) == {RATE: 80.0}
+
+
+def test_revert_tells_what_it_takes_back(head: gazerig.Head):
+    invoked("ctl", "set", RATE, "150")
+    done = invoked("ctl", "revert")
+    assert f"{RATE} = 80.0" in done.out and head.get(RATE) == {RATE: 80.0}
+    assert "1 value undone" in done.err
+
+
+def test_stop_and_resume(head: gazerig.Head):
+    done = invoked("stop", "finger")
+    assert done.code == 0 and "torque is off" in done.err
+    assert head.state.stopped == "finger"
+    unsure = invoked("ctl", "resume")  # no person confirms that no hand is in it
+    assert unsure.code != 0 and "no hand" in unsure.out + unsure.err
+    assert head.state.stopped == "finger"
+    assert invoked("ctl", "resume", "--yes").code == 0
+    assert "nothing to resume" in invoked("ctl", "resume").err
+
+
+def test_stop_stops_every_rig_that_runs(head: gazerig.Head, rig: str):
+    def run() -> None:
+        stop.MIN_HOLD_S = 0.0
+        with opened(rig):
+            print("open", flush=True)
+            signal.pause()
+
+    with Branch(run, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout is not None and process.stdout.readline() == "open\n"
+        refused = invoked("ctl", "get", RATE)
+        assert refused.code == 2 and "--pid" in refused.err and str(process.pid) in refused.err
+        assert invoked("stop").code == 0
+        with gazerig.connect(process.pid) as other:
+            assert head.state.stopped and other.state.stopped
+        named = invoked("ctl", "rigs").out.splitlines()
+        assert [row.split()[0] for row in named] == ["desk", "desk"]
+        ambiguous = invoked("ctl", "--rig", "desk", "get", RATE)
+        assert ambiguous.code == 2 and "2 rigs named desk are running" in ambiguous.err
+        assert invoked("ctl", "--rig", str(process.pid), "get", RATE).code == 0
+        unknown = invoked("ctl", "get", RATE, "--rig", "eva")
+        assert "no rig named eva is running: desk (process " in unknown.err
+        process.terminate()
+
+
+def test_ask_lists_the_menus_and_chooses_from_them(head: gazerig.Head):
+    present, *others = head.menus()["conversation"]
+    lines = invoked("ctl", "ask").out.splitlines()
+    assert any(line.startswith("behaviour: ") for line in lines)
+    assert f"conversation: {present} (in force), {', '.join(others)}" in lines
+    done = invoked("ctl", "ask", "conversation", others[0])
+    assert (done.code, done.err) == (0, f"conversation {others[0]} is active\n")
+    (line,) = invoked("ctl", "ask", "conversation").out.splitlines()
+    assert line.startswith(f"conversation: {others[0]} (in force), ")
+    invoked("ctl", "ask", "conversation", present)
+
+
+def test_status_says_what_the_rig_does(rig: str):
+    said = invoked("ctl", "status").out
+    assert f"rig: {rig}, process {os.getpid()}\n" in said
+    assert "looks at: " in said and "guard: " in said and "neck_yaw" in said
+    assert "all saved" in said and "STOPPED" not in said
+    invoked("ctl", "set", RATE, "150")
+    invoked("stop", "finger")
+    said = invoked("ctl", "status").out
+    assert "STOPPED, torque off: finger; gazerig ctl resume continues" in said
+    assert "not saved: 1 value" in said and "said: stopped by gazerig stop (process" in said
+    assert json.loads(invoked("ctl", "status", "--json").out)["stopped"] == "finger"
+
+
+def test_where_no_rig_runs_it_is_one_line_and_exit_code_2(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    none = (2, "", "no rig is running: start one with gazerig run ...\n")
+    for words in (("get",), ("set", RATE, "100"), ("stop",), ("look", "free"), ("save",),
+                  ("ask",), ("status",)):  # fmt: skip
+        assert invoked("ctl", *words) == none, words
+    assert invoked("stop") == none
+    done = invoked("stop", "--pid", "1")
+    assert done.err == "no rig of process 1 is running: start one with gazerig run ...\n"

@@ -1,0 +1,144 @@
+"""Commands of README and docs that need a head that runs, servos, or a recording."""
+
+import re
+import shlex
+import signal
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from shutil import which
+
+import pytest
+from branch import Branch
+from branch import gazerig as gazerig_branch
+from command_line import GAZERIG, invoked
+from features_there import needs_all_features
+from papers import COMMANDS, blocks
+from shown_page import wait_for
+
+import gazerig
+from gazerig.config.load import shipped_path
+from gazerig.drivers.sound.sound_file import write_wav
+from gazerig.robot.loop import stop
+
+pytestmark = [needs_all_features, pytest.mark.usefixtures("simulated_wires")]
+
+SAYS_TEXT = re.compile(r"ctl say (?!\S+\.wav)")
+TO_A_HEAD = [
+    w
+    for w in COMMANDS
+    if re.match(r"(ctl|stop)\b", w)
+    and " fault " not in w
+    and (which("espeak-ng") or not SAYS_TEXT.match(w))
+]
+TO_SERVOS = [
+    w
+    for w in COMMANDS
+    if re.match(r"(jog|look-at|home|monitor|reboot|doctor|scan)\b", w)
+    and not re.search(r"--mock|--port|myhead", w)
+]
+ON_A_RECORDING = [w for w in COMMANDS if re.match(r"export|rerun ", w)]
+ENDLESS = [w for w in COMMANDS if w.startswith("emulate ")]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with its own sockets, in which the commands are typed."""
+    folder = tmp_path_factory.mktemp("live")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        patch.setattr(stop, "MIN_HOLD_S", 0.0)
+        patch.setattr(stop, "MIN_RESUME_GAP_S", 0.0)
+        patch.chdir(folder)
+        yield folder
+
+
+def copy(rig: str, to: Path, more: str = "") -> None:
+    """Write a rig of ours under a name of the papers."""
+    to.write_text(shipped_path("rigs", rig).read_text() + more)
+
+
+def works(words: str, answers: str = "") -> str:
+    """Type a command that ends without a request; return its output."""
+    done = invoked(*shlex.split(words), answers=answers)
+    assert done.code == 0, f"{words}: {done.out}{done.err}"
+    return done.out + done.err
+
+
+def typed_alone(words: str) -> subprocess.Popen[str]:
+    """Type a command in a process that has no thread of a head."""
+    pipe, both = subprocess.PIPE, subprocess.STDOUT
+    return subprocess.Popen([*GAZERIG, *shlex.split(words)], stdout=pipe, stderr=both, text=True)
+
+
+def works_until_ctrl_c(process: subprocess.Popen[str], first: str) -> None:
+    """Press Ctrl-C once a command that goes on has written ``first``."""
+    try:
+        assert process.stdout is not None
+        written = ""
+        while first not in written:
+            line = process.stdout.readline()
+            assert line, written
+            written += line
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60.0) in (0, 130)
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.slow
+def test_commands_to_a_running_head_work(folder: Path):
+    """Of one head for all: the expressive one with the track of the tutorial."""
+    [agree] = [b.text for b in blocks("yaml") if b.text.startswith('description: "a small nod')]
+    (folder / "tracks").mkdir()
+    (folder / "tracks" / "agree.yaml").write_text(agree)
+    own = "\nsound: {device: silent}\nloop: {rate_hz: 40.0}\n"
+    copy("expressive", folder / "head.yaml", own)
+    write_wav(folder / "hello.wav", b"\0\0" * 4800, 16000)
+    with gazerig.open("head.yaml", mock=True, scene="face-to-face"):
+        for words in TO_A_HEAD:
+            _works_on_a_head(words)
+
+
+def _works_on_a_head(words: str) -> None:
+    if words == "ctl resume":
+        works("stop")
+        assert "no hand" in works(words, answers="y\n")
+    elif "person" in words:
+        wait_for(lambda: invoked(*shlex.split(words)).code == 0, "somebody to be seen")
+    else:
+        works(words)
+    if words == "stop":
+        works("ctl resume --confirm")
+    works("ctl look free")
+    works("ctl revert")
+
+
+@pytest.mark.parametrize("words", TO_SERVOS)
+def test_a_command_to_servos_works(words: str, folder: Path):
+    """With emulated ones instead of those on a port."""
+    copy("maker" if COMMANDS[words] == "start.md" else "desk", folder / "myrig.yaml")
+    works(f"{words} --mock" + " --once" * (words == "monitor"), answers="y\n")
+
+
+@pytest.fixture(scope="module")
+def recording(folder: Path) -> Path:
+    """A recording under the name that papers give theirs."""
+    copy("desk", folder / "my.yaml")
+    works("run my.yaml --mock --fast --seconds 5 --scene face-to-face --record evening.mcap")
+    return folder
+
+
+@pytest.mark.parametrize("words", ON_A_RECORDING)
+def test_a_command_on_a_recording_works(words: str, recording: Path):
+    works(words)
+
+
+@pytest.mark.pty
+@pytest.mark.parametrize("words", ENDLESS)
+def test_a_command_that_runs_until_it_is_ended_works(words: str, folder: Path):
+    copy("desk", folder / "my.yaml")
+    work = gazerig_branch(*shlex.split(words.replace("/tmp/", f"{folder}/")))
+    pipe, both = subprocess.PIPE, subprocess.STDOUT
+    works_until_ctrl_c(Branch(work, stdout=pipe, stderr=both, text=True), "/")

@@ -1,0 +1,150 @@
+"""A recorded run repeated: to the bit with the same parameters, followed with changed ones."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from math import inf, nextafter
+from pathlib import Path
+
+import pytest
+from fakes.runs import VISIT, record
+from msgspec import structs
+from recorded_rigs import RecordedRun
+from recorded_run import exact
+
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.loop.loop import Tick
+from gazerig.robot.loop.tick import TickRecord
+from gazerig.robot.model.commands import (
+    Ask,
+    Command,
+    EndTrack,
+    Express,
+    Jog,
+    LookAt,
+    Play,
+    Resume,
+    SetLevel,
+    Speak,
+    Stop,
+    SyncTrack,
+    Tune,
+)
+from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.recording.run_info import RunEnd
+from gazerig.robot.recording.writer import RunWriter
+from gazerig.robot.run.rerun import rerun
+from gazerig.robot.run.run import Run
+
+NECK_YAW = 6
+PUPPET: dict[int, tuple[Command, ...]] = {
+    40: (Ask("conversation", "talk"), Ask("lids", "wink left")),
+    80: (LookAt((1.0, 0.3, 0.3)),),
+    140: (LookAt(None), Jog((("neck_yaw", 0.2), ("left_eye_pan", 0.1)))),
+    200: (Jog(()),),
+    240: (Stop("a finger is in it"),),
+    650: (Resume(),),
+    700: (Tune((("gaze.saccade.profile", "min_jerk"), ("joints.neck_yaw.zero_step", 2060))),),
+    730: (Tune((("gaze.attention.habituation", "none"), ("gaze.idle.hold_ms", 500.0))),),
+}
+
+
+@pytest.fixture(scope="module")
+def once(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
+    """A run in which one of much is ordered, recorded as ``gazerig run --fast --record`` does."""
+    path = tmp_path_factory.mktemp("reruns") / "run.mcap"
+
+    def order(number: int, made: Run) -> None:
+        for command in PUPPET.get(number, ()):
+            made.robot.command(command)
+
+    ticks = record(path, load_rig("desk"), 3.8, replace(VISIT, rig="desk"), order)
+    return RecordedRun(RunRecording(path), ticks)
+
+
+def test_the_same_code_and_configuration_give_the_same_to_the_bit(once: RecordedRun):
+    assert {type(order) for tick in once.ticks for order in tick.commands} == {
+        Ask, LookAt, Jog, Stop, Resume, Tune
+    }  # fmt: skip
+    again: list[Tick] = []
+    found = rerun(once.recording, on_tick=again.append)
+    assert found.is_same and found.ticks == found.agreeing_ticks == len(once.ticks) == 759
+    assert found.first_difference_s is None and found.difference == ""
+    assert found.notes == ()
+    assert len(once.recording.end.tx_sha256) == 64 and found.sent_bytes_same is True
+    # Not the decisions alone: whole ticks, stop, puppet and tuning included.
+    assert list(map(exact, again)) == list(map(exact, once.ticks))
+
+
+def test_the_last_bit_of_one_joint_is_seen(once: RecordedRun, monkeypatch: pytest.MonkeyPatch):
+    real = RunRecording.moments
+
+    def bent(self: RunRecording) -> Iterator[TickRecord]:
+        for number, moment in enumerate(real(self)):
+            if number == 20:
+                joints = moment.tick.joints
+                angles = list(joints.position_rad)
+                angles[NECK_YAW] = nextafter(angles[NECK_YAW], inf)
+                joints = structs.replace(joints, position_rad=tuple(angles))
+                moment = structs.replace(moment, tick=structs.replace(moment.tick, joints=joints))
+            yield moment
+
+    monkeypatch.setattr(RunRecording, "moments", bent)
+    found = rerun(once.recording)
+    assert found.first_difference_s == pytest.approx(0.1)
+
+
+def test_a_recording_without_ticks_is_refused(once: RecordedRun, tmp_path: Path):
+    path = tmp_path / "none.mcap"
+    writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), once.recording.info)
+    writer.close(RunEnd("seconds"))
+    with pytest.raises(SetupError, match="contains no tick: nothing can be run again"):
+        rerun(RunRecording(path))
+
+
+# A recorded run with tracks is done again to the same bytes, without the tracks' files
+
+
+SHOW = """\
+description: a show
+owns: [neck, eyes]
+cues: {here: 0.8}
+frames:
+  - {time_s: 0.4, levels: {mouth: 0.7}}
+  - {time_s: 0.8, head_yaw_deg: 8, eyes_yaw_deg: 3, joints_deg: {right_brow: 3}}
+  - {time_s: 1.4, head_yaw_deg: -6}
+  - {time_s: 2.0, head_yaw_deg: 0, eyes_yaw_deg: 0}
+"""
+COMMANDS: dict[int, Command] = {
+    100: Play("a_show", loop=True, from_s="here"), 260: Play("wink_brow"),
+    340: SyncTrack(1, 1.2), 360: SyncTrack(1, 0.1), 520: EndTrack("a_show"),
+    550: Speak("absent.wav", 0.3, "mouth", ((0.1, 0.6), (0.2, 0.0))), 600: Play("a_show", from_s=1.0),
+    640: Express("happy", 0.5), 660: SetLevel("mouth", 0.4), 680: Stop("test", who="me"),
+}  # fmt: skip
+
+
+def test_a_show_is_done_again_to_the_same_bytes(tmp_path: Path):
+    files = {
+        "a_show": SHOW,
+        "wink_brow": "description: x\nframes: [{time_s: 1, joints_deg: {left_brow: 3}}]",
+    }
+    for name, text in files.items():
+        (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
+    paths = tuple(str(tmp_path / f"{name}.yaml") for name in files)
+    rig = replace(load_rig("expressive"), track_files=paths)
+
+    def ask(number: int, made: Run) -> None:
+        if (command := COMMANDS.get(number)) is not None:
+            made.robot.command(command)
+
+    ticks = record(tmp_path / "run.mcap", rig, 3.7, VISIT, ask)
+    states = [tick.tracks for tick in ticks]
+    assert max(len([one for one in them if one.is_playing]) for them in states) == 2
+    assert {one.cue for them in states for one in them} == {"", "here"}
+    assert {one.name for one in states[-1] if one.is_playing} == set()
+    assert "switched off" in states[-1][-1].end_reason
+    for name in files:
+        (tmp_path / f"{name}.yaml").unlink()
+    again = rerun(RunRecording(tmp_path / "run.mcap"))
+    assert again.is_same and again.sent_bytes_same is True, again

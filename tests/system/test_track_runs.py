@@ -1,0 +1,152 @@
+"""Tracks on whole robots over emulated servos in simulated time: followed by joints and eyes."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import degrees
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fakes.runs import ticks
+
+import gazerig
+from gazerig import Refused
+from gazerig.config.load import shipped_path
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.model.commands import LookAt, Play
+from gazerig.robot.model.kinematics import gaze_error
+from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.run.rerun import rerun
+from gazerig.robot.run.run import Run
+
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
+DT = 0.005
+POINT = (1.0, 0.0, 0.25)
+
+
+def steady(name: str) -> Rig:
+    """Return a rig without drift, recentring, and eye turns of blinks."""
+    rig = load_rig(name)
+    gaze = rig.gaze
+    gaze = replace(
+        gaze,
+        drift="none",
+        head=replace(gaze.head, eye_only_range_deg=0.0),
+        lids=replace(gaze.lids, law="nakamoto"),
+    )
+    return replace(rig, gaze=gaze)
+
+
+def played(made: Run, track: str) -> tuple[CommandReply, list[Tick]]:
+    """Play a track and go on until shortly after its end."""
+    ticket = made.robot.command(Play(track))
+    first = ticks(made, 1)
+    reply = ticket.wait(0.0)
+    assert reply is not None and reply.track is not None, reply
+    return reply, first + ticks(made, int(reply.track.duration_s / DT) + 60)
+
+
+@pytest.mark.parametrize("name", ("desk", "expressive", "feetech", "maker"))
+def test_joints_follow_tracks_and_the_eyes_stay_on_the_point(
+    name: str, started: Callable[[Rig], Run]
+):
+    rig = steady(name)
+    made = started(rig)
+    lids = np.array([joint.endswith("lid") for joint in rig.names])
+    made.robot.command(LookAt(POINT, who="test", stay=True))
+    before = ticks(made, 500)[-1]
+    for track in ("nod", "shake", "laugh", "look_around"):
+        _, done = played(made, track)
+        desired = np.array([tick.desired_rad for tick in done])
+        commanded = np.array([tick.guard_result.command_rad for tick in done])
+        measured = np.array([tick.joints.position_rad for tick in done])
+        # A blink may come in between and ask for more than a lid can do; nothing else may.
+        assert np.array_equal(desired[:, ~lids], commanded[:, ~lids])
+        moved = np.ptp(commanded[:, ~lids], axis=0)
+        if track != "laugh" or "neck_pitch" in rig.names:
+            assert degrees(moved.max()) > 4.0
+        behind = np.abs(commanded - measured)[:, ~lids].max(axis=0)
+        assert degrees(behind.max()) < 7.0 and (behind < 0.75 * moved + 0.02).all()
+        assert np.abs(desired[-1] - before.desired_rad)[~lids].max() < np.radians(0.1)
+        if track in ("nod", "shake", "laugh") and "neck_pitch" in rig.names:
+            errors = [gaze_error(POINT, tick.pose, "eyes_pan" not in rig.names) for tick in done]
+            assert max(degrees(error) for error in errors) < 1.0
+
+
+OWNED = """\
+description: own neck and jaw
+owns: [neck, jaw]
+frames:
+  - {time_s: 1.0, head_yaw_deg: 10, joints_deg: {jaw: 4}}
+  - {time_s: 2.0, head_yaw_deg: -8, head_pitch_deg: -5, levels: {mouth: 0.5}}
+  - {time_s: 3.0, head_yaw_deg: 0, head_pitch_deg: 0, joints_deg: {jaw: 0}}
+"""
+
+
+def test_gaze_keeps_the_eyes_on_the_point_while_a_track_owns_neck_and_jaw(
+    tmp_path: Path, started: Callable[[Rig], Run]
+):
+    file = tmp_path / "own.yaml"
+    file.write_text(OWNED, encoding="utf-8")
+    rig = replace(steady("expressive"), track_files=(str(file),))
+    made = started(rig)
+    made.robot.command(LookAt(POINT, stay=True))
+    ticks(made, 400)
+    _, found = played(made, "own")
+    yaw, jaw = rig.names.index("neck_yaw"), rig.names.index("jaw")
+    at_s = [tick.t_s - found[0].t_s for tick in found]
+    angles = np.degrees([tick.guard_result.command_rad for tick in found])
+    at_2s = int(np.searchsorted(at_s, 2.0))
+    assert angles[at_2s, yaw] == pytest.approx(-8.0, abs=0.1)
+    assert angles[:, jaw].max() > 3.9
+    errors = [degrees(gaze_error(POINT, tick.pose)) for tick in found]
+    assert max(errors) < errors[0] + 0.7
+    assert found[at_2s].tracks[-1].owns == ("neck_yaw", "neck_pitch", "jaw")
+    assert found[-1].tracks[-1].end_reason == "finished"
+
+
+def test_owned_eyes_and_lids_are_the_track_s_alone(tmp_path: Path, started: Callable[[Rig], Run]):
+    file = tmp_path / "stare.yaml"
+    file.write_text(
+        "description: x\nowns: [eyes, lids]\nframes:\n"
+        "  - {time_s: 1, eyes_yaw_deg: 10, lids: {all: 0.4}}\n"
+        "  - {time_s: 3, eyes_yaw_deg: 10, lids: {all: 0.4}}\n  - {time_s: 4, eyes_yaw_deg: 0}\n"
+    )
+    rig = replace(load_rig("desk"), track_files=(str(file),))
+    made = started(rig)
+    ticks(made, 300)
+    _, found = played(made, "stare")
+    held = found[240:580]  # saccades and blinks of gaze do not move them
+    for eye in (0, 1):
+        pans = [(tick.gaze.eye_left_rad, tick.gaze.eye_right_rad)[eye][0] for tick in held]
+        assert np.degrees(pans) == pytest.approx(10.0, abs=1e-6)
+    assert [tick.gaze.lid_left for tick in held] == pytest.approx([0.4] * len(held), abs=1e-6)
+    assert len({tick.gaze.saccades for tick in held}) > 1
+    assert found[-1].gaze.eye_left_rad != found[-1].gaze.eye_right_rad  # they converge again
+
+
+def test_a_file_in_the_folder_tracks_is_found_without_an_edit_or_a_restart(tmp_path: Path):
+    (tmp_path / "tracks").mkdir()
+    (tmp_path / "my.yaml").write_text(shipped_path("rigs", "desk").read_text("utf-8"))
+    bow = "description: x\nframes: [{{time_s: 0.5, head_pitch_deg: {}}}]\n"
+    recording = tmp_path / "run.mcap"
+    with gazerig.open(str(tmp_path / "my.yaml"), fast=True, record=recording) as head:
+        head.step(1.0)
+        (tmp_path / "tracks" / "late.yaml").write_text(bow.format(-4))
+        head.play("late")
+        head.step(0.5)
+        first_deg = head.state.joints["neck_pitch"].commanded_deg
+        (tmp_path / "tracks" / "late.yaml").write_text(bow.format(6.5))
+        head.step(1.0)
+        head.play("late")
+        head.step(0.5)
+        assert head.state.joints["neck_pitch"].commanded_deg > first_deg + 8.0
+        (tmp_path / "tracks" / "bad.yaml").write_text("description: x\nframes: [{time_s: 1}]\n")
+        with pytest.raises(Refused, match=r"bad.yaml:2: .*names no motion"):
+            head.play("bad")
+    for file in (tmp_path / "tracks").iterdir():
+        file.unlink()
+    assert rerun(RunRecording(recording)).is_same

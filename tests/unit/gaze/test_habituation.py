@@ -1,0 +1,120 @@
+"""Interest that wears off, the place just left, and several people who share the gaze."""
+
+from itertools import groupby
+from math import exp, radians
+from typing import Literal
+
+import numpy as np
+import pytest
+from attention_scene import NO_STAYS, attention, looking
+
+from gazerig.gaze.attention.habituation import Habituation, HabituationParams
+from gazerig.gaze.types import Bodies, Percept, Target, Vec3
+
+EYE: Vec3 = (0.0, 0.0, 0.0)
+PARAMS = HabituationParams()
+
+
+def bodies(kinds: str, *places: Vec3, speed: float = 0.0) -> Bodies:
+    n = len(places)
+    v = np.zeros((n, 3))
+    v[:, 1] = speed
+    return Bodies(
+        tuple(range(1, n + 1)), tuple(kinds.split()), np.array(places, float).reshape(n, 3), v,
+        np.zeros((n, 3)), np.full(n, 0.1),
+    )  # fmt: skip
+
+
+def arc(*away_m: float) -> Bodies:
+    """Return faces at these distances, from the left to the right."""
+    aside = np.radians(np.linspace(22.0, -22.0, len(away_m)))
+    places = [(d * np.cos(a), d * np.sin(a), 0.0) for d, a in zip(away_m, aside, strict=True)]
+    return bodies(" ".join(["face"] * len(away_m)), *places)
+
+
+def watch(
+    seen: Bodies,
+    seconds: float,
+    later: Bodies | None = None,
+    habituation: HabituationParams | Literal["none"] = PARAMS,
+) -> list[Target]:
+    """Let attention look at a scene that stays as it is, 30 pictures a second."""
+    model = attention(habituation=habituation)
+    scenes = [seen, later] if later is not None else [seen]
+    times = [k / 30 for k in range(round(30 * seconds * len(scenes)))]
+    return [model.choose(Percept(t, scenes[int(t / seconds)]), looking(), t) for t in times]
+
+
+def waits_s(targets: list[Target], n: int) -> list[float]:
+    """Return for how long each of n bodies was not looked at, at most."""
+    ids = np.array([target.id for target in targets])
+    on = [np.flatnonzero(np.concatenate(([True], ids == k, [True]))) for k in range(1, n + 1)]
+    return [float(np.diff(one).max()) / 30 for one in on]
+
+
+def shares(targets: list[Target]) -> dict[int, float]:
+    ids = [target.id for target in targets]
+    return {name: ids.count(name) / len(ids) for name in set(ids)}
+
+
+def stays_s(targets: list[Target]) -> list[float]:
+    """Return how long each look lasted, without the last one, which the end cuts short."""
+    return [len(list(same)) / 30 for _, same in groupby(t.id for t in targets)][:-1]
+
+
+def interest(model: Habituation, seen: Bodies, attended: int, t_s: float) -> list[float]:
+    return [*model.step(seen.rows(), EYE, attended, t_s).values()]
+
+
+def test_interest_falls_while_attended_and_recovers_otherwise():
+    model = Habituation(PARAMS, NO_STAYS)
+    seen = bodies("face face", (1, 0.5, 0), (1, -0.5, 0))
+    assert interest(model, seen, -1, 0.0) == [1.0, 1.0]
+    assert interest(model, seen, 1, 2.0) == pytest.approx([0.6, 1.0])
+    assert interest(model, seen, 1, 30.0) == [0.0, 1.0]
+    assert interest(model, seen, 2, 30.5) == pytest.approx([0.5, 0.9])
+    assert interest(model, seen, -1, 31.5) == [1.0, 1.0]
+
+
+def test_a_rule_keeps_its_floor_of_interest():
+    """A second of looking, at a body of half the weight, is a lead of two."""
+    model = Habituation(HabituationParams(rule_floor=0.6, decay_rate_1_s=0.3), NO_STAYS)
+    two = {1: 1.0, 2: 0.5}
+    assert model.share(two, 1, 0.0) == pytest.approx({1: 1.0, 2: 1.0}, abs=0.01)
+    assert model.share(two, 2, 1.0)[1] == 1.0
+    assert model.share(two, -1, 1.0)[2] == pytest.approx(0.6 + 0.4 * exp(-0.6), abs=0.01)
+    assert model.share({2: 0.5}, 2, 9.0) == {2: 1.0}  # one alone is not left for habituation
+
+
+@pytest.mark.parametrize(("aside_deg", "age_s"), [(0.0, 0.0), (4.0, 0.0), (4.0, 1.5), (20.0, 0.0)])
+def test_the_place_left_is_avoided_by_a_gaussian_that_decays(aside_deg: float, age_s: float):
+    model = Habituation(PARAMS, NO_STAYS)
+    a = radians(aside_deg)
+    seen = bodies("hand", (2 * np.cos(a), 2 * np.sin(a), 0))
+    interest(model, seen, -1, 10.0)
+    model.record_left((1.0, 0.0, 0.0), 10.0)
+    expected = 1.0 - 0.5 * np.exp(-0.5 * (aside_deg / 4.0) ** 2 - age_s / 1.5)
+    assert interest(model, seen, -1, 10.0 + age_s) == pytest.approx([expected])
+    assert interest(model, seen, -1, 17.0) == [1.0]
+
+
+def test_a_single_still_face_is_never_left():
+    targets = watch(bodies("face", (1, 0, 0)), 120.0)
+    assert {(t.id, t.kind, t.salience, t.shift) for t in targets} == {(1, "face", 0.5, 1)}
+
+
+@pytest.mark.parametrize(
+    "away_m", [(1.5, 1.0), (0.8, 3.0, 3.0, 3.0), (1.0, 1.0, 2.0, 2.0, 3.0, 4.0)]
+)
+def test_people_are_looked_at_for_times_as_their_nearness(away_m: tuple[float, ...]):
+    share = shares(watch(arc(*away_m), 200.0))
+    weights = np.array(away_m) ** -0.5
+    measured = [share[id] for id in range(1, len(away_m) + 1)]
+    assert measured == pytest.approx(weights / weights.sum(), abs=0.03)
+
+
+@pytest.mark.parametrize("n", [3, 4, 6, 8])
+def test_nobody_of_many_waits_for_long_and_no_look_is_a_glance(n: int):
+    targets = watch(arc(*[1.5] * n), 90.0)
+    assert max(waits_s(targets, n)) < 15.0 and min(shares(targets).values()) > 0.75 / n
+    assert min(stays_s(targets)[n:]) > 1.0

@@ -1,0 +1,115 @@
+"""The opening of a mouth from sound."""
+
+import numpy as np
+import pytest
+
+from gazerig.gaze.minimum_jerk import MinimumJerkBlend
+from gazerig.gaze.mouth.loudness import FRAME_S, WINDOW_S, band_pressures, opening
+from gazerig.gaze.mouth.mouth import Closure, Mouth, phoneme_closures
+from gazerig.gaze.types import Floats
+
+RATE = 16000
+
+
+def tone(hz: float, seconds: float, size: float = 0.5) -> Floats:
+    samples: Floats = size * np.sin(2 * np.pi * hz * np.arange(round(seconds * RATE)) / RATE)
+    return samples
+
+
+def test_the_pressure_is_the_root_mean_square_in_the_band_of_an_open_mouth():
+    inside, murmur, hiss = (band_pressures(tone(hz, 1.0), RATE) for hz in (1000, 200, 6000))
+    assert len(inside) == pytest.approx((1.0 - WINDOW_S) / FRAME_S, abs=2)
+    assert inside == pytest.approx(0.5 / np.sqrt(2), rel=0.01)
+    assert max(murmur.max(), hiss.max()) < 0.05 * inside.min()
+    assert len(band_pressures(tone(1000, 0.01), RATE)) == 0
+
+
+def mouth_of(samples: Floats, pieces: int = 1, rate: int = RATE) -> Mouth:
+    mouth = Mouth(rate)
+    for piece in np.array_split(samples, pieces):
+        mouth.add(piece)
+    return mouth
+
+
+def test_a_frame_has_its_time_at_every_rate_also_in_a_stream():
+    rate = 22050
+    samples = np.zeros(60 * rate)
+    samples[50 * rate : 51 * rate] = tone(1000, 1.0)[:RATE][np.arange(rate) * RATE // rate]
+    middle = np.flatnonzero(band_pressures(samples, rate) > 0.1).mean()
+    assert middle * FRAME_S + 0.5 * WINDOW_S == pytest.approx(50.5, abs=0.005)
+    mouth = mouth_of(samples, 1500, rate)
+    assert mouth.opening_at(49.9) == 0.0 and mouth.opening_at(50.5) > 0.5
+    assert mouth.opening_at(51.1) == 0.0
+
+
+def test_ten_decibels_less_are_half_as_loud():
+    loud, half, shut_at = (opening(one, 1.0) for one in (1.0, 10**-0.5, 10**-1.5))
+    shut = 10 ** (-30 / 20 * 0.6)
+    assert loud == 1.0 and shut_at == pytest.approx(0.0, abs=1e-9)
+    assert half * (1 - shut) + shut == pytest.approx(0.5, abs=0.002)
+
+
+@pytest.mark.parametrize("samples", [np.zeros(RATE), np.zeros(0), np.full(RATE, 1.0)])
+def test_silence_nothing_and_a_constant_keep_the_mouth_shut(samples: Floats):
+    assert all(value == 0.0 for _, value in mouth_of(samples).keys(1.0))
+
+
+def spoken(period_s: float, seconds: float = 3.0) -> Floats:
+    """Return syllables without pauses, which are never silent."""
+    t_s = np.arange(round(seconds * RATE)) / RATE
+    loud = 0.6 - 0.4 * np.cos(2 * np.pi * t_s / period_s)
+    return np.asarray(tone(1000, seconds) * loud, dtype=np.float64)
+
+
+def followed(mouth: Mouth, seconds: float) -> tuple[Floats, Floats]:
+    """Return times, and the opening of a level that follows the keys of a mouth, as it is led."""
+    level, smoothing_s = MinimumJerkBlend((0.0,), 0.08), 0.08
+    keys = np.array(mouth.keys(seconds)).T
+    times = np.arange(0.0, seconds, 0.005)
+    found = []
+    for t_s in times.tolist():
+        level.move_to((float(np.interp(t_s + 0.5 * smoothing_s, *keys)),))
+        found.append(level.step(t_s)[0])
+    return times, np.array(found)
+
+
+def test_the_level_reaches_the_loud_parts_and_is_closed_in_every_closure():
+    mouth = mouth_of(spoken(0.25))
+    shut = (Closure(0.98, 1.03), Closure(1.5, 1.5), Closure(2.0, 2.055))
+    mouth.close(shut)
+    times, found = followed(mouth, 3.0)
+    for begin_s, end_s in shut:
+        near = (times >= begin_s - 0.005) & (times <= end_s + 0.005)
+        assert found[near].min() < 0.03
+    opened = found[(times > 0.2) & (times < 0.9)]
+    assert 0.8 < opened.max() <= 0.9 and opened.min() > 0.3
+    peaks = times[1:-1][
+        (found[1:-1] > found[:-2]) & (found[1:-1] >= found[2:]) & (found[1:-1] > 0.7)
+    ]
+    late_s = np.array([min(abs(t - 0.125 - 0.25 * k) for k in range(12)) for t in peaks])
+    assert np.median(late_s) < 0.012
+
+
+def test_lips_close_before_p_and_within_b_and_m():
+    names = [("p", 0.2), ("a", 0.23), ("m", 0.4), ("a", 0.5), ("b", 0.6), ("m", 0.68), ("b", 0.78)]
+    p, m, held = phoneme_closures(names, 0.9)
+    assert p.end_s == 0.2 and 0.13 < p.begin_s < 0.16
+    assert m.begin_s == 0.4 and 0.45 < m.end_s < 0.5
+    assert held.end_s - held.begin_s <= 0.12001 and 0.8 < held.end_s < 0.9
+
+
+def test_without_phonemes_short_dips_are_closures_and_a_slow_end_is_none():
+    samples = tone(1000, 1.0)
+    samples[round(0.5 * RATE) : round(0.56 * RATE)] *= 0.05
+    times, found = followed(mouth_of(samples), 1.0)
+    assert found[(times > 0.5) & (times < 0.56)].min() < 0.05
+    slow = mouth_of(tone(1000, 2.0) * np.linspace(1.0, 0.3, 2 * RATE))
+    assert min(slow.opening_at(t) for t in np.arange(0.1, 1.9, 0.01)) > 0.3
+
+
+def test_a_stream_opens_the_mouth_as_the_whole_sound_does():
+    samples = spoken(0.25)
+    whole, pieces = mouth_of(samples), mouth_of(samples, 75)
+    assert np.array(pieces.keys(3.0)) == pytest.approx(np.array(whole.keys(3.0)), abs=1e-6)
+    assert pieces.opening_at(-1.0) == pieces.opening_at(4.0) == 0.0
+    assert whole.keys(2.0)[-1] == (2.0, 0.0)

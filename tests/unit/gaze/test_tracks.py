@@ -1,0 +1,461 @@
+"""Tracks as data: curves of least jerk, what a rig can do of them, and bad input."""
+
+from collections.abc import Sequence
+from functools import cache, partial
+from math import degrees, pi, radians
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.schema import Rig, load_rig
+from gazerig.config.tracks import load_track, shipped_tracks
+from gazerig.gaze.lids.lids import LidOpenings
+from gazerig.gaze.track.minimum_jerk_curve import evaluate, key_states
+from gazerig.gaze.track.motion_keys import fit_keys, smooth
+from gazerig.gaze.track.pose_offset import OwnedPose, PoseOffset
+from gazerig.gaze.track.track import LIMIT_SHARE, KeyFrame, Track
+from gazerig.gaze.track.track_motion import TrackMotion
+from gazerig.gaze.track.track_player import TrackPlayer
+from gazerig.gaze.types import Floats, GazeCommand
+from gazerig.robot.loop.track_choices import TrackChoices
+from gazerig.robot.model.commands import EndTrack, Play, SyncTrack
+from gazerig.robot.model.joint import JointLimit
+from gazerig.robot.model.reply import TrackReply
+from gazerig.robot.model.track_fit import TrackFit, TrackRefused
+from gazerig.robot.model.types import JointAngles, further_joints
+from gazerig.robot.run.models import rig_kinematics
+from gazerig.robot.run.rig_limits import face_tables, lid_spans, limits, pose_offset
+from gazerig.robot.run.track_file import TOLERANCE_DEG
+
+RIGS = [name for name in shipped_names("rigs") if name != "minimal"]
+"""The shipped rigs but the one without neck and lids, which has nothing to laugh or tilt with."""
+
+
+def fitted(track: Track, name: str = "desk") -> tuple[TrackMotion, TrackReply]:
+    """Return the curves of a track on a shipped rig, and the reply to its play."""
+    rig = load_rig(name)
+    return TrackFit(rig.names, lid_spans(rig)).motion("x", track, limits(rig.joints))
+
+
+def sampled(motion: TrackMotion) -> Floats:
+    return motion.sample_at(np.arange(0.0, motion.duration_s + 0.1, 0.001))
+
+
+@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize("name", shipped_names("tracks"))
+def test_every_shipped_track_is_done_by_every_shipped_rig_as_written(name: str, rig: str):
+    track = shipped_tracks()[name]
+    brows = {"left_brow", "right_brow"} <= set(load_rig(rig).names)
+    if (name == "brow_shrug" and not brows) or (
+        name == "tilt" and "neck_roll" not in load_rig(rig).names
+    ):
+        with pytest.raises(TrackRefused, match="left_brow, right_brow|head_roll"):
+            fitted(track, rig)
+        return
+    motion, reply = fitted(track, rig)
+    assert "as far" not in reply.limited
+    assert "slower" not in reply.limited or name == "flinch"
+    samples = sampled(motion)
+    assert np.abs(samples[0]).max() > radians(3.0)
+    assert np.abs(samples[:, [0, -1]]).max() < 1e-9
+
+
+def spline_of_least_jerk(times: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
+    from scipy.interpolate import make_interp_spline
+
+    rest = [(1, 0.0), (2, 0.0)]
+    spline = make_interp_spline([0.0, *times], [0.0, *values], k=5, bc_type=(rest, rest))
+    return spline(at), spline(at, 1)
+
+
+@given(keys=st.lists(st.tuples(st.floats(0.05, 2.0), st.floats(0.1, 30.0)), min_size=1, max_size=8))
+@settings(max_examples=100, deadline=None)
+def test_a_curve_that_does_not_turn_is_the_spline_of_least_jerk_unless_that_swings_back(
+    keys: list[tuple[float, float]],
+):
+    spans, steps = np.array(keys).T
+    times, values = np.cumsum(spans), np.cumsum(steps)
+    curve = partial(evaluate, *key_states(times, values))
+    at = np.linspace(0.0, times[-1], 500)
+    least, rate = spline_of_least_jerk(times, values, at)
+    value, speed, acceleration = curve(at)
+    assert speed.min() > -1e-4 * speed.max()  # never back
+    if rate.min() > 0.0:
+        assert np.abs(value - least).max() < 1e-6 * np.abs(least).max()
+    before = np.maximum(0.0, times - 1e-9)
+    for one, other in zip(curve(before)[1:], curve(times)[1:], strict=True):
+        assert np.abs(one - other).max() < 1e-5 * max(1.0, np.abs(acceleration).max())
+
+
+def test_a_curve_rests_where_it_turns_and_never_swings_past():
+    curve = partial(
+        evaluate, *key_states(np.array([0.3, 0.6, 0.9, 1.4]), np.array([10.0, -4.0, -4.0, 0.0]))
+    )
+    value, speed, acceleration = curve(np.linspace(0.0, 1.5, 3001))
+    assert value.max() <= 10.0 + 1e-9 and value.min() >= -4.0 - 1e-9
+    at = curve(np.array([0.3, 0.6, 0.9, 1.4]))
+    assert np.abs(at[1]).max() < 1e-9 and np.abs(at[2]).max() < 1e-6
+    assert np.abs(np.gradient(value, 5e-4) - speed).max() < 0.2
+    assert np.abs(np.gradient(speed, 5e-4) - acceleration)[5:-5].max() < 20.0
+
+
+def nod() -> Track:
+    return Track("a nod", (KeyFrame(0.2, head_pitch_deg=-8.0), KeyFrame(0.5, head_pitch_deg=0.0)))
+
+
+def test_only_segments_that_are_too_fast_take_longer():
+    fast = (KeyFrame(1.0, head_pitch_deg=-10.0), KeyFrame(1.05, head_pitch_deg=0.0))
+    held = (KeyFrame(2.05, head_pitch_deg=0.0), KeyFrame(3.05, head_pitch_deg=5.0))
+    motion, reply = fitted(Track("a jerk", (*fast, *held)))
+    # 10 deg in 50 ms peak at 5.7735 x 10 / .05^2 = 23094 deg/s2; 1600 may be used.
+    longer_s = 0.05 * ((23094.0 / 1600.0) ** 0.5 - 1.0)
+    assert motion.duration_s == pytest.approx(3.45 + longer_s, abs=0.003)
+    assert motion.slowed_by == pytest.approx(1.0 + longer_s / 3.45, abs=0.001)
+    assert reply.limited == f"slower by {motion.slowed_by:.2f} for neck_pitch"
+    assert degrees(np.abs(sampled(motion)[2]).max()) == pytest.approx(1600.0, rel=0.01)
+    for before_s, after_s in ((1.0, 1.0), (2.05, 2.05 + longer_s)):
+        assert motion.position_at(after_s) == pytest.approx(before_s, abs=0.003)
+    assert motion.rate < 1.0
+
+
+def test_a_track_that_begins_in_motion_is_led_in_from_rest():
+    frames = tuple(KeyFrame(0.02 + 0.1 * i, head_yaw_deg=12.0 + 2.0 * i) for i in range(8))
+    motion = fitted(Track("a part of a turn", frames))[0]
+    lead_s = -motion.position_at(0.0)
+    assert 0.1 < lead_s < 0.5 and motion.rate == 1.0  # the rest keeps its times
+    value, speed, acceleration = motion.sample_at(np.arange(0.0, lead_s + 0.8, 0.001))[:, :, 0]
+    assert value[0] == speed[0] == acceleration[0] == 0.0
+    assert degrees(np.abs(acceleration).max()) < 1.001 * LIMIT_SHARE * 2000.0
+    (at,) = motion.sample_at(np.array([lead_s + 0.42]))[0, :, 0]
+    assert degrees(at) == pytest.approx(20.0, abs=1e-6)
+
+
+def test_it_stays_within_the_ranges_and_says_what_they_leave():
+    bow = Track("a bow", (KeyFrame(1.0, head_pitch_deg=-70.0), KeyFrame(2.0, head_pitch_deg=10.0)))
+    motion, reply = fitted(bow)
+    assert "neck_pitch moves 50% as far" in reply.limited
+    pitch = np.degrees(sampled(motion)[0, :, 1])
+    assert pitch.min() == pytest.approx(-35.0) and pitch.max() == pytest.approx(10.0, abs=0.01)
+
+
+def test_what_a_rig_lacks_is_left_out_and_named():
+    jaw = KeyFrame(0.3, head_pitch_deg=5.0, joints_deg={"jaw": 10.0})
+    assert fitted(Track("a yawn", (jaw,)))[1].limited == "without jaw"
+    with pytest.raises(TrackRefused, match="this rig has none of the joints that it moves: jaw"):
+        fitted(Track("a yawn", (KeyFrame(0.3, joints_deg={"jaw": 9.0}),)))
+    mouth = KeyFrame(0.3, head_pitch_deg=5.0, levels={"mouth": 1.0})
+    assert fitted(Track("a word", (mouth,), owns=("tail",)))[1].limited == "without mouth, tail"
+
+
+def test_a_frame_names_expressions_as_levels():
+    rig = load_rig("expressive")
+    fit = TrackFit(rig.names, lid_spans(rig), face_tables(rig))
+    smile = Track("a smile", (KeyFrame(1.0, levels={"happy": 0.5}),))
+    motion, _ = fit.motion("smile", smile, limits(rig.joints))
+    full = np.array(pose_offset(rig, rig.expressions["happy"]).to_flat())
+    (half,) = motion.sample_at(np.array([1.0]))[0]
+    assert half == pytest.approx(0.5 * (full - pose_offset(rig, {}).to_flat()))
+
+
+def test_eyes_move_instead_of_a_neck_that_a_rig_lacks():
+    rig = load_rig("maker")
+    assert "neck_pitch" not in rig.names
+    motion, reply = fitted(nod(), "maker")
+    assert motion.channels == {4} and reply.limited == "without neck_pitch"
+    both = Track("both", (KeyFrame(0.5, head_pitch_deg=-8.0, eyes_pitch_deg=3.0),))
+    motion, reply = fitted(both, "maker")
+    assert np.degrees(sampled(motion)[0, :, 4]).max() == pytest.approx(3.0)
+    assert reply.limited == "without neck_pitch"
+
+
+LONG = "frames:\n" + "".join(
+    f"  - {{time_s: {i + 1}, head_yaw_deg: {i % 5}, eyes_yaw_deg: 1}}\n" for i in range(5000)
+)
+BAD = {
+    "frames:\n  - {time_s: 0.2}\n": ("frames.0", "names no motion"),
+    "frames:\n  - {time_s: 0.2, head_pich_deg: 3}\n": ("frames.0.head_pich_deg", "head_pitch_deg"),
+    "frames:\n  - {time_s: 0.2, head_pitch_deg: 300}\n": ("frames.0.head_pitch_deg", "90"),
+    "frames:\n  - {time_s: 0.2, lids: {top: 0.5}}\n": ("frames.0", "unknown lids 'top'"),
+    "frames:\n  - {time_s: 0.2, head_yaw_deg: .nan}\n": ("frames.0.head_yaw_deg", ""),
+    "frames: []\n": ("frames", "at least one frame"),
+    "frames:\n  - {time_s: 0.5, head_yaw_deg: 1}\n  - {time_s: 0.5, head_yaw_deg: 2}\n": (
+        "frames.1.time_s",
+        "later than the previous frame",
+    ),
+    "frames:\n  - {time_s: 0.5, joints_deg: {neck_yaw: 1}}\n": (
+        "frames.0.joints_deg.neck_yaw",
+        "head_yaw_deg",
+    ),
+    "cues: {a: 1, a: 2}\nframes: [{time_s: 2, head_yaw_deg: 3}]\n": ("cues.a", "duplicate key"),
+    "cues: {a: 9}\nframes: [{time_s: 2, head_yaw_deg: 3}]\n": ("cues.a", "after the last frame"),
+    "owns: [Neck]\nframes: [{time_s: 2, head_yaw_deg: 3}]\n": ("owns.0", "neck, eyes, lids"),
+    "sound: ../x.wav\n": ("sound", "and below can be named"),
+    LONG.replace("time_s: 7, head", "time_s: 7, heat"): ("frames.6.heat_yaw_deg", "head_yaw_deg"),
+}
+
+
+def test_a_long_track_is_one_curve_and_a_longer_file_is_refused(tmp_path: Path):
+    file = tmp_path / "long.yaml"
+    file.write_text(f"description: long\n{LONG}cues: {{a: 4}}\n", encoding="utf-8")
+    track = load_track(file)
+    assert len(track.frames) == 5000 and track.frames[6].eyes_yaw_deg == 1 and track.cues
+    motion = fitted(track)[0]
+    assert motion.duration_s == motion.length_s > 5000.0
+    yaw = np.degrees(motion.sample_at(np.array([1.0, 7.0, 4999.0]))[0, :, 0])
+    assert yaw == pytest.approx([0.0, 1.0, 3.0])
+    file.write_bytes(b"frames:\n" + b"  - {time_s: 1, lids: 1}\n   " * 750_000)
+    with pytest.raises(ConfigError, match="larger than the 20 MB that"):
+        load_track(file)
+
+
+@pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
+def test_a_bad_file_is_answered_with_line_key_and_rule(text: str, tmp_path: Path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"description: mine\n{text}", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load_track(file)
+    key, rule = BAD[text]
+    (fault,) = caught.value.faults
+    assert fault.key == key and rule in fault.rule
+    assert fault.line is not None and fault.line >= 1
+
+
+# --- Files of tracks, and fits of keys to samples
+
+
+def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance():
+    random = np.random.default_rng(3)
+    times = np.cumsum(random.uniform(0.015, 0.025, 200))
+    truth = 12.0 * np.sin(2 * pi * 0.6 * times) * np.minimum(1.0, times)
+    even, values_deg = smooth(times, truth + random.normal(0.0, 0.15, 200))
+    found, values = fit_keys(even, values_deg, TOLERANCE_DEG)
+    assert 4 <= len(found) <= 30
+    curve = partial(evaluate, *key_states(found, values, float(values_deg[0])))
+    assert np.abs(curve(even)[0] - values_deg).max() <= TOLERANCE_DEG
+    assert np.abs(curve(times - times[0])[0] - truth).max() < TOLERANCE_DEG + 0.6
+    still = fit_keys(even, np.full(len(even), 3.0), TOLERANCE_DEG)
+    assert len(still[0]) == 0
+
+
+# --- Tracks begin, end and are interrupted at random moments: no joint jumps or breaks a limit
+
+
+DT_S = 0.01
+TARGET = (1.0, 0.0, 0.25)
+
+
+def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
+    """Return (n, joints) angles of a head that looks at a point straight ahead all the while."""
+    kinematics = rig_kinematics(load_rig(rig_name))
+
+    def angles(one: PoseOffset) -> JointAngles:
+        eyes = kinematics.eye_angles_to(TARGET, *kinematics.head_pose(one.head_rad))
+        left, right = ((yaw + one.eyes_rad[0], pitch + one.eyes_rad[1]) for yaw, pitch in eyes)
+        lids = LidOpenings(0.9, 0.9, False, 0.9, 0.9).scale(one.lids)
+        gaze = GazeCommand(
+            one.head_rad, left, right, lids.left, lids.right, "fixate", False, TARGET, 0, 0, 0,
+            lids.lower_left, lids.lower_right,
+        )  # fmt: skip
+        return kinematics.inverse(gaze, one.joints_rad)
+
+    return np.array([angles(one) for one in offsets])
+
+
+def interrupted(track: str, rig_name: str, moments: int) -> tuple[Floats, Sequence[JointLimit]]:
+    """Play a track and, at random moments, another one, the same again, or nothing.
+
+    Returns:
+        (n, joints) angles in each tick, and the limits of the joints.
+    """
+    rig, random = load_rig(rig_name), np.random.default_rng(len(track))
+    player = TrackPlayer(len(further_joints(rig.joints)))
+    choices = TrackChoices(shipped_tracks(), player, TrackFit(rig.names, lid_spans(rig)))
+    bounds, others = limits(rig.joints), (*choices.names, track, track, "")
+    offsets, t, began = [PoseOffset.from_flat(player.rest.tolist())] * 3, 0.0, 0
+    for _ in range(moments):
+        name = track if not player.voices else others[int(random.integers(len(others)))]
+        speed = float(random.uniform(0.5, 2.0))
+        reply = choices.play(Play(name, speed), t, bounds)
+        began += bool(name) and not reply.refused
+        for _ in range(int(random.integers(1, round(0.25 / DT_S)))):
+            t += DT_S
+            offsets.append(PoseOffset.from_flat((player.rest + player.step(t)).tolist()))
+    assert began > 0.7 * moments
+    return joint_angles(rig_name, offsets), bounds
+
+
+TRACKS = shipped_names("tracks")
+RIG_OF = dict(
+    zip(TRACKS, ("expressive", "desk", "maker", "expressive", "feetech") * 9, strict=False)
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("track", TRACKS)
+def test_no_joint_jumps_or_breaks_a_limit_at_400_random_moments(track: str):
+    angles, bounds = interrupted(track, RIG_OF[track], 400)
+    speed = np.abs(np.diff(angles, axis=0)).max(axis=0) / DT_S
+    acceleration = np.abs(np.diff(angles, 2, axis=0)).max(axis=0) / DT_S**2
+    assert speed.max() * DT_S > radians(0.1)  # something has moved
+    assert (speed < [one.speed_rad_s for one in bounds]).all()
+    assert (acceleration < [one.accel_rad_s2 for one in bounds]).all()
+
+
+# --- Tracks in a show: another clock at random, several at once, joints of their own
+
+
+@cache
+def rig() -> Rig:
+    return load_rig("expressive")
+
+
+class Show(NamedTuple):
+    """A player, and what starts and controls its tracks."""
+
+    player: TrackPlayer
+    choices: TrackChoices
+    bounds: Sequence[JointLimit]
+
+    def play(self, name: str, t_s: float, **how: object) -> int:
+        reply = self.choices.play(Play(name, **how), t_s, self.bounds)  # type: ignore[arg-type]
+        assert reply.track is not None, reply
+        return reply.track.number
+
+    def strain(self, speed: Floats, acceleration: Floats) -> float:
+        """Return the factor by which offsets must be slower to keep the share of all limits."""
+        strain = TrackFit(rig().names, lid_spans(rig()))._strain(frozenset(), self.bounds)
+        none = np.zeros((1, speed.shape[1]))
+        return float(max(strain(speed, 0.0 * speed).max(), strain(none, acceleration).max()))
+
+    def end(self, t_s: float, track: str = "") -> str:
+        return self.choices.end(EndTrack(track), t_s).refused
+
+
+def show(**tracks: Track) -> Show:
+    player = TrackPlayer(len(further_joints(rig().joints)))
+    choices = TrackChoices(tracks, player, TrackFit(rig().names, lid_spans(rig())))
+    return Show(player, choices, limits(rig().joints))
+
+
+def long_track(seconds: float, seed: int) -> Track:
+    """Return a track with a key of neck and jaw in each second or so."""
+    random, times = np.random.default_rng(seed), np.arange(0.8, seconds, 0.9)
+    frames = tuple(
+        KeyFrame(
+            round(float(t), 3),
+            head_yaw_deg=float(random.uniform(-15, 15)),
+            head_pitch_deg=float(random.uniform(-6, 6)),
+            joints_deg={"jaw": float(random.uniform(0, 6))},
+        )
+        for t in times
+    )
+    return Track("a show", frames, cues={"middle": seconds / 2})
+
+
+def test_a_show_of_an_hour_with_200_corrections_keeps_all_limits():
+    it, random = show(hour=long_track(3600.0, 1)), np.random.default_rng(2)
+    t = 0.0
+    it.play("hour", t, loop=True)
+    (voice,) = it.player.voices
+    worst = 0.0
+    for _ in range(200):
+        off_s = float(random.choice([0.01, 0.1, -0.2, 2.0]))
+        it.choices.sync(SyncTrack(1, max(0.0, voice.position_s(t) + off_s)), t)
+        rows = []
+        for _ in range(600):
+            t += 0.005
+            rows.append(it.player.step(t))
+        worst = max(worst, it.strain(np.diff(rows, axis=0) / 0.005, np.diff(rows, 2, 0) / 0.005**2))
+    assert 0.4 < worst <= 1.1, worst
+
+
+@pytest.mark.parametrize("at_s", [3.1, 40.0, 59.0])
+def test_a_track_that_begins_in_its_middle_grows_from_rest_within_limits(at_s: float):
+    it = show(minute=long_track(60.0, 3))
+    it.play("minute", 0.0, from_s=at_s)
+    (voice,) = it.player.voices
+    assert voice.position_s(0.0) == pytest.approx(at_s)
+    rows = np.array([it.player.step(0.005 * k) for k in range(400)])
+    speed, acceleration = np.diff(rows, axis=0) / 0.005, np.diff(rows, 2, 0) / 0.005**2
+    assert not rows[0].any() and np.abs(speed[0]).max() < 0.01
+    assert it.strain(speed, acceleration) <= 1.1
+    later = voice.motion.sample_at(np.array([voice.time_s(1.995)]))[0, 0]
+    assert rows[-1] == pytest.approx(later, abs=1e-9)
+
+
+def test_other_channels_run_together_and_the_same_replace():
+    pitch = Track("p", (KeyFrame(2.0, head_pitch_deg=5.0),))
+    jaw = Track("j", (KeyFrame(2.0, joints_deg={"jaw": 5.0}),), owns=("jaw",))
+    talk = Track("t", (KeyFrame(2.0, joints_deg={"jaw": 3.0}),))
+    it = show(pitch=pitch, jaw=jaw, talk=talk)
+    it.play("pitch", 0.0)
+    it.play("jaw", 0.1)
+    it.player.step(0.5)
+    states = it.choices.states(0.5)
+    assert [one.name for one in states if one.is_playing] == ["pitch", "jaw"]
+    assert states[1].owns == ("jaw",)
+    it.play("talk", 0.6)
+    it.player.step(0.6)
+    states = it.choices.states(0.6)
+    assert [one.name for one in states if one.is_playing] == ["pitch", "talk"]
+    assert states[1].end_reason == "another track: talk"
+    assert not it.choices.ends_show(Play("talk"), it.bounds)
+    assert it.end(0.7) == ""
+    it.player.step(0.7)
+    assert not [one for one in it.choices.states(0.7) if one.is_playing]
+    assert it.end(0.8, "talk") == "talk is not playing; playing: none"
+
+
+def test_an_owned_jaw_goes_from_the_present_angle_to_the_track_and_back():
+    jaw = Track(
+        "j", tuple(KeyFrame(float(s), joints_deg={"jaw": 2.0 + s % 2}) for s in range(1, 9)),
+        owns=("jaw",),
+    )  # fmt: skip
+    it = show(jaw=jaw)
+    it.play("jaw", 0.0)
+    angles, index = [], 9
+    for k in range(2200):
+        t = k * 0.005
+        it.player.step(t)
+        (index,) = it.player.owned or (index,)
+        angles.append(OwnedPose(it.player.owned).mix(index, radians(5.0)))
+    at = np.degrees(angles)
+    assert at[0] == pytest.approx(5.0) and at[-1] == pytest.approx(5.0)
+    assert at[400] == pytest.approx(2.0, abs=0.01)  # of the track alone
+    bound = it.bounds[rig().names.index("jaw")]
+    assert np.abs(np.diff(at, 2)).max() / 0.005**2 <= np.degrees(bound.accel_rad_s2)
+    assert np.abs(np.diff(at)).max() / 0.005 <= np.degrees(bound.speed_rad_s)
+
+
+def test_cues_loops_and_a_clock_of_a_sound():
+    frames = (KeyFrame(1.0, head_pitch_deg=3.0), KeyFrame(2.0, head_pitch_deg=0.0))
+    it = show(hello=Track("h", frames, cues={"top": 1.0, "end": 1.9}, loop=True))
+    number = it.play("hello", 0.0)
+    t, cues = 0.0, list[tuple[int, str]]()
+    for _ in range(1004):
+        t += 0.005
+        it.player.step(t)
+        (state,) = it.choices.states(t)
+        if not cues or state.cues != cues[-1][0]:
+            cues.append((state.cues, state.cue))
+    assert cues == [(0, ""), (1, "top"), (2, "end"), (3, "top"), (4, "end"), (5, "top")]
+    assert state.loop and state.position_s == pytest.approx(1.02)
+    it.choices.sync(SyncTrack(number, 1.12, "sound"), t)  # 0.1 s late: faster for 3.75 s
+    for _ in range(800):
+        t += 0.005
+        it.player.step(t)
+    (state,) = it.choices.states(t)
+    assert state.position_s == pytest.approx((1.12 + 4.0) % 2.0, abs=0.012)
+    assert state.clock == "sound"
+    with pytest.raises(ValueError, match="has no cue 'no'; available: top, end"):
+        it.choices.require(Play("hello", from_s="no"), it.bounds)
+    it.play("hello", t, from_s="top")
+    (playing,) = [one for one in it.choices.states(t) if one.is_playing]
+    assert playing.position_s <= 1.0
+    it.player.step(t + 0.5)
+    (playing,) = [one for one in it.choices.states(t + 0.5) if one.is_playing]
+    assert 1.0 <= playing.position_s <= 1.5 and playing.cue == "top"

@@ -1,0 +1,492 @@
+"""Commands to a running robot: checked, executed at the next tick, and safe."""
+
+from math import degrees, nan, pi, radians
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import yaml
+from commanded_robot import YAW, Running
+from fakes.runs import go
+
+from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
+from gazerig.gaze.types import PART_NAMES, Floats
+from gazerig.robot.loop.head_state import head_state
+from gazerig.robot.loop.power_down import Interrupts
+from gazerig.robot.loop.tick import Tick
+from gazerig.robot.model.commands import (
+    AnyCommand,
+    Ask,
+    Command,
+    Jog,
+    LookAt,
+    LookAtDirection,
+    LookAtInHead,
+    LookAtPerson,
+    LookAtPixel,
+    Renew,
+    Resume,
+    Say,
+    SetLevel,
+    Stop,
+    Talk,
+    Tune,
+    check_command,
+    read_request,
+)
+from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlSource, control_sentence
+from gazerig.robot.model.reply import ARRIVED_RAD
+from gazerig.robot.run.session import prepare_shutdown
+
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+GENTLE_RAD_S = radians(load_rig("desk").guard.soft_start_speed_deg_s)
+
+
+ORDERS: list[Command] = [
+    Ask("lids", "wink left"),
+    LookAt((1.0, 0.2, 0.3)),
+    LookAt(None),
+    Jog((("neck_yaw", 0.2), ("left_eye_pan", -0.1))),
+    Jog(()),
+    Renew(who="a program"),
+    Stop("a hand"),
+    Stop("a hand", who="browser 3"),
+    Resume(),
+    Resume(who="browser 3", confirmed=True),
+    Tune((("loop.rate_hz", 100.0), ("gaze.saccade.profile", "min_jerk"), ("x", (1, 2)))),
+]
+
+
+@pytest.mark.parametrize("order", ORDERS, ids=str)
+def test_orders_cross_processes_and_recordings_as_they_are(order: Command):
+    plain = msgspec.json.decode(msgspec.json.encode(order))
+    assert check_command(msgspec.convert(plain, AnyCommand)) == check_command(order) == order
+    assert isinstance(order, Tune) or read_request(plain) == order
+
+
+REFUSED = yaml.safe_load(
+    (Path(__file__).parents[3] / "tests" / "golden" / "refused_requests.yaml").read_text()
+)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        *REFUSED,
+        ({"do": "jog", "angles_rad": [["neck_yaw", 0.0]] * 99}, "length <= 64"),
+        ({"do": "stop", "why": "x" * 999}, "length <= 200 - at `.*why`"),
+        ({"do": "look_at_person", "id": 10**30}, "out of range|<= 9007199254740992"),
+        ({"do": "look_at_pixel", "pixel_px": [1, 2], "captured_s": 10**400}, "out of range"),
+    ],
+)
+def test_what_is_no_order_is_refused_with_place_and_rule(data: object, words: str):
+    with pytest.raises(ValueError, match=words):
+        read_request(data)
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        (LookAt((1.0, 0.0, 0.3), for_s=nan), "look_at: Expected `float` > 0.0 - at `.for_s`"),
+        (SetLevel("mouth", nan), "set_level: Expected `float` >= 0.0"),
+        (Stop("\ud800"), "surrogates not allowed"),
+        (Talk("listening", text="hello"), "belong to speaking"),
+        (Say(" \n"), "a text without a word is no speech"),
+    ],
+)
+def test_an_invalid_order_of_this_program_is_refused(order: Command, words: str):
+    with pytest.raises(ValueError, match=words.replace("`.", r"`\$.")):
+        check_command(order)
+
+
+def fastest_rad_s(ticks: list[Tick]) -> Floats:
+    """Return the highest commanded speed of each joint."""
+    angles = np.array([tick.guard_result.command_rad for tick in ticks])
+    times = np.array([tick.t_s for tick in ticks])
+    speeds: Floats = np.abs(np.diff(angles, axis=0)) / np.diff(times)[:, None]
+    return speeds.max(axis=0)
+
+
+def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(
+    running: Running,
+):
+    running.order(Stop("the space bar"))
+    ticks = running.go(1.0)
+    first = ticks[0]
+    assert first.commands == (Stop("the space bar"),) and first.stopped == "the space bar"
+    assert not any(ticks[1].joints.torque)
+    assert {tick.guard_result.level for tick in ticks} == {"torque_off"}
+    assert first.guard_result.reasons == ("all: stopped (the space bar)",)
+    assert any("torque off" in event for event in first.events)
+    later = [tick.joints.position_rad for tick in ticks[20:]]
+    assert max(abs(a - b) for p in later for a, b in zip(p, later[0], strict=True)) < 0.02
+    # The program goes on: people can see, and resume.
+    assert running.count.stopped_by == "over"
+
+
+def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running):
+    running.order(Stop("test"))
+    before = running.go(2.0)[-1]
+    running.order(Resume())
+    ticks = running.go(3.0)
+    assert not ticks[0].stopped and all(ticks[2].joints.torque)
+    start = ticks[0].guard_result.command_rad
+    assert start == pytest.approx(before.joints.position_rad, abs=radians(0.5))
+    assert fastest_rad_s(ticks[:100]).max() <= GENTLE_RAD_S * 1.01
+    assert ticks[-1].guard_result.level in ("ok", "limited")
+    assert ticks[-1].target.kind == "face"
+
+
+def test_a_run_that_ends_stopped_does_not_park(running: Running):
+    running.order(Stop("test"))
+    running.go(0.2)
+    said: list[str] = []
+    end = prepare_shutdown(running.made, said.append, Interrupts())
+    end.cause = running.count.stopped_by
+    end.shut_down()
+    assert said == ["stopped by over: not parked, as it was stopped, torque off"]
+
+
+def test_a_stop_while_parking_is_obeyed_at_once(running: Running):
+    robot, made = running.made.robot, running.made
+    robot.command(Jog((("neck_yaw", radians(50.0)),), stay=True))
+    running.go(2.0)
+    began_s = made.clock.now_s()
+    robot.command(LookAt(None))
+    robot.command(Stop("a hand"))
+    seen: list[Tick] = []
+    assert not robot.park(made.park_rad, made.clock, made.loop, watch=seen.append)
+    assert [tick.stopped for tick in seen] == ["a hand"]
+    assert made.clock.now_s() - began_s < 0.011
+    joints = robot.body.read(made.clock.now_s())
+    assert not any(joints.torque) and degrees(joints.position_rad[YAW]) > 45.0
+
+
+def test_two_stops_are_one_and_a_resume_of_nothing_is_nothing(running: Running):
+    running.order(Resume())
+    assert not any("torque" in e for tick in running.go(0.1) for e in tick.events)
+    running.order(Stop("one"))
+    running.order(Stop("two"))
+    tick = running.go(0.1)[0]
+    assert sum("stopped" in event for event in tick.events) == 1
+
+
+def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running):
+    held = running.ticks[-1].guard_result.command_rad
+    running.order(Jog((("neck_yaw", radians(25.0)),), stay=True))
+    ticks = running.go(2.0)
+    end = ticks[-1].guard_result.command_rad
+    assert degrees(end[YAW]) == pytest.approx(25.0, abs=0.1)
+    assert all(
+        abs(a - b) < 1e-3 for i, (a, b) in enumerate(zip(end, held, strict=True)) if i != YAW
+    )
+    assert fastest_rad_s(ticks)[YAW] <= GENTLE_RAD_S * 1.01
+    running.order(Jog(()))
+    assert running.go(2.0)[-1].target.kind == "face"
+
+
+def test_a_jog_beyond_the_end_is_refused_with_the_joints_range(running: Running):
+    with pytest.raises(ValueError, match=r"neck_yaw 180.0 deg is outside its range, -70..70 deg"):
+        running.order(Jog((("neck_yaw", pi),)))
+    running.order(Jog((("neck_yaw", radians(70.04)),)))  # a slider's rounding
+    assert running.go(0.1)[0].controlled_by == "a client: neck_yaw at 70.0 deg"
+
+
+def test_unknown_menus_are_refused_when_asked(running: Running):
+    with pytest.raises(ValueError, match="available: behaviour, conversation, lids"):
+        running.order(Ask("mood", "x"))
+    with pytest.raises(ValueError, match="available: wink left"):
+        running.order(Ask("lids", "x"))
+
+
+# Clients that may resume, and the time
+
+
+def replied(running: Running, order: Command) -> str:
+    """Ask, run on, and give why it was refused."""
+    return running.do(order)[0].refused
+
+
+def test_a_stop_holds_two_seconds_whoever_asks(running: Running):
+    running.order(Stop("a hand", who="browser 1"))
+    running.go(0.5)
+    assert "lasts at least 2 s: try again in 1.5 s" in replied(
+        running, Resume(who="browser 1", confirmed=True)
+    )
+    running.go(1.6)
+    assert replied(running, Resume(who="browser 1")) == "" and not running.made.robot.stopped
+
+
+def test_another_resumes_only_who_confirms(running: Running):
+    for who in ("browser 1", "browser 2"):
+        running.order(Stop("a hand", who=who))
+    running.go(2.1)
+    by = "stopped by browser 1 and browser 2: another client must confirm"
+    for command in (Resume(who="browser 2"), Resume()):
+        assert by in replied(running, command)
+    assert running.made.robot.stopped
+    ticket = running.made.robot.command(Resume(who="browser 2", confirmed=True))
+    tick = running.go(0.006)[0]
+    assert ticket.wait(0.0) is not None and not tick.stopped
+    assert any("torque on again by browser 2" in event for event in tick.events)
+
+
+@pytest.mark.parametrize("confirmed", [False, True])
+def test_a_flood_of_resumes_beats_no_stop(running: Running, confirmed: bool):
+    running.order(Stop("a hand", who="browser 1"))
+    events: list[str] = []
+    for _ in range(700):  # 3.5 s, one a tick
+        running.order(Resume(who="a loop", confirmed=confirmed))
+        events += [event for tick in running.go(0.006) for event in tick.events]
+    assert running.made.robot.stopped == "a hand"
+    assert len([event for event in events if "resume" in event]) < 10
+
+
+def test_a_command_is_replied_to_when_its_tick_can_be_seen(running: Running):
+    robot = running.made.robot
+    orders: tuple[list[Command], ...] = (
+        [Stop("a hand")],
+        [LookAt((1.0, 0.2, 0.3)), Stop("again")],
+    )
+    for commands in orders:
+        tickets = [robot.command(command) for command in commands]
+        seen = []
+
+        def watch(tick: Tick) -> None:
+            seen.append([ticket.wait(0.0) for ticket in tickets])  # noqa: B023
+
+        go(running.made, 0.006, watch)
+        assert seen[0] == [None] * len(tickets)
+        assert None not in [ticket.wait(0.0) for ticket in tickets]
+
+
+def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: Running):
+    tickets = [
+        running.made.robot.command(order)
+        for order in (LookAt((1.0, 0.2, 0.3)), Jog((("neck_yaw", 0.2),)), Resume(confirmed=True))
+    ]
+    running.order(Stop("a hand"))
+    assert running.go(0.006)[0].commands == (Stop("a hand"),)
+    replies = [ticket.wait(0.0) for ticket in tickets]
+    assert all(reply is not None and "stopped meanwhile" in reply.refused for reply in replies)
+    assert "resume first" in replied(running, LookAt((1.0, 0.2, 0.3)))
+
+
+# The client in control, and the duration
+
+
+def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running):
+    running.order(Jog((("neck_yaw", 0.3),), who="a show (process 7)"))
+    ticks = running.go(1.5)
+    assert ticks[0].controlled_by == "a show (process 7): neck_yaw at 17.2 deg"
+    led = [tick for tick in ticks if tick.controlled_by]
+    assert led[-1].t_s - led[0].t_s == pytest.approx(1.0, abs=0.011)
+    words = [event for tick in ticks for event in tick.events]
+    assert "controlled by a show (process 7): neck_yaw at 17.2 deg" in words
+    assert (
+        "a show (process 7): neck_yaw at 17.2 deg: not renewed, so the gaze models are in control again"
+        in words
+    )
+    assert fastest_rad_s(ticks)[YAW] <= GENTLE_RAD_S * 1.01
+
+
+def test_a_lead_holds_while_it_is_renewed_by_the_one_who_leads(running: Running):
+    running.order(LookAt((1.2, 0.6, 0.3), who="a show"))
+    for _ in range(5):
+        running.go(0.5)
+        assert replied(running, Renew(who="a show")) == ""
+    assert running.ticks[-1].controlled_by == "a show: look at 1.2 0.6 0.3"
+    for _ in range(4):
+        assert "no longer control" in replied(running, Renew(who="another"))
+        running.go(0.4)
+    assert running.ticks[-1].controlled_by == "" and running.ticks[-1].target.kind == "face"
+
+
+# Floods
+
+
+def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Running):
+    robot = running.made.robot
+    with pytest.raises(ValueError, match="too many requests"):
+        for _ in range(1000):
+            robot.command(Ask("lids", "wink left"))
+    stop = robot.command(Stop("a hand"))
+    tick = running.go(0.006)[0]
+    assert tick.commands[0] == Stop("a hand") and len(tick.commands) <= 9
+    assert stop.wait(0.0) is not None and tick.stopped
+    for _ in range(1000):
+        robot.command(Stop("again"))
+    assert len(robot._commands) <= 128
+
+
+# ---- Gaze targets of clients: points of two frames, directions, people, pixels; the end
+
+
+def test_a_point_of_the_head_is_where_the_head_had_it(running: Running):
+    before = running.go(0.006)[-1].pose
+    ticks = running.do(LookAtInHead((1.2, 0.3, 0.1), stay=True), 1.5)[1]
+    (point,) = {tick.target.p_world_m for tick in ticks}  # it stays while the head turns to it
+    seen = rotate_back(before.R_world_head, sub(point, before.p_world_head_m))
+    assert seen == pytest.approx((1.2, 0.3, 0.1), abs=1e-9)
+    assert ticks[-1].client_control.arrived and ticks[-1].client_control.error_rad <= ARRIVED_RAD
+
+
+@pytest.mark.parametrize("frame", ["world", "head"])
+def test_a_direction_is_looked_in(running: Running, frame: Any):
+    running.do(Jog((("neck_yaw", radians(15.0)),), stay=True), 2.0)
+    before = running.go(0.006)[-1].pose
+    asked = (radians(10.0), radians(-5.0))
+    ticks = running.do(LookAtDirection(asked, frame, stay=True), 2.0)[1]
+    pose, point = ticks[-1].pose, ticks[-1].gaze.gaze_point_world_m
+    seen = yaw_pitch(sub(point, pose.p_world_head_m))
+    if frame == "head":
+        seen = yaw_pitch(rotate_back(before.R_world_head, sub(point, pose.p_world_head_m)))
+    assert tuple(map(degrees, seen)) == pytest.approx((10.0, -5.0), abs=0.2)
+    assert ticks[-1].client_control.arrived
+
+
+def test_a_person_is_followed_with_the_scanpath_on_the_face(running: Running):
+    percept = running.go(0.006)[-1].percept
+    assert percept is not None
+    person = percept.faces[0].id
+    reply, ticks = running.do(LookAtPerson(person, stay=True), 3.0)
+    assert not reply.refused and reply.control_number == 1
+    assert {(tick.target.kind, tick.target.id) for tick in ticks} == {("face", person)}
+    assert len({tick.target.part for tick in ticks}) > 1
+    assert (
+        ticks[-1].client_control.arrived
+        and ticks[-1].controlled_by == f"a client: look at person {person}"
+    )
+
+
+def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(running: Running):
+    assert running.do(LookAtPerson(99))[0].refused.startswith("no visible person '99'; available: ")
+    percept = running.go(0.006)[-1].percept
+    assert percept is not None
+    running.do(LookAtPerson(percept.faces[0].id, stay=True))
+    blind: Any = lambda found, poses: None  # noqa: E731
+    running.made.robot.perception.see = blind  # type: ignore[method-assign]
+    ticks = running.go(2.5)
+    assert ticks[100].controlled_by and not ticks[-1].controlled_by
+    assert ticks[-1].client_control.end_reason == f"person {percept.faces[0].id} is gone"
+
+
+def test_a_pixel_is_where_it_was_when_the_frame_was_taken(running: Running):
+    tick = running.go(0.006)[-1]
+    found = tick.detections
+    assert found is not None and tick.percept is not None
+    x, y, width, height = found.faces[0].box_px
+    pixel = (x + width / 2, y + height / 2)
+    ticks = running.do(LookAtPixel(pixel, captured_s=found.captured_s, stay=True), 1.5)[1]
+    face = tick.percept.faces[0].p_world_m
+    head = tick.pose.p_world_head_m
+    (command,) = ticks[0].commands
+    point = ticks[0].target.p_world_m
+    assert isinstance(command, LookAtPixel) and command.p_world_m == point
+    assert degrees(angle_between(sub(point, head), sub(face, head))) < 2.0
+    assert norm(sub(point, head)) == pytest.approx(norm(sub(face, head)), abs=0.1)
+    assert ticks[-1].client_control.arrived
+    near = running.do(LookAtPixel(pixel, 0.5))[1][0].target.p_world_m
+    assert norm(sub(near, head)) == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_pixel_without_a_frame_is_refused(running: Running):
+    nothing: Any = lambda now_s: None  # noqa: E731
+    running.made.robot.camera.latest = nothing  # type: ignore[method-assign]
+    running.go(0.006)
+    assert "no camera frame" in running.do(LookAtPixel((1.0, 1.0)))[0].refused
+
+
+def test_leads_are_counted_and_their_ends_have_reasons(running: Running):
+    assert running.go(0.006)[-1].client_control == NO_CLIENT_CONTROL
+    assert running.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].control_number == 1
+    reply, ticks = running.do(LookAt((1.0, 0.4, 0.3), stay=True), 1.5)
+    assert (
+        reply.control_number == 2
+        and ticks[0].client_control.number == 2
+        and not ticks[0].client_control.arrived
+    )
+    assert ticks[-1].client_control.arrived
+    free = running.do(LookAt(None, who="a show"))
+    assert (
+        free[0].control_number == 0
+        and free[1][-1].client_control.end_reason == "a show looks elsewhere"
+    )
+    reply, ticks = running.do(Jog((("neck_yaw", radians(20.0)),), stay=True), 0.1)
+    assert reply.control_number == 3 and degrees(ticks[0].client_control.error_rad) > 3.0
+    assert running.go(2.0)[-1].client_control.arrived
+    assert running.do(Stop("a hand"))[1][-1].client_control.end_reason == "stopped: a hand"
+
+
+# ---- The source of control of the head is one value with the same words everywhere.
+
+
+def test_by_itself_it_says_what_it_looks_at(running: Running):
+    tick = running.go(0.1)[-1]
+    assert tick.control_source == ControlSource() and not tick.control_source.overrides_gaze
+    state = head_state(tick)
+    assert state.headline.startswith("looks at person 1") and state.gaze.kind == "face"
+    assert state.gaze.part in PART_NAMES.values() and state.saliences[0].id == 1
+
+
+def test_a_held_joint_is_named_with_who_and_nothing_else(running: Running):
+    running.order(Jog((("neck_yaw", 0.3),), who="ann"))
+    running.go(0.2)
+    running.order(Jog((("neck_yaw", 0.1), ("neck_pitch", 0.1)), who="ann"))
+    for _ in range(6):
+        running.order(Jog((("neck_yaw", 0.3),), who="ann"))
+        tick = running.go(0.5)[-1]
+    leads = tick.control_source
+    assert (leads.kind, leads.who) == ("joint", "ann")
+    assert leads.joints == ("neck_yaw", "neck_pitch")
+    state = head_state(tick)
+    assert state.headline == "ann holds neck_yaw at 17.2 deg, neck_pitch at 5.7 deg"
+    assert (state.gaze.target, state.gaze.phase) == ("neck_yaw and neck_pitch held", "held")
+    assert state.gaze.reason == state.headline
+    assert (state.gaze.kind, state.gaze.part, state.saliences) == ("joint", None, ())
+
+
+@pytest.mark.parametrize(
+    ("pointer", "kind", "said"),
+    [
+        (False, "person", "ann makes it look at 1 0.2 0.3"),
+        (True, "pointer", "it looks at the pointer of ann"),
+    ],
+)
+def test_a_point_and_a_pointer_are_led_by_who_chose_them(
+    running: Running, pointer: bool, kind: str, said: str
+):
+    for _ in range(10):
+        running.order(LookAt((1.0, 0.2, 0.3), who="ann", pointer=pointer))
+        tick = running.go(0.2)[-1]
+    assert tick.control_source.kind == kind
+    assert head_state(tick).headline == said
+
+
+def test_stopped_says_that_and_nothing_else(running: Running):
+    running.order(Jog((("neck_yaw", 0.3),), who="ann"))
+    running.go(0.2)
+    running.order(Stop("STOP was pressed", who="ann"))
+    state = head_state(running.go(0.5)[-1])
+    assert state.control_source.kind == state.gaze.target == state.gaze.phase == "stopped"
+    assert state.headline == state.gaze.reason == "stopped: STOP was pressed; the torque is off"
+    running.go(2.0)
+    running.order(Resume(who="ann"))
+    assert running.go(0.1)[-1].control_source == ControlSource()
+
+
+def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running):
+    running.order(Jog((("neck_yaw", 0.3),), who="ann", stay=True))
+    running.go(1.0)
+    made = running.made
+    ticks: list[Tick] = []
+    assert made.robot.park(made.park_rad, made.clock, made.loop, watch=ticks.append)
+    assert {tick.control_source.kind for tick in ticks} == {"parking"} and len(ticks) > 5
+    assert head_state(ticks[-1]).headline == control_sentence(ControlSource("parking"))
+    yaw = [
+        tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
+    ]
+    assert abs(yaw[-1]) < abs(yaw[0])

@@ -1,0 +1,216 @@
+"""Two servos that move two joints together: geometry, servo limits, feedback, and a run."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import degrees, inf, radians
+from pathlib import Path
+
+import pytest
+from command_line import invoked
+from expressive_rig import faults
+from fakes.runs import ticks
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gazerig.config.load import shipped_path
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
+from gazerig.drivers.types import Feedback
+from gazerig.robot.loop.body import CoupledServos
+from gazerig.robot.model.commands import Jog
+from gazerig.robot.model.coupling import CouplingParams
+from gazerig.robot.model.weight import HeadMassParams, MassParams
+from gazerig.robot.run.rig_limits import servo_configs
+from gazerig.robot.run.run import Run
+
+PITCH, ROLL = 35.0, 25.0
+COUPLING = CouplingParams("neck_pitch", "neck_roll", 1.5, 1.2)
+
+
+def rig_with(coupling: CouplingParams) -> Rig:
+    # With a balanced head goals have no part that makes up for its weight.
+    balanced = MassParams(head=HeadMassParams(com_mm=(0.0, 0.0, 0.0)))
+    return replace(load_rig("desk"), couplings={"neck": coupling}, mass=balanced)
+
+
+@settings(max_examples=100)
+@given(first=st.floats(-PITCH, PITCH), second=st.floats(-ROLL, ROLL))
+def test_servo_angles_come_back_as_joint_angles_to_1e_9(first: float, second: float):
+    at = radians(first), radians(second)
+    assert COUPLING.joint_rad(COUPLING.servo_rad(at)) == pytest.approx(at, abs=1e-9)
+
+
+def test_a_differential_is_the_mean_and_half_the_difference():
+    assert CouplingParams("a", "b").joint_rad((0.5, 0.1)) == pytest.approx((0.3, 0.2))
+    for column, joint in enumerate(((1.0, 0.0), (0.0, 1.0))):
+        slopes = [row[column] for row in COUPLING.rates]
+        assert COUPLING.servo_rad(joint) == pytest.approx(slopes)
+
+
+def test_servos_get_the_limits_that_the_whole_range_needs():
+    rig = rig_with(COUPLING)
+    assert faults(rig) == []
+    found = dict(zip(rig.names, servo_configs(rig), strict=True))
+    plain = dict(zip(rig.names, servo_configs(load_rig("desk")), strict=True))
+    assert {name for name in rig.names if found[name] != plain[name]} == {"neck_pitch", "neck_roll"}
+    needed: dict[str, list[float]] = {"neck_pitch": [], "neck_roll": []}
+    for first in (-PITCH, 0.0, PITCH):
+        for second in (-ROLL, 0.0, ROLL):
+            servos = COUPLING.servo_rad((radians(first), radians(second)))
+            for name, angle in zip(needed, servos, strict=True):
+                needed[name].append(rig.joints[name].steps(angle))
+    for name, steps in needed.items():
+        assert found[name].min_steps == pytest.approx(min(steps), abs=2.0)
+        assert found[name].max_steps == pytest.approx(max(steps), abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("coupling", "said"),
+    [
+        (replace(COUPLING, first_ratio=5.0),
+         "the servo of neck_pitch would be at -284, outside the servo's 0..4095 steps"),
+        (replace(COUPLING, first="nek_pitch"), "no joint 'nek_pitch'; did you mean 'neck_pitch'? available: left"),
+    ],
+)  # fmt: skip
+def test_a_range_that_the_servos_cannot_do_is_refused_with_its_corner(
+    coupling: CouplingParams, said: str
+):
+    (fault,) = faults(rig_with(coupling))
+    assert fault.startswith("couplings.neck") and said in fault
+
+
+def test_a_coupling_of_a_joint_with_itself_is_refused():
+    with pytest.raises(ValueError, match="give two different joints"):
+        CouplingParams("jaw", "jaw")
+
+
+def answered(**changes: object) -> Feedback:
+    whole = Feedback(
+        (0.0, 1.0, 2.0), (0.0, 0.0, 0.0), (0.0, -0.4, 0.1), (5.0, 5.0, 4.9), (30, 30, 30),
+        (5.0, 5.0, 5.0), (True, True, True), ("", "", ""), (True,) * 3, (False,) * 3, (),
+    )  # fmt: skip
+    return whole._replace(**changes)  # type: ignore[arg-type]
+
+
+def test_one_servo_of_a_pair_speaks_for_both_joints():
+    servos = CoupledServos([COUPLING], ("jaw", "neck_pitch", "neck_roll"))
+    servos.share_feedback(answered(), released=False)
+    later = answered(
+        missing=(2,), at_s=(6.0, 6.0, 4.9), position_steps=(0.5, 9.0, 2.0),
+        torque=(True, False, True), rearmed=(False, True, False), fault=("", "", "overheating"),
+    )  # fmt: skip
+    found = servos.share_feedback(later, released=False)
+    assert found.missing == (1, 2) and found.at_s == (6.0, 4.9, 4.9)
+    assert found.position_steps == (0.5, 1.0, 2.0)
+    assert found.load == (0.0, -0.4, -0.4)
+    assert found.torque == (True, False, False) and found.rearmed == (False, True, True)
+    assert found.fault == ("", "overheating (of its coupled servo)", "overheating")
+    assert servos.share_feedback(later, released=True).torque == (True, True, True)
+
+
+def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
+    started: Callable[[Rig], Run],
+):
+    """Joints are measured where they are sent, through two servos that know of no joints."""
+    rig = rig_with(COUPLING)
+    made = started(rig)
+    asked = (("neck_pitch", radians(20.0)), ("neck_roll", radians(-15.0)))
+    made.robot.command(Jog(asked, stay=True))
+    sent: list[list[int]] = []
+    write = made.robot.body.bus.write
+
+    def noted(steps: list[int]) -> None:
+        sent.append(list(steps))
+        write(steps)
+
+    made.robot.body.bus.write = noted  # type: ignore[method-assign,assignment]
+    last = [degrees(angle) for angle in ticks(made, 500)[-1].joints.position_rad]
+    at = dict(zip(rig.names, last, strict=True))
+    assert at["neck_pitch"] == pytest.approx(20.0, abs=0.4)
+    assert at["neck_roll"] == pytest.approx(-15.0, abs=0.4)
+    servos = COUPLING.servo_rad((radians(20.0), radians(-15.0)))
+    goals = dict(zip(rig.names, sent[-1], strict=True))
+    for name, angle in zip(("neck_pitch", "neck_roll"), servos, strict=True):
+        assert goals[name] == pytest.approx(rig.joints[name].steps(angle), abs=1.0)
+    setups = dict(zip(rig.names, servo_configs(rig), strict=True))
+    for goal in sent:
+        for name, steps in zip(rig.names, goal, strict=True):
+            assert setups[name].min_steps - 1 <= steps <= setups[name].max_steps + 1
+
+
+def test_a_lost_servo_of_a_pair_makes_both_joints_stale(started: Callable[[Rig], Run]):
+    rig = rig_with(COUPLING)
+    made = started(rig)
+    read = made.robot.body.bus.read
+    k = rig.names.index("neck_roll")
+
+    def silent(t_s: float) -> Feedback:
+        whole = read(t_s)
+        nothing = Feedback.create_missing(len(rig.names))
+        columns = [
+            (*column[:k], none[k], *column[k + 1 :])
+            for column, none in zip(whole[:9], nothing[:9], strict=True)
+        ]
+        return Feedback._make((*columns, whole.rearmed, (k,)))
+
+    made.robot.body.bus.read = silent  # type: ignore[method-assign,assignment]
+    first, *_, tick = ticks(made, 60)
+    assert first.joints.missing == ("neck_pitch", "neck_roll")
+    held = {reason.partition(":")[0] for reason in tick.guard_result.reasons}
+    assert {"neck_pitch", "neck_roll"} <= held
+    assert inf > min(tick.joints.measured_s) > -inf
+
+
+def coupled_file(tmp_path: Path) -> str:
+    text = shipped_path("rigs", "feetech").read_text()
+    text += "\ncouplings:\n  neck: {first: neck_pitch, second: neck_roll}\n"
+    path = tmp_path / "coupled.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+def test_bring_up_of_a_coupled_neck(tmp_path: Path):
+    pytest.importorskip("gazerig.features.bringup")
+    rig = coupled_file(tmp_path)
+    assert "valid: rig 'feetech'" in invoked("check", rig).err
+    jog = invoked("jog", rig, "neck_roll", "6", "--mock")
+    assert jog.code == 0 and "neck_roll: desired 6.0, measured" in jog.out + jog.err
+    refused = invoked("calibrate", "joints", rig, "--joint", "neck_roll", "--mock", "--dry-run")
+    assert refused.code == 2
+    assert "neck_roll is moved together with neck_pitch by two servos" in refused.out + refused.err
+    doctor = invoked("doctor", rig, "--mock", "--fix")
+    # Both at 35 + 25 deg, and both joints' speeds at once on one shaft.
+    assert "neck_pitch (servo 8): min position limit 0 -> 1366: done" in doctor.out + doctor.err
+    assert "the YAML asks its shaft for 360 deg/s" in doctor.out + doctor.err
+    once = invoked("monitor", rig, "--mock", "--once")
+    row = next(line.split() for line in once.out.splitlines() if line.startswith("neck_pitch"))
+    assert float(row[3]) == pytest.approx(-8.0, abs=0.2)
+
+
+def test_hobby_servos_of_a_coupled_neck_get_the_range_of_both_joints(
+    started: Callable[[Rig], Run],
+):
+    """Channels of a board are checked and armed for pitch and roll at once."""
+    rig = load_rig("maker")
+    joint = replace(
+        rig.joints["left_upper_lid"], transmission_points=(), min_deg=-30.0, max_deg=30.0
+    )
+    rig = replace(
+        rig,
+        joints={
+            **rig.joints,
+            "neck_pitch": replace(joint, id=10, sign=1),
+            "neck_roll": replace(joint, id=11, sign=1),
+        },
+        couplings={"neck": CouplingParams("neck_pitch", "neck_roll")},
+    )
+    assert faults(rig) == []
+    found = dict(zip(rig.names, servo_configs(rig), strict=True))
+    own = joint.setup("neck_pitch")
+    wide = found["neck_pitch"].max_steps - found["neck_pitch"].min_steps
+    assert wide == pytest.approx(2 * (own.max_steps - own.min_steps), abs=4)
+    made = started(rig)
+    made.robot.command(Jog((("neck_pitch", radians(10.0)), ("neck_roll", radians(8.0))), stay=True))
+    tick = ticks(made, 400)[-1]
+    at = dict(zip(rig.names, map(degrees, tick.joints.position_rad), strict=True))
+    assert (at["neck_pitch"], at["neck_roll"]) == pytest.approx((10.0, 8.0), abs=0.3)

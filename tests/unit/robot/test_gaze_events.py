@@ -1,0 +1,48 @@
+"""Events of gaze, people and tracks are those of the ticks, each once and in order."""
+
+from typing import get_args
+
+import pytest
+from commanded_robot import running_desk
+
+import gazerig
+from gazerig.robot.loop.events import EventKind, TickFeed
+from gazerig.robot.model.commands import Play
+
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
+
+def test_every_saccade_blink_and_track_of_the_ticks_is_an_event():
+    feed = TickFeed()
+    with running_desk() as running:
+        ticks = running.go(4.0)
+        running.order(Play("nod"))
+        ticks += running.go(4.0)
+    for tick in ticks:
+        feed.update(tick)
+    found = [event for event in feed.events() if event.kind != "message"]
+    times = {kind: [e.t_s for e in found if e.kind == kind] for kind in get_args(EventKind)}
+    saccades = ticks[-1].gaze.saccades - ticks[0].gaze.saccades
+    assert saccades > 8 and abs(len(times["saccade_start"]) - saccades) <= 1
+    pairs = list(zip(times["saccade_start"], times["saccade_landing"], strict=False))
+    assert len(pairs) >= saccades - 1
+    assert all(0.0 < landing - start < 0.3 for start, landing in pairs)
+    blinks = sum(b.gaze.blink > a.gaze.blink for a, b in zip(ticks, ticks[1:], strict=False))
+    assert len(times["blink"]) == blinks > 0
+    assert [e.subject for e in found if e.kind == "track_finished"] == ["nod"]
+    numbers = [event.number for event in feed.events()]
+    assert numbers == list(range(1, len(numbers) + 1))
+    assert [e.number for e in feed.events(numbers[-3])] == numbers[-2:]
+
+
+def test_people_arrive_and_leave_once():
+    with gazerig.open("desk", fast=True, scene="visitor") as head:
+        head.step(40.0)
+        events = list(head.events(0.0, kinds=("person_arrived", "person_left", "target")))
+        texts = [event.text for event in head.events(0.0)]
+    for person in {e.subject for e in events if e.kind == "person_arrived"}:
+        turns = [e.kind for e in events if e.subject == person]
+        assert turns[::2] == ["person_arrived"] * len(turns[::2])
+        assert turns[1::2] == ["person_left"] * len(turns[1::2])
+    assert any(e.kind == "target" and str(e.subject).startswith("face ") for e in events)
+    assert not {e.text for e in events} & set(texts)

@@ -1,0 +1,25 @@
+"""Commands that messages suggest: typed unchanged, they reach the same rig and port."""
+
+import pytest
+
+from gazerig.robot.cli.terminal import clear_errors, complete_suggestions
+
+pytestmark = pytest.mark.usefixtures("simulated_wires")
+
+
+@pytest.mark.parametrize(
+    ("said", "wanted"),
+    [
+        ("gazerig doctor --fix", "gazerig doctor 'my rig.yaml' --fix --port /dev/ttyACM3"),
+        ("gazerig setup --joint neck_yaw, as", 
+         "gazerig setup 'my rig.yaml' --joint neck_yaw --port /dev/ttyACM3, as"),
+        ("run gazerig scan: it", "run gazerig scan --port /dev/ttyACM3: it"),
+        ("gazerig calibrate", "gazerig calibrate 'my rig.yaml' --port /dev/ttyACM3"),
+        ("gazerig run --mock", "gazerig run --mock"),
+        ("gazerig ctl set a b", "gazerig ctl set a b"),
+    ],
+)  # fmt: skip
+def test_a_suggestion_names_rig_and_port(said: str, wanted: str):
+    with clear_errors("my rig.yaml", "/dev/ttyACM3"):
+        assert complete_suggestions(said) == wanted == complete_suggestions(wanted)
+    assert complete_suggestions(said) == said

@@ -1,0 +1,174 @@
+"""The camera that draws: true geometry, faces that the real detector finds, and honest times."""
+
+import pickle
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import radians
+from typing import Any
+
+import numpy as np
+import pytest
+from fakes.scenes import EmptyScene
+from present import present
+
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
+from gazerig.drivers.types import DetectedFace, ImageArray
+from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.gaze.angles import angle_between, rotation
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
+from gazerig.robot.model.frames import CameraMount, CameraParams
+from gazerig.robot.model.intrinsics import project
+from gazerig.robot.model.scene import PinholeView
+from gazerig.robot.perception.face_pose import face_pose
+from gazerig.robot.run.surroundings import load_scene, scene_names
+from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
+from gazerig.sim_mock.cameras.frame_times import FrameParams
+from gazerig.sim_mock.cameras.rendered import PixelCamera
+from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
+
+SIZE = WIDTH, HEIGHT = 640, 400
+LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)
+MOUNT = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
+ORIGIN: Vec3 = (0.0, 0.0, 0.0)
+LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class Nobody:
+    """A detector that finds nothing."""
+
+    def find(self, picture: ImageArray) -> tuple[DetectedFace, ...]:
+        return ()
+
+
+@dataclass
+class Still(EmptyScene):
+    """A scene in which nothing moves."""
+
+    seen: tuple[ScenePerson, ...] = ()
+    moving: tuple[Thing, ...] = ()
+
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+        return self.seen
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        return self.moving
+
+
+def person(place: Vec3, yaw_rad: float = np.pi) -> ScenePerson:
+    return ScenePerson(place, (yaw_rad, 0.0), None)
+
+
+def seen_from(yaw_deg: float = 0.0, pitch_deg: float = 0.0, p_m: Vec3 = ORIGIN) -> PinholeView:
+    turned = rotation((radians(yaw_deg), radians(pitch_deg), 0.0))
+    return PinholeView(0.0, LENS, SIZE, *MOUNT.pose(turned, p_m))
+
+
+def drawn(scene: EmptyScene, *view: Any) -> ImageArray:
+    return DrawnScene(scene).draw(seen_from(*view))
+
+
+def pixel_of(point_m: Vec3, view: PinholeView) -> Any:
+    return project((np.array(point_m) - view.p_m) @ np.array(view.R), LENS)[0]
+
+
+@pytest.mark.parametrize("view", [(0.0, 0.0, ORIGIN), (-30.0, 8.0, (0.1, -0.2, 0.1))])
+def test_a_thing_is_drawn_where_a_camera_sees_it(view: tuple[float, float, Vec3]):
+    c, s = np.cos(radians(view[0])), np.sin(radians(view[0]))
+    place = (1.3 * c - 0.1 * s, 1.3 * s + 0.1 * c, 0.2)
+    ball = Still(moving=(Thing(1, "thing", place, 0.08),))
+    changed = np.abs(drawn(ball, *view).astype(int) - drawn(Still(), *view)).max(axis=2) > 20
+    y, x = np.nonzero(changed)
+    middle = np.array((x.min() + x.max(), y.min() + y.max())) / 2
+    assert middle == pytest.approx(pixel_of(place, seen_from(*view)), abs=2.0)
+    distance = float(np.linalg.norm(np.subtract(place, view[2])))
+    assert np.ptp(x) == pytest.approx(2 * 0.08 * LENS.fx_px / distance, rel=0.1)
+
+
+def test_whoever_is_behind_or_in_the_lens_is_not_drawn():
+    empty = drawn(Still())
+    for x in (-1.0, -0.05, 0.0):
+        thing = Thing(1, "thing", (x, 0.0, 0.0), 0.02)
+        scene = Still((person((x, 0.0, 0.0)),), (thing,))
+        assert (drawn(scene) == empty).all()
+
+
+@pytest.fixture(scope="module")
+def mtcnn() -> MtcnnDetector:
+    return MtcnnDetector(FaceDetectorParams())
+
+
+@pytest.mark.parametrize("turn_deg", [-25.0, 0.0, 20.0])
+def test_a_real_detector_finds_drawn_faces_where_they_are(mtcnn: MtcnnDetector, turn_deg: float):
+    """At eight distances: landmarks within a part of the distance between the eyes."""
+    errors, directions, noise = [], [], np.random.default_rng(0)
+    view = seen_from()
+    for number, away_m in enumerate(np.geomspace(0.45, 2.2, 8).tolist()):
+        place = (away_m, 0.05 * away_m, 0.03)
+        yaw = np.pi + radians(turn_deg)
+        others = [person((-5.0, 0.0, 0.0))] * (number % 4)  # the looks go by number
+        picture = drawn(Still((*others, person(place, yaw))))
+        found: tuple[DetectedFace, ...] = ()
+        for _ in range(2):  # one of 100 pictures of a face at 1.4 m has none
+            noisy = np.clip(picture + noise.normal(0.0, 3.0, picture.shape), 0, 255)
+            found = found or mtcnn.find(noisy.astype(np.uint8))
+        assert len(found) == 1, away_m
+        landmarks = LANDMARKS_FACE_M @ np.array(rotation((yaw, 0.0, 0.0))).T + place
+        true = project(landmarks @ np.array(view.R), LENS)
+        eyes_px = LENS.fx_px * 0.063 / away_m
+        errors.append(np.linalg.norm(found[0].landmarks_px - true, axis=1).mean() / eyes_px)
+        pose = present(face_pose(found[0].landmarks_px, LENS))
+        nose = np.array(place) @ np.array(view.R)
+        directions.append(angle_between(pose.p_camera_m, tuple(nose)))
+        assert np.linalg.norm(pose.p_camera_m) == pytest.approx(np.linalg.norm(nose), rel=0.15)
+    assert np.mean(errors) < 0.08 and max(errors) < 0.15
+    assert np.degrees(np.mean(directions)) < 0.5
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_scene_can_be_sent_and_drawn(name: str):
+    scene = DrawnScene(load_scene(name))
+    sent = pickle.loads(pickle.dumps(scene))
+    for t_s in (0.0, 17.9):
+        view = seen_from(0.0, 0.0, (0.05, 0.0, 0.16))._replace(t_s=t_s)
+        assert np.array_equal(scene.draw(view), sent.draw(view))
+
+
+def level(_: float) -> tuple[Mat3, Vec3]:
+    return LEVEL, ORIGIN
+
+
+def camera(
+    scene: EmptyScene,
+    head: Callable[[float], tuple[Mat3, Vec3]] = level,
+    seed: int = 0,
+    **params: Any,
+) -> PixelCamera:
+    rng = np.random.default_rng(seed)
+    view = DrawnScene(scene)
+    return PixelCamera(FrameParams(**params), view, MOUNT, head, Nobody(), rng)
+
+
+def test_pictures_come_late_at_their_rate_and_a_late_look_skips_some():
+    made = camera(Still(), width_px=64, height_px=40, latency_ms=60.0, rate_hz=30.0)
+    arrivals = {}
+    for now_s in np.arange(5.0, 6.0, 0.005).tolist():
+        found = made.latest(now_s)
+        if found is not None and found.number not in arrivals:
+            arrivals[found.number] = now_s - found.captured_s
+    assert len(arrivals) in (28, 29)
+    assert min(arrivals.values()) >= 0.06 - 1e-9 and max(arrivals.values()) < 0.066
+    made.latest(7.0)
+    assert present(made.latest(7.1)).number > 55
+
+
+def test_the_same_dice_give_the_same_bytes():
+    """Noise is drawn once a camera and in order; other dice give another picture."""
+
+    def shot(seed: int) -> bytes:
+        scene = Still((person((1.0, 0.0, 0.0)),))
+        image = present(camera(scene, seed=seed, latency_ms=0.0).latest(0.0)).image
+        return bytes(present(image).tobytes())
+
+    assert shot(1) == shot(1) != shot(2)
