@@ -4,7 +4,7 @@ The world is a feature, found by the entry point ``world`` of the group ``gazeri
 """
 
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import Any
 
 from gazerig.config.load import find_file, load
 from gazerig.config.shipped_files import is_path, shipped_names
@@ -15,9 +15,6 @@ from gazerig.robot.run.options import RunOptions
 from gazerig.sim_mock.scenes.faces_scene import FacesScene, faults
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import SceneScript
-
-if TYPE_CHECKING:
-    from gazerig.features.world.run.surroundings import WorldSurroundings
 
 KIND = "scenes"
 """Folder of the shipped scenes."""
@@ -56,7 +53,8 @@ def scene_of(options: RunOptions) -> Scene | None:
         SetupError: the scene or world is unknown.
     """
     if options.world is not None:
-        return world().scene(options)
+        scene: Scene = world().scene(options)
+        return scene
     return None if options.scene is None else load_scene(options.scene, options.seed)
 
 
@@ -74,10 +72,11 @@ def refuse_missing_rules(rules: TopDownParams, scene: Scene, option: str) -> Non
         )
 
 
-def world() -> "WorldSurroundings":
-    """Return the feature that makes worlds.
+def world() -> Any:
+    """Return the ``WorldSurroundings`` of gazerig.features.world, which makes worlds.
 
     Raises:
         PluginError: it cannot be imported.
     """
-    return cast("type[WorldSurroundings]", find(SURROUNDINGS, "world").load())()
+    found: Any = find(SURROUNDINGS, "world").load()
+    return found()
