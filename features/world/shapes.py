@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from gazerig.features.world.figure import Figures
 from gazerig.features.world.gl_context import import_mujoco
-from gazerig.features.world.opponent_motion import Opponent
 from gazerig.gaze.types import Vec3
 from gazerig.robot.dashboard.feed.world_shapes import WorldPart
 from gazerig.robot.model.frames import Quaternion
@@ -44,11 +43,6 @@ class SpecShapes(NamedTuple):
                 for name, shape in moving.items()
             ),
         )
-
-    @property
-    def opponent(self) -> Opponent | None:
-        """Return the boxer that a person can move, None without one."""
-        return self.figures.opponent
 
     def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
         """Return the poses of all moving parts; see ``WorldShapes.poses``."""

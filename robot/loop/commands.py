@@ -45,10 +45,10 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, Ticket
+from gazerig.robot.model.scene import MovableOpponent
 from gazerig.robot.model.types import JointAngles
 
 if TYPE_CHECKING:
-    from gazerig.features.world.opponent_motion import Opponent
     from gazerig.robot.loop.loop import Robot
 
 MAX_WAITING = 64
@@ -143,7 +143,7 @@ class CommandExecutor:
         self.stop = StopControl(robot.body, robot.messages)
         self.conversation = Conversation()
         self.commanded_rad: JointAngles = ()
-        self.opponent: tuple[Opponent, Callable[[], float | None]] | None = None
+        self.opponent: tuple[MovableOpponent, Callable[[], float | None]] | None = None
         self._known: set[int] = set()
         self._taken_over = False
         self.reset()

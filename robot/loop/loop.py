@@ -3,7 +3,7 @@
 import contextlib
 from collections.abc import Callable
 from math import inf, radians
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from msgspec import structs
 
@@ -38,13 +38,11 @@ from gazerig.robot.model.commands import (
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.reply import Ticket
+from gazerig.robot.model.scene import MovableOpponent
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.safety.guard import Guard
-
-if TYPE_CHECKING:
-    from gazerig.features.world.opponent_motion import Opponent
 
 PARK_S = 4.0
 """Longest time for parking before torque is switched off."""
@@ -150,7 +148,7 @@ class Robot:
         self._executor.refuse_impossible(command)
         return self._commands.add(command)
 
-    def set_opponent(self, opponent: "Opponent", start_s: Callable[[], float | None]) -> None:
+    def set_opponent(self, opponent: MovableOpponent, start_s: Callable[[], float | None]) -> None:
         """Let commands move a boxer of the emulated world.
 
         Args:

@@ -33,3 +33,13 @@ class SceneView(Protocol):
 
     def close(self) -> None:
         """Free the renderer's resources; safe to call twice."""
+
+
+class MovableOpponent(Protocol):
+    """A boxer in the emulated world; its times are those of the scene."""
+
+    def move(self, p_m: Vec3, t_s: float) -> None:
+        """Move the leading fist to a point."""
+
+    def update(self, t_s: float) -> None:
+        """Advance the motion to a time."""

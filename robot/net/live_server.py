@@ -5,21 +5,18 @@ A rig that is being calibrated accepts only stops.
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.loop import Robot
 from gazerig.robot.net.request_handler import (
+    ParamAccess,
+    PathGuard,
     RequestHandler,
+    Speaker,
     accept_only_stops,
 )
 from gazerig.robot.net.socket_server import RemoteServer
-
-if TYPE_CHECKING:
-    from gazerig.config.rig_files import AllowedFolder
-    from gazerig.robot.run.live import ParamStore
-    from gazerig.robot.run.voice import RunVoice
 
 _CALIBRATED = "it is being calibrated"
 
@@ -45,13 +42,13 @@ class LiveServer:
     def __init__(
         self,
         robot: Robot,
-        tuning: "ParamStore | None",
+        tuning: ParamAccess | None,
         about: Mapping[str, object],
         say: Callable[[str], None],
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
-        paths: "AllowedFolder | None" = None,
-        voice: "RunVoice | None" = None,
+        paths: PathGuard | None = None,
+        voice: Speaker | None = None,
     ) -> None:
         self._say = say
         feed = TickFeed()

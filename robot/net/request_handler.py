@@ -6,7 +6,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from msgspec import structs
 
@@ -32,21 +32,19 @@ from gazerig.robot.model.commands import (
     Say,
     SayPiece,
     Set,
+    Speak,
     State,
     Stop,
     Tracks,
     Unsaved,
+    Value,
     as_value,
     read_request,
     set_client,
 )
+from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.net.socket_io import VERSION
-
-if TYPE_CHECKING:
-    from gazerig.config.rig_files import AllowedFolder
-    from gazerig.robot.run.live import ParamStore
-    from gazerig.robot.run.voice import RunVoice
 
 _TAKEN_UP_S = 1.0
 """Timeout of the loop's execution, s; a servo that answers late delays it by some 50 ms."""
@@ -64,6 +62,60 @@ _HANGS = (
 REFUSALS = (ValueError, OSError, Error)
 """Exceptions that refuse a request; the message is for the user."""
 FIXED = "these parameters cannot be changed while the rig runs"
+
+
+class ParamAccess(Protocol):
+    """The parameters of a running rig, such as ``gazerig.robot.run.live.ParamStore``."""
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return all parameters."""
+
+    def get(self, prefix: str) -> Mapping[str, Value]:
+        """Return the present values whose keys start with ``prefix``."""
+
+    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
+        """Apply values from the next tick on; return notes for the user."""
+
+    def unsaved(self) -> Sequence[ParamChange]:
+        """Return the present values that are not in the file."""
+
+    def save(self, path: Path | None = None) -> SavedFile:
+        """Write the present values to a file."""
+
+    def revert(self) -> tuple[str, ...]:
+        """Restore the values of the file; return notes for the user."""
+
+    def characters(self) -> Sequence[str]:
+        """Return the available characters."""
+
+    def apply_character(self, name: str) -> tuple[str, ...]:
+        """Apply another character to the rig; return notes for the user."""
+
+
+class PathGuard(Protocol):
+    """Rules for the files that a client may name (``config.rig_files.AllowedFolder``)."""
+
+    def check_file(self, given: str, kind: str = "") -> str:
+        """Return a shipped name or an absolute path; raise if it is not allowed."""
+
+    def check_changes(self, changes: Mapping[str, object]) -> None:
+        """Raise if a value names a file that is not allowed."""
+
+
+class Speaker(Protocol):
+    """The voice of a head (``gazerig.robot.run.voice.RunVoice``)."""
+
+    def prepare(self, command: Say, confined: bool = False, /) -> Speak:
+        """Return the command that says a file or a text; raise if it cannot be said.
+
+        confined: only files in the folders of sounds
+        """
+
+    def feed(self, pcm: bytes, rate_hz: int, channels: int, volume: float, /) -> float:
+        """Say a piece of a stream; return the length that has not been heard, s."""
+
+    def finish(self) -> None:
+        """Mark the end of the stream."""
 
 
 def accept_only_stops(command: CommandTaker, reason: str) -> CommandTaker:
@@ -101,14 +153,14 @@ class RequestHandler:
         command: CommandTaker,
         feed: TickFeed,
         about: Mapping[str, object],
-        params: "ParamStore | None" = None,
+        params: ParamAccess | None = None,
         *,
-        voice: "RunVoice | None" = None,
+        voice: Speaker | None = None,
         menus: Callable[[], Mapping[str, tuple[str, ...]]] = dict,
         tracks: Callable[[], Sequence[TrackInfo]] = tuple,
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
-        paths: "AllowedFolder | None" = None,
+        paths: PathGuard | None = None,
     ) -> None:
         self._command, self._feed, self._about = command, feed, dict(about)
         self._params, self._paths = params, paths
@@ -228,7 +280,7 @@ class RequestHandler:
             voice.finish()
         return ahead_s
 
-    def _require_voice(self) -> "RunVoice":
+    def _require_voice(self) -> Speaker:
         if self._voice is None:
             raise ValueError("this head has no voice")
         return self._voice

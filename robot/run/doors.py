@@ -11,7 +11,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from typing import TYPE_CHECKING, cast
+from typing import Protocol, cast
 
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import DOOR, find
@@ -19,14 +19,23 @@ from gazerig.drivers.process import child_process
 from gazerig.drivers.process.visible_text import visible
 from gazerig.errors import Error
 
-if TYPE_CHECKING:
-    from gazerig.doors.door import Door
-
 _ENDS_S = 2.0
 _MAX_LINE = 400
 
 
-def load_door(name: str) -> "Door":
+class RunnableDoor(Protocol):
+    """The object of a door's entry point."""
+
+    summary: str
+
+    def run(
+        self, head: int | str | None = None, address: str = "", bind: str = "",
+        say: Callable[[str], None] = ..., ends_with_input: bool = False,
+    ) -> None:  # fmt: skip
+        """Run the door until it is ended; see ``gazerig.doors.door.Door.run``."""
+
+
+def load_door(name: str) -> RunnableDoor:
     """Return the door of a name.
 
     Raises:
@@ -36,7 +45,7 @@ def load_door(name: str) -> "Door":
     door = found.load()
     if not callable(getattr(door, "run", None)):
         raise PluginError(f"{found.label} is not a Door of gazerig.doors.door")
-    return cast("Door", door)
+    return cast(RunnableDoor, door)
 
 
 class DoorProcesses:

@@ -116,7 +116,7 @@ class RunObservers:
             run.rig.name,
             str(run.params.path),
             options.mock,
-            shapes is not None and shapes.opponent is not None,
+            run.room is not None and run.room.world.scene.opponent is not None,
             "" if computed else str(detector_status(run.rig.detector)),
             level_text(options.computer) if options.computer is not None else "",
             dict(zip(names, map(_joint_info, limits(run.rig.joints)), strict=True)),

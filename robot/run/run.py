@@ -56,13 +56,12 @@ from gazerig.robot.run.rig_limits import (
     park_rad,
 )
 from gazerig.robot.run.run_rig import run_info, with_options
-from gazerig.robot.run.surroundings import refuse_missing_rules, scene_of, world
+from gazerig.robot.run.surroundings import RunRoom, refuse_missing_rules, scene_of, world
 from gazerig.robot.run.track_file import TrackFolder
 from gazerig.robot.run.voice import RunVoice
 from gazerig.robot.safety.guard import Guard
 
 if TYPE_CHECKING:
-    from gazerig.features.world.run.rig_room import RigRoom
     from gazerig.robot.recording.recorder import Recorder
 
 
@@ -115,7 +114,7 @@ class Run:
             # Bus and surroundings
             self.clock: Clock = SimulatedClock() if options.fast else RealClock()
             self.scene = scene_of(options)
-            self.room: RigRoom | None = None
+            self.room: RunRoom | None = None
             if options.world is not None:
                 self.room = world().open(rig, options, self.clock)
                 self.scene, self.clock = self.room.scene, self.room.clock

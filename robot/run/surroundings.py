@@ -3,8 +3,9 @@
 The world is a feature, found by the entry point ``world`` of the group ``gazerig.surroundings``.
 """
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from gazerig.config.load import find_file, load
 from gazerig.config.shipped_files import is_path, shipped_names
@@ -15,6 +16,16 @@ from gazerig.robot.run.options import RunOptions
 from gazerig.sim_mock.scenes.faces_scene import FacesScene, faults
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import SceneScript
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from gazerig.config.rig import Rig
+    from gazerig.drivers.types import Camera, FaceDetector
+    from gazerig.robot.dashboard.feed.world_shapes import WorldShapes
+    from gazerig.robot.model.clock import Clock
+    from gazerig.robot.run.buses import RunBus
+    from gazerig.robot.run.cameras import CameraView
 
 KIND = "scenes"
 """Folder of the shipped scenes."""
@@ -80,3 +91,39 @@ def world() -> Any:
     """
     found: Any = find(SURROUNDINGS, "world").load()
     return found()
+
+
+class RunRoom(Protocol):
+    """A world from the view of its rig, whose emulated servos are in it."""
+
+    @property
+    def world(self) -> Any:
+        """Return the world, for its people."""
+
+    @property
+    def clock(self) -> "Clock":
+        """Return the clock of the run."""
+
+    @property
+    def run_bus(self) -> "RunBus":
+        """Return the bus of the rig's emulated servos."""
+
+    @property
+    def scene(self) -> Scene:
+        """Return the people in the world, in the frame of the rig."""
+
+    def camera(
+        self,
+        rig: "Rig",
+        options: RunOptions,
+        view: "CameraView",
+        rng: "np.random.Generator",
+        detector: "Callable[[], FaceDetector]",
+    ) -> "Camera":
+        """Return the rig's camera; called only once."""
+
+    def start_s(self) -> float | None:
+        """Return the start time of the script of the people, None before it."""
+
+    def shapes(self) -> "WorldShapes":
+        """Return the shapes of the world."""

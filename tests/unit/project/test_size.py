@@ -12,7 +12,7 @@ LARGEST = {
     "drivers": 79_720,
     "sim_mock": 35_870,
     "config": 11_460,
-    "robot": 122_850,
+    "robot": 123_280,
     "robot/dashboard": 21_800,
     "gazerig": 13_010,
     "doors": 8_510,
