@@ -140,11 +140,6 @@ def declarations(params: type) -> dict[str, Declaration]:
     }
 
 
-def choices_of(params: type, name: str) -> tuple[Any, ...]:
-    """Return the allowed values of a parameter, () without a list."""
-    return declarations(params)[name].choices
-
-
 def unit_of(name: str) -> str:
     """Return the unit with which a parameter's name ends, "" without one."""
     return next((UNITS[suffix] for suffix in _LONGEST_FIRST if name.endswith(suffix)), "")

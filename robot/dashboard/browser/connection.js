@@ -6,7 +6,7 @@
 const AGAIN_MS = 500;
 const LOST_AFTER_MS = 3000; // the server sends at least once a second
 const ANSWER_MS = 10_000;
-const QUERY = "rate_hz=20&pictures=true&rig=true";
+const QUERY = "rate_hz=25&pictures=true&rig=true";
 
 /**
  * Newest messages: state, rig, run; shown: the state at the capture of the picture that is shown;
