@@ -105,7 +105,6 @@ def _syntax_fault(file: str, text: str, error: yaml.YAMLError) -> ConfigFault:
 
 
 def _line(event: Any) -> int:
-    """Return the line of an event, from 1."""
     return int(event.start_mark.line) + 1
 
 
@@ -131,7 +130,6 @@ class _Reader:
         return value
 
     def _value(self, event: Any, line: int, key: str, depth: int) -> Any:
-        """Return the value that begins with an event."""
         self.lines[key] = line
         start = f"{key}." if key else ""
         if depth > _DEPTH or len(self.lines) > _VALUES:

@@ -154,7 +154,6 @@ def start_note(key: str) -> str:
 
 
 def _fields(value: Any) -> dict[str, Any]:
-    """Return the fields of a section, and the sections of plug-ins in it."""
     own = {name: getattr(value, name) for name in declarations(value.__class__)}
     return own | getattr(value, "plugins", {})
 

@@ -87,7 +87,6 @@ class LocalHead(Head):
         return order
 
     def _active_run(self) -> Run:
-        """Return the run."""
         if self._ended:
             raise HeadEnded(f"the head has ended: {self._ended}")
         if self._made is None:

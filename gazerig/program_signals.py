@@ -36,7 +36,6 @@ def is_left_waiting_for(worker: threading.Thread) -> bool:
 
 
 def _shuts_down_pool_of(worker: threading.Thread, frame: FrameType | None) -> bool:
-    """Return whether a thread with this frame shuts down the pool of a worker."""
     while frame is not None:
         if frame.f_code is ThreadPoolExecutor.shutdown.__code__:
             return worker in tuple(frame.f_locals["self"]._threads)

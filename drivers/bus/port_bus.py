@@ -175,7 +175,6 @@ class PortBus(ABC):
             self._log.add(text)
 
     def _record_loss(self, lost: BusLost) -> None:
-        """Record that the port is lost."""
         self._is_down, self._lost_s, self._next_s = True, self._now_s, self._now_s + AGAIN_S
         self._port.closePort()
         self._log.add(f"port lost: {lost}")

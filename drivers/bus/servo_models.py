@@ -81,7 +81,6 @@ class ServoModelInfo(NamedTuple):
 
 
 def _smart_servo(family: Family, model: ServoModel) -> ServoModelInfo:
-    """Return the model information of a smart servo."""
     gain, full_steps = FACTORY_P_GAIN, P_FULL_STEPS * model.steps_per_turn / STEPS_PER_TURN
     if isinstance(model, DynamixelModel):
         gain, full_steps = model.gains[4], P_UNIT * PWM_FULL

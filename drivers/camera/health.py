@@ -185,7 +185,6 @@ class TurnedFaceSearch:
 
 
 def _surest_upright(faces: Sequence[DetectedFace]) -> float:
-    """Return the confidence of the surest upright face, 0 without one."""
     return max((face.confidence for face in faces if _is_upright(face)), default=0.0)
 
 

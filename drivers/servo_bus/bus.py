@@ -282,7 +282,6 @@ class SmartServoBus(PortBus):
         return switch_off(self._line, self._ids)
 
     def _reset_after_reconnect(self) -> None:
-        """Reset the state after the port reconnects."""
         self._poll_list.restore()
         self._line.starved = False
         self._supervisor.mark_all()

@@ -146,7 +146,6 @@ class FeedbackColumns:
 
 
 def _replace_value(column: tuple[Any, ...], slot: int, value: Any) -> tuple[Any, ...]:
-    """Return a column with a new value for one servo."""
     return (*column[:slot], value, *column[slot + 1 :])
 
 

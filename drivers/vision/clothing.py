@@ -113,6 +113,5 @@ def face_head(face: DetectedFace) -> _Head | None:
 
 
 def _person_head(person: DetectedPerson) -> _Head | None:
-    """Return the position and scale of a person's head."""
     (x, y), px_m = person.head_px, person.trunk_px / _TRUNK_M
     return _Head(x, y + _NOSE_BELOW_M * px_m, px_m) if px_m > 0.0 else None

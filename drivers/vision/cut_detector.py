@@ -54,5 +54,4 @@ class CutDetector:
 
 
 def _correlation(image: NDArray[np.float32], part: NDArray[np.float32]) -> float:
-    """Return the highest correlation of a part with any position in an image."""
     return float(cv2.matchTemplate(image, part, cv2.TM_CCOEFF_NORMED).max())

@@ -114,5 +114,4 @@ def _forget_opengl() -> None:
 
 
 def _one_line(error: Exception) -> str:
-    """Return an error as one short line."""
     return " ".join(str(error).split())[:160] or type(error).__name__

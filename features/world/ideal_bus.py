@@ -87,7 +87,6 @@ class WorldIdealBus(IdealBus):
             one.goal = None
 
     def _measure(self, now_s: float) -> tuple[Steps, Steps]:
-        """Return positions and speeds."""
         return self.positions_steps(), tuple([one.speed_steps_s for one in self._shafts])
 
     def _follow(self, goals_steps: Sequence[int]) -> tuple[int, ...]:

@@ -68,7 +68,6 @@ def _point(frame: Frame, origin: Floats, ahead: float, out: float, up: float) ->
 
 
 def _direction(frame: Frame, ahead: float, out: float, up: float) -> Floats:
-    """Return a direction."""
     return np.asarray(ahead * frame.ahead + out * frame.side * frame.left + up * UP)
 
 
@@ -174,7 +173,6 @@ def act_pose(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: Hand
 
 
 def _punch(frame: Frame, wrist_m: Floats, to: Floats) -> HandPose:
-    """Return a stretched punch in a direction."""
     palm = _direction(frame, 0.0, -0.2, -1.0)
     return HandPose(wrist_m, to, palm, _direction(frame, 0.0, 0.6, -0.8))
 

@@ -61,7 +61,6 @@ WALK_STARTS_S, WALK_ENDS_S = 0.6, 0.8
 
 @cache
 def _room_places(room: str) -> Mapping[str, Place]:
-    """Return the places of a room by name."""
     text = (HOME / "rooms" / f"{room}.yaml").read_bytes()
     return msgspec.yaml.decode(text, type=dict[str, Place])
 

@@ -31,7 +31,6 @@ PUSH_S = 0.5
 
 
 def _push(world: World, body: str, newton: float, to: str, seconds: float = PUSH_S) -> str:
-    """Push a body of the rig."""
     if to not in DIRECTIONS:
         raise ValueError(f"{to!r} is not {'|'.join(DIRECTIONS)}")
     x, y, z = DIRECTIONS[to]

@@ -255,7 +255,6 @@ class WorldShaft(Shaft):
         return push * c, gain, push * least, push * most
 
     def _error(self, r: float) -> float:
-        """Return the position error, in steps."""
         return r - self.x
 
     def sense(self, x: float, v: float) -> None:
@@ -287,7 +286,6 @@ class DeadBandShaft(WorldShaft):
     dead: float
 
     def _error(self, r: float) -> float:
-        """Return the position error, 0 within the dead band."""
         error = r - self.x
         return 0.0 if -self.dead <= error <= self.dead else error
 

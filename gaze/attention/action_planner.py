@@ -359,7 +359,6 @@ def hit_places(face: Face, hands: Sequence[SeenHand], p_eye: Vec3) -> list[HitTa
 
 
 def _distance_from_line(p: Vec3, start: Vec3, end: Vec3) -> float:
-    """Return the distance of a point from the line between two others."""
     along, rel = sub(end, start), sub(p, start)
     share = min(1.0, max(0.0, dot(rel, along) / max(dot(along, along), 1e-9)))
     return norm(sub(rel, scale(along, share)))

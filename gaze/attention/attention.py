@@ -288,7 +288,6 @@ class Attention:
         return self._target and replace(self._target, plan=winner.plan)
 
     def _make_target(self, made: _Decision, row: int, captured_s: float) -> Target:
-        """Return the target of a row, with its reason."""
         first, rule_target = made.saliences[row], made.rule_target
         others = [one for i, one in enumerate(made.saliences) if i != row and one.total > -inf]
         others.sort(key=lambda one: -one.total)
@@ -317,7 +316,6 @@ class Attention:
         return best.total == -inf or (faint and best.kind != "face" and best.id != NO_BODY)
 
     def _compare(self, percept: Percept, rows: BodyRows, state: GazeState, t_s: float) -> _Decision:
-        """Return the saliences that the decision compares."""
         eye, attended = state.p_world_head_m, self._identity[1]
         self._met = {attended, *self._met}.intersection(rows.ids)
         seen = visible_bodies(rows, state)

@@ -331,7 +331,6 @@ class ConversationGaze:
         return self._away_target(target, self._away, t_s)
 
     def _count(self, target: Target) -> Target:
-        """Return a target with the shifts of earlier looks away."""
         return replace(target, shift=target.shift + self._shifts) if self._shifts else target
 
     def _is_disturbed(self, target: Target) -> bool:
@@ -437,7 +436,6 @@ class ConversationGaze:
             self._shifts += 1
 
     def _away_target(self, target: Target, away: Vec3, t_s: float) -> Target:
-        """Return the target of a look away."""
         role = "no conversation" if self._mode == "none" else self._mode
         centre = _centre_of_target(target)
         return replace(
@@ -464,7 +462,6 @@ class ConversationGaze:
         return spread_deg + (90.0 if draw < aside + up else 270.0)
 
     def _draw_face_s(self) -> float:
-        """Draw a duration on the face."""
         mean_s, sd_s, *_ = self._role
         if sd_s is None:
             beyond_s = max(0.0, mean_s - _STAYS_S) * float(self._rng.standard_exponential())

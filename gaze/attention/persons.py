@@ -270,7 +270,6 @@ class Persons:
 
 
 def _is_raised(place: Vec3, face: Vec3) -> bool:
-    """Return whether something is at the height of a face."""
     return place[2] > face[2] - _RAISED_M
 
 

@@ -64,7 +64,6 @@ class Reaction:
 
 
 def _ratio(target: Target) -> float:
-    """Return the share of the drawn time that applies to a target."""
     first = target.saliences[0]
     looms = first.looming > max(first.translation, first.rotation, first.onset, first.rule)
     return _LOOMING if looms else 1.0

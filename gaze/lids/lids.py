@@ -255,10 +255,8 @@ class Lids:
 
 
 def _clip(opening: float) -> float:
-    """Return an opening clipped to 0..1."""
     return opening if 0.0 < opening < 1.0 else 1.0 if opening >= 1.0 else 0.0
 
 
 def _closure(closing: LidClosure | None, t_s: float) -> float:
-    """Return the closure by a blink or wink, 0..1."""
     return 0.0 if closing is None else closing.closure_at(t_s)

@@ -299,7 +299,6 @@ class BinocularController:
 
 
 def _clip(v: Vec3, most: float) -> Vec3:
-    """Return a vector no longer than ``most``."""
     size = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     return v if size <= most else scale(v, most / size)
 

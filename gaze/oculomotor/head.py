@@ -584,7 +584,6 @@ class HeadModel:
         return (*goal, min(max(roll, low), high))
 
     def _extrapolated_direction(self, t_s: float, ahead_s: float = 0.0) -> Vec3:
-        """Return the direction of the head, extrapolated with its present speed over a time."""
         since_s = t_s - self._planned_s
         (yaw, yaw_rate, _), (pitch, pitch_rate, _) = (p.state_at(since_s) for p in self._plans[:2])
         return direction((yaw + ahead_s * yaw_rate, pitch + ahead_s * pitch_rate))

@@ -301,13 +301,11 @@ class Oculomotor:
 
 
 def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:
-    """Return eye angles clipped to their range."""
     (yaw_low, yaw_high), (pitch_low, pitch_high) = limits
     return (min(max(eye[0], yaw_low), yaw_high), min(max(eye[1], pitch_low), pitch_high))
 
 
 def _add_offset(eye: Angles2, offset: Angles2) -> Angles2:
-    """Return an eye's angles with an offset."""
     return eye[0] + offset[0], eye[1] + offset[1]
 
 

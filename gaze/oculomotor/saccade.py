@@ -146,7 +146,6 @@ class HumanProfile:
         return D, V, flanks * share, flanks
 
     def _rise_share(self, amplitude_rad: float, peak_rad_s: float, duration_s: float) -> float:
-        """Return the share of the rise in the time of rise and fall."""
         over = min(1.0, max(0.0, (degrees(amplitude_rad) - 10.0) / 28.0))
         flanks = (peak_rad_s * duration_s - amplitude_rad) / (1.0 - 1.0 / PEAK_SPEED)
         if flanks <= 0.0:

@@ -118,7 +118,6 @@ def merge_refixations(matrix: ArrayLike) -> Floats:
 def _replace_target(
     target: Target, face: Face | None, look: ScanpathStep | None, shift: int
 ) -> Target:
-    """Return a target with the point of its face, and counting the shifts on the face."""
     if face is None or look is None:
         return replace(target, shift=target.shift + shift) if shift else target
     what = PART_NAMES[look.part] if look.part is not None else "random angles about"
@@ -235,7 +234,6 @@ def _nearest(face: Face, p_world_head_m: Vec3, gaze_world_m: Vec3 | None) -> str
 
 
 def _model(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> ScanpathModel:
-    """Return the model that the parameters name."""
     match params.model:
         case "simple":
             return SimpleCycle(params.rate_scale)

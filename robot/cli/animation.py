@@ -63,7 +63,6 @@ def say_aloud(
 
 
 def _track_line(track: Mapping[str, Any]) -> str:
-    """Return one line about a track."""
     head = f"{track['name']:<14}{track['description']}"
     if track["refused"]:
         return f"{head}; not on this rig: {track['refused']}"

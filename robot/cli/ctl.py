@@ -420,7 +420,6 @@ def _rule_text(param: Parameter) -> str:
 
 
 def _value_text(value: object) -> str:
-    """Return a value as text that ``set`` accepts."""
     return value if isinstance(value, str) else json.dumps(value)
 
 

@@ -205,7 +205,6 @@ class _Builder:
         self._links.append(Link(BASE, None, visuals=tuple(looks), collisions=(body,)))
 
     def _head(self, neck: str, p_m: Vec3, carried: list[Link]) -> Link:
-        """Return the head without the links that it carries."""
         measures, joints, lids = self._measures, self._rig.joints, self._rig.lids
         unit = measures.interocular_m
         looks = [Visual("skin", "skin", "skin", scale=unit), Visual("cap", "cap", scale=unit)]
@@ -272,7 +271,6 @@ class _Builder:
         self._links.append(Link(name, HEAD, p_m, joint=joint, inertia=inertia, visuals=(look,)))
 
     def _lid_meeting_rad(self, side: str) -> float:
-        """Return the elevation at which the lids of an eye meet."""
         ends = (self._rig.lids.get(f"{side}_{one}_lid", (0.0, 0.0)) for one in ("upper", "lower"))
         return meeting_rad(*(abs(wide - shut) for shut, wide in ends))
 

@@ -203,7 +203,6 @@ class Guardian:
                 pipe.close()
 
     def _start(self) -> None:
-        """Start the process."""
         self._ready = False
         self._looks = self._heartbeat.checks, inf
         self._process = child_process.start(

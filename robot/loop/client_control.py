@@ -265,7 +265,6 @@ def _limits_text(gaze: GazeCommand, error_rad: float) -> str:
 
 
 def _look_text(command: Look) -> str:
-    """Return a look command as text."""
     match command:
         case LookAt(point) if point is not None:
             return f"look at {_numbers(point)}"

@@ -295,7 +295,6 @@ class CommandExecutor:
             self._known.update(face.id for face in percept.faces)
 
     def _choose(self, menu: str, choice: str, t_s: float) -> None:
-        """Apply a choice of a menu."""
         robot = self._robot
         if menu == "behaviour":
             robot.attention.top_down.behave(choice)
@@ -324,7 +323,6 @@ class CommandExecutor:
         return self._control_reply()
 
     def _control_reply(self) -> CommandReply:
-        """Return a reply with the number of the present control, 0 if the gaze is free."""
         state = self.lead.state
         return CommandReply(control_number=state.number if state.active else 0)
 
@@ -465,5 +463,4 @@ def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[Jo
 
 
 def _put_first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names with the present choice first."""
     return (present, *(name for name in names if name != present))

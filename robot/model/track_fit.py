@@ -174,7 +174,6 @@ class TrackFit:
         return tuple([name for name in self.joints if channel_of_joint(name) in owned])
 
     def _members(self, name: str) -> list[str]:
-        """Return the joints of a group, or a single one."""
         return [joint for joint in self.joints if _GROUPS.get(name, name.__eq__)(joint)]
 
     def _clip(

@@ -262,5 +262,4 @@ def _smile(wider: float) -> tuple[Vec3, ...]:
 
 
 def _mouth_width(seen: Points) -> float:
-    """Return the width of a mouth relative to the distance of the eyes."""
     return dist(seen[3], seen[4]) / dist(seen[0], seen[1])

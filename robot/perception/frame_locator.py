@@ -198,7 +198,6 @@ def _person(person: DetectedPerson, found: Detections, lens: Intrinsics) -> Loca
 
 
 def _palm(palm: DetectedPalm, found: Detections, lens: Intrinsics) -> Located:
-    """Locate a palm."""
     half_px = 0.25 * palm.size_px
     hand = _by_length("hand", palm.centre_px, _PALM_M / palm.size_px, half_px, found, lens)
     return hand._replace(confidence=palm.confidence, across_sd_m=_PALM_SD_M)
@@ -281,7 +280,6 @@ def _is_flat(face: DetectedFace, found: Detections) -> bool:
 
 
 def _is_face_of(person: DetectedPerson, face: DetectedFace) -> bool:
-    """Return whether a face belongs to a person."""
     x, y = face.landmarks_px.mean(axis=0).tolist()
     apart = hypot(x - person.head_px[0], y - person.head_px[1])
     return apart < _OWN_FACE * person.trunk_px

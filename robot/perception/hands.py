@@ -237,7 +237,6 @@ class Hands:
         return found
 
     def _is_recent(self, thing: Located, p_camera: Vec3) -> bool:
-        """Return whether something is at the position of a recent hand."""
         hands = [one.hand for one in self._moving.values() if one.frames >= _FRAMES]
         hands += [one.hand for one in self.resting.values()]
         return any(_distance_from_hand(thing, hand, p_camera) < _AGAIN_M for hand in hands)
@@ -460,7 +459,6 @@ def _place_at_distance(thing: Located, far_m: float, p_camera: Vec3) -> Vec3:
 
 
 def _horizontal_distance_m(p_m: Vec3, p_camera: Vec3) -> float:
-    """Return the horizontal distance of a position."""
     return max(hypot(p_m[0] - p_camera[0], p_m[1] - p_camera[1]), 1e-6)
 
 

@@ -116,7 +116,6 @@ def _turn(rays: Floats, depth_px: Floats, focal_px: float) -> Floats | None:
 
 
 def _rotation_towards(ray: Floats) -> Floats:
-    """Return the smallest rotation from the optical axis to a ray."""
     x, y, z = ray / np.linalg.norm(ray)
     cross = np.array([(0.0, 0.0, x), (0.0, 0.0, y), (-x, -y, 0.0)])
     return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + z))

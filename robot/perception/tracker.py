@@ -197,7 +197,6 @@ class Tracker:
         self._tracks = [one for one in self._tracks if one not in gone or one.id != back.id]
 
     def _update_track(self, track: BodyTrack, detection: Located, p_camera: Vec3) -> None:
-        """Update a track with a detection."""
         place, R = detection.p_m, detection.R_face
         if track.face_size and R is not None and not detection.depth_measured:
             place = add(p_camera, scale(sub(place, p_camera), track.face_size))
@@ -239,7 +238,6 @@ class Tracker:
 
 
 def _person(track: BodyTrack) -> SeenPerson:
-    """Return the features of the person of a track."""
     size, worn = track.face_size, track.clothes.colours
     if (before := track.returned_person) is not None:
         size = before.face_size if size is None else size

@@ -138,7 +138,6 @@ def rig_bus(
 def _make_bus(
     name: str, config: BusConfig, port: BusPort, servos: tuple[ServoConfig, ...]
 ) -> tuple[str, ServoBus]:
-    """Return one bus with its name in messages."""
     make = load(BUS, config.kind, BusPlugin).make
     if is_ours(BUS, config.kind):
         return name, make(port, servos, config.section)

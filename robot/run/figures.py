@@ -85,7 +85,6 @@ def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:
 
 
 def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
-    """Return shares of the total, largest first."""
     total = sum(seconds.values())
     by_time = sorted(seconds.items(), key=lambda item: -item[1])
     return {name: round(time / total, 4) for name, time in by_time if total > 0.0}

@@ -156,7 +156,6 @@ def _channels(series: Mapping[str, Series], owned: bool) -> dict[str, Series]:
 
 
 def _add(first: Series, second: Series, share: float) -> Series:
-    """Return a share of the sum of two series, at the times of both."""
     both_s = np.union1d(first[0], second[0])
     return both_s, share * (np.interp(both_s, *first) + np.interp(both_s, *second))
 

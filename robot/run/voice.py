@@ -358,7 +358,6 @@ class RunVoice:
 
     @property
     def _level(self) -> str:
-        """Return the level that opens the mouth, "" for a rig without it."""
         return MOUTH if MOUTH in self._rig().levels else ""
 
     def _try(self, command: Command) -> None:
@@ -391,11 +390,9 @@ def _sounding_track(tick: Tick) -> TrackState | None:
 
 
 def _has_finished(played: TrackState, tick: Tick) -> bool:
-    """Return whether a track has reached its end, and its sound with it."""
     return any(one.number == played.number and one.end_reason == FINISHED for one in tick.tracks)
 
 
 def _mono(pcm: bytes, channels: int) -> Floats:
-    """Return samples as one channel, -1..1."""
     samples = np.frombuffer(pcm, "<i2").reshape(-1, channels).mean(axis=1) / 32768.0
     return np.asarray(samples, dtype=np.float64)

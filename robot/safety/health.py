@@ -133,7 +133,6 @@ class JointHealth:
 
 
 def _joint_value(column: Sequence[float | None], i: int) -> float | None:
-    """Return one joint's value, None if it is unknown."""
     value = column[i] if column else None
     return value if value is not None and isfinite(value) else None
 

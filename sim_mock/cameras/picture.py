@@ -107,13 +107,11 @@ def _head(number: int) -> tuple[_Shape, _Shape]:
 
 @lru_cache(maxsize=8)
 def _chest(number: int) -> _Shape:
-    """Return a chest in a checked shirt."""
     return _pattern(torso(number, _CHEST_M), _SPINE_M, 7.0, 9.0)
 
 
 @lru_cache(maxsize=8)
 def _palm(number: int) -> _Shape:
-    """Return an open hand of radius 1."""
     return _pattern(part_of(number, "hand"), 0.0, 5.0, 7.0)
 
 

@@ -171,7 +171,6 @@ class LineFaults(ABC):
         return piece._replace(data=bytes(data), late_s=late_s)
 
     def _find(self, kind: str, servo_id: int | None) -> LineFault | None:
-        """Return the oldest active fault of a kind that affects a servo."""
         return next(
             (f for f in self._active() if f.kind == kind and f.servo_id in (None, servo_id)), None
         )

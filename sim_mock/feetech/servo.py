@@ -186,7 +186,6 @@ class FeetechServo(EmulatedServo):
         return code != REBOOT and super().answers_instruction(code)
 
     def _overload_limit(self) -> tuple[float, float]:
-        """Return it from its registers."""
         get = self.memory.get
         return get("overload_torque") / 100.0, get("protection_time") * TIME_UNIT_S
 

@@ -125,7 +125,6 @@ class EmulatedMaestro(HobbyBoard):
         self._unread = text[at:]
 
     def _size(self, text: bytes) -> int:
-        """Return the bytes of the command at the begin of a text, 0 for none."""
         code = text[0]
         return 1 + DATA_BYTES[code] + self._crc if code in DATA_BYTES else 0
 

@@ -97,7 +97,6 @@ class Bridge(HobbyBoard):
         return found or b""
 
     def _channel_of(self, first: TransferPart) -> int:
-        """Return the channel whose registers a transfer selects first."""
         if first.data and LED0 <= first.data[0] < LED0 + 4 * CHANNELS:
             return [*self.chips].index(first.address) * CHANNELS + (first.data[0] - LED0) // 4
         return NO_DEVICE

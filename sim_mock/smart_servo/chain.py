@@ -192,7 +192,6 @@ class ServoChain(ABC):
     # --- one id
 
     def _answer_all(self, servo_id: int, code: int, params: bytes) -> Piece | None:
-        """Execute an instruction on all servos with an id."""
         # An answer is sent with the old settings.
         packet, delay_s = b"", 0.0
         for servo in self._by_id.get(servo_id, ()):

@@ -204,7 +204,6 @@ class PlannerScore:
         }
 
     def _event_times(self, name: str) -> list[_Time]:
-        """Return the times of all events with a name."""
         rounds = range(int(self._last_s // self._round_s) + 1)
         return [
             _time(event, self._round_s * number)
@@ -220,5 +219,4 @@ def _time(event: Event, after_s: float) -> _Time:
 
 
 def _is_during(at_s: float, times: Iterable[_Time], before_s: float, after_s: float) -> bool:
-    """Return whether a time is within an event, or near one."""
     return any(start - before_s <= at_s <= end + after_s for start, end, _ in times)

@@ -82,7 +82,6 @@ class _Wires:
     def port(
         self, path: str, exclusive: bool = True, on_traffic: Callable[[], None] | None = None
     ) -> InProcessPort | BlockingPort:
-        """Stands for BlockingPort."""
         if path not in self._devices:
             return BlockingPort(path, exclusive, on_traffic)
         heard = on_traffic if on_traffic is not None else lambda: None

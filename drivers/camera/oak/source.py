@@ -187,5 +187,4 @@ class OakSource:
 
 
 def _one_line(error: BaseException) -> str:
-    """Return an error's text on one line."""
     return " ".join(str(error).split())

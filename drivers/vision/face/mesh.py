@@ -110,13 +110,11 @@ def _square_map(middle: Floats, side: float, across: Floats, size_px: int) -> Fl
 
 
 def _crop(image: ImageArray, to_image: Floats, size_px: int) -> ImageArray:
-    """Return a square crop of an image, black beyond the image."""
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.asarray(cv2.warpAffine(image, to_image, (size_px, size_px), flags=flags), np.uint8)
 
 
 def _to_image(grid: NDArray[np.floating], to_image: Floats) -> Floats:
-    """Return points of a crop in pixels of the image."""
     return np.asarray(grid @ to_image[:, :2].T + to_image[:, 2], dtype=np.float64)
 
 

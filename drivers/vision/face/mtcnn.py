@@ -203,7 +203,6 @@ def _crops(image: ImageArray, boxes: Boxes, side_px: int) -> tuple[NDArray[np.ui
 
 
 def _shift_edges(boxes: Boxes, shifts: Floats32) -> Boxes:
-    """Return boxes with edges moved by shares of the box's size."""
     return boxes + shifts * np.tile(boxes[:, 2:] - boxes[:, :2], 2)
 
 

@@ -253,5 +253,4 @@ def _inverse(H: Floats) -> Floats:
 
 
 def _median_shift(H: Floats, points: Floats) -> float:
-    """Return the median motion of points by a homography."""
     return float(np.median(np.hypot(*(warp_points(H, points) - points).T)))

@@ -101,7 +101,6 @@ def is_unchanged(pair: ImagePair) -> bool:
 
 
 def _noise(squares: Plane) -> float:
-    """Return the usual value of local mean squares."""
     return _ROUNDING + float(np.quantile(squares[::4, ::4], 0.3))
 
 
@@ -144,7 +143,6 @@ def _mean_squares(pair: ImagePair, there: Flow) -> Plane:
 
 
 def _warp(image: Grey | Plane, there: Flow) -> Plane:
-    """Return an image seen through a map."""
     linear, edge = cv2.INTER_LINEAR, cv2.BORDER_REPLICATE
     seen = cv2.remap(image.astype(np.float32), there, _ONE_MAP, linear, None, edge)
     return np.asarray(seen, np.float32)

@@ -150,7 +150,6 @@ class _Problem:
         )
 
     def lens(self, x: Floats) -> Intrinsics:
-        """Return the lens."""
         zoom, right, down = x[12:_SHARED].tolist()
         lens = self._lens
         return replace(

@@ -114,7 +114,6 @@ def _examine_and_fix(rig: Rig, bus: str, line: BusPort, fix: bool, tell: Tell) -
 
 
 def _examine(rig: Rig, bus: str, line: BusPort) -> list[Diagnostic]:
-    """Examine one bus."""
     config, setups = rig.bus_named(bus), setups_on(rig, bus)
     if config.kind == "maestro":
         usb = usb_id(line.port_name)

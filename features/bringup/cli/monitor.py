@@ -131,7 +131,6 @@ def _samples(
 
 
 def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: float) -> Table:
-    """Format a sample as a table."""
     caption = (
         f"{rate:g} looks a second, each {1e3 * sample.took_s:.0f} ms; {sample.unanswered} of "
         f"{sample.asked} unanswered ({sample.unanswered / sample.asked:.1%})"

@@ -116,7 +116,6 @@ def enter_pressed() -> str | None:
 
 
 def _print_events(events: Iterable[str]) -> None:
-    """Print the events by servo."""
     for line in group_events(events):
         say(line)
 

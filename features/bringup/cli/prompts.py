@@ -182,7 +182,6 @@ class TerminalPerson:
 
 
 def _number(line: str) -> float | None:
-    """Return a typed number, None if it is none."""
     try:
         number = float(line)
     except ValueError:

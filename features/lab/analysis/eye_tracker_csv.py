@@ -222,7 +222,6 @@ class _Table:
         raise self.fault("part", row, f"no part {cell[:40]!r}; known: {known}, outside")
 
     def fault(self, wanted: str, row: int, why: str) -> SetupError:
-        """Return an error at a cell."""
         name = self._require(wanted).name
         return SetupError(f"{self._path}:{self._rows[row][0]}: column {name}: {why}")
 

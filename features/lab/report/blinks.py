@@ -63,5 +63,4 @@ def _counts(run: GazeTrace, onsets: Floats) -> Floats:
 
 
 def _spread_over_mean(rows: Floats) -> float:
-    """Return the standard deviation over the mean."""
     return float(np.std(rows, ddof=1) / np.mean(rows)) if len(rows) > 1 else np.nan

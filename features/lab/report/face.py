@@ -209,7 +209,6 @@ def _share_difference(rows: Floats) -> float:
 
 
 def _transition_difference(rows: NDArray[np.intp]) -> float:
-    """Return that difference for the rows of the transition matrix, weighted by their shifts."""
     shares, total = shift_shares(rows)
     apart = 0.5 * np.abs(shares - human_shifts()).sum(axis=1)
     return float(np.average(apart, weights=total))

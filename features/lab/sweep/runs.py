@@ -179,7 +179,6 @@ def _finished_row(future: Future[Row], point: Point, seed: int) -> Row:
 
 
 def _error_text(error: BaseException) -> str:
-    """Return an error as one line."""
     text = "; ".join(map(str.strip, str(error).splitlines()))
     return text if isinstance(error, Error) and text else f"{type(error).__name__}: {text}"
 

@@ -78,7 +78,6 @@ class RenderedWorld(NamedTuple):
         return camera
 
     def _view(self) -> "SceneView":
-        """Return the renderer's view of the world."""
         model = self.spec.compile()
         from gazerig.features.world.figure_model import PeoplePlacer
         from gazerig.features.world.renderer import RendererParams, WorldPicture
@@ -105,7 +104,6 @@ class _NoFaces:
     """Detector that finds no faces: the camera's process detects them later."""
 
     def find(self, bgr: ImageArray) -> tuple[DetectedFace, ...]:
-        """Return no faces."""
         return ()
 
 

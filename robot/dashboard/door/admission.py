@@ -53,7 +53,6 @@ _SHOW = (
 
 
 def _bearer(request: web.Request) -> str:
-    """Return the token in the header Authorization, "" without one."""
     kind, _, token = request.headers.get("Authorization", "").partition(" ")
     return token.strip() if kind.lower() == "bearer" else ""
 

@@ -95,7 +95,6 @@ def _things(found: Detections, lens: Intrinsics) -> tuple[SeenThing, ...]:
 
 
 def _rounded(values: Any) -> Any:
-    """Return numbers with a tenth of a pixel."""
     return tuple(round(float(value), 1) for value in values)
 
 

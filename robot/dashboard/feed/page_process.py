@@ -289,7 +289,6 @@ class PageProcess:
 
 
 def _errors_file() -> BinaryIO:
-    """Return a file without a name, in memory."""
     return os.fdopen(os.memfd_create("page_errors"), "w+b", buffering=0)
 
 

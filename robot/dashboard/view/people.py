@@ -26,7 +26,6 @@ _LEFT_EYE, _RIGHT_EYE, _NOSE = (PARTS.index(part) for part in ("LE", "RE", "N"))
 
 @lru_cache(maxsize=len(SHIRTS))
 def _person_glb(number: int) -> tuple[bytes, bytes]:
-    """Return the head and chest of a person as files for browsers."""
     return painted_glb(head(number), SKIN), painted_glb(torso(number, _CHEST_M), CLOTH)
 
 

@@ -215,7 +215,6 @@ class _Columns:
         self._start_s: float | None = None
 
     def update(self, tick: Tick) -> None:
-        """Add a tick."""
         self._export.update(tick)
         if self._start_s is None:
             self._start_s = tick.t_s
@@ -250,7 +249,6 @@ class _Columns:
             self._rows[name].append(value)
 
     def gathered(self, scene: Scene, trace: GazeTrace) -> MeasuredRun:
-        """Return the columns."""
         columns: dict[str, Any] = {name: np.array(rows) for name, rows in self._rows.items()}
         for name in [name for name in columns if name.endswith("_deg")]:
             columns[name] = np.degrees(columns[name])

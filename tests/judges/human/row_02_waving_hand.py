@@ -42,7 +42,6 @@ def measure(runs: Runs) -> Figures:
 
 
 def _share(seen: MeasuredRun, on: np.ndarray, start_s: float, end_s: float) -> float:
-    """Return the share of a time on the hand."""
     return on[(seen.t_s > start_s) & (seen.t_s < end_s)].mean()
 
 

@@ -47,7 +47,6 @@ def measure(runs: Runs) -> Figures:
 
 
 def _planned(counts: np.ndarray) -> np.ndarray:
-    """Return the ticks in which a count rises."""
     return np.flatnonzero(np.diff(counts) > 0) + 1
 
 

@@ -109,6 +109,5 @@ def _rate(runs: Sequence[MeasuredRun]) -> float:
 
 
 def _on(runs: Sequence[MeasuredRun], name: str) -> float:
-    """Return the share of time on a thing in percent."""
     off = np.concatenate([one.gaze_deg - one.truth_deg(name) for one in runs])
     return 100.0 * (np.hypot(*off.T) <= _ON_DEG).mean()

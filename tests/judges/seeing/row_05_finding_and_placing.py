@@ -78,7 +78,6 @@ def hard_portraits() -> Iterator[ImageArray]:
 
 
 def _frames(film: Path, numbers: tuple[int, ...]) -> list[ImageArray]:
-    """Return frames of a film by their numbers."""
     video, found = cv2.VideoCapture(str(film)), []
     for number in range(numbers[-1] + 1):
         _, frame = video.read()

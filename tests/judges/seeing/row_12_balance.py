@@ -31,7 +31,6 @@ WANTED = {
 
 
 def _beside_deg(tick: Tick, eye: Vec3, face: Face) -> float:
-    """Return the distance of the measured gaze from the outline of a face."""
     way = sub(face.p_world_m, eye)
     off = acos(max(-1.0, min(1.0, dot(cyclopean_direction(tick), unit(way)))))
     return degrees(off - atan(FACE_M / norm(way)))

@@ -172,7 +172,6 @@ class _NullDetector:
     """Detector for a board, which has no faces."""
 
     def find(self, _: ImageArray) -> tuple[DetectedFace, ...]:
-        """Find nothing."""
         return ()
 
 
