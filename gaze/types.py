@@ -128,6 +128,7 @@ class Face(Struct, frozen=True, gc=False):
     eye_opening: opening of the lids divided by the usual one, 0 is shut; None if not found
     mouth_opening_m: gap between the lips, at an adult's size; None if not found
     speaks:        whether the mouth moves like that of a speaking person; None if not found
+    has_moved:     whether the face has moved since it came into view, which a picture does not
     """
 
     id: int
@@ -144,6 +145,7 @@ class Face(Struct, frozen=True, gc=False):
     eye_opening: float | None = None
     mouth_opening_m: float | None = None
     speaks: bool | None = None
+    has_moved: bool = False
 
 
 class Percept(Struct, frozen=True, gc=False):

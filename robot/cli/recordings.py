@@ -1,17 +1,14 @@
 """Commands rerun and export, for recorded runs."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.robot.cli.progress import progress_bar
 from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, say
 
 if TYPE_CHECKING:
-    from gazerig.robot.loop.tick import Tick
     from gazerig.robot.run.rerun import Rerun
 
 app = typer.Typer(add_completion=False)
@@ -29,9 +26,8 @@ def rerun(file: Recording) -> None:
         from gazerig.robot.run.rerun import rerun as run_again
 
         recording = RunRecording(file)
-        with report_bad_contents(file), progress_bar() as tell:
-            on_tick = _progress(tell, "running again", recording.duration_s)
-            result = run_again(recording, on_tick)
+        with report_bad_contents(file):
+            result = run_again(recording)
         for line in (*result.notes, agreement_text(result)):
             say(line)
     if not result.is_same:
@@ -55,11 +51,9 @@ def export(
         if recording.note:
             say(recording.note)
         gaze = GazeExport()
-        with report_bad_contents(file), progress_bar() as tell:
-            on_tick = _progress(tell, "reading", recording.duration_s)
+        with report_bad_contents(file):
             for tick in recording.ticks():
                 gaze.update(tick)
-                on_tick(tick)
         summary = gaze.write(stem, force)
         say("\n".join(map(str, (*csv_files(stem), summary))))
         if gaze.estimated:
@@ -78,17 +72,3 @@ def agreement_text(result: "Rerun") -> str:
             f"; the bytes on the bus are {'the same' if result.sent_bytes_same else 'different'}"
         )
     return text
-
-
-def _progress(
-    tell: Callable[[str, float], None], text: str, total_s: float
-) -> Callable[["Tick"], None]:
-    """Return a function that shows the progress of a run's ticks."""
-    start_s: list[float] = []
-
-    def on_tick(tick: "Tick") -> None:
-        if not start_s:
-            start_s.append(tick.t_s)
-        tell(text, min(1.0, (tick.t_s - start_s[0]) / total_s) if total_s else 1.0)
-
-    return on_tick

@@ -53,7 +53,11 @@ class TickFeed:
         for text in tick.events:
             self._messages.append(self._add(tick, (text, "message", "")))
         if last is not None and not tick.parking:
-            for change in (*_gaze_changes(last, tick), *_track_changes(last, tick)):
+            for change in (
+                *_gaze_changes(last, tick),
+                *_track_changes(last, tick),
+                *_addressed_change(last, tick),
+            ):
                 self._add(tick, change)
         for change in self._people_changes(tick):
             self._add(tick, change)
@@ -140,6 +144,15 @@ def _track_changes(last: Tick, tick: Tick) -> Iterator[_Change]:
             finished = now.end_reason == FINISHED
             text = "has finished" if finished else f"ended: {now.end_reason}"
             yield f"{now.name} {text}", "track_finished", now.name
+
+
+def _addressed_change(last: Tick, tick: Tick) -> Iterator[_Change]:
+    """Yield a change of the person who addresses the head; its subject is "" for nobody."""
+    before, now = last.addressed_by, tick.addressed_by
+    if now is not None and now != before:
+        yield f"person {now} addresses the head", "addressed", now
+    elif now != before:
+        yield f"person {before} no longer addresses the head", "addressed", ""
 
 
 def _target_change(text: str, kind: EventKind, target: Target) -> _Change:

@@ -11,6 +11,7 @@ from typing import Literal
 from msgspec import Struct
 
 from gazerig.gaze.angles import yaw_pitch
+from gazerig.gaze.attention.addressing import Addressing
 from gazerig.gaze.types import (
     ORDERED,
     PART_NAMES,
@@ -35,7 +36,7 @@ from gazerig.robot.model.control_source import (
 
 EventKind = Literal[
     "message", "saccade_start", "saccade_landing", "blink", "target", "person_arrived",
-    "person_left", "track_finished", "cue",
+    "person_left", "addressed", "track_finished", "cue",
 ]  # fmt: skip
 """message: of the bus, the camera or a program's request; all others are found in the ticks."""
 
@@ -199,6 +200,10 @@ class HeadState(Struct, frozen=True):
         saliences: Saliences of the winner and the next bodies, highest first; empty while a client
             is in control.
         plan: Choice of the action planner and its reason, "" without one.
+        addressed_by: Number of the person who addresses the head, looks at it to talk with it; None
+            if nobody does.
+        addressed: The people who do so, with the beginning of the look and the confidence; the one
+            in front keeps the head until the end.
     """
 
     t_s: float
@@ -217,6 +222,8 @@ class HeadState(Struct, frozen=True):
     conversation: ConversationState = NO_CONVERSATION
     saliences: tuple[Salience, ...] = ()
     plan: str = ""
+    addressed_by: int | None = None
+    addressed: tuple[Addressing, ...] = ()
 
 
 class HeadReport(Struct, frozen=True):
@@ -251,6 +258,8 @@ def head_state(tick: Tick) -> HeadState:
         tick.conversation,
         tick.target.saliences if chooses else (),
         tick.target.plan if chooses else "",
+        tick.addressed_by,
+        tick.addressed,
     )
 
 

@@ -11,6 +11,7 @@ from gazerig.drivers.camera.capture_loop import CLOSING
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.plugins import describe_error, plugin_error
 from gazerig.drivers.types import Camera
+from gazerig.gaze.attention.addressing import AddressingModel
 from gazerig.gaze.attention.conversation import ConversationGaze
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
@@ -109,7 +110,7 @@ class Robot:
         self.messages = messages if messages is not None else []
         self.newest: Tick | None = None
         self.closing_events: tuple[str, ...] = ()
-        self._scanpath = scanpath
+        self._scanpath, self._addressing = scanpath, AddressingModel()
         self._gaze_m: Vec3 | None = None
         self._commands = CommandQueue()
         self._executor = CommandExecutor(self)
@@ -222,6 +223,7 @@ class Robot:
         self.attention.reset(t_s)
         self.conversation_gaze.reset(t_s)
         self._scanpath.reset(t_s)
+        self._addressing.reset()
         self._gaze_m = None
         self.oculomotor.reset(t_s, pose)
         self.animation.reset(t_s)
@@ -301,6 +303,7 @@ class Robot:
             lead.measure(target, pose, gaze, joints.position_rad, converges, t_s),
             self.track_choices.states(t_s),
             conversation=conversation.state,
+            addressed=self._addressing.step(percept, pose.p_world_head_m, t_s),
         )  # fmt: skip
         return self.newest
 

@@ -4,6 +4,7 @@ from msgspec import UNSET, Struct, UnsetType
 
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, unit
+from gazerig.gaze.attention.addressing import Addressing
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import PART_NAMES, GazeCommand, GazeState, Percept, Target, Vec3, body_name
 from gazerig.robot.model.commands import AnyCommand
@@ -29,6 +30,7 @@ class Tick(Struct, frozen=True, gc=False, omit_defaults=True):
         client_control: State of the newest client's control, with arrival at its target.
         tracks: Tracks that play, and the last ones that have ended, in the order of their numbers.
         conversation: State of the conversation.
+        addressed: People who address the head, the first one in front.
         parking: The run is over and the head moves to its parking pose; such ticks are only
             displayed.
     """
@@ -49,11 +51,17 @@ class Tick(Struct, frozen=True, gc=False, omit_defaults=True):
     tracks: tuple[TrackState, ...] = ()
     parking: bool = False
     conversation: ConversationState = NO_CONVERSATION
+    addressed: tuple[Addressing, ...] = ()
 
     @property
     def controlled_by(self) -> str:
         """Return the client that controls gaze or joints, and its command; "" without one."""
         return self.client_control.client
+
+    @property
+    def addressed_by(self) -> int | None:
+        """Return the person who addresses the head, None if nobody does."""
+        return self.addressed[0].person if self.addressed else None
 
     @property
     def control_source(self) -> ControlSource:

@@ -201,6 +201,7 @@ class Perception:
             opening,
             signs and signs.mouth_opening_m,
             track.is_alive and track.speech.speaks(t_s) if signs else None,
+            track.life.has_moved,
         )
 
 

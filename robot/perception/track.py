@@ -106,6 +106,7 @@ class Life:
     still_s: time without motion while the camera hardly turned, since the last motion
     mean, at_s: mean direction to the head, and its time
     view, axis, since_s: mean from which motion is measured, the camera's axis then, and that time
+    has_moved: whether there was any motion
     """
 
     still_s: float
@@ -114,6 +115,7 @@ class Life:
     view: Vec3 = mean
     axis: Vec3 = mean
     since_s: float = -inf
+    has_moved: bool = False
 
     def record(self, known: TrackFilter, axis: Vec3, t_s: float) -> None:
         """Record the position of a head that was seen now, with the camera's present axis."""
@@ -124,7 +126,7 @@ class Life:
         if t_s - self.since_s < _ANEW_S:
             if angle_between(self.mean, self.view) <= least_rad:
                 return
-            self.still_s = 0.0
+            self.still_s, self.has_moved = 0.0, True
         elif turned_rad < _STEADY_RAD:
             self.still_s += _ANEW_S
         self.view, self.axis, self.since_s = self.mean, axis, t_s

@@ -1,7 +1,6 @@
 """Figures of a run, collected tick by tick and returned as one JSON object at the end."""
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping
 from math import degrees, inf, radians
 
 import numpy as np
@@ -22,7 +21,6 @@ class Summary:
 
     def __init__(self) -> None:
         self._target_s: defaultdict[str, float] = defaultdict(float)
-        self._part_s: defaultdict[str, float] = defaultdict(float)
         # Counts by thousandths of a degree: a list would grow while the rig runs.
         self._errors_mdeg: Counter[int] = Counter()
         self._first_s: float | None = None
@@ -47,8 +45,6 @@ class Summary:
         if before is None:
             return
         self._target_s[target.kind] += dt_s
-        if target.part is not None:
-            self._part_s[target.part] += dt_s
         # As in an eye tracker, the speed of the gaze defines a fixation.
         still = angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s
         if still and tick.gaze.phase != "saccade":
@@ -60,14 +56,14 @@ class Summary:
 
     def figures(self) -> dict[str, object]:
         """Return the figures of the ticks; the caller adds bus, loop and frames."""
-        last = self._last
+        last, total = self._last, sum(self._target_s.values())
+        by_time = sorted(self._target_s.items(), key=lambda item: -item[1])
         return {
             "seconds": round(last.t_s - (self._first_s or 0.0), 6) if last else 0.0,
             "fixations": last.gaze.fixations if last else 0,
             "saccades": last.gaze.saccades if last else 0,
             "blinks": last.gaze.blinks if last else 0,
-            "target_share": _shares(self._target_s),
-            "part_share": _shares(self._part_s),
+            "target_share": {name: round(time / total, 4) for name, time in by_time},
             "gaze_error_deg": {
                 "median": _percentile_deg(self._errors_mdeg, 50.0),
                 "p95": _percentile_deg(self._errors_mdeg, 95.0),
@@ -82,9 +78,3 @@ def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:
     values = sorted(counts_mdeg)
     reached = np.cumsum([counts_mdeg[value] for value in values])
     return values[int(np.searchsorted(reached, percent / 100.0 * reached[-1]))] / 1000.0
-
-
-def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
-    total = sum(seconds.values())
-    by_time = sorted(seconds.items(), key=lambda item: -item[1])
-    return {name: round(time / total, 4) for name, time in by_time if total > 0.0}

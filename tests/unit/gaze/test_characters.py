@@ -14,7 +14,7 @@ from gazerig.gaze.angles import rotation
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.idle import Idle
-from gazerig.gaze.attention.top_down import Rule, TopDown
+from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Bodies, GazeState, Percept
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -52,19 +52,6 @@ def face_share(gaze: GazeConfig) -> float:
     times = [k / 15 for k in range(900)]
     kinds = [model.choose(hands_about_a_face(t), AHEAD, t).kind for t in times]
     return kinds.count("face") / len(kinds)
-
-
-def with_face_pull(gaze: GazeConfig, pull: float) -> GazeConfig:
-    rules = {**gaze.top_down.rules, "wait": Rule("face", pull)}
-    return replace(gaze, top_down=replace(gaze.top_down, rules=rules))
-
-
-def test_a_larger_pull_of_the_face_means_more_time_on_it():
-    gaze = load_rig("desk").gaze
-    found = [face_share(with_face_pull(gaze, pull)) for pull in (0.1, 0.3, 0.6, 0.9)]
-    assert all(more > less + 0.02 for less, more in zip(found, found[1:], strict=False)), found
-    # Hands that move to and fro become known: they have less of the time than the face.
-    assert found[0] < 0.75 and found[-1] > 0.8
 
 
 @pytest.mark.parametrize("name", CHARACTERS)

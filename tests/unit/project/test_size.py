@@ -8,11 +8,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
 LARGEST = {
-    "gaze": 55_180,
+    "gaze": 56_090,
     "drivers": 79_720,
     "sim_mock": 35_870,
     "config": 11_460,
-    "robot": 123_280,
+    "robot": 123_250,
     "robot/dashboard": 21_800,
     "gazerig": 13_010,
     "doors": 8_510,

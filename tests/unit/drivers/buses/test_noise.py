@@ -5,7 +5,7 @@ from bus_kinds import BOARDS, SMART, in_process
 
 PERCENT = (0.5, 3.0, 10.0)
 DAMAGED = 10_000
-"""Bytes hit in a test; tests/judges/attack/soak.py hits millions."""
+"""Bytes hit in a test."""
 
 
 @pytest.mark.parametrize("name", SMART)
