@@ -144,6 +144,9 @@ def test_headline_and_ring_name_the_same_part(page: tuple[Stub, Person]):
     # The next part is chosen before the eyes go there.
     assert "(mouth)" in shown("left eye", "mouth")
     wait_for(lambda: "(left eye)" in shown("left eye", "left eye"), "the landing")
+    stub.show(addressed_by=someone.id)
+    shown("left eye", "left eye")
+    assert person.reads(f"person {someone.id} addresses it")
 
 
 def test_the_first_panel_says_in_words_what_and_why(page: tuple[Stub, Person]):

@@ -31,9 +31,10 @@ function title(state) {
 }
 
 onShown((shown) => {
-  const led = isLed(shown);
+  const led = isLed(shown), person = shown.addressed_by;
   write($("#headline"), shown.headline);
-  const why = led || shown.level === "torque_off" ? "" : reason(shown, now.run, 1);
+  const why = person ? `person ${person} addresses it`
+    : led || shown.level === "torque_off" ? "" : reason(shown, now.run, 1);
   write($("#control"), why);
   // A change of control is read out; the target changes three times a second.
   const lasting = / for \d.*$/;

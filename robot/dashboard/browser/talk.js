@@ -24,8 +24,7 @@ export default {
       rows.replaceChildren(...(modes ? [modes.node] : []));
     });
     return ({ state, run }) => {
-      const talk = state.conversation;
-      const idle = !talk || talk.state === "idle";
+      const talk = state.conversation, idle = !talk || talk.state === "idle";
       what.textContent = idle ? "no conversation" : `the head ${DOES[talk.state]}`;
       detail.textContent = idle ? talk?.end_reason ?? "" : details(talk, state.t_s);
       spoken.textContent = idle || !talk.text ? "" : `“${talk.text}”`;
