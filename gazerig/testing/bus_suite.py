@@ -9,6 +9,7 @@ A package runs it on its own bus with a short class:
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import nan
 from typing import Any
 
@@ -58,7 +59,7 @@ class BusUnderTest:
     board: bool = False
     pulses_on: "Callable[[BusBench], None] | None" = None
 
-    @property
+    @cached_property
     def setups(self) -> tuple[ServoConfig, ...]:
         """Return the configurations of the servos."""
         rest = (self.low + self.high) // 2 if self.board else None

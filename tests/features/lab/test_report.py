@@ -157,9 +157,7 @@ def test_people_are_as_published():
     assert human.mean_head_deg([20.0, 40.0, 80.0]) == pytest.approx([1.6, 17.0, 47.8], abs=0.1)
 
 
-def test_servos_without_bytes_are_not_judged(
-    walking: GazeTrace, results: dict[str, MeasureResult]
-):
+def test_servos_without_bytes_are_not_judged(walking: GazeTrace, results: dict[str, MeasureResult]):
     """Their lag makes most small saccades too long; what the models choose is judged."""
     seen = verdicts(replace(walking, ideal_servos=True))
     for key in ("duration_small", "skew", "rest_error", "vor", "pursuit_lag", "blink_close"):
@@ -176,7 +174,9 @@ def test_the_whole_report_is_written(
     from gazerig.features.lab.report.report import ReportedRun, make_report
 
     styles = frozenset({"saccade min_jerk"})
-    one = ReportedRun("a <run>", walking, {"rig": "desk"}, styles, "cut short", tuple(results.values()))
+    one = ReportedRun(
+        "a <run>", walking, {"rig": "desk"}, styles, "cut short", tuple(results.values())
+    )
     outside = tuple(result._replace(verdict="outside") for result in one.results)
     out = tmp_path / "deep" / "report.html"
     make_report([one, replace(one, results=outside)], out, lambda words, share: None)

@@ -1,22 +1,16 @@
 """Conversation: the state that a voice agent reports, its end, and what the gaze makes of it."""
 
 from math import inf
-from types import SimpleNamespace
 from typing import Any
 
 import msgspec
-import numpy as np
 import pytest
 from commanded_robot import Running
 
 import gazerig
-from gazerig.gaze.attention.conversation import (
-    NOD,
-    AversionParams,
-    ConversationGaze,
-    ConversationParams,
-)
+from gazerig.gaze.attention.conversation import NOD
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
+from gazerig.robot.loop.conversation import Conversation
 from gazerig.robot.loop.head_state import HeadState, head_state
 from gazerig.robot.model.commands import LookAt, Renew, Talk, TalkOrder
 from gazerig.robot.model.control_source import ConversationState
@@ -55,16 +49,22 @@ def test_states_follow_each_other_and_are_in_tick_and_state(running: Running):
         (Talk("listening", who="a"), 1.0, "not renewed"),
         (Talk("speaking", seconds=2.0, stay=True), 62.0, "no report for 60 s"),
         (Talk("thinking", stay=True), 60.0, "no report for 60 s"),
+        (Talk("listening", stay=True), inf, ""),
     ],
 )
-def test_a_state_ends_without_its_program(
-    running: Running, given: Talk, lasts_s: float, reason: str
-):
-    start_s = running.do(given)[1][0].t_s
-    ticks = running.go(lasts_s + 0.5)
+def test_a_state_ends_without_its_program(given: Talk, lasts_s: float, reason: str):
+    conversation = Conversation()
+    conversation.report(given, 5.0)
+    assert conversation.expiry_reason(5.0 + min(lasts_s, 3600.0) - 0.03) == ""
+    assert reason in conversation.expiry_reason(5.0 + min(lasts_s, 3600.0) + 0.03)
+
+
+def test_an_end_is_told_once_and_the_gaze_goes_on(running: Running):
+    start_s = running.do(Talk("speaking", seconds=9.0, who="a"))[1][0].t_s
+    ticks = running.go(1.5)
     ended = next(tick for tick in ticks if tick.conversation.state == "idle")
-    assert ended.t_s - start_s == pytest.approx(lasts_s, abs=0.03)
-    assert reason in ended.conversation.end_reason
+    assert ended.t_s - start_s == pytest.approx(1.0, abs=0.03)
+    assert "not renewed" in ended.conversation.end_reason
     assert sum(text.startswith("conversation: ") for one in ticks for text in one.events) == 1
     assert ticks[-1].target.kind in ("face", "away")
 
@@ -140,9 +140,3 @@ def test_a_websocket_renews_what_its_program_controls():
     ):
         program.hold(message, reply)
         assert program.held == held and program.who == message["who"]
-
-
-def gaze(seed: int) -> ConversationGaze:
-    attention: Any = SimpleNamespace(converse=lambda *of: None)
-    rngs = (np.random.default_rng((seed, n)) for n in range(2))
-    return ConversationGaze("people", AversionParams(), ConversationParams(), attention, *rngs)
