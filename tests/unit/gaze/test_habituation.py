@@ -107,7 +107,7 @@ def test_a_single_still_face_is_never_left():
     "away_m", [(1.5, 1.0), (0.8, 3.0, 3.0, 3.0), (1.0, 1.0, 2.0, 2.0, 3.0, 4.0)]
 )
 def test_people_are_looked_at_for_times_as_their_nearness(away_m: tuple[float, ...]):
-    share = shares(watch(arc(*away_m), 200.0))
+    share = shares(watch(arc(*away_m), 120.0))
     weights = np.array(away_m) ** -0.5
     measured = [share[id] for id in range(1, len(away_m) + 1)]
     assert measured == pytest.approx(weights / weights.sum(), abs=0.03)
@@ -115,6 +115,6 @@ def test_people_are_looked_at_for_times_as_their_nearness(away_m: tuple[float, .
 
 @pytest.mark.parametrize("n", [3, 4, 6, 8])
 def test_nobody_of_many_waits_for_long_and_no_look_is_a_glance(n: int):
-    targets = watch(arc(*[1.5] * n), 90.0)
+    targets = watch(arc(*[1.5] * n), 60.0)
     assert max(waits_s(targets, n)) < 15.0 and min(shares(targets).values()) > 0.75 / n
     assert min(stays_s(targets)[n:]) > 1.0

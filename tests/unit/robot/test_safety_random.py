@@ -1,4 +1,4 @@
-"""Hundreds of thousands of random wishes with random servos: nothing outside any limit leaves."""
+"""A hundred thousand random wishes with random servos: nothing outside any limit leaves."""
 
 from collections.abc import Callable
 from math import inf, nan, radians
@@ -19,7 +19,7 @@ from gazerig.robot.safety.guard import Guard
 Array = NDArray[np.float64]
 Row = tuple[float, ...]
 LENGTH = 25  # ticks of one sequence
-WISHES = 12_500  # of each guard, of which there are 24
+WISHES = 6_000  # of each guard, of which there are 24
 LID = JointLimit(radians(-30), radians(25), radians(1200), radians(60_000), 70.0, 3.5, 7.0)
 SLOW = JointLimit(radians(-5), radians(170), radians(3), radians(10), 80.0, 9.5, 16.0)
 RIGS = ((EYE,) * 4 + (LID,) * 2 + (NECK,) * 3, (SLOW, LID, NECK) * 3)

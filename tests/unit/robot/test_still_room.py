@@ -17,7 +17,7 @@ from gazerig.sim_mock.scenes.scene import Thing
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
-SECONDS = 5.0
+SECONDS = 3.0
 
 
 class Room(EmptyScene):

@@ -2,7 +2,6 @@
 
 import json
 
-import pytest
 from commanded_robot import Running
 from fakes.runs import simulated
 from mixed_rig import rig_of
@@ -10,9 +9,8 @@ from mixed_rig import rig_of
 from gazerig.robot.model.commands import Resume, Stop
 
 
-@pytest.mark.parametrize("name", ["feetech", "mixed"])
-def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(devices, tmp_path, name):
-    running = Running(simulated(rig_of(name, tmp_path), "face-to-face", 2))
+def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(devices, tmp_path):
+    running = Running(simulated(rig_of("mixed", tmp_path), "face-to-face", 2))
     robot = running.made.robot
     robot.start(running.made.clock)
 
