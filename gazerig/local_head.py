@@ -22,7 +22,7 @@ from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Command, Request, Say, set_client
 from gazerig.robot.model.reply import Progress
-from gazerig.robot.net.request_handler import RequestHandler
+from gazerig.robot.run.requests import RequestHandler
 from gazerig.robot.run.run import Run
 from gazerig.robot.run.session import Session
 
@@ -97,9 +97,7 @@ class LocalHead(Head):
         if self._made is not None:
             raise Error("a head can be used in one with block only: open another")
         self._made = run = self._make()
-        self._requests = RequestHandler(
-            run.robot.command, self._feed, {}, run.params, voice=run.voice, menus=run.robot.menus
-        )
+        self._requests = RequestHandler(run, self._feed, {})
         return run
 
 

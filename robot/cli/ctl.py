@@ -21,7 +21,6 @@ from gazerig.robot.cli.terminal import FAULT, clear_errors, confirm, say
 from gazerig.robot.model.commands import (
     AnyCommand,
     Ask,
-    Character,
     Command,
     Fault,
     Look,
@@ -157,20 +156,6 @@ def revert(pid: PidOption = None) -> None:
 
 
 @ctl.command()
-def character(
-    name: Annotated[
-        str,
-        typer.Argument(help="Name of a shipped character."),
-    ],
-    pid: PidOption = None,
-) -> None:
-    """Apply another character to the running rig."""
-    with connect(pid) as rig:
-        _print_lines(rig.change(Character(name)))
-        say(f"character {name} is active")
-
-
-@ctl.command()
 def ask(
     menu: Annotated[
         str | None,
@@ -182,7 +167,7 @@ def ask(
     ] = None,
     pid: PidOption = None,
 ) -> None:
-    """Choose a behaviour, or talk, listen or think, on the running head; or list all choices."""
+    """Choose a behaviour, a character, or talk, listen or think; or list all choices."""
     with connect(pid) as rig:
         if menu is not None and choice is not None:
             rig.send(Ask(menu, choice))

@@ -422,7 +422,7 @@ class State(Request, frozen=True):
 
 
 class ReadMenus(Request, frozen=True, tag="menus"):
-    """Behaviours, modes of conversation, lid movements; the present one first."""
+    """Behaviours, modes of conversation, lid movements, characters; the present one first."""
 
 
 class Tracks(Request, frozen=True):
@@ -445,10 +445,6 @@ class Unsaved(Request, frozen=True):
     """Values that differ from the rig's file."""
 
 
-class Characters(Request, frozen=True):
-    """Names of characters."""
-
-
 class Set(Request, frozen=True):
     """Apply values of keys, all of them or none."""
 
@@ -463,12 +459,6 @@ class Save(Request, frozen=True):
 
 class Revert(Request, frozen=True):
     """Apply the values of the rig's file again."""
-
-
-class Character(Request, frozen=True):
-    """Apply another character to the rig."""
-
-    name: str
 
 
 class SayPiece(Request, frozen=True):
@@ -487,10 +477,8 @@ class Fault(Request, frozen=True):
     text: str
 
 
-Question = (
-    Hello | ReadStatus | State | ReadMenus | Tracks | Parameters | Get | Unsaved | Characters
-)  # fmt: skip
-Change = Set | Save | Revert | Character | SayPiece | Fault
+Question = Hello | ReadStatus | State | ReadMenus | Tracks | Parameters | Get | Unsaved
+Change = Set | Save | Revert | SayPiece | Fault
 SLOW: frozenset[str] = frozenset((*map(verb, get_args(Change)), "say"))
 """Requests that may read or write files."""
 ORDERS: dict[str, type[Command]] = {

@@ -74,3 +74,8 @@ class TokenBucket:
                 self._left = min(self._burst, self._left + gained)
             self._at_s = now_s
             return 0.0 if self._left > 0.0 else (1e-9 - self._left) / self._per_s
+
+
+def is_stop(message: object) -> bool:
+    """Return whether a message is a stop, which nothing may delay."""
+    return isinstance(message, dict) and message.get("do") == "stop"

@@ -27,8 +27,8 @@ from gazerig.robot.net.excess import (
     ExcessCount,
     TokenBucket,
     find_stop,
+    is_stop,
 )
-from gazerig.robot.net.request_handler import RequestHandler, is_stop
 from gazerig.robot.net.socket_io import (
     REQUEST_BYTES,
     MalformedMessage,
@@ -105,13 +105,18 @@ _NAMING = threading.Lock()
 class RemoteServer:
     """Server that listens while a rig runs.
 
+    Args:
+        answer: Executes a request of a peer, "" for the page; returns the answer.
+        say: Prints a line on the terminal.
+
     Attributes:
         path: Path of the socket, None before ``open``.
     """
 
-    def __init__(self, requests: RequestHandler, say: Callable[[str], None]) -> None:
-        self._requests = requests
-        self._say = say
+    def __init__(
+        self, answer: Callable[[object, str], dict[str, object]], say: Callable[[str], None]
+    ) -> None:
+        self._answer_request, self._say = answer, say
         self._clock = RealClock()
         self._budget = TokenBucket(*ALL)
         self.path: Path | None = None
@@ -271,7 +276,7 @@ class RemoteServer:
     def _execute(self, request: object, peer: str) -> dict[str, object]:
         """Execute a request; return its answer."""
         try:
-            return self._requests.answer(request, peer)
+            return self._answer_request(request, peer)
         except Exception as error:
             # An internal error in one request must not end the remote control, which stops need.
             failed = f"{type(error).__name__}: {error}"

@@ -1,10 +1,7 @@
 """Parameters of a running rig: present values, changes and files.
 
-There are three rigs: that of the files (with the options of the command line), the present one, and
-that of the defaults. A user's changes override the files until they are saved, also after a change
-of the character or of the files.
-
-All methods may be called from any thread. Changes are checked together, and then reach the running
+A user's changes stay over the files until they are saved, also after a change of the character. All
+methods may be called from any thread. Changes are checked together, and then reach the running
 parts as one command.
 """
 
@@ -14,7 +11,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import NamedTuple
 
 from gazerig.config.load import find_file, shipped_names
 from gazerig.config.parameters import (
@@ -59,28 +55,6 @@ def rig_folder(name: str) -> Path:
     return find_file("rigs", name).parent if is_path(name) else Path.cwd()
 
 
-class _Rigs(NamedTuple):
-    """State at one moment, replaced as a whole.
-
-    saved: rig of the files, with the options; rig: the present one
-    in_effect: the one that the running parts have
-    layers: requested files
-    """
-
-    saved: Rig
-    rig: Rig
-    in_effect: Rig
-    layers: RigLayers
-
-    @property
-    def present_layers(self) -> RigLayers:
-        """Return the files with the present character, which may be unsaved."""
-        chosen = self.rig.character
-        if chosen == self.saved.character:
-            return self.layers
-        return self.layers._replace(character=chosen or NO_CHARACTER)
-
-
 class ParamStore:
     """Parameters of one running rig.
 
@@ -104,10 +78,13 @@ class ParamStore:
         layers: RigLayers,
         now: Callable[[], datetime] = datetime.now,
     ) -> None:
-        self._command, self._now = command, now
-        self._changing = threading.Lock()
+        self._command, self._now, self._layers = command, now, layers
+        self._lock = threading.RLock()
         self._options = differences(load_rig(*layers), rig)
-        self._rigs = _Rigs(rig, rig, rig, layers)
+        if layers.character is not None:
+            rig = replace(rig, character=_character(layers.character))
+        # The rig of the files, that with the present character, and that with all changes.
+        self._saved = self._base = self._rig = self._started = rig
         self._defaults = load_rig(rig.name if rig.name in shipped_names("rigs") else "desk")
         self.version = 0
         self.confined = AllowedFolder(rig_folder(layers.name))
@@ -115,21 +92,22 @@ class ParamStore:
     @property
     def path(self) -> Path:
         """Return the rig's file."""
-        return find_file("rigs", self._rigs.layers.name)
+        return find_file("rigs", self._layers.name)
 
     @property
-    def character_name(self) -> str:
+    def character(self) -> str:
         """Return the present character, "none" without one."""
-        rigs = self._rigs
-        return rigs.present_layers.character or rigs.rig.character or NO_CHARACTER
+        return self._rig.character or NO_CHARACTER
 
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Return all parameters in the order of the file."""
-        return parameters(self._rigs.rig, self._defaults)
+    def characters(self) -> tuple[str, ...]:
+        """Return the known characters, the present one first; "none" is the rig itself."""
+        now = self.character
+        return (now, *(n for n in (NO_CHARACTER, *shipped_names("characters")) if n != now))
 
-    def values(self) -> dict[str, Value]:
-        """Return the present value of every parameter, by key."""
-        return values(self._rigs.rig)
+    def parameters(self, prefix: str = "") -> tuple[Parameter, ...]:
+        """Return the parameters whose keys have a prefix, in the order of the file."""
+        every = parameters(self._rig, self._defaults)
+        return tuple(one for one in every if one.key.startswith(prefix))
 
     def get(self, prefix: str = "") -> dict[str, Value]:
         """Return the present values whose keys have a prefix.
@@ -137,7 +115,7 @@ class ParamStore:
         Raises:
             gazerig.config.load.ConfigError: no key matches; the message lists similar keys.
         """
-        rig = self._rigs.rig
+        rig = self._rig
         found = {key: value for key, value in values(rig).items() if key.startswith(prefix)}
         return found or {prefix: value_of(rig, prefix)}
 
@@ -149,110 +127,70 @@ class ParamStore:
         Raises:
             gazerig.config.load.ConfigError: lists every fault; nothing changes.
         """
-        with self._changing:
-            before = self._rigs
-            rig = apply_changes(before.rig, changes)
-            if "character" not in changes:
-                return self._apply(before, rig)
-            layers = before.layers
-            if rig.character == before.saved.character:  # the file's replaces the option
-                layers = layers._replace(character=None)
-            state = _read(before._replace(rig=rig, layers=layers), self._options)
-            unsaved = {**differences(before.saved, rig), **changes}
-            return self._apply(state, apply_changes(state.saved, unsaved))
+        with self._lock:
+            base, wanted = self._base, {**differences(self._base, self._rig), **changes}
+            if "character" in changes:
+                wanted["character"] = name = _character(changes["character"])
+                layers = self._layers._replace(character=name or NO_CHARACTER)
+                base = apply_changes(load_rig(*layers), {**self._options, "character": name})
+            return self._apply(base, apply_changes(base, wanted))
 
     def unsaved(self) -> tuple[ParamChange, ...]:
         """Return the present values that differ from the files."""
-        rigs = self._rigs
-        was = values(rigs.saved)
-        return tuple(
-            ParamChange(key, format_value(was[key]) if key in was else None, format_value(value))
-            for key, value in differences(rigs.saved, rigs.rig).items()
-        )
+        with self._lock:
+            was = values(self._saved)
+            return tuple(
+                ParamChange(key, format_value(was[key]) if key in was else None, format_value(new))
+                for key, new in self._unsaved().items()
+            )
 
     def revert(self) -> tuple[str, ...]:
-        """Apply the values in the files again.
-
-        Raises:
-            gazerig.config.load.ConfigError: the files that are read without an unsaved character
-                have become invalid.
-        """
-        with self._changing:
-            rigs = self._rigs
-            if rigs.rig.character != rigs.saved.character:
-                rigs = _read(rigs._replace(rig=rigs.saved), self._options)
-            return self._apply(rigs, rigs.saved)
+        """Apply the values in the files again."""
+        with self._lock:
+            return self._apply(self._saved, self._saved)
 
     def save(self, path: Path | str | None = None) -> SavedFile:
         """Write the present values into the rig's file, or into a copy of it at a new path.
 
-        From then on the copy is this rig's file. Edits of the file that are not applied yet are
-        included.
+        From then on the copy is this rig's file. Other values that were edited in the file stay
+        there for the next start.
 
         Raises:
             gazerig.config.load.ConfigError: the rig is a shipped one and no path is given, the path
                 exists or cannot be written, the file has faults now, or another layer overrides a
                 value.
         """
-        with self._changing:
+        with self._lock:
             copied = path is not None and os.path.realpath(path) != os.path.realpath(self.path)
-            self._reload()
-            rigs, to = self._rigs, str(path) if copied else None
-            wanted = differences(rigs.saved, rigs.rig)
-            saved = save_layers(rigs.present_layers, to, wanted, self._now())
-            layers = rigs.layers._replace(name=to or rigs.layers.name)
+            wanted, layers = self._unsaved(), self._layers
             if "character" in wanted:
                 layers = layers._replace(character=None)
-            self._rigs = rigs._replace(saved=rigs.rig, layers=layers)
+            saved = save_layers(layers, str(path) if copied else None, wanted, self._now())
+            self._layers = layers._replace(name=str(path)) if copied else layers
+            self._saved = self._base = self._rig
             self.version += 1
             return saved
 
-    def characters(self) -> tuple[str, ...]:
-        """Return the known characters, the present one first; "none" is the rig itself."""
-        now = self.character_name
-        return (now, *(n for n in (NO_CHARACTER, *shipped_names("characters")) if n != now))
+    def _unsaved(self) -> dict[str, Value]:
+        changed = differences(self._base, self._rig)
+        if self._rig.character != self._saved.character:
+            changed = {"character": self._rig.character, **changed}
+        return changed
 
-    def apply_character(self, name: str) -> tuple[str, ...]:
-        """Apply another character to the rig; unsaved values override both.
-
-        name: name of a shipped character, a path, or "none"
-
-        Raises:
-            gazerig.config.load.ConfigError: the character is unknown, or does not fit the rig.
-        """
-        return self.set({"character": None if name in (NO_CHARACTER, "") else name})
-
-    def _reload(self) -> None:
-        """Read the files again; unsaved values stay unless the files changed them."""
-        before = self._rigs
-        rigs = _read(before, self._options)
-        edited = differences(before.saved, rigs.saved)
-        if "character" in edited and before.rig.character != before.saved.character:
-            rigs = _read(before._replace(rig=before.saved), self._options)
-        kept = {
-            key: value
-            for key, value in differences(before.saved, before.rig).items()
-            if key not in edited
-        }
-        self._apply(rigs, apply_changes(rigs.saved, kept))
-
-    def _apply(self, rigs: _Rigs, rig: Rig) -> tuple[str, ...]:
+    def _apply(self, base: Rig, rig: Rig) -> tuple[str, ...]:
         """Apply a checked rig, and return the changes."""
-        before = self._rigs
-        found = differences(before.rig, rig)
-        if not found and rigs == before:
-            return ()
-        in_effect = rig_in_effect(before.in_effect, rig)
-        walk = in_effect.gaze.scanpath.transition_matrix
-        if walk != before.in_effect.gaze.scanpath.transition_matrix:
+        changed = differences(self._rig, rig)
+        walk = rig.gaze.scanpath.transition_matrix
+        if walk != self._rig.gaze.scanpath.transition_matrix:
             load_walk(walk)  # refused here rather than in the tick
-        if in_effect != before.in_effect:
-            self._command(Tune(tuple(differences(before.in_effect, in_effect).items())))
-        self._rigs = rigs._replace(rig=rig, in_effect=in_effect)
-        self.version += 1
-        return tuple(f"{k} = {format_value(v)}{start_note(k)}" for k, v in found.items())
+        effect = differences(*(rig_in_effect(self._started, one) for one in (self._rig, rig)))
+        if effect:
+            self._command(Tune(tuple(effect.items())))
+        self._base, self._rig = base, rig
+        self.version += bool(changed)
+        return tuple(f"{k} = {format_value(v)}{start_note(k)}" for k, v in changed.items())
 
 
-def _read(rigs: _Rigs, options: Mapping[str, Value]) -> _Rigs:
-    """Return the state with the files' present values under the options; the rig stays."""
-    return rigs._replace(saved=apply_changes(load_rig(*rigs.present_layers), options))
+def _character(name: Value) -> str | None:
+    """Return the value of the key: None instead of "none"."""
+    return None if name in (NO_CHARACTER, "", None) else str(name)

@@ -17,16 +17,18 @@ from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.rig_feed import LiveRig
 from gazerig.robot.dashboard.feed.status_line import StatusLine, health_text
+from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.loop.tick_stream import Observers, TickStream, failure_text
 from gazerig.robot.loop.timing import LoopTiming, busy_text
 from gazerig.robot.model.commands import Talk
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.net.client import rig_name
-from gazerig.robot.net.live_server import LiveServer
+from gazerig.robot.net.socket_server import RemoteServer
 from gazerig.robot.net.topics import JointInfo, RigInfo, RunState
 from gazerig.robot.run.doors import DoorProcesses
 from gazerig.robot.run.options import level_text
+from gazerig.robot.run.requests import RequestHandler
 from gazerig.robot.run.rig_limits import limits
 from gazerig.robot.run.run import Run
 from gazerig.robot.safety.health import HOT_C, LASTING_LOAD, VOLTAGE_MARGIN_V, WARM_C
@@ -60,19 +62,23 @@ class RunObservers:
         self._timing, self._stopped_by = LoopTiming(run.loop.rate_hz), ""
         self._page: PageProcess | None = None
         self._publisher: Publisher | None = None
-        self._server: LiveServer | None = None
+        self._feed: TickFeed | None = None
         self._status: StatusLine | None = None
         self._parts: list[tuple[str, Callable[[], object], Callable[[], object]]] = []
         if run.recorder is not None:
             self._parts.append(("the recording", lambda: None, self._close_recording))
         if not options.fast:
-            self._server = self._make_server()
-            self._parts.append(("the remote control", self._server.open, self._server.close))
+            self._feed = TickFeed()
+            programs = self._server(self._feed)
+            self._parts.append(("the remote control", programs.open, programs.close))
             if status is not None:
                 health = run.robot.body.bus.health
                 self._status = StatusLine(status, health, self._timing.figures)
             if options.page_address is not None:
-                self._page, self._publisher = self._make_page(browse)
+                # Apart from programs of this computer, so that neither uses up the other's time.
+                visitors = self._server(self._feed, confined=True)
+                self._parts.append(("the page's requests", lambda: None, visitors.close))
+                self._page, self._publisher = self._make_page(visitors, browse)
                 self._parts.append(("the page", self._page.open, self._page.close))
             doors = DoorProcesses(run.rig.doors, os.getpid(), say)
             self._parts.append(("the doors", doors.open, doors.close))
@@ -82,24 +88,25 @@ class RunObservers:
         opened = run.voice.open if has_sound else lambda: None
         self._parts.append(("the voice", opened, run.voice.close))
 
-    def _make_server(self) -> LiveServer:
-        run, options = self._run, self._run.options
-        return LiveServer(
-            run.robot,
-            run.params,
-            {"rig": options.rig, "name": options.name or rig_name(options.rig), "pid": os.getpid()},
-            self._say,
-            run.bus.inject_fault,
+    def _server(self, feed: TickFeed, confined: bool = False) -> RemoteServer:
+        options = self._run.options
+        about = {"rig": options.rig, "name": options.name or rig_name(options.rig)}
+        requests = RequestHandler(
+            self._run,
+            feed,
+            {**about, "pid": os.getpid()},
             lambda: {"page": self._page.url() if self._page is not None else None},
-            run.params.confined,
-            run.voice,
+            confined=confined,
         )
+        return RemoteServer(requests.answer, self._say)
 
-    def _make_page(self, browse: Callable[[str], object] | None) -> tuple[PageProcess, Publisher]:
+    def _make_page(
+        self, visitors: RemoteServer, browse: Callable[[str], object] | None
+    ) -> tuple[PageProcess, Publisher]:
         options, say, browser = self._run.options, self._say, self._run.browser
-        assert options.page_address is not None and self._server is not None
+        assert options.page_address is not None
         take = browser.take if browser is not None else None
-        page = PageProcess(*options.page_address, self._server.serve, take, options.page_token)
+        page = PageProcess(*options.page_address, visitors.serve, take, options.page_token)
         # Who keeps a token does not want it in a log.
         tell = say if options.token_file is None else lambda line: say(hide_token(line))
         publisher = Publisher(page, self._live_rig, self._run_state, tell, browse)
@@ -131,7 +138,7 @@ class RunObservers:
         return RunState(
             menus["behaviour"][0],
             menus["conversation"][0],
-            params.character_name,
+            params.character,
             menus.get("expression", ("",))[0],
             health_text(robot.body.bus.health()),
             params.version,
@@ -154,8 +161,8 @@ class RunObservers:
             observers.add("the page's view", self._follow)
         if self._status is not None:
             observers.add("the status line", self._status.update)
-        if self._server is not None:
-            observers.add("the remote control", self._server.update)
+        if self._feed is not None:
+            observers.add("the remote control", self._feed.update)
         observers.add("the voice", self._run.voice.update)
 
     def show_parking(self, tick: Tick) -> None:
@@ -164,8 +171,8 @@ class RunObservers:
             self._run.voice.stop()
             if self._status is not None:
                 self._status.update(tick)
-            if self._server is not None:
-                self._server.update(tick)
+            if self._feed is not None:
+                self._feed.update(tick)
             self._parking.update(tick)
 
     def open(self) -> None:

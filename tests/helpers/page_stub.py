@@ -82,7 +82,7 @@ class Stub:
         rig = load_rig("desk")
         live = [one for one in parameters(rig, rig) if one.live == "next tick"]
         self.usual: dict[str, object] = {
-            "menus": MENUS, "tracks": TRACKS, "characters": ["none", "bold", "shy", "boxer"],
+            "menus": MENUS, "tracks": TRACKS,
             "parameters": live, "get": values(rig), "unsaved": [],
         }  # fmt: skip
 

@@ -11,11 +11,10 @@ from typer.testing import CliRunner
 
 from gazerig.robot.cli.ctl import app
 from gazerig.robot.loop.events import TickFeed
-from gazerig.robot.loop.track_choices import TrackInfo
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.net.client import RobotClient
-from gazerig.robot.net.request_handler import RequestHandler
+from gazerig.robot.run.requests import RequestHandler
 from gazerig.robot.run.run import Run
 
 
@@ -25,13 +24,12 @@ class TickedRig:
     def __init__(self, made: Run) -> None:
         self.made, self.pulse = made, TickFeed()
         self.commands: list[Command] = []
-        self.handler = RequestHandler(
-            self.command, self.pulse, {}, menus=self.menus, tracks=self.tracks
-        )
+        self.handler = RequestHandler(made, self.pulse, {})
+        self._take, made.robot.command = made.robot.command, self.command  # type: ignore[method-assign]
         self.answer: object = None
 
     def command(self, command: Command) -> Ticket:
-        ticket = self.made.robot.command(command)
+        ticket = self._take(command)
         self.commands.append(command)
         self.tick()
         return ticket
@@ -40,12 +38,6 @@ class TickedRig:
         for tick in ticks(self.made, number):
             self.pulse.update(tick)
         return dict(zip(self.made.robot.body.names, map(degrees, tick.desired_rad), strict=True))
-
-    def menus(self) -> dict[str, tuple[str, ...]]:
-        return self.made.robot.menus()
-
-    def tracks(self) -> tuple[TrackInfo, ...]:
-        return self.made.robot.tracks()
 
     def write(self, request: object, within_s: float) -> None:
         answer = self.handler.answer(msgspec.to_builtins(request))

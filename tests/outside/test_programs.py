@@ -294,7 +294,7 @@ BAD = (
     (b'{"do": "look_at", "p_world_m": [1, 0, 0], "x": 1}', 409, "look_at has p_world_m, pointer"),
     (b'{"do": "dance"}', 409, "available: hello"),
     (b'{"do": "save", "path": "/etc/passwd.yaml"}', 409, "only files in"),
-    (b'{"do": "character", "name": "/etc/passwd"}', 409, "and below can be named"),
+    (b'{"do": "ask", "menu": "character", "choice": "/etc/passwd"}', 409, "and below can be named"),
     (b'{"do": "set", "changes": {"doors": ["wyoming"]}}', 409, "cannot be set over the network"),
     (b" " * 70_000, 413, "longer than 65536 bytes"),
 )
@@ -310,8 +310,8 @@ def test_a_bad_message_gets_one_clear_error(rig: Rig, body: bytes, status: int, 
         with contextlib.suppress(UnicodeDecodeError):
             end.send(body.decode())
             assert json.loads(end.recv(timeout=PATIENCE_S)) == answer
-        ask(end, do="characters", tag=1)  # the connection goes on
-        assert "shy" in heard(end, "tag", 1)["ok"]
+        ask(end, do="menus", tag=1)  # the connection goes on
+        assert "shy" in heard(end, "tag", 1)["ok"]["character"]
 
 
 @pytest.mark.parametrize(

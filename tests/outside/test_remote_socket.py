@@ -14,18 +14,18 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from branch import Branch
 from fakes.runs import simulated
 
-from gazerig.config.rig_files import RigLayers
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.loop import client_control, stop
 from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.loop import Robot, Tick
-from gazerig.robot.model.commands import Characters, LookAt, Resume, Stop, Value
+from gazerig.robot.model.commands import Get, LookAt, ReadMenus, Request, Resume, Stop, Value
 from gazerig.robot.net import client
 from gazerig.robot.net import socket_io as remote_socket
 from gazerig.robot.net import socket_server as server_module
@@ -36,9 +36,9 @@ from gazerig.robot.net.client import (
     RobotClient,
     connect_to_all,
 )
-from gazerig.robot.net.request_handler import RequestHandler
 from gazerig.robot.net.socket_server import RemoteServer
 from gazerig.robot.run.live import ParamStore
+from gazerig.robot.run.requests import RequestHandler
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -114,11 +114,8 @@ def errors() -> list[str]:
 
 @pytest.fixture
 def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
-    tuning = ParamStore(beat.made.rig, beat.robot.command, RigLayers("desk", None, None))
     about = {"rig": "desk", "pid": os.getpid()}
-    robot = beat.robot
-    requests = RequestHandler(robot.command, beat.pulse, about, tuning, menus=robot.menus)
-    server = RemoteServer(requests, errors.append)
+    server = RemoteServer(RequestHandler(beat.made, beat.pulse, about).answer, errors.append)
     server.open()
     with RobotClient.connect() as connected:
         yield connected
@@ -136,11 +133,13 @@ def test_the_socket_is_the_owners_alone(rig: RobotClient, folder: Path):
 
 
 def open_server() -> RemoteServer:
-    return RemoteServer(beatless(), lambda _: None)
+    return RemoteServer(beatless().answer, lambda _: None)
 
 
 def beatless() -> RequestHandler:
-    return RequestHandler(lambda command: None, TickFeed(), {"rig": "other"})
+    robot = SimpleNamespace(command=lambda command: None)
+    run: Any = SimpleNamespace(robot=robot, params=SimpleNamespace(unsaved=tuple))
+    return RequestHandler(run, TickFeed(), {"rig": "other"})
 
 
 def test_close_removes_it_and_hangs_up(folder: Path):
@@ -172,7 +171,7 @@ def test_a_folder_of_somebody_else_is_refused(folder: Path):
 
 def listens() -> None:
     """Have a socket until standard input ends."""
-    server = RemoteServer(beatless(), print)
+    server = RemoteServer(beatless().answer, print)
     server.open()
     print("open", flush=True)
     sys.stdin.read()
@@ -295,8 +294,8 @@ def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(
         answer = line_of(end)
         (said,) = answer.values()
         assert re.search(words, said), said
-        end.sendall(b'{"do": "characters"}\n')
-        assert line_of(end) == {"ok": [*rig.ask(Characters(), tuple[str, ...])]}
+        end.sendall(b'{"do": "menus"}\n')
+        assert line_of(end) == {"ok": rig.ask(ReadMenus(), dict[str, list[str]])}
 
 
 def test_an_endless_request_is_refused_and_hung_up_on(
@@ -304,7 +303,7 @@ def test_an_endless_request_is_refused_and_hung_up_on(
 ):
     monkeypatch.setattr("gazerig.robot.net.socket_server._REST_S", 0.2)
     with raw(folder) as end:
-        end.sendall(b'{"do": "characters"}\n')
+        end.sendall(b'{"do": "menus"}\n')
         assert "ok" in line_of(end)
         over = threading.Event()
 
@@ -435,8 +434,8 @@ def test_a_resume_from_before_a_stop_is_not_executed_after_it(
     rig.send(Stop("a hand"))
     with raw(folder) as end:
         resume = b'{"do": "resume", "confirmed": true, "tag": "r"}\n'
-        end.sendall(20 * LEVEL + resume + STOP + b'{"do": "characters"}\n')
-        answers = lines_until(end, lambda answer: "shy" in answer.get("ok", ()))
+        end.sendall(20 * LEVEL + resume + STOP + b'{"do": "menus"}\n')
+        answers = lines_until(end, lambda answer: "character" in answer.get("ok", ()))
     assert len(answers) == 23 and answers[20] == {
         "refused": "it has been stopped meanwhile", "tag": "r",
     }  # fmt: skip
@@ -508,15 +507,15 @@ def test_a_stop_does_not_wait_for_another_thread_of_its_program(
     rig: RobotClient, monkeypatch: pytest.MonkeyPatch
 ):
     """Like that of a head that is speaking: the answer to say comes when it begins."""
-    answer, asked, over = RequestHandler.answer, threading.Event(), threading.Event()
+    perform, asked, over = RequestHandler.perform, threading.Event(), threading.Event()
 
-    def slow(self: RequestHandler, request: Any, peer: str = "") -> dict[str, object]:
-        if request["do"] == "get":
+    def slow(self: RequestHandler, request: Request) -> object:
+        if isinstance(request, Get):
             asked.set()
             over.wait(20.0)
-        return answer(self, request, peer)
+        return perform(self, request)
 
-    monkeypatch.setattr(RequestHandler, "answer", slow)
+    monkeypatch.setattr(RequestHandler, "perform", slow)
     other = threading.Thread(target=rig.get)
     other.start()
     assert asked.wait(20.0)

@@ -1,9 +1,9 @@
-// What the rig offers to choose from: menus, characters and tracks.
+// What the rig offers to choose from: menus and tracks.
 
 import { ask, on } from "/rig/connection.js";
 
-/** menus: name -> choices; tracks: name -> what is known of it; characters: names. */
-export const choices = { menus: {}, tracks: {}, characters: [] };
+/** menus: name -> choices; tracks: name -> what is known of it. */
+export const choices = { menus: {}, tracks: {} };
 
 const BOXING = /boxer|^attack$|^guard$/;
 
@@ -22,15 +22,14 @@ let known = "";
 
 async function read(rig) {
   const answers = await Promise.all(
-    ["menus", "tracks", "characters"].map((verb) => ask({ do: verb }).catch(() => null)),
+    ["menus", "tracks"].map((verb) => ask({ do: verb }).catch(() => null)),
   );
   const text = JSON.stringify([answers, rig]);
   if (text === known) return; // keep a button that is being pressed
   known = text;
-  const [menus, tracks, characters] = answers;
+  const [menus, tracks] = answers;
   choices.menus = menus ?? {};
   choices.tracks = Object.fromEntries((tracks ?? []).map((track) => [track.name, track]));
-  choices.characters = characters ?? [];
   for (const handle of handlers) handle();
 }
 

@@ -10,14 +10,11 @@ const AHEAD_M = [1, 0, 0.15];
 const FREE = "look freely", AHEAD = "look straight ahead";
 const LISTED_ELSEWHERE = ["track", "expression", "conversation"];
 
-/** Row of buttons for a menu of the rig, or for its characters; null without anything to choose. */
+/** Row of buttons for a menu of the rig; null without anything to choose. */
 export function menu(name, title = name) {
-  const names = name === "character" ? choices.characters : choices.menus[name] ?? [];
-  const options = fitting(names, now.rig).toSorted();
+  const options = fitting(choices.menus[name] ?? [], now.rig).toSorted();
   if (options.length < 2) return null;
-  const made = buttons(title, options, (choice) => order(
-    name === "character" ? { do: "character", name: choice } : { do: "ask", menu: name, choice },
-  ));
+  const made = buttons(title, options, (choice) => order({ do: "ask", menu: name, choice }));
   return { ...made, refresh: (run) => made.show(run?.[name] ?? "") };
 }
 
@@ -34,9 +31,8 @@ export default {
       behaviour.node, face.node, joints.node);
     let menus = [];
     onChoices(() => {
-      const names = [...Object.keys(choices.menus), "character"];
-      menus = names.filter((name) => !LISTED_ELSEWHERE.includes(name)).map((name) => menu(name))
-        .filter(Boolean);
+      menus = Object.keys(choices.menus).filter((name) => !LISTED_ELSEWHERE.includes(name))
+        .map((name) => menu(name)).filter(Boolean);
       behaviour.body.replaceChildren(...menus.map(({ node }) => node));
       const expressions = faces();
       face.node.hidden = !expressions.length;

@@ -20,7 +20,7 @@ NO_ANSWER = "the rig does not answer"
 BUSY = f"{TOO_MANY}; try again"
 _MOST_WAITING = 48
 """Largest number of requests that wait for an answer; the rig would refuse more than 64."""
-_SLOW = SLOW | {"parameters", "get", "unsaved", "characters", "tracks"}
+_SLOW = SLOW | {"parameters", "get", "unsaved", "menus", "tracks"}
 _ANSWER_S, _SLOW_S = 10.0, 40.0
 _STOP_S = 1.5
 

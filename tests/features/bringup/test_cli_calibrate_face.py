@@ -5,14 +5,16 @@ from pathlib import Path
 import pytest
 from command_line import Invoked, answers_in, invoked
 from commands_started import OnTerminal
+from fakes.runs import simulated
 
 from gazerig.config.schema import load_rig
 from gazerig.features.bringup.cli.prompts import (
     split_words,
 )
-from gazerig.robot.model.commands import Command, Jog, LookAt, Resume, Stop
+from gazerig.robot.loop.events import TickFeed
+from gazerig.robot.model.commands import Command, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
-from gazerig.robot.net.request_handler import accept_only_stops
+from gazerig.robot.run.requests import RequestHandler
 
 
 def run(*words: str) -> Invoked:
@@ -108,11 +110,17 @@ def test_ctrl_c_parks_and_writes_nothing(rig: Path):
 
 
 def test_while_the_terminal_leads_the_page_can_only_stop_and_resume():
+    made = simulated("desk")
     given: list[Command] = []
-    order = accept_only_stops(given.append, "the terminal leads the head now")
-    order(Stop("a test"))
-    order(Resume())
-    for asked in (LookAt((1.0, 0.0, 0.0)), Jog((("neck_yaw", 0.1),))):
-        with pytest.raises(ValueError, match="leads the head now"):
-            order(asked)
+    made.robot.command = given.append  # type: ignore[method-assign,assignment]
+    hear = RequestHandler(made, TickFeed(), {}, calibrated=True).answer
+    for do, fields in (
+        ("look_at", {"p_world_m": [1.0, 0.0, 0.0]}), ("set", {"changes": {}}),
+        ("jog", {"angles_rad": []}), ("ask", {"menu": "character", "choice": "shy"}), ("menus", {}),
+    ):  # fmt: skip
+        assert "is being calibrated" in str(hear({"do": do, **fields})["refused"])
+    assert hear({"do": "status"})["ok"] and not given
+    hear({"do": "stop", "why": "a test"})
+    hear({"do": "resume"})
     assert given == [Stop("a test"), Resume()]
+    made.close()

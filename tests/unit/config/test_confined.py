@@ -1,17 +1,17 @@
 """A person at a browser names shipped files and those in the rig's folder, and no others."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
-from gazerig.config.rig_files import AllowedFolder, RigLayers
+from gazerig.config.rig_files import AllowedFolder
 from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.model.parameter import SavedFile
-from gazerig.robot.net.request_handler import RequestHandler
-from gazerig.robot.run.live import ParamStore
+from gazerig.robot.run.requests import RequestHandler
 
 
 @pytest.fixture
@@ -73,12 +73,11 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path):
     rig = home / "mine.yaml"
     rig.write_text(Path("config/rigs/desk.yaml").read_text())
     made = simulated(str(rig))
-    tuning = ParamStore(made.rig, lambda _: None, RigLayers(str(rig), None, None))
-    handler = RequestHandler(made.robot.command, TickFeed(), {}, tuning, paths=tuning.confined)
-    hear = handler.answer
+    made.options = replace(made.options, rig=str(rig))
+    hear = RequestHandler(made, TickFeed(), {}, confined=True).answer
     before = sorted(os.listdir(tmp_path))
     for asked in (
-        {"do": "character", "name": "/etc/shadow"},
+        {"do": "ask", "menu": "character", "choice": "/etc/shadow"},
         {"do": "save", "path": str(tmp_path / "made.yaml")},
         {"do": "save", "path": "~/made.yaml"},
         {"do": "set", "changes": {"gaze.scanpath.transition_matrix": "/etc/shadow"}},

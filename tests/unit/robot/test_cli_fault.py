@@ -6,7 +6,7 @@ import pytest
 from ticked_rig import TickedRig, connected, gazerig
 
 from gazerig.drivers.bus.servo_models import SERVOS
-from gazerig.robot.net.request_handler import REAL, RequestHandler
+from gazerig.robot.run.requests import REAL
 from gazerig.sim_mock.device_spec import line_of
 from gazerig.sim_mock.devices import build
 
@@ -17,7 +17,7 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
 
 
 def with_faults(rig: TickedRig, fault: Callable[[str], str]) -> None:
-    rig.handler = RequestHandler(rig.command, rig.pulse, {}, fault=fault)
+    rig.made.bus = rig.made.bus._replace(inject_fault=fault)
 
 
 def test_a_command_reaches_the_emulated_servos_and_says_what_it_did(rig: TickedRig):

@@ -1,5 +1,6 @@
 """Tuning: values set, saved, reverted and read again while a rig runs."""
 
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -54,7 +55,7 @@ def test_one_wrong_value_refuses_all_with_every_rule():
             }
         )
     assert len(refused.value.faults) == 2 and not bench.orders
-    assert bench.tuning.values()["gaze.lids.open_ms"] == 175.0
+    assert bench.tuning.get()["gaze.lids.open_ms"] == 175.0
     with pytest.raises(ConfigError, match="No such file"):
         bench.tuning.set({"gaze.scanpath.transition_matrix": "absent.yaml"})
     assert not bench.orders and bench.tuning.version == 0
@@ -105,20 +106,20 @@ def test_characters_are_switched_and_what_is_unsaved_stays_over_them():
     bench = Bench("desk", "shy")
     assert bench.tuning.characters()[0] == "shy" and "none" in bench.tuning.characters()
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
-    bench.tuning.apply_character("sleepy")
+    bench.tuning.set({"character": "sleepy"})
     want = load_rig("desk", "sleepy").gaze
     got = bench.made.rig.gaze
     assert got.head == want.head and got.top_down == want.top_down
     assert got.lids.close_ms == 90.0 and got.lids.open_ms == want.lids.open_ms
-    assert bench.tuning.character_name == "sleepy"
+    assert bench.tuning.character == "sleepy"
     bench.tuning.revert()
-    assert bench.made.rig == load_rig("desk", "shy")
-    assert bench.tuning.character_name == "shy" and bench.tuning.unsaved() == ()
-    bench.tuning.apply_character("none")
+    assert bench.made.rig == replace(load_rig("desk", "shy"), character="shy")
+    assert bench.tuning.character == "shy" and bench.tuning.unsaved() == ()
+    bench.tuning.set({"character": "none"})
     assert bench.made.rig == load_rig("desk")
     with pytest.raises(ConfigError, match="nothing named 'slepy'"):
-        bench.tuning.apply_character("slepy")
-    assert bench.tuning.character_name == "none"
+        bench.tuning.set({"character": "slepy"})
+    assert bench.tuning.character == "none"
 
 
 @pytest.mark.parametrize("copied", [False, True])
@@ -126,7 +127,7 @@ def test_a_character_is_saved_by_its_name_and_of_the_values_only_those_set_by_ha
     mine: Path, tmp_path: Path, copied: bool
 ):
     bench = Bench(str(mine))
-    bench.tuning.apply_character("bold")
+    bench.tuning.set({"character": "bold"})
     bench.tuning.set({"gaze.lids.close_ms": 90.0, "character": "shy"})
     assert [str(change) for change in bench.tuning.unsaved()] == [
         "character: null -> shy",
@@ -135,12 +136,12 @@ def test_a_character_is_saved_by_its_name_and_of_the_values_only_those_set_by_ha
     saved = bench.tuning.save(tmp_path / "copy.yaml" if copied else None)
     assert {change.key for change in saved.changes} == {"character", "gaze.lids.close_ms"}
     again, by_hand = Bench(str(saved.path)), {"gaze.lids.close_ms": 90.0, "character": "shy"}
-    assert again.tuning.character_name == bench.tuning.character_name == "shy"
+    assert again.tuning.character == bench.tuning.character == "shy"
     assert again.tuning.unsaved() == bench.tuning.unsaved() == ()
-    assert again.tuning.values() == bench.tuning.values()
-    assert values(load_rig("desk", "shy")) | by_hand == bench.tuning.values()
+    assert again.tuning.get() == bench.tuning.get()
+    assert values(load_rig("desk", "shy")) | by_hand == bench.tuning.get()
     assert values(load_rig(str(saved.path), "none")) == values(load_rig("desk")) | by_hand
-    again.tuning.apply_character("none")
+    again.tuning.set({"character": "none"})
     again.tuning.save()
     assert values(load_rig(str(saved.path))) == values(load_rig("desk")) | {
         "gaze.lids.close_ms": 90.0
@@ -150,7 +151,7 @@ def test_a_character_is_saved_by_its_name_and_of_the_values_only_those_set_by_ha
 def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path):
     bench = Bench(str(mine), scanpath="random")
     assert bench.tuning.unsaved() == ()
-    bench.tuning.apply_character("bold")
+    bench.tuning.set({"character": "bold"})
     assert bench.made.rig.gaze.scanpath.model == "random"
     assert [change.key for change in bench.tuning.unsaved()] == ["character"]
     bench.tuning.set({"gaze.idle.hold_ms": 300.0})

@@ -36,12 +36,13 @@ from gazerig.features.bringup.cli.rig_writer import (
 from gazerig.gaze.attention.idle import REST_M
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
-from gazerig.robot.loop.events import group_events
+from gazerig.robot.loop.events import TickFeed, group_events
 from gazerig.robot.loop.loop import LoopCount, Tick
 from gazerig.robot.loop.loop import run as run_loop
 from gazerig.robot.loop.power_down import Interrupts
-from gazerig.robot.net.live_server import LiveServer
+from gazerig.robot.net.socket_server import RemoteServer
 from gazerig.robot.run.options import RunOptions
+from gazerig.robot.run.requests import RequestHandler
 from gazerig.robot.run.run import Run
 from gazerig.robot.run.session import prepare_shutdown
 
@@ -115,8 +116,9 @@ def _calibrate(
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), REST_M, "eyes_pan" not in rig.joints)
     made = Run(exact_gaze(rig), options, chooser=steering)
     about = {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"}
-    door = LiveServer(made.robot, None, about, say)
-    session = _CalibrationSession(steering, lines, made.clock.now_s, stopped, door)
+    feed = TickFeed()
+    door = RemoteServer(RequestHandler(made, feed, about, calibrated=True).answer, say)
+    session = _CalibrationSession(steering, lines, made.clock.now_s, stopped, feed)
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
     count = LoopCount(0, 0, "fault: unexpected error")
@@ -150,10 +152,10 @@ class _CalibrationSession:
         lines: Lines,
         now_s: Callable[[], float],
         stopped: Callable[[], str | None],
-        door: LiveServer,
+        feed: TickFeed,
     ) -> None:
         self._steering, self._lines, self._now_s = steering, lines, now_s
-        self._stopped, self._door = stopped, door
+        self._stopped, self._feed = stopped, feed
         scripted = lines.is_scripted or not sys.stdin.isatty()
         self.keys = None if scripted else TerminalKeys()
         self._script: list[Key] = []
@@ -197,7 +199,7 @@ class _CalibrationSession:
     def update(self, tick: Tick) -> None:
         """Update from a tick, and print instructions for the person."""
         steering = self._steering
-        self._door.update(tick)
+        self._feed.update(tick)
         steering.update(tick)
         for event in group_events(tick.events):
             say(event)
