@@ -177,7 +177,6 @@ class RunningHead(LocalHead):
                 self._interrupts,
                 lambda line: lines.add(partial(self._say, line)),
                 watch=self._update,
-                summarised=False,
             )
             figures = session.run()
             lines.wait_idle(_LINES_S)
@@ -245,7 +244,6 @@ class SimulatedHead(LocalHead):
                 Interrupts(signals=False),
                 self._say,
                 watch=self._feed.update,
-                summarised=False,
             )
             self._loop: TickLoop = stack.enter_context(self._session.power_on())
             self._stack = stack.pop_all()

@@ -25,18 +25,15 @@ def oak(params: OakParams) -> FrameSource:
     return OakSource(params)
 
 
-def film(path: str) -> FrameSource:
-    """Return a film or photo."""
+def film(file: Path) -> FrameSource:
+    """Return a film, a photo or a recording of a camera."""
+    if file.suffix == ".mcap":
+        from gazerig.drivers.camera.playback import CameraReplay
+
+        return CameraReplay(file)
     from gazerig.drivers.camera.film import Film
 
-    return Film(path)
-
-
-def recording(file: Path) -> FrameSource:
-    """Return a recording of a camera."""
-    from gazerig.drivers.camera.playback import CameraReplay
-
-    return CameraReplay(file)
+    return Film(str(file))
 
 
 WEBCAM = CameraPlugin(webcam, WebcamParams)

@@ -15,7 +15,7 @@ from gazerig.drivers.errors import CameraError
 from gazerig.drivers.files.file_input import open_mcap
 
 _LARGEST = 1 << 30  # bytes of a record; more is damage
-_CURE = "make one with gazerig run --record-camera; use --video for films"
+_CURE = "make one with gazerig run --record-camera"
 Messages = dict[str, bytes]
 """Topic -> data of a frame's message."""
 

@@ -114,7 +114,7 @@ def find(line: Transactions, setups: Sequence[ServoConfig]) -> dict[int, int]:
             name = family.model_name(identity.model_number)
             problems.append(f"{one.label()} is {name}, not {one.model}")
     if problems:
-        fault, remedy = "; ".join(problems), "check cables and ids, or ask gazerig doctor"
+        fault, remedy = "; ".join(problems), "check cables and ids, or ask gazerig doctor RIG"
         if not firmware:
             fault, remedy = "no servo answers", "check servo power, cable and baud rate"
         text = f"{line.port.port_name}: {fault}"

@@ -5,7 +5,6 @@ import zipfile
 from collections.abc import Callable, Iterable
 from http.client import HTTPException
 from itertools import groupby
-from pathlib import Path
 from urllib.request import Request, urlopen
 
 from gazerig.drivers.errors import ModelFileError
@@ -19,17 +18,12 @@ Progress = Callable[[str, float], None]
 """Receives the name of a download, and the share of it that has arrived, 0..1."""
 
 
-def fetch(
-    files: Iterable[ModelFile],
-    progress: Progress,
-    folder: Path | None = None,
-) -> list[ModelFile]:
+def fetch(files: Iterable[ModelFile], progress: Progress) -> list[ModelFile]:
     """Fetch model files into the folder of models; existing ones stay.
 
     Args:
         files: Wanted files.
         progress: Receives the progress of each download.
-        folder: Local folder with the downloads; None: fetch them from their addresses.
 
     Returns:
         The fetched files.
@@ -43,11 +37,10 @@ def fetch(
     for address, group in groupby(wanted, lambda file: file.address):
         members = list(group)
         name = address.rpartition("/")[2]
-        source = address if folder is None else (folder / name).absolute().as_uri()
         try:
             size_bytes = members[0].archive_bytes
             content = bytearray()
-            request = Request(source, headers={"User-Agent": "gazerig"})
+            request = Request(address, headers={"User-Agent": "gazerig"})
             with urlopen(request, timeout=_STALLED_S) as reply:
                 while chunk := reply.read(_CHUNK_BYTES):
                     content += chunk
@@ -59,14 +52,10 @@ def fetch(
             found = [(file, _extract(bytes(content), file)) for file in members]
         except (OSError, ValueError, HTTPException, zipfile.BadZipFile) as error:
             first = members[0]
-            where = (
-                f"download it elsewhere and run 'gazerig models fetch {first.name} --from FOLDER'"
-                if first.member
-                else f"put the file into {models_folder()}"
-            )
+            part = f"{first.member} of this archive" if first.member else "it"
             raise ModelFileError(
-                f"cannot get {first.name} from {source} ({' '.join(str(error).split())}). Everything "
-                f"else works without it. To get it by hand: {where}; its address is {first.address}"
+                f"cannot get {first.name} from {address} ({' '.join(str(error).split())}). Everything "
+                f"else works without it. To get it by hand: put {part} into {first.path}"
             ) from error
         for file, data in found:
             write_file(file.path, data, force=True)

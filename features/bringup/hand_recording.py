@@ -57,7 +57,7 @@ def switch_off(joints: Mapping[str, JointParams], port: BusPort) -> None:
     if holding:
         raise ServoFault(
             f"{', '.join(holding)}: not known to have let go: cut the servo power, then find the "
-            "cause with gazerig doctor"
+            "cause with gazerig doctor RIG"
         )
 
 

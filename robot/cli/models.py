@@ -1,6 +1,5 @@
 """Commands under models: a list of model files, and their download."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -49,10 +48,6 @@ def fetch_models(
             help=f"Names: {', '.join(_NAMES)}; default: all.",
         ),
     ] = None,
-    folder: Annotated[
-        Path | None,
-        typer.Option("--from", help="Folder with the downloads, on a machine that is offline."),
-    ] = None,
 ) -> None:
     """Download model files, verify them and put them into the folder of models."""
     with clear_errors():
@@ -64,7 +59,7 @@ def fetch_models(
             for address in dict.fromkeys(file.address for file in wanted):
                 some = [file for file in wanted if file.address == address]
                 try:
-                    brought = fetch(some, progress, folder)
+                    brought = fetch(some, progress)
                 except SetupError as error:
                     failed.append(str(error))
                     continue

@@ -58,10 +58,7 @@ def run(**given: Any) -> None:
         with exit_on_signals():
             made = Run(run_rig(asked), asked)
         with record_signals() as stopped:
-            session = Session(
-                made, stopped, opening.say, shows, opening.update, browse,
-                summarised=summary is not None,
-            )  # fmt: skip
+            session = Session(made, stopped, opening.say, shows, opening.update, browse)
             figures = session.run()
         if summary is not None:
             text = json.dumps(figures, indent=2) + "\n"

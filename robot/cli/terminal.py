@@ -3,15 +3,14 @@
 A thread writes the message lines, so that a pipe without a reader, a terminal stopped with Ctrl-S
 or a full disk delays no caller. Lines that cannot be written are dropped and counted.
 
-Commands suggested in messages get the rig and port of the current command. A driver or the doctor
-that reports a fault does not have them; without them a suggested command would use the default rig.
+In commands that messages suggest, RIG becomes the rig and port of the current command, which a
+driver or the doctor does not have.
 """
 
 import atexit
 import contextlib
 import logging
 import os
-import re
 import select
 import shlex
 import shutil
@@ -21,7 +20,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
-from typing import Annotated, Any, NamedTuple, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -87,38 +86,13 @@ class LineWriter:
                 return
 
 
-_SUGGESTED = re.compile(
-    r"\bgazerig (doctor|setup|calibrate|scan|run(?= --recover))\b"
-    r"((?: --fix\b| --recover\b| --joint \w+| --kind \w+)*)"
-)
-
-
-class _Arguments(NamedTuple):
-    """Rig and port of the current command, for the commands that its messages suggest."""
-
-    rig: str = ""
-    port: str | None = None
-    mock: bool = False
-
-
-_arguments = _Arguments()
-"""Shared by all threads, as monitor threads also write messages."""
+_rig = "RIG"
+"""Rig and port of the current command; shared by all threads, as all write messages."""
 
 
 def complete_suggestions(text: str) -> str:
     """Return a message whose suggested commands use the rig and port of the current command."""
-    rig, port, mock = shlex.quote(_arguments.rig), _arguments.port, _arguments.mock
-    if not _arguments.rig:
-        return text
-
-    def complete(found: re.Match[str]) -> str:
-        if text[found.end() :].startswith((f" {rig}", " --port ")):
-            return found[0]  # it already has these arguments
-        named = "" if found[1] == "scan" and not mock else f" {rig}"
-        more = (f" --port {shlex.quote(port)}" if port else "") + (" --mock" if mock else "")
-        return f"gazerig {found[1]}{named}{found[2]}{more}"
-
-    return _SUGGESTED.sub(complete, text)
+    return text.replace(" RIG", f" {_rig}")
 
 
 BAD_INPUT = 2
@@ -159,17 +133,18 @@ def clear_errors(
 
     rig, port, mock: arguments of the command, for suggested commands
     """
-    global _arguments
-    outer = _arguments
+    global _rig
+    outer = _rig
     if rig is not None:
-        _arguments = _Arguments(rig, port, mock)
+        named = f" --port {shlex.quote(port)}" if port else ""
+        _rig = f"{shlex.quote(rig)}{named}{' --mock' if mock else ''}"
     try:
         yield
     except (ConfigError, SetupError, DriverError) as error:
         text = str(error)
         is_servo = isinstance(error, ServoMissing | ServoFault)
-        if is_servo and _arguments.rig and not _arguments.mock and "gazerig " not in text:
-            text = f"{text}; gazerig doctor finds the cause"
+        if is_servo and rig is not None and not mock and "gazerig " not in text:
+            text = f"{text}; gazerig doctor RIG finds the cause"
         _exit(text, BAD_INPUT if isinstance(error, ConfigError | SetupError) else FAULT)
     except ModuleNotFoundError as error:
         if error.name not in _OF_REPORTS:
@@ -180,7 +155,7 @@ def clear_errors(
     except OSError as error:
         _exit(f"{error.filename or 'file'}: {error.strerror or error}", BAD_INPUT)
     finally:
-        _arguments = outer
+        _rig = outer
 
 
 def _exit(text: str, code: int) -> NoReturn:

@@ -235,8 +235,8 @@ class Body:
         where = [f"{name} {text}" for name, text in far.items()]
         if self._recover is None:
             raise SetupError(
-                f"{'; '.join(where)} Torque stays off: gazerig doctor examines it, gazerig run "
-                "--recover moves it slowly into its range"
+                f"{'; '.join(where)} Torque stays off: gazerig doctor RIG examines it, gazerig run "
+                "RIG --recover moves it slowly into its range"
             )
         for text in where:
             self._recover(f"{text} It moves slowly into its range")

@@ -111,7 +111,7 @@ class FrameLocator:
             return ""
         return (
             f"camera.lens does not fit: {why}; the camera's lens or camera.horizontal_field_deg is "
-            "used instead: calibrate the lens at this size (gazerig calibrate camera)"
+            "used instead: calibrate the lens at this size (gazerig calibrate camera RIG)"
         )
 
     def __call__(self, found: Detections) -> LocatedFrame:

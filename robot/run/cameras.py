@@ -83,7 +83,7 @@ def place_camera(
         in_process: Whether frames are analysed, which needs the rotation of the camera.
     """
     what, params, notes = options.camera_source, rig.camera, tuple[str, ...]()
-    filmed = options.video is not None or options.replay is not None
+    filmed = options.video is not None
     if what is not None and (filmed or options.mock) and params.mount != "base":
         where = "" if filmed else " next to an emulated head"
         notes = (f"{what}{where} does not turn with the head: the camera counts as fixed",)
@@ -150,10 +150,8 @@ def real_camera(
 def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     """Return a function that creates the source of frames, in the process that will use it."""
     name = options.camera
-    if options.replay is not None:
-        return partial(camera_plugins.recording, options.replay)
     if options.video is not None:
-        return partial(camera_plugins.film, str(options.video))
+        return partial(camera_plugins.film, options.video)
     if options.oak or name == "oak":
         return partial(camera_plugins.oak, rig.oak)
     if isinstance(name, int) or name == "webcam":

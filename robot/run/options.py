@@ -79,8 +79,7 @@ class RunOptions:
     world: Annotated[str | None, Option("World with physics: living-room, boxing ...", "NAME|FILE")] = None
     camera: Annotated[int | str | None, Option("Webcam N, or the camera NAME of a package.", "N|NAME")] = None
     oak: Annotated[bool, Option("OAK-D camera.")] = False
-    video: Annotated[Path | None, Option("Film or image, in a loop.", "FILE")] = None
-    replay: Annotated[Path | None, Option("Recording of --record-camera, in a loop.", "FILE", name="camera-recording")] = None
+    video: Annotated[Path | None, Option("Film, image or recording of a camera, in a loop.", "FILE")] = None
     record_camera: Annotated[Path | None, Option("Record every frame of the camera: FILE.mcap.", "FILE")] = None
     pixels: Annotated[bool, Option("Draw the scene, and detect in it; needs --fast.", is_shown=False)] = False
     no_pictures: Annotated[bool, Option("Compute what the camera of a world sees, without pictures.", is_shown=False)] = False
@@ -105,7 +104,6 @@ class RunOptions:
     record_pictures: Annotated[float, Option("Camera frames per second in the recording.", "HZ", 0.0, 60.0, is_shown=False)] = 2.0
     summary: Annotated[str | None, Option("Write figures as JSON; - prints them.", "FILE")] = None
     force: Annotated[bool, Option("Overwrite existing files.")] = False
-    verbose: Annotated[bool, Option("Also print details.", is_shown=False)] = False
     # fmt: on
 
     @property
@@ -113,8 +111,6 @@ class RunOptions:
         """Return the name of the real or filmed camera, None for a scene."""
         if self.video is not None:
             return "a film"
-        if self.replay is not None:
-            return "a recording"
         if self.camera is not None:
             return "a webcam" if isinstance(self.camera, int) else f"the camera {self.camera!r}"
         return "an OAK-D" if self.oak else None
@@ -165,7 +161,7 @@ class RunOptions:
         _ = self.page_address, self.page_token
         views = [
             name
-            for name in ("scene", "video", "camera", "oak", "replay", "world")
+            for name in ("scene", "video", "camera", "oak", "world")
             # Webcam 0 is valid.
             if getattr(self, name) is not None and getattr(self, name) is not False
         ]

@@ -202,10 +202,9 @@ class Run:
                 self.robot.report,
             )
             self._opened = opened.pop_all()
-        shipped = rig.gaze.scanpath.transition_matrix in shipped_names("scanpaths")
-        # A shipped walk is reported only if verbose.
-        note = row_sums_note(models.walk) if options.verbose or not shipped else None
-        self.notes = (*notes, *([note] if note is not None else []))
+        own_walk = rig.gaze.scanpath.transition_matrix not in shipped_names("scanpaths")
+        note = row_sums_note(models.walk) if own_walk else None
+        self.notes = notes if note is None else (*notes, note)
 
     def close(self) -> None:
         """End the processes started for it; the robot closes its own camera and bus."""

@@ -5,6 +5,7 @@ it. Then the observers are closed, the recording last, and the processes of the 
 """
 
 import contextlib
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 
 from gazerig.drivers.errors import SetupError
@@ -15,7 +16,6 @@ from gazerig.robot.loop.power_down import Again, Interrupts, PowerDown
 from gazerig.robot.loop.tick_stream import Observers
 from gazerig.robot.loop.timing import SWITCH_INTERVAL, frozen_objects
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.run.figures import Summary
 from gazerig.robot.run.observers import RunObservers
 from gazerig.robot.run.run import Run
 
@@ -33,7 +33,6 @@ class Session:
         status: Rewrites the status line; None for none.
         watch: Receives every tick.
         browse: Opens the page in the user's browser; None: the user does.
-        summarised: also summarise every tick, for figures of the gaze.
 
     Attributes:
         stopped_by: reason of its end; a fault unless the block of ``power_on`` sets another one
@@ -47,12 +46,12 @@ class Session:
         status: Callable[[str], None] | None = None,
         watch: Callable[[Tick], object] | None = None,
         browse: Callable[[str], object] | None = None,
-        summarised: bool = True,
     ) -> None:
         self._run, self._write = run, say
         self._status, self._watch, self._browse = status, watch, browse
         self._interrupts = Interrupts.from_stop(stopped)
-        self._summary = Summary() if summarised else None
+        self._target_s: defaultdict[str, float] = defaultdict(float)
+        self._last: Tick | None = None
         self._longest_s = run.options.seconds
         if self._longest_s is None and run.options.fast and run.scene is not None:
             self._longest_s = run.scene.round_s + 1.0  # includes the end of the round
@@ -125,8 +124,7 @@ class Session:
 
     def _observers(self, people: RunObservers, faults: JointFaults) -> Observers[Tick]:
         observers = Observers[Tick](self._say)
-        if self._summary is not None:
-            observers.add("the summary", self._summary.update)
+        observers.add("the summary", self._summarise)
         observers.add("the watch for faults", faults.update)
         people.attach(observers)
 
@@ -141,20 +139,26 @@ class Session:
             observers.add("the program", self._watch)
         return observers
 
+    def _summarise(self, tick: Tick) -> None:
+        """Count the time of each kind of target."""
+        if self._last is not None:
+            self._target_s[tick.target.kind] += tick.t_s - self._last.t_s
+        self._last = tick
+
     def _stop_reason(self, seconds: float) -> str | None:
         """Return the reason for ending the run now, None while it continues."""
         over = self._longest_s is not None and seconds >= self._longest_s - 1e-9
         return self._interrupts() or (SECONDS if over else None)
 
     def _print_start(self) -> None:
-        options, events = self._run.options, self._run.robot.body.bus.events()
-        if options.mock and not options.verbose:  # omit registers of emulated servos
+        events = self._run.robot.body.bus.events()
+        if self._run.options.mock:  # omit registers of emulated servos
             events = tuple(event for event in events if not is_register_change(event))
         for note in (*self._run.notes, *group_events(events)):
             self._say(note)
 
     def _collect_figures(self, count: LoopCount, faults: JointFaults) -> dict[str, object]:
-        """Return the figures of the ticks (if summarised), the loop, the frames and the bus."""
+        """Return the figures of gaze, loop, frames and bus."""
         perception, health = self._run.robot.perception, self._run.robot.body.bus.health()
         bus: dict[str, object] = {
             "tx_bytes": health.tx_bytes,
@@ -164,12 +168,20 @@ class Session:
         digest = self._run.bus.sent_bytes_digest()
         if digest is not None:
             bus["tx_sha256"] = digest
+        seconds, gaze = sum(self._target_s.values()), self._last.gaze if self._last else None
         return {
+            "seconds": round(seconds, 6),
+            "fixations": gaze.fixations if gaze else 0,
+            "saccades": gaze.saccades if gaze else 0,
+            "blinks": gaze.blinks if gaze else 0,
+            "target_share": {
+                kind: round(time_s / seconds, 4)
+                for kind, time_s in sorted(self._target_s.items(), key=lambda item: -item[1])
+            },
             "ticks": count.ticks,
             "overruns": count.overruns,
             "faces_seen": perception.frames_with_face,
             "pictures": perception.frames,
-            **(self._summary.figures() if self._summary is not None else {}),
             "joint_faults": faults.counts,
             "bus": bus,
             "stopped_by": count.stopped_by,

@@ -115,6 +115,7 @@ def errors() -> list[str]:
 @pytest.fixture
 def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
     about = {"rig": "desk", "pid": os.getpid()}
+    beat.made.__dict__.pop("params", None)  # values that another test has set
     server = RemoteServer(RequestHandler(beat.made, beat.pulse, about).answer, errors.append)
     server.open()
     with RobotClient.connect() as connected:

@@ -53,7 +53,7 @@ class JoggedNeck:
         moved = self._control.pose({name: degrees(a) for name, a in axes if name in there})
         if moved.end_reason == "torque_off":
             raise SetupError(
-                "the torque went off during the move: see gazerig doctor, then start again"
+                "the torque went off during the move: see gazerig doctor RIG, then start again"
             )
         self.rest(_SETTLE_S)
 

@@ -259,7 +259,7 @@ def _show(rounds: Sequence[SearchRound], where: str, channels: int | None, as_js
     for _, baud, answers in searched:
         lines += [
             f"two or more servos have id {servo_id} at {baud} bit/s: connect them one at a time and "
-            "run gazerig setup"
+            "run gazerig setup RIG"
             for servo_id in answers.shared_ids
         ]
         if answers.junk and not answers.found and baud not in {servo.baud for _, servo in found}:

@@ -58,14 +58,14 @@ def setup(
                 done |= _set_up_chain(model, bus, mine, port, mock, yes)
             elif mine:
                 say(
-                    f"{bus_label(model, bus)}: channels of a board have no ids; gazerig doctor "
+                    f"{bus_label(model, bus)}: channels of a board have no ids; gazerig doctor RIG "
                     "checks the board, gazerig jog shows which servo is on which channel"
                 )
                 done |= {one.name for one in mine}
         left = [name for name in wanted if name not in done]
         if left:
             say(f"skipped: {', '.join(left)}")
-        say(f"done: {len(wanted) - len(left)} of {len(wanted)}. Next: gazerig doctor")
+        say(f"done: {len(wanted) - len(left)} of {len(wanted)}. Next: gazerig doctor RIG")
 
 
 def _set_up_chain(
@@ -128,7 +128,7 @@ def _set_up(
         (found, wanted), names = spare, {one.name for one in chain}
         say(
             f"   all others of the chain answer, so it is for {servo_label(wanted)}; its zero is "
-            f"another: then gazerig calibrate --joint {wanted.name}"
+            f"another: then gazerig calibrate RIG --joint {wanted.name}"
         )
     else:
         found = servo_setup.find_alone(answers, line.port_name)

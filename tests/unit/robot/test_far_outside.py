@@ -168,7 +168,7 @@ def test_the_command_is_refused_in_one_line_and_recovers_on_request(bus: str, ca
     assert typed(*words) == 2
     (line,) = capfd.readouterr().err.splitlines()
     assert line.startswith(SAID) and "gazerig doctor desk --mock" in line
-    assert "gazerig run desk --recover --mock" in line
+    assert "gazerig run desk --mock --recover" in line
     assert typed(*words, "--recover") == 0
     said = capfd.readouterr().err
     assert SAID in said
@@ -180,7 +180,7 @@ def test_the_doctor_says_the_same(capfd: Terminal):
     assert typed("doctor", "desk", "--mock") == 1
     said = capfd.readouterr().out
     assert f"left_eye_pan (servo 1): {SAID.removeprefix(f'{EYE} ')}" in said
-    assert "gazerig calibrate desk --joint left_eye_pan --mock" in said
+    assert "gazerig calibrate desk --mock --joint left_eye_pan" in said
     assert "is at step" not in said
 
 

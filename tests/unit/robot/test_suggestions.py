@@ -10,12 +10,8 @@ pytestmark = pytest.mark.usefixtures("simulated_wires")
 @pytest.mark.parametrize(
     ("said", "wanted"),
     [
-        ("gazerig doctor --fix", "gazerig doctor 'my rig.yaml' --fix --port /dev/ttyACM3"),
-        ("gazerig setup --joint neck_yaw, as", 
-         "gazerig setup 'my rig.yaml' --joint neck_yaw --port /dev/ttyACM3, as"),
-        ("run gazerig scan: it", "run gazerig scan --port /dev/ttyACM3: it"),
-        ("gazerig calibrate", "gazerig calibrate 'my rig.yaml' --port /dev/ttyACM3"),
-        ("gazerig run --mock", "gazerig run --mock"),
+        ("gazerig doctor RIG --fix", "gazerig doctor 'my rig.yaml' --port /dev/ttyACM3 --fix"),
+        ("gazerig setup RIG, as", "gazerig setup 'my rig.yaml' --port /dev/ttyACM3, as"),
         ("gazerig ctl set a b", "gazerig ctl set a b"),
     ],
 )  # fmt: skip
