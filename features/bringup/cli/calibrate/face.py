@@ -115,10 +115,11 @@ def _calibrate(
     begin = FaceCalibration(rig.face_parts_mm)
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), REST_M, "eyes_pan" not in rig.joints)
     made = Run(exact_gaze(rig), options, chooser=steering)
-    about = {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"}
-    feed = TickFeed()
-    door = RemoteServer(RequestHandler(made, feed, about, calibrated=True).answer, say)
-    session = _CalibrationSession(steering, lines, made.clock.now_s, stopped, feed)
+    session = _CalibrationSession(steering, lines, made.clock.now_s, stopped)
+    requests = RequestHandler(
+        made, session.feed, {"rig": rig.name, "pid": os.getpid()}, calibrated=True
+    )
+    door = RemoteServer(requests.answer, say)
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
     count = LoopCount(0, 0, "fault: unexpected error")
@@ -144,6 +145,7 @@ class _CalibrationSession:
     """Session between the ticks: reads keys, and prints instructions.
 
     keys: keys of a terminal, None for lines of a file or a pipe, which no user can end
+    feed: its ticks, for requests of other programs
     """
 
     def __init__(
@@ -152,10 +154,9 @@ class _CalibrationSession:
         lines: Lines,
         now_s: Callable[[], float],
         stopped: Callable[[], str | None],
-        feed: TickFeed,
     ) -> None:
         self._steering, self._lines, self._now_s = steering, lines, now_s
-        self._stopped, self._feed = stopped, feed
+        self._stopped, self.feed = stopped, TickFeed()
         scripted = lines.is_scripted or not sys.stdin.isatty()
         self.keys = None if scripted else TerminalKeys()
         self._script: list[Key] = []
@@ -199,7 +200,7 @@ class _CalibrationSession:
     def update(self, tick: Tick) -> None:
         """Update from a tick, and print instructions for the person."""
         steering = self._steering
-        self._feed.update(tick)
+        self.feed.update(tick)
         steering.update(tick)
         for event in group_events(tick.events):
             say(event)
