@@ -163,9 +163,6 @@ class ServoBus(Protocol):
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, e.g. "servo 3 restarted: set up again"."""
 
-    def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Store setups, with the same ids and models, for the next time torque is switched on."""
-
     def disable_torque(self) -> None:
         """Switch torque off on every servo; never raises for a servo that does not answer."""
 

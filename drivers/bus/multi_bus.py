@@ -37,7 +37,8 @@ class MultiBus:
     def __init__(self, shares: Sequence[BusShare], setups: Sequence[ServoConfig]) -> None:
         self._shares = tuple(shares)
         self._buses = tuple(share.bus for share in shares)
-        self._setups = self._target_setups = tuple(setups)
+        self._lowest = [setup.min_steps for setup in setups]
+        self._highest = [setup.max_steps for setup in setups]
         given = [place for share in shares for place in share.servo_indices]
         # Position of each of the rig's servos among those of the buses, one after the other.
         self._order = sorted(range(len(given)), key=given.__getitem__)
@@ -71,7 +72,6 @@ class MultiBus:
 
     def enable_torque(self) -> tuple[int, ...]:
         """Switch torque on, bus by bus, and return the goals; if one refuses, release all again."""
-        self._setups = self._target_setups
         try:
             goals = [goal for bus in self._buses for goal in bus.enable_torque()]
         except BaseException:
@@ -82,9 +82,7 @@ class MultiBus:
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo; goals are clipped to the limits."""
-        lowest = [setup.min_steps for setup in self._setups]
-        highest = [setup.max_steps for setup in self._setups]
-        goals = clip_goals(goals_steps, lowest, highest)
+        goals = clip_goals(goals_steps, self._lowest, self._highest)
         for _, bus, indices in self._shares:
             bus.write([goals[place] for place in indices])
 
@@ -95,14 +93,6 @@ class MultiBus:
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
         return tuple(event for bus in self._buses for event in bus.events())
-
-    def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Store setups for the next time torque is switched on."""
-        if len(setups) != len(self._setups):
-            raise ValueError("ids and models must not change: create another bus for other servos")
-        for _, bus, indices in self._shares:
-            bus.retune([setups[place] for place in indices])
-        self._target_setups = tuple(setups)
 
     def disable_torque(self) -> None:
         """Switch torque off on every bus, even if another bus fails.

@@ -329,11 +329,6 @@ class GuardedBus:
         self._events.clear()
         return events
 
-    def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Store setups that take effect when the torque is switched on next."""
-        self._setups = tuple(setups)
-        self._bus.retune(setups)
-
     def health(self) -> BusHealth:
         """Return byte and error counts."""
         return self._bus.health()

@@ -11,7 +11,7 @@ from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
 from gazerig.robot.loop.sag import SagCompensation
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling import CouplingParams, pair_setups
-from gazerig.robot.model.joint import JointLimit, JointParams
+from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import JointAngles, JointState, order_joints
 from gazerig.robot.safety.start_range import find_far_outside
 
@@ -52,7 +52,6 @@ class Body:
     Args:
         bus: Bus with the configuration from ``servo_setups``.
         joints: The joints by name.
-        park_rad: As in ``servo_setups``.
         pairs: As in ``servo_setups``.
         sag: Changes of the goals that make up for the weight; None: none.
         recover: Receives a line about each joint that is far outside its range, which then moves
@@ -63,7 +62,6 @@ class Body:
         self,
         bus: ServoBus,
         joints: Mapping[str, JointParams],
-        park_rad: Mapping[str, float] | None = None,
         pairs: Collection[CouplingParams] = (),
         sag: SagCompensation | None = None,
         recover: Callable[[str], object] | None = None,
@@ -74,10 +72,9 @@ class Body:
         self.names = order_joints(joints)
         self._pairs = tuple(pairs)
         self._coupled = CoupledServos(pairs, self.names)
-        self._park_rad = dict(park_rad or {})
         self._torque_off = False
-        self._joints = self._set_up = tuple(joints[name] for name in self.names)
-        self._linkages = [joint.make_linkage() for joint in self._joints]
+        self._joints = {name: joints[name] for name in self.names}
+        self._linkages = [joint.make_linkage() for joint in self._joints.values()]
         # Before the first answer: the centre, infinitely old.
         self._nothing = Feedback.create_missing(len(self.names))
         self._last = self._nothing._replace(
@@ -85,17 +82,8 @@ class Body:
             velocity_steps_s=(0.0,) * len(self.names),
             load=(0.0,) * len(self.names),
             torque=(True,) * len(self.names),  # it was switched on, and no servo reports otherwise
-            measured=tuple([joint.model_facts.measures_position for joint in self._joints]),
+            measured=tuple([one.model_facts.measures_position for one in self._joints.values()]),
         )
-
-    def retune(self, joints: Mapping[str, JointParams], gentle_deg_s: float) -> None:
-        """Apply new limits of joints; the servos are set up again when torque is switched on."""
-        self._joints = tuple(joints[name] for name in self.names)
-        self.bus.retune(servo_setups(joints, self._park_rad, gentle_deg_s, self._pairs))
-
-    def configured_limits(self) -> tuple[JointLimit, ...]:
-        """Return the ranges and speeds of the servos' configuration."""
-        return tuple([joint.limit() for joint in self._set_up])
 
     def start(self, clock: Clock) -> JointAngles:
         """Open the bus and switch the torque on at the present angles; return the goals.
@@ -212,24 +200,17 @@ class Body:
         self._torque_off = False
         # A servo that has not answered since then has torque.
         self._last = self._last._replace(torque=(True,) * len(self.names))
-        self._set_up = self._joints
         return self.angles(goals)
 
     def _refuse_far_outside(self) -> None:
         """Refuse torque if a joint is far outside its range, or report that it moves inside.
-
-        A joint within the range of the last torque-on is not refused: its range was changed.
 
         Raises:
             SetupError: A joint is far outside, and its recovery was not requested.
         """
         rows = zip(self.names, self._last.measured, self._last.position_steps, strict=True)
         steps = {name: at for name, measured, at in rows if measured}
-        far, before = (
-            find_far_outside(dict(zip(self.names, joints, strict=True)), self._pairs, steps)
-            for joints in (self._joints, self._set_up)
-        )
-        far = {name: text for name, text in far.items() if name in before}
+        far = find_far_outside(self._joints, self._pairs, steps)
         if not far:
             return
         where = [f"{name} {text}" for name, text in far.items()]

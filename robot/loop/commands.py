@@ -4,19 +4,24 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from math import degrees, inf, radians
-from typing import TYPE_CHECKING
 
 from msgspec import structs
 
+from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, direction, rotate, scale
-from gazerig.gaze.attention.conversation import MODES
+from gazerig.gaze.attention.conversation import MODES, ConversationGaze
 from gazerig.gaze.attention.startle import FLINCH, Startle
+from gazerig.gaze.lids.lids import Lids
+from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
 from gazerig.params import unknown_text
+from gazerig.robot.loop.body import Body
+from gazerig.robot.loop.chooser import TargetChooser
 from gazerig.robot.loop.client_control import ClientControl
 from gazerig.robot.loop.conversation import Conversation
 from gazerig.robot.loop.stop import StopControl
+from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.commands import (
     NO_TRACK,
     Ask,
@@ -43,13 +48,13 @@ from gazerig.robot.model.commands import (
     Talk,
     Tune,
 )
+from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, Ticket
 from gazerig.robot.model.scene import MovableOpponent
 from gazerig.robot.model.types import JointAngles
-
-if TYPE_CHECKING:
-    from gazerig.robot.loop.loop import Robot
+from gazerig.robot.perception.pixel_to_world import PixelToWorld
+from gazerig.robot.safety.guard import Guard
 
 MAX_WAITING = 64
 MAX_PER_TICK = 8
@@ -130,17 +135,44 @@ class CommandExecutor:
         lead: Control of gaze or joints by a client.
         stop: Stops and resumes.
         conversation: State that a voice agent reports.
+        tracks: Tracks that can be played.
         commanded_rad: Joint angles last sent to the servos; joints are held from there.
         opponent: Boxer in the emulated world and the start of its scene; None without one.
 
     Args:
-        robot: The robot.
+        body: The joints on their bus.
+        poses: History of the head's pose.
+        attention: Chooses the target.
+        gaze: Looks away from faces, and follows reported turns.
+        lids: Lids, for winks and sleepiness.
+        animation: Tracks and expressions on top of the gaze.
+        tracks: Tracks that can be played.
+        guard: Guard between desired angles and the bus.
+        tune: Applies changed parameters and returns messages about it.
+        pixels: Converts pixels of a camera frame to points in the world.
+        messages: Receives lines for the events of the next tick.
     """
 
-    def __init__(self, robot: "Robot") -> None:
-        self._robot = robot
-        self.lead = ClientControl(robot.body.names)
-        self.stop = StopControl(robot.body, robot.messages)
+    def __init__(
+        self,
+        body: Body,
+        poses: PoseHistory,
+        attention: TargetChooser,
+        gaze: ConversationGaze,
+        lids: Lids,
+        animation: Animation,
+        tracks: TrackChoices,
+        guard: Guard,
+        tune: Callable[[Tune, float], tuple[str, ...]],
+        pixels: PixelToWorld,
+        messages: list[str],
+    ) -> None:
+        self._poses, self._attention, self._gaze, self._lids = poses, attention, gaze, lids
+        self._animation, self._guard, self._tune, self._pixels = animation, guard, tune, pixels
+        self._names, self._messages = body.names, messages
+        self.tracks = tracks
+        self.lead = ClientControl(body.names)
+        self.stop = StopControl(body, messages)
         self.conversation = Conversation()
         self.commanded_rad: JointAngles = ()
         self.opponent: tuple[MovableOpponent, Callable[[], float | None]] | None = None
@@ -149,8 +181,10 @@ class CommandExecutor:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the tracks that rules have played."""
+        """Forget the newest frame and the tracks that rules have played."""
         self._trigger, self._startle = TrackTrigger(), Startle()
+        self._detections: Detections | None = None
+        self._percept: Percept | None = None
 
     def models_took_over(self) -> bool:
         """Return once whether the gaze models take control again, from the present pose."""
@@ -161,17 +195,16 @@ class CommandExecutor:
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return the choices of ``Ask``: menu -> choices, the present one first."""
-        robot, top_down = self._robot, self._robot.attention.top_down
+        top_down, animation = self._attention.top_down, self._animation
         menus = {
             "behaviour": _put_first(top_down.chosen_behaviour, top_down.behaviours),
-            "conversation": _put_first(robot.conversation_gaze.chosen_mode, MODES),
+            "conversation": _put_first(self._gaze.chosen_mode, MODES),
             "lids": _LID_COMMANDS,
         }
-        animation = robot.animation
         if animation.expressions:
             menus["expression"] = _put_first(animation.expression, animation.expressions)
-        names = (NO_TRACK, *robot.track_choices.names)
-        menus["track"] = _put_first(robot.track_choices.playing or NO_TRACK, names)
+        names = (NO_TRACK, *self.tracks.names)
+        menus["track"] = _put_first(self.tracks.playing or NO_TRACK, names)
         return menus
 
     def refuse_impossible(self, command: Command) -> None:
@@ -180,7 +213,6 @@ class CommandExecutor:
         Raises:
             ValueError: The message lists the available choices.
         """
-        robot = self._robot
         match command:
             case Ask(menu, choice):
                 menus = self.menus()
@@ -189,33 +221,32 @@ class CommandExecutor:
                 if choice not in menus[menu]:
                     raise ValueError(unknown_text(menu, choice, menus[menu]))
             case Jog(angles_rad):
-                names = robot.body.names
+                names = self._names
                 for name, _ in angles_rad:
                     if name not in names:
                         raise ValueError(unknown_text("joint", name, names))
             case Express(name):
-                robot.animation.require("expression", name)
+                self._animation.require("expression", name)
             case SetLevel(name):
-                robot.animation.require("level", name)
+                self._animation.require("level", name)
             case Say():
                 raise ValueError("this run has no voice")
             case Play() | Speak():
-                robot.track_choices.require(command, robot.guard.limits)
+                self.tracks.require(command, self._guard.limits)
 
     # --- execution, in the loop's thread
 
     def complete(self, command: Command) -> Command:
         """Return a command as it is executed, with everything that a recording needs."""
-        robot = self._robot
         if isinstance(command, Ask) and command.menu == "track":
             command = Play("" if command.choice == NO_TRACK else command.choice)
         if isinstance(command, Play) and command.track:
-            return robot.track_choices.complete(command, robot.guard.limits)
-        tick = robot.newest
-        if tick is None or tick.detections is None or not isinstance(command, LookAtPixel):
+            return self.tracks.complete(command, self._guard.limits)
+        frame = self._detections
+        if frame is None or not isinstance(command, LookAtPixel):
             return command
-        point = command.p_world_m or robot.pixels.point(
-            command.pixel_px, tick.detections, tick.percept, command.distance_m, command.captured_s
+        point = command.p_world_m or self._pixels.point(
+            command.pixel_px, frame, self._percept, command.distance_m, command.captured_s
         )
         return structs.replace(command, p_world_m=point)
 
@@ -229,7 +260,6 @@ class CommandExecutor:
             return CommandReply(str(error))
 
     def _execute(self, command: Command, t_s: float) -> CommandReply | None:
-        robot = self._robot
         match command:
             case Ask(menu, choice):
                 self._choose(menu, choice, t_s)
@@ -240,20 +270,20 @@ class CommandExecutor:
             case Play() | Speak():
                 return self._play(command, t_s)
             case EndTrack():
-                return robot.track_choices.end(command, t_s)
+                return self.tracks.end(command, t_s)
             case SyncTrack():
-                robot.track_choices.sync(command, t_s)
+                self.tracks.sync(command, t_s)
             case Express(name, strength):
-                robot.animation.express(name, strength)
+                self._animation.express(name, strength)
             case SetLevel(name, value):
-                robot.animation.set_level(name, value, t_s)
+                self._animation.set_level(name, value, t_s)
             case MoveOpponent(point):
                 self._move_opponent(t_s, point)
             case Talk():
                 if command.person is not None and command.person not in self._known:
                     self._face(command.person)
                 if message := self.conversation.report(command, t_s):
-                    robot.messages.append(message)
+                    self._messages.append(message)
                 self._converse(t_s)
             case Renew(who=who):
                 talks = self.conversation.renew(who, t_s)
@@ -262,20 +292,20 @@ class CommandExecutor:
             case Stop():
                 self.stop.halt(command, t_s)
                 self.lead.end(f"stopped: {command.why}")
-                robot.track_choices.drop_present(t_s)
+                self.tracks.drop_present(t_s)
             case Resume() if self.stop.reason:
                 goals = self.stop.resume(command, t_s)
                 if isinstance(goals, CommandReply):
                     return goals
-                robot.guard.reset(t_s, goals)
+                self._guard.reset(t_s, goals)
                 self._taken_over = True
             case Tune():
-                robot.messages += robot.tune(command, t_s)
+                self._messages += self._tune(command, t_s)
         return None
 
     def end_expired(self, t_s: float) -> None:
         """End a client's control that was not renewed or has expired, and expired levels."""
-        messages = self._robot.messages
+        messages = self._messages
         self._move_opponent(t_s)
         if why := self.lead.expiry_reason(t_s):
             client = self.lead.state.client
@@ -286,31 +316,31 @@ class CommandExecutor:
             messages.append(f"conversation: {state.state} of {state.who or 'a client'} ends: {why}")
             self.conversation.end(why, t_s)
             self._converse(t_s)
-        for name in self._robot.animation.drop_lapsed(t_s):
+        for name in self._animation.drop_lapsed(t_s):
             messages.append(f"level {name}: not set any more, so it returns to 0")
 
-    def remember_people(self, percept: Percept | None) -> None:
-        """Remember the people of a frame, whom commands may name although they are out of view."""
+    def remember(self, detections: Detections | None, percept: Percept | None) -> None:
+        """Remember a frame and its people, whom commands may name although they are out of view."""
+        self._detections, self._percept = detections, percept
         if percept is not None:
             self._known.update(face.id for face in percept.faces)
 
     def _choose(self, menu: str, choice: str, t_s: float) -> None:
-        robot = self._robot
         if menu == "behaviour":
-            robot.attention.top_down.behave(choice)
+            self._attention.top_down.behave(choice)
         elif menu == "conversation":
-            robot.conversation_gaze.choose_mode(choice, t_s)
-            robot.lids.set_conversation(robot.conversation_gaze.converses)
+            self._gaze.choose_mode(choice, t_s)
+            self._lids.set_conversation(self._gaze.converses)
         elif menu == "expression":
-            robot.animation.express(choice)
+            self._animation.express(choice)
         else:
-            robot.lids.wink("left" if choice == "wink left" else "right", t_s)
+            self._lids.wink("left" if choice == "wink left" else "right", t_s)
 
     def _converse(self, t_s: float) -> None:
         """Let gaze and lids follow the state of conversation; when idle, the chosen mode."""
-        state, gaze = self.conversation.state, self._robot.conversation_gaze
+        state, gaze = self.conversation.state, self._gaze
         gaze.enter(state.state, state.partner, state.ends_s, state.confidence, t_s)
-        self._robot.lids.set_conversation(gaze.converses)
+        self._lids.set_conversation(gaze.converses)
 
     def _look(self, command: Look, t_s: float) -> CommandReply:
         """Give a client control of the gaze, or free it."""
@@ -332,7 +362,7 @@ class CommandExecutor:
         Raises:
             ValueError: The point cannot be found now; the message gives the reason.
         """
-        R, p = self._robot.poses.head_pose(inf)
+        R, p = self._poses.head_pose(inf)
         match command:
             case LookAt(point):
                 return point
@@ -351,7 +381,7 @@ class CommandExecutor:
         Raises:
             ValueError: No visible person has that number; the message lists the visible people.
         """
-        percept = self._robot.newest.percept if self._robot.newest is not None else None
+        percept = self._percept
         faces = percept.faces if percept is not None else ()
         for face in faces:
             if face.id == number and percept is not None:
@@ -361,12 +391,11 @@ class CommandExecutor:
 
     def _jog(self, command: Jog, t_s: float) -> CommandReply:
         """Move the given joints and hold the others; without any, free the joints."""
-        robot, tracks = self._robot, self._robot.track_choices
-        if command.angles_rad and (dropped := tracks.drop_present(t_s)):
-            robot.messages.append(f"track {dropped} ends: a client controls the joints")
+        if command.angles_rad and (dropped := self.tracks.drop_present(t_s)):
+            self._messages.append(f"track {dropped} ends: a client controls the joints")
         self._change_control(lambda: self.lead.jog(command, self.commanded_rad, t_s))
         if command.angles_rad:
-            robot.guard.start_gently()  # a slider may jump from end to end
+            self._guard.start_gently()  # a slider may jump from end to end
         return self._control_reply()
 
     def _change_control(self, change: Callable[[], None]) -> None:
@@ -375,9 +404,9 @@ class CommandExecutor:
         change()
         if held and not self.lead.pose_rad:
             self._taken_over = True
-            self._robot.guard.start_gently()
+            self._guard.start_gently()
         if self.lead.state.active and not active:
-            self._robot.messages.append(f"controlled by {self.lead.state.client}")
+            self._messages.append(f"controlled by {self.lead.state.client}")
 
     def _move_opponent(self, t_s: float, point: Vec3 | None = None) -> None:
         """Advance a boxer of the emulated world, or move its fist; a repeated run has none."""
@@ -396,18 +425,17 @@ class CommandExecutor:
         starts = isinstance(command, Speak) or bool(command.track)
         if starts and self.lead.pose_rad:
             return CommandReply(f"{self.lead.state.client}: the joints are held at their angles")
-        robot = self._robot
-        reply = robot.track_choices.play(command, t_s, robot.guard.limits)
+        reply = self.tracks.play(command, t_s, self._guard.limits)
         if starts:
             by = f" for {command.who}" if command.who else ""
-            robot.messages.append(f"track{by}: {reply.text()}")
+            self._messages.append(f"track{by}: {reply.text()}")
         return reply
 
     # --- tracks that no client has asked for
 
     def follow_turn(self, t_s: float) -> None:
         """Let the gaze follow the present turn, and play a listener's nod."""
-        if self.conversation.active and (name := self._robot.conversation_gaze.step(t_s)):
+        if self.conversation.active and (name := self._gaze.step(t_s)):
             self._play_unasked(Play(name, who="conversation"), t_s)
 
     def react_by_track(
@@ -423,7 +451,7 @@ class CommandExecutor:
             pose: Measured poses of head and eyes.
             t_s: Present time.
         """
-        top_down = self._robot.attention.top_down
+        top_down = self._attention.top_down
         name = self._trigger.step(
             top_down.behaviour, top_down.rule, target, t_s, top_down.named_ids
         )
@@ -435,12 +463,12 @@ class CommandExecutor:
 
     def _play_unasked(self, command: Play, t_s: float) -> None:
         """Play a track unless a client or a show moves the head."""
-        tracks, limits = self._robot.track_choices, self._robot.guard.limits
+        tracks, limits = self.tracks, self._guard.limits
         if self.stop.reason or self.lead.state.active or tracks.ends_show(command, limits):
             return
         reply = self._play(tracks.complete(command, limits), t_s)
         if reply.refused:
-            self._robot.messages.append(f"track for {command.who} {reply.text()}")
+            self._messages.append(f"track for {command.who} {reply.text()}")
 
 
 def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> None:

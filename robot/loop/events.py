@@ -3,7 +3,7 @@
 import re
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from itertools import takewhile
 
 from gazerig.gaze.types import ORDERED, Target
@@ -16,7 +16,6 @@ from gazerig.robot.model.reply import Progress
 _MOST_EVENTS, _MOST_MESSAGES = 2000, 100
 """Number of stored events, and of messages besides."""
 _LOOK_S = 0.002
-_SERVO = re.compile(r"servo (\d+)")
 _REGISTER = re.compile(r": .+ (-?\d+ -> -?\d+|set)$")
 
 _Change = tuple[str, EventKind, int | str]
@@ -161,19 +160,14 @@ def _target_change(text: str, kind: EventKind, target: Target) -> _Change:
 
 
 def group_events(events: Iterable[str]) -> list[str]:
-    """Group events that differ only in their servo, e.g. "servos 1-9: Return Delay Time 250 -> 0".
-
-    An event is "neck_yaw (servo 7): what" or "servo 7: what"; other texts stay unchanged.
-    """
+    """Join events that differ only in their servo: "jaw (servo 1), brow (servo 2): what"."""
     whose: dict[str, list[str]] = {}
     for event in events:
         who, colon, what = event.partition(": ")
         whose.setdefault(what if colon else event, []).append(who if colon else "")
     lines = []
     for what, names in whose.items():
-        ids = [int(found[1]) for name in names if (found := _SERVO.search(name))]
-        several = len(names) > 1 and len(ids) == len(names)
-        who = f"servos {format_ranges(ids)}" if several else ", ".join(filter(None, names))
+        who = ", ".join(filter(None, names))
         lines.append(f"{who}: {what}" if who else what)
     return lines
 
@@ -181,14 +175,3 @@ def group_events(events: Iterable[str]) -> list[str]:
 def is_register_change(event: str) -> bool:
     """Return whether an event only reports that a register of a servo was set."""
     return _REGISTER.search(event) is not None
-
-
-def format_ranges(numbers: Sequence[int]) -> str:
-    """Format numbers with runs joined: 1-3, 7."""
-    runs: list[list[int]] = []
-    for number in sorted(numbers):
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(f"{r[0]}-{r[-1]}" if len(r) > 1 else f"{r[0]}" for r in runs)

@@ -13,7 +13,6 @@ from gazerig.drivers.plugins import describe_error, plugin_error
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.addressing import AddressingModel
 from gazerig.gaze.attention.conversation import ConversationGaze
-from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.scanpath.scanpath import Scanpath
 from gazerig.gaze.track.animation import Animation
@@ -24,7 +23,7 @@ from gazerig.robot.loop.commands import CommandExecutor, CommandQueue, refuse_ou
 from gazerig.robot.loop.tick import Tick as Tick
 from gazerig.robot.loop.tick import stopped_result
 from gazerig.robot.loop.timing import freeze_objects
-from gazerig.robot.loop.track_choices import TrackChoices, TrackInfo
+from gazerig.robot.loop.track_choices import TrackInfo
 from gazerig.robot.model.clock import Clock, LoopParams, RealClock
 from gazerig.robot.model.commands import (
     AnyCommand,
@@ -33,7 +32,6 @@ from gazerig.robot.model.commands import (
     Jog,
     MoveOpponent,
     Play,
-    Tune,
     check_command,
 )
 from gazerig.robot.model.frames import PoseHistory
@@ -42,7 +40,6 @@ from gazerig.robot.model.reply import Ticket
 from gazerig.robot.model.scene import MovableOpponent
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.safety.guard import Guard
 
 PARK_S = 4.0
@@ -70,12 +67,9 @@ class Robot:
         scanpath: Chooses the part of a face.
         conversation: Looks away from faces, and follows reported turns.
         oculomotor: Target to eyes, head and lids; reports whether the gaze has arrived.
-        lids: Lids, for winks and sleepiness.
         animation: Tracks and expressions on top of the gaze.
-        tracks: Tracks that can be played.
         guard: Guard between desired angles and the bus.
-        tune: Applies changed parameters and returns messages about it.
-        pixels: Converts pixels of a camera frame to points in the world.
+        commands: Executes commands on these components.
         messages: Lines for the events of the next tick; other components add theirs.
 
     Attributes:
@@ -94,26 +88,21 @@ class Robot:
         scanpath: Scanpath,
         conversation: ConversationGaze,
         oculomotor: Oculomotor,
-        lids: Lids,
         animation: Animation,
-        tracks: TrackChoices,
         guard: Guard,
-        tune: Callable[[Tune, float], tuple[str, ...]],
-        pixels: PixelToWorld,
-        messages: list[str] | None = None,
+        commands: CommandExecutor,
+        messages: list[str],
     ) -> None:
         self.body, self.kinematics = body, kinematics
         self.camera, self.perception = camera, perception
         self.poses, self.attention, self.conversation_gaze = poses, attention, conversation
-        self.oculomotor, self.lids, self.animation = oculomotor, lids, animation
-        self.track_choices, self.guard, self.tune, self.pixels = tracks, guard, tune, pixels
-        self.messages = messages if messages is not None else []
+        self.oculomotor, self.animation = oculomotor, animation
+        self.guard, self.messages = guard, messages
         self.newest: Tick | None = None
         self.closing_events: tuple[str, ...] = ()
         self._scanpath, self._addressing = scanpath, AddressingModel()
         self._gaze_m: Vec3 | None = None
-        self._commands = CommandQueue()
-        self._executor = CommandExecutor(self)
+        self._commands, self._executor = CommandQueue(), commands
 
     @property
     def stopped(self) -> str:
@@ -176,7 +165,7 @@ class Robot:
 
     def tracks(self) -> tuple[TrackInfo, ...]:
         """Return all tracks with their fit to this rig."""
-        return self.track_choices.all_tracks(self.guard.limits)
+        return self._executor.tracks.all_tracks(self.guard.limits)
 
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
         """Open camera and bus, switch the torque on and start from the present angles.
@@ -293,7 +282,7 @@ class Robot:
             guard_result = self.guard.check(desired, joints, self._frame_age_s(percept, t_s), t_s)
             self.body.write(guard_result.command_rad)
         executor.commanded_rad = guard_result.command_rad
-        executor.remember_people(percept)
+        executor.remember(detections, percept)
         converges = not self.kinematics.one_pan
         events = (*self.messages, *self.body.bus.events(), *self.camera.events())
         self.messages.clear()
@@ -301,7 +290,7 @@ class Robot:
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events,
             commands, stop.reason,
             lead.measure(target, pose, gaze, joints.position_rad, converges, t_s),
-            self.track_choices.states(t_s),
+            self._executor.tracks.states(t_s),
             conversation=conversation.state,
             addressed=self._addressing.step(percept, pose.p_world_head_m, t_s),
         )  # fmt: skip

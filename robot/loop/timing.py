@@ -7,8 +7,6 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import numpy as np
-
 from gazerig.drivers.process.priority import SHORT_S, request_slice
 from gazerig.robot.model.types import LoopFigures
 
@@ -28,8 +26,7 @@ class LoopTiming:
     """
 
     def __init__(self, rate_hz: float) -> None:
-        self._rows: deque[tuple[float, float, int, float]] = deque()
-        self._overruns = 0
+        self._rows: deque[tuple[float, int, float]] = deque()
         self._period_s = 1.0 / rate_hz
         self._last_s: float | None = None
 
@@ -41,9 +38,7 @@ class LoopTiming:
             return
         wait_s = t_s - last_s
         slots = max(1, round(wait_s / self._period_s))
-        off_s = abs(wait_s - slots * self._period_s)
-        self._rows.append((t_s, off_s, slots - 1, wait_s - self._period_s))
-        self._overruns += slots - 1
+        self._rows.append((t_s, slots - 1, wait_s - self._period_s))
         while t_s - self._rows[0][0] >= OVER_S:
             self._rows.popleft()
 
@@ -52,20 +47,14 @@ class LoopTiming:
         rows = list(self._rows)
         if not rows:
             return None
-        table = np.array(rows)
-        overruns = int(table[:, 2].sum())
-        spread_s = table[-1, 0] - table[0, 0]
-        p50, p99, worst = (1e3 * np.percentile(table[:, 1], (50.0, 99.0, 100.0))).tolist()
+        overruns = sum(skipped for _, skipped, _ in rows)
+        spread_s = rows[-1][0] - rows[0][0]
         return LoopFigures(
-            rate_hz=float((len(table) - 1) / spread_s) if spread_s > 0.0 else 1.0 / self._period_s,
-            p50_ms=p50,
-            p99_ms=p99,
-            worst_ms=worst,
+            rate_hz=(len(rows) - 1) / spread_s if spread_s > 0.0 else 1.0 / self._period_s,
             overruns=overruns,
-            overruns_ever=self._overruns,
-            over_s=min(OVER_S, float(spread_s)),
+            over_s=min(OVER_S, spread_s),
             late_share=overruns / (overruns + len(rows)),
-            latest_ms=1e3 * max(0.0, float(table[:, 3].max())),
+            latest_ms=1e3 * max(0.0, *[late_s for *_, late_s in rows]),
         )
 
 

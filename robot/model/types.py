@@ -109,19 +109,13 @@ class LoopFigures(Struct, frozen=True):
     """The loop's timing over the last ``over_s`` seconds.
 
     Attributes:
-        p50_ms, p99_ms, worst_ms: Deviation of the time between two ticks from whole slots.
-        overruns: Slots skipped in these seconds.
-        overruns_ever: Slots skipped since the start.
+        overruns: Skipped slots.
         late_share: Share of skipped slots.
         latest_ms: Largest delay of a tick after its slot.
     """
 
     rate_hz: float
-    p50_ms: float
-    p99_ms: float
-    worst_ms: float
     overruns: int
-    overruns_ever: int
     over_s: float
-    late_share: float = 0.0
-    latest_ms: float = 0.0
+    late_share: float
+    latest_ms: float

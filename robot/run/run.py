@@ -20,6 +20,7 @@ from gazerig.gaze.scanpath.scanpath import row_sums_note
 from gazerig.robot.dashboard.feed.rig_feed import ShownRig
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.chooser import Chooser, RuleChooser, TargetChooser
+from gazerig.robot.loop.commands import CommandExecutor
 from gazerig.robot.loop.loop import Robot
 from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClock
@@ -144,14 +145,11 @@ class Run:
             # Joints and their guard
             sag = None if options.bus == "ideal" else sag_compensation(rig)
             recovered = self._messages.append if options.recover else None
-            self.body = Body(
-                self.bus.bus, rig.joints, park_rad(rig), rig.couplings.values(), sag, recovered
-            )
+            self.body = Body(self.bus.bus, rig.joints, rig.couplings.values(), sag, recovered)
             self.guard = Guard(
                 rig.guard,
                 limits(rig.joints),
                 self.body.names,
-                self.body.configured_limits,
                 1.0 / rig.loop.rate_hz,
             )
             # The robot, which joins them in every tick
@@ -162,8 +160,22 @@ class Run:
                 label = f"attention {type(rule).__name__} of the program"
                 attention = RuleChooser(rule, attention, label)
             self.tracks = _tracks(rig, models, options.rig)
+            body = wrap_body(self.body) if wrap_body is not None else self.body
+            commands = CommandExecutor(
+                body,
+                view.poses,
+                attention,
+                models.conversation,
+                models.lids,
+                models.animation,
+                self.tracks,
+                self.guard,
+                self._tune,
+                PixelToWorld(view.mount, view.poses, lambda: self.camera_params),
+                self._messages,
+            )
             self.robot = Robot(
-                wrap_body(self.body) if wrap_body is not None else self.body,
+                body,
                 models.kinematics,
                 seen,
                 Perception(
@@ -177,12 +189,9 @@ class Run:
                 models.scanpath,
                 models.conversation,
                 models.oculomotor,
-                models.lids,
                 models.animation,
-                self.tracks,
                 self.guard,
-                self._tune,
-                PixelToWorld(view.mount, view.poses, lambda: self.camera_params),
+                commands,
                 self._messages,
             )
             if self.room is not None and (opponent := self.room.world.scene.opponent) is not None:
@@ -265,27 +274,14 @@ class Run:
             return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         self.rig = new
         self.tracks.latency_s = new.gaze.oculomotor.eye_lag_ms / 1e3
-        gentle_deg_s = new.guard.soft_start_speed_deg_s
-        set_up = new.joints != old.joints or gentle_deg_s != old.guard.soft_start_speed_deg_s
-        if set_up:
-            self.body.retune(new.joints, gentle_deg_s)
-        if set_up or new.guard != old.guard:
-            self.guard.retune(new.guard, limits(new.joints))
         if new.ranges != old.ranges:
             self.guard.start_gently()  # desired angles jump
-        more = [
-            name
-            for name, desired, most in zip(
-                self.body.names, limits(new.joints), self.body.configured_limits(), strict=True
-            )
-            if desired.low_rad < most.low_rad - 1e-6
-            or desired.high_rad > most.high_rad + 1e-6
-            or desired.speed_rad_s > most.speed_rad_s + 1e-6
-        ]
         lines = [f"tuned: {key} = {value}{start_note(key)}" for key, value in command.changes]
-        if set_up and more:
-            names = ", ".join(more)
-            lines.append(f"{names}: the full range and speed apply after a stop and a resume")
+        if new.joints != old.joints or new.guard != old.guard:
+            for i in self.guard.retune(new.guard, limits(new.joints)):
+                lines.append(
+                    f"{self.body.names[i]}: the full range and speed apply at the next start"
+                )
         return tuple(lines)
 
     def _look_by(self, camera: Camera | None) -> None:

@@ -6,7 +6,6 @@ joints. A joint that is hot, overloaded, stuck or has too low a voltage slows do
 independently of the others. Angles are in rad.
 """
 
-from collections.abc import Callable
 from math import inf, isfinite, radians
 from typing import Literal, NamedTuple
 
@@ -56,10 +55,8 @@ class Guard:
 
     Args:
         params: Thresholds and times.
-        limits: One limit per joint.
+        limits: One limit per joint, as in the servos' own configuration.
         joints: The joints' names.
-        reach: Returns the ranges and speeds in the servos' own configuration, which apply in
-            addition to changed limits; None for servos without limits of their own.
         period_s: Nominal time between ticks. Motion missed by a late tick is not made up for.
 
     Raises:
@@ -71,7 +68,6 @@ class Guard:
         params: GuardParams,
         limits: tuple[JointLimit, ...],
         joints: tuple[str, ...],
-        reach: Callable[[], tuple[JointLimit, ...]] | None = None,
         period_s: float = 0.1,
     ) -> None:
         self._gentle_speed = radians(params.soft_start_speed_deg_s)
@@ -80,25 +76,29 @@ class Guard:
         self._names = joints
         self._neck = tuple("neck" in name.split("_") for name in joints)
         self._motion = MotionLimiter(limits)
-        self._change = LimitChange(self._motion, limits, reach)
+        self._change = LimitChange(self._motion)
         self._limits = self._motion.limits
         self._health = JointHealth(limits)
         self._stuck = StallDetector(len(limits))
         self._collisions = Collisions(params.collisions, limits, joints)
         self.reset(0.0, tuple(0.5 * (limit.low_rad + limit.high_rad) for limit in limits))
 
-    def retune(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
+    def retune(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> list[int]:
         """Change the limits without a jump; counters and findings stay.
 
         A joint whose motion exceeds its new limit first comes to rest under the old one. A joint
-        outside its new range then moves inside slowly.
+        outside its new range then moves inside slowly. Limits wider than at the start have no
+        effect, as the servos have those as well.
+
+        Returns:
+            The joints whose new limits are wider.
 
         Raises:
             ValueError: A collision leaves no pose inside the limits; nothing has changed.
         """
         self._collisions = Collisions(params.collisions, limits, self._names)
         self._gentle_speed = radians(params.soft_start_speed_deg_s)
-        self._change.retune(limits)
+        return self._change.retune(limits)
 
     def reset(self, t_s: float, command_rad: JointAngles) -> None:
         """Start slowly and at rest from the present goals on the bus."""

@@ -6,7 +6,6 @@ following ticks.
 """
 
 from collections import deque
-from collections.abc import Callable
 from math import copysign, inf, sqrt
 
 from gazerig.robot.model.joint import JointLimit
@@ -227,42 +226,36 @@ class LimitChange:
         outside: Joints that are outside their ranges.
 
     Args:
-        motion: Limiter with the present limits.
-        wanted: One limit per joint.
-        reach: Returns the ranges and speeds in the servos' own configuration; None for servos
-            without limits of their own.
+        motion: Limiter with the limits of the servos' own configuration.
     """
 
-    def __init__(
-        self,
-        motion: MotionLimiter,
-        wanted: tuple[JointLimit, ...],
-        reach: Callable[[], tuple[JointLimit, ...]] | None,
-    ) -> None:
-        self._motion, self._wanted, self._reach = motion, wanted, reach
+    def __init__(self, motion: MotionLimiter) -> None:
+        self._motion = motion
+        self._own = self._wanted = tuple(motion.limits)
         self.waiting: set[int] = set()
         self.outside: set[int] = set()
-        self.reset()
 
     def reset(self) -> None:
         """Apply all limits immediately."""
-        self._motion.limits[:] = self._within_reach()
+        self._motion.limits[:] = self._wanted
         self.waiting.clear()
 
-    def retune(self, wanted: tuple[JointLimit, ...]) -> None:
-        """Change the limits, each as soon as its joint can keep it."""
-        self._wanted = wanted
-        in_force = self._motion.limits
-        self.waiting = {i for i, limit in enumerate(self._within_reach()) if limit != in_force[i]}
+    def retune(self, wanted: tuple[JointLimit, ...]) -> list[int]:
+        """Change the limits within the servos' own, each as soon as its joint can keep it.
+
+        Returns:
+            The joints whose servos allow less.
+        """
+        self._wanted = tuple(map(JointLimit.reduced_to, wanted, self._own))
+        rows = zip(self._wanted, self._motion.limits, strict=True)
+        self.waiting = {i for i, (limit, present) in enumerate(rows) if limit != present}
         for i in range(len(wanted)):
             self._motion.reset_range(i)  # walls of a collision that no longer applies
+        return [i for i, limit in enumerate(self._wanted) if limit != wanted[i]]
 
     def begin(self, i: int, angle_rad: float) -> None:
         """Start a joint at its present goal on the bus, at rest."""
-        low, high = self._motion.limits[i][:2]
-        if self._reach is not None:
-            reach = self._reach()[i]
-            low, high = min(low, reach.low_rad), max(high, reach.high_rad)
+        low, high = self._own[i][:2]
         self._motion.restart(i, min(max(angle_rad, low), high))
         self._update_outside(i)
 
@@ -273,7 +266,7 @@ class LimitChange:
             walls: Whether there are walls against collisions, made for the present accelerations.
         """
         if self.waiting:
-            limits, motion = self._within_reach(), self._motion
+            limits, motion = self._wanted, self._motion
             for i in sorted(self.waiting):
                 free = not walls and motion.keeps_limit(i, limits[i])
                 if motion.speed[i] == 0.0 or free:
@@ -282,12 +275,6 @@ class LimitChange:
                     self._update_outside(i)
         for i in sorted(self.outside):
             self._update_outside(i)
-
-    def _within_reach(self) -> tuple[JointLimit, ...]:
-        """Return the wanted limits, reduced to those of the servos' configuration."""
-        if self._reach is None:
-            return self._wanted
-        return tuple(map(JointLimit.reduced_to, self._wanted, self._reach()))
 
     def _update_outside(self, i: int) -> None:
         """Update whether a joint is outside its range."""

@@ -55,7 +55,8 @@ class IdealBus:
         self._events: tuple[str, ...] = ()
         self._measured = tuple(measured)
         self._warm = tuple([WARM_C if one else None for one in self._measured])
-        self.retune(configs)
+        self._lowest = tuple([one.min_steps for one in configs])
+        self._highest = tuple([one.max_steps for one in configs])
 
     @property
     def has_torque(self) -> bool:
@@ -104,11 +105,6 @@ class IdealBus:
         """Stop the shafts at their positions."""
         now_s = self._now_s()
         self._motion = _Motion(now_s, self._motion.steps(now_s), None)
-
-    def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Use other limits from the next goals on."""
-        self._lowest = tuple([one.min_steps for one in setups])
-        self._highest = tuple([one.max_steps for one in setups])
 
     def faults(self) -> tuple[str, ...]:
         """Return no faults."""

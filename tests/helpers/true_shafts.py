@@ -20,7 +20,7 @@ from gazerig.robot.model.types import JointAngles
 from gazerig.robot.run.buses import rig_bus
 from gazerig.robot.run.emulated import emulated_lines, servo_index
 from gazerig.robot.run.rig_description import sag_compensation
-from gazerig.robot.run.rig_limits import limits, park_rad
+from gazerig.robot.run.rig_limits import limits
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, build
@@ -156,12 +156,11 @@ class Bench:
         for name, angle in (where_rad or {}).items():
             self.turn(name, angle)
         sag = sag_compensation(rig)
-        self.body = Body(rig_bus(rig, ports), rig.joints, park_rad(rig), sag=sag, recover=recover)
+        self.body = Body(rig_bus(rig, ports), rig.joints, sag=sag, recover=recover)
         self.guard = Guard(
             rig.guard,
             limits(rig.joints),
             self.names,
-            self.body.configured_limits,
             1.0 / rig.loop.rate_hz,
         )
         self.period_s = 1.0 / rig.loop.rate_hz

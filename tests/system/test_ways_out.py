@@ -96,7 +96,8 @@ def test_servos_that_do_not_confirm_are_said_even_where_success_is_not():
 
     with PowerDown(head.park, off, said.append, Interrupts(), quiet=True) as leaving:
         leaving.switch_on(lambda: None)
-    assert said == ["parked, torque off; servos 1-3: torque-off not confirmed: cut it"]
+    eyes = "eye (servo 1), eye (servo 2), eye (servo 3)"
+    assert said == [f"parked, torque off; {eyes}: torque-off not confirmed: cut it"]
 
 
 def test_a_start_that_is_refused_needs_no_end_and_one_that_breaks_off_does():
@@ -261,7 +262,8 @@ def test_servos_that_go_silent_at_the_end_are_named(
     assert figures["joint_faults"] == {} and report_faults(figures, said.append)
     assert said[-1] == (
         "stopped by seconds: parked, torque off; "
-        "servos 2-3: torque-off not confirmed: cut the servo power"
+        "left_eye_tilt (servo 2), right_eye_pan (servo 3): "
+        "torque-off not confirmed: cut the servo power"
     )
 
 

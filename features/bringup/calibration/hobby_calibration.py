@@ -102,7 +102,7 @@ class HobbyServoAccess:
         self._setup = ServoConfig(joint.id, joint.model, low, high, speed, name)
         maestro = isinstance(params, MaestroParams)
         board = MaestroBoard(port, params) if maestro else Pca9685Board(port, params)
-        bus = HobbyBoardBus(board, [self._setup])
+        self._board_bus = bus = HobbyBoardBus(board, [self._setup])
         self._bus: ServoBus = (
             bus if guardian is None else GuardedBus(bus, [self._setup], guardian, 0)
         )
@@ -134,7 +134,7 @@ class HobbyServoAccess:
                 str,
             )
         self.aim(at_us)
-        self._bus.retune([self._setup._replace(rest_steps=self._goal)])
+        self._board_bus.retune([self._setup._replace(rest_steps=self._goal)])
         (self._goal,) = self._bus.enable_torque()
         self._tell_events()
         self._person.tell(

@@ -31,7 +31,7 @@ from gazerig.robot.loop.events import group_events
 from gazerig.robot.loop.power_down import Interrupts, PowerDown
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.run.buses import guarded_rig_bus
-from gazerig.robot.run.rig_limits import limits, park_rad
+from gazerig.robot.run.rig_limits import limits
 from gazerig.robot.safety.guard import Guard
 
 app = typer.Typer()
@@ -149,9 +149,7 @@ def holding_rig(
         SetupError: port or servos do not match the configuration.
         typer.Exit: not all servos confirmed the torque-off after a successful block.
     """
-    body = Body(
-        guarded_rig_bus(rig, paths), rig.joints, park_rad(rig), pairs=rig.couplings.values()
-    )
+    body = Body(guarded_rig_bus(rig, paths), rig.joints, pairs=rig.couplings.values())
     guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=1.0 / RATE_HZ)
     control = ManualControl(body, guard, RealClock(), speed_deg_s, stopped)
     with PowerDown(

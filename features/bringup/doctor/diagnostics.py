@@ -10,8 +10,6 @@ from typing import Literal
 
 import msgspec
 
-from gazerig.robot.loop.events import format_ranges
-
 Level = Literal["ok", "note", "warn", "error"]
 LEVELS: tuple[Level, ...] = ("ok", "note", "warn", "error")
 
@@ -141,13 +139,13 @@ def group_findings(findings: Sequence[Diagnostic]) -> list[tuple[Level, str, str
 
 
 def join_places(places: Sequence[str]) -> str:
-    """Join the names of several places; joints first, then servos: "a, b, c (servos 1-3)"."""
+    """Join the names of several places; joints first, then servos: "a, b (servos 1, 2)"."""
     found = [match for place in places if (match := _JOINT.fullmatch(place))]
     nouns = {match[2] for match in found}
     if len(places) == 1 or len(found) < len(places) or len(nouns) > 1:
         return ", ".join(places)
     names = ", ".join(match[1] for match in found)
-    return f"{names} ({nouns.pop()}s {format_ranges([int(match[3]) for match in found])})"
+    return f"{names} ({nouns.pop()}s {', '.join(match[3] for match in found)})"
 
 
 def summarize(findings: Sequence[Diagnostic], rig: str, fixed: bool) -> str:

@@ -87,15 +87,14 @@ const cell = (text, strain = "") => make("td", { className: strain, textContent:
 
 function timing(loop) {
   if (!loop) return [note("the loop's times are not known yet")];
-  const { rate_hz, p50_ms, p99_ms, worst_ms, overruns, overruns_ever, over_s } = loop;
-  const late = rate_hz > 0 && worst_ms > (LATE_SHARE * 1000) / rate_hz ? "near" : "";
+  const { rate_hz, latest_ms, overruns, over_s } = loop;
+  const late = rate_hz > 0 && latest_ms > (LATE_SHARE * 1000) / rate_hz ? "near" : "";
   return [
-    table(["rate", "p50", "p99", "worst", "overruns"], [[
-      `${rate_hz.toFixed(1)} Hz`, cell(`${p50_ms.toFixed(2)} ms`),
-      cell(`${p99_ms.toFixed(2)} ms`), cell(`${worst_ms.toFixed(2)} ms`, late),
+    table(["rate", "latest tick", "overruns"], [[
+      `${rate_hz.toFixed(1)} Hz`, cell(`${latest_ms.toFixed(2)} ms late`, late),
       cell(overruns, overruns ? "near" : ""),
     ]]),
-    note(`off the slots, over the last ${over_s.toFixed(0)} s; ${overruns_ever} slots overrun since the start`),
+    note(`over the last ${over_s.toFixed(0)} s`),
   ];
 }
 

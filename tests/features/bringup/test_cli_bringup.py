@@ -42,7 +42,7 @@ def test_scan_lists_every_servo():
 def test_doctor_finds_and_fixes():
     code, out, _ = invoked("doctor", "--mock")
     assert code == 0
-    assert "waits 500 us before every answer" in out and "(servos 1-9)" in out
+    assert "waits 500 us before every answer" in out and "(servos 1, 2, 3, 4, 5, 6, 7, 8, 9)" in out
     assert " mends " in out
     code, out, _ = invoked("doctor", "--mock", "--fix")
     assert code == 0

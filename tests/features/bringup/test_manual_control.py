@@ -15,7 +15,7 @@ from gazerig.features.bringup.manual_control import ManualControl, Step
 from gazerig.robot.loop.body import Body
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.run.buses import rig_bus
-from gazerig.robot.run.rig_limits import limits, park_rad
+from gazerig.robot.run.rig_limits import limits
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.devices import DynamixelLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -49,7 +49,7 @@ class Bench(EmulatedRig):
         self.why: str | None = None
         self.at: dict[float, str] = {}
         self.control = ManualControl(
-            Body(rig_bus(rig, self.ports), rig.joints, park_rad(rig)),
+            Body(rig_bus(rig, self.ports), rig.joints),
             guard,
             self.clock,
             speed_deg_s,

@@ -58,9 +58,6 @@ class Scripted:
     def events(self):
         return (f"{self.name} says",)
 
-    def retune(self, setups):
-        self._do("retune " + ",".join(str(setup.id) for setup in setups))
-
     def disable_torque(self):
         self._do("disable_torque")
 
@@ -98,12 +95,6 @@ def test_every_sequence_is_in_the_order_of_the_whole(mixture):
     assert reported.missing == ()
     mixture.bus.write([20, 21, 22, 23, 24])
     assert (mixture.a.steps, mixture.b.steps) == ([21, 23, 24], [22, 20])
-    mixture.reported()
-    mixture.bus.retune(WANTED)
-    assert mixture.reported() == ["a retune 1,3,4", "b retune 2,0"]
-    with pytest.raises(ValueError, match="ids and models must not change"):
-        mixture.bus.retune(WANTED[:4])
-    assert mixture.reported() == []
     assert mixture.bus.faults() == ("a: overload", "b: overload")
     assert mixture.bus.events() == ("a says", "b says")
     assert mixture.bus.health() == (20, 40, {"timeout": 2, "a": 2, "b": 2})

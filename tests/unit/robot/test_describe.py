@@ -30,7 +30,6 @@ from gazerig.robot.run.rig_description import (
     sag_compensation,
     statics_of,
 )
-from gazerig.robot.run.rig_limits import park_rad
 
 
 @pytest.fixture(scope="module")
@@ -255,7 +254,7 @@ class Neck:
         self.emulated = EmulatedRig(rig)
         sag = sag_compensation(rig) if compensated else None
         bus = rig_bus(rig, self.emulated.ports)
-        self.body = Body(bus, rig.joints, park_rad(rig), sag=sag)
+        self.body = Body(bus, rig.joints, sag=sag)
         self.at = self.body.names.index("neck_pitch")
         self.goal = list(self.body.start(self.emulated.clock))
         self.t_s = 0.0

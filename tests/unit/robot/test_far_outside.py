@@ -141,10 +141,6 @@ def test_a_stop_holds_when_a_hand_has_turned_a_joint_far_outside(
     bench.run(0.1)
     with pytest.raises(SetupError, match="25 deg outside its range"):
         bench.body.enable_torque()
-    # A range that was widened meanwhile contains it; one that is narrowed later refuses nothing.
-    for max_deg in (80.0, 35.0):
-        bench.body.retune({**bench.rig.joints, EYE: replace(joint, max_deg=max_deg)}, 30.0)
-        bench.body.enable_torque()
 
 
 @pytest.mark.usefixtures("slipped")

@@ -1,6 +1,5 @@
 """Figures of the loop's time, from the times of its ticks."""
 
-import numpy as np
 import pytest
 
 from gazerig.robot.loop.timing import LoopTiming, busy_text
@@ -16,37 +15,26 @@ def timed(times_s: list[float], rate_hz: float = 200.0) -> LoopFigures:
     return figures
 
 
-def test_a_loop_that_keeps_its_slots_has_no_jitter():
+def test_a_loop_that_keeps_its_slots_has_no_late_tick():
     figures = timed([0.005 * k for k in range(400)])
     assert figures.rate_hz == pytest.approx(200.0)
-    assert figures.worst_ms == pytest.approx(0.0, abs=1e-6)
-    assert figures.overruns == figures.overruns_ever == 0
-
-
-def test_a_late_tick_shows_as_a_long_and_a_short_wait():
-    times = [0.005 * k for k in range(400)]
-    times[200] += 0.0015
-    figures = timed(times)
-    assert figures.worst_ms == pytest.approx(1.5, abs=1e-6)
-    assert figures.p50_ms == pytest.approx(0.0, abs=1e-6)
+    assert figures.latest_ms == pytest.approx(0.0, abs=1e-6)
     assert figures.overruns == 0
 
 
-def test_percentiles_are_those_of_the_waits():
-    dice = np.random.default_rng(4)
-    times = 0.005 * np.arange(900) + dice.uniform(0.0, 1e-3, 900)
-    off_ms = 1e3 * np.abs(np.diff(times) - 0.005)
-    figures = timed(times.tolist())
-    assert figures.p50_ms == pytest.approx(np.percentile(off_ms, 50))
-    assert figures.p99_ms == pytest.approx(np.percentile(off_ms, 99))
-    assert figures.worst_ms == pytest.approx(off_ms.max())
+def test_a_late_tick_shows_and_is_no_overrun():
+    times = [0.005 * k for k in range(400)]
+    times[200] += 0.0015
+    figures = timed(times)
+    assert figures.latest_ms == pytest.approx(1.5, abs=1e-6)
+    assert figures.overruns == 0
 
 
-def test_skipped_slots_are_overruns_and_no_jitter():
+def test_skipped_slots_are_overruns():
     times = [0.005 * k for k in range(200) if k not in (50, 51, 120)]
     figures = timed(times)
-    assert figures.overruns == figures.overruns_ever == 3
-    assert figures.worst_ms == pytest.approx(0.0, abs=1e-6)
+    assert figures.overruns == 3
+    assert figures.latest_ms == pytest.approx(10.0)
 
 
 def test_a_computer_that_misses_slots_is_called_busy_with_its_figures():

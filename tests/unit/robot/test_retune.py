@@ -15,7 +15,7 @@ from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.parameters import NEXT_TICK, apply_changes, differences, parameters, value_of
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.loop.loop import Tick
-from gazerig.robot.model.commands import AnyCommand, Jog, Resume, Stop, Tune, Value
+from gazerig.robot.model.commands import AnyCommand, Jog, Tune, Value
 from gazerig.robot.model.parameter import Parameter
 from gazerig.robot.run.live import rig_in_effect
 from gazerig.robot.run.run import Run
@@ -64,17 +64,19 @@ class Judge:
     def __init__(self, running: Running) -> None:
         self.running = running
         self.guard = running.made.guard
-        joints, speeds = running.made.robot.body._joints, self.guard._motion.speed
+        self.joints = [*running.made.robot.body._joints.values()]
         self.steps = self._steps()
         self.speed = np.array(
-            [j.steps(v) - j.steps(0.0) for j, v in zip(joints, speeds, strict=True)]
+            [
+                joint.steps(speed) - joint.steps(0.0)
+                for joint, speed in zip(self.joints, self.guard._motion.speed, strict=True)
+            ]
         )
         self.seen = len(running.goals)
 
     def _steps(self) -> np.ndarray:
-        joints = self.running.made.robot.body._joints
         command = self.guard._motion.command
-        return np.array([j.steps(q) for j, q in zip(joints, command, strict=True)])
+        return np.array([j.steps(q) for j, q in zip(self.joints, command, strict=True)])
 
     def _sag_steps(self) -> np.ndarray:
         """What makes up for the weight is added to the goals of the neck."""
@@ -88,17 +90,14 @@ class Judge:
     def go(self, count: int, dt_s: float = DT_S) -> None:
         for _ in range(count):
             before = self.guard.limits
-            joints_before = self.running.made.robot.body._joints
             self.running.go(1, dt_s)
-            joints = self.running.made.robot.body._joints
             steps = self._steps()
             speed = (steps - self.steps) / dt_s
             for i, limit in enumerate(self.guard.limits):
-                per_rad = joints[i].ratio * STEPS_PER_RAD
-                old = joints_before[i].ratio * STEPS_PER_RAD
+                per_rad = self.joints[i].ratio * STEPS_PER_RAD
                 # A limit taken over in this tick was kept before it was.
-                top = max(limit.speed_rad_s * per_rad, before[i].speed_rad_s * old)
-                hard = max(limit.accel_rad_s2 * per_rad, before[i].accel_rad_s2 * old)
+                top = max(limit.speed_rad_s * per_rad, before[i].speed_rad_s * per_rad)
+                hard = max(limit.accel_rad_s2 * per_rad, before[i].accel_rad_s2 * per_rad)
                 where = f"{GAZE_JOINTS[i]} at {self.running.ticks[-1].t_s}"
                 assert isfinite(steps[i]), where
                 assert abs(speed[i]) <= top + 1e-3, where
@@ -247,22 +246,13 @@ def jog(running: Running, joint: str, deg: float, ticks: int) -> None:
     running.go(ticks)
 
 
-def test_a_wider_range_waits_until_the_servos_are_set_up_anew():
+def test_a_wider_range_waits_until_the_next_start():
     running = started()
     running.tune({"joints.neck_yaw.max_deg": 73.0, "joints.neck_yaw.max_speed_deg_s": 250.0})
     running.go(1)
-    assert "neck_yaw: the full range and speed apply after a stop and a resume" in (
+    assert "neck_yaw: the full range and speed apply at the next start" in (
         running.ticks[-1].events
     )
     jog(running, "neck_yaw", 80.0, 500)
     held = np.degrees(running.ticks[-1].guard_result.command_rad[6])
     assert held == pytest.approx(70.0, abs=0.1)
-    running.made.robot.command(Stop("test"))
-    running.go(401)
-    running.made.robot.command(Resume())
-    running.go(200)
-    jog(running, "neck_yaw", 80.0, 800)
-    assert np.degrees(running.ticks[-1].guard_result.command_rad[6]) == pytest.approx(73.0, abs=0.1)
-    measured = np.degrees(running.ticks[-1].joints.position_rad[6])
-    assert measured == pytest.approx(73.0, abs=1.0)
-    assert max(goals[6] for goals in running.goals) > 2844  # the old end in steps
