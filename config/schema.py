@@ -233,9 +233,7 @@ def _mechanism(rig: Rig) -> Faults:
         from gazerig.robot.description.build import RigShape, head_mass_fault  # few rigs need it
 
         lids = dict.fromkeys(LIDS, (-0.4, 0.4))  # their angles hardly matter to the masses
-        shape = RigShape(
-            rig.name, rig.geometry, rig.joints, lids, rig.couplings, rig.camera, rig.mass
-        )
+        shape = RigShape(rig.name, rig.geometry, rig.joints, lids, rig.camera, rig.mass)
         if fault := head_mass_fault(shape):
             yield "mass.head.mass_kg", fault
 

@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from gazerig.robot.loop.head_state import HeadState as HeadState
     from gazerig.robot.loop.head_state import JointReading as JointReading
     from gazerig.robot.loop.head_state import Person as Person
-    from gazerig.robot.model.control_source import CHARACTERS_PER_S as CHARACTERS_PER_S
+    from gazerig.robot.model.reply import CHARACTERS_PER_S as CHARACTERS_PER_S
     from gazerig.robot.model.reply import Outcome as Outcome
 
     __version__: str
 
 _HOME = {
-    "CHARACTERS_PER_S": "gazerig.robot.loop.conversation",
+    "CHARACTERS_PER_S": "gazerig.robot.loop.client_control",
     "ConfigError": "gazerig.config.faults",
     "Error": "gazerig.errors",
     "GazeReading": "gazerig.robot.loop.head_state",

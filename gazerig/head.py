@@ -29,7 +29,6 @@ from gazerig.robot.model.commands import (
     Jog,
     LookAt,
     LookAtDirection,
-    LookAtInHead,
     LookAtPerson,
     LookAtPixel,
     MoveOpponent,
@@ -176,26 +175,18 @@ class Head(ABC):
 
     # Gaze
 
-    def look_at(
-        self, x_m: float, y_m: float, z_m: float, *, frame: Frame = "world",
-        for_s: float | None = None,
-    ) -> Order:  # fmt: skip
-        """Look at a point with head and eyes.
+    def look_at(self, x_m: float, y_m: float, z_m: float, *, for_s: float | None = None) -> Order:
+        """Look at a point of the world with head and eyes.
 
         Args:
             x_m: metres ahead.
             y_m: metres to the left.
             z_m: metres up.
-            frame: "world"; or "head": relative to the present pose, then fixed in the world.
             for_s: seconds until the order gives up control.
 
         Raises:
             Refused: the coordinates are not a point.
         """
-        if frame == "head":
-            return self._send(LookAtInHead((x_m, y_m, z_m), stay=self._stay, for_s=for_s))
-        if frame != "world":
-            raise Refused(f"frame {frame!r}: expected world or head")
         return self._send(LookAt((x_m, y_m, z_m), stay=self._stay, for_s=for_s))
 
     def look_towards(

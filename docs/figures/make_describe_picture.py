@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.description.files import scene_files
+from gazerig.robot.description.export import scene_files
 from gazerig.robot.run.rig_description import description_of
 
 PICTURE = Path(__file__).parent / "describe.png"

@@ -20,7 +20,7 @@ from gazerig.features.lab.film_writer import film_writer
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.study.design import SEED, Study
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.files import scene_files
+from gazerig.robot.description.export import scene_files
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.types import order_joints
 from gazerig.robot.run.options import RunOptions

@@ -10,9 +10,14 @@ from gazerig.features.world.figure import Figures
 from gazerig.features.world.measures import ADULT_M, Measures
 from gazerig.gaze.angles import scale
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.mesh import Painted, merge_meshes, move_mesh, stored_shape
+from gazerig.robot.description.mesh import (
+    Painted,
+    add_texture,
+    merge_meshes,
+    move_mesh,
+    stored_shape,
+)
 from gazerig.robot.description.people import SHIRTS, part_of
-from gazerig.robot.description.texture import add_texture
 
 SOLID_GROUP = 3
 """Group of the collision shapes, which pictures do not show."""

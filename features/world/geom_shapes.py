@@ -11,8 +11,7 @@ from trimesh.graph import smooth_shade
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.feed.world_shapes import WorldPart
-from gazerig.robot.description.mesh import Mesh, Painted
-from gazerig.robot.description.texture import TexturedMesh
+from gazerig.robot.description.mesh import Mesh, Painted, TexturedMesh
 
 _SHOWN_GROUPS = 3
 """Groups of geoms below this are shown, as in MuJoCo's own viewer."""

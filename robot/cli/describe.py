@@ -26,7 +26,7 @@ def describe(
     """Write a rig as a robot description: MJCF, URDF and glTF with meshes."""
     with clear_errors(rig):
         from gazerig.config.schema import load_rig
-        from gazerig.robot.description.files import description_files
+        from gazerig.robot.description.export import description_files
         from gazerig.robot.run.rig_description import description_of
 
         description = description_of(load_rig(rig))

@@ -39,33 +39,11 @@ from gazerig.robot.description.parts import (
     meeting_rad,
     tube,
 )
-from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import OPTICAL, CameraParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, NECK, GeometryParams, LidEnds
 from gazerig.robot.model.types import further_joints
 from gazerig.robot.model.weight import MassParams
-
-
-def joint_torques_nm(
-    joints: Mapping[str, JointParams], couplings: Mapping[str, CouplingParams]
-) -> dict[str, float]:
-    """Return the stall torque at every joint, at the rated voltage of its servos.
-
-    In a pair that two servos move together, each joint gets the torque of both servos on it alone.
-    """
-    own = {}
-    for name, joint in joints.items():
-        shaft_nm = joint.model_facts.stall_torque_nm * (joint.torque_limit or 1.0)
-        own[name] = shaft_nm * joint.shaft_turns()
-    found = dict(own)
-    for pair in couplings.values():
-        if joints.keys() >= {*pair.joints}:
-            both = own[pair.first] + own[pair.second]
-            for name, ratio in zip(pair.joints, pair.rates[0], strict=True):
-                found[name] = ratio * both
-    return found
-
 
 BASE, HEAD = "base_link", mass.HEAD
 
@@ -92,7 +70,6 @@ class RigShape(NamedTuple):
     geometry: GeometryParams
     joints: Mapping[str, JointParams]
     lids: Mapping[str, LidEnds]
-    couplings: Mapping[str, CouplingParams]
     camera: CameraParams
     mass: MassParams = MassParams()
 
@@ -124,7 +101,6 @@ def _measures(geometry: GeometryParams) -> HeadMeasures:
 class _Builder:
     def __init__(self, rig: RigShape) -> None:
         self._rig = rig
-        self._torques = joint_torques_nm(rig.joints, rig.couplings)
         geometry = rig.geometry
         self._eyes_m: Vec3 = (geometry.eyes_ahead_mm / 1e3, 0.0, geometry.eyes_above_mm / 1e3)
         self._measures = _measures(geometry)
@@ -157,8 +133,9 @@ class _Builder:
         return Description(name, tuple(self._links))
 
     def _joint(self, name: str, axis: Vec3, follows: str = "") -> LinkJoint:
-        limit = self._rig.joints[follows or name].limit()
-        most_nm = self._torques[follows or name]
+        params = self._rig.joints[follows or name]
+        limit, turns = params.limit(), params.shaft_turns()
+        most_nm = params.model_facts.stall_torque_nm * (params.torque_limit or 1.0) * turns
         return LinkJoint(
             name, axis, limit.low_rad, limit.high_rad, limit.speed_rad_s, most_nm, follows
         )

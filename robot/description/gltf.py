@@ -14,12 +14,14 @@ from trimesh.visual.material import PBRMaterial
 
 from gazerig.gaze.angles import compose, turn_about
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.description.links import ORIGIN, ROUGHNESS, Description, Visual
-from gazerig.robot.description.texture import add_texture
+from gazerig.robot.description.links import ORIGIN, Description, Visual
+from gazerig.robot.description.mesh import add_texture
 from gazerig.robot.model.frames import quaternion
 
 _Y_UP: Mat3 = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
 _ROOT = "world"
+_ROUGHNESS = 0.7
+"""0 is a mirror; pictures of the page have one for each material."""
 
 
 def gltf(description: Description) -> bytes:
@@ -64,7 +66,7 @@ def _mesh(visual: Visual) -> Any:
         name=visual.name,
         baseColorTexture=Image.fromarray(mesh.image),
         metallicFactor=0.0,
-        roughnessFactor=ROUGHNESS[visual.finish],
+        roughnessFactor=_ROUGHNESS,
     )
     # trimesh counts v from below.
     uv = mesh.uv * (1.0, -1.0) + (0.0, 1.0)

@@ -19,10 +19,6 @@ Pose = tuple[Mat3, Vec3]
 """R_parent_child and p_parent_child_m."""
 Finish = Literal["skin", "plastic", "cloth", "eye", "dark"]
 """Material of a surface; each viewer approximates it."""
-ROUGHNESS: Mapping[Finish, float] = {
-    "skin": 0.7, "plastic": 0.45, "cloth": 0.95, "eye": 0.12, "dark": 1.0,
-}  # fmt: skip
-"""Of glTF: 0 is a mirror."""
 
 
 class Inertia(NamedTuple):
@@ -65,7 +61,7 @@ class LinkJoint(NamedTuple):
     name: name in the rig, or a separate one if it follows another joint
     follows: joint of the rig that a linkage turns together with it, "" for none
     axis: unit vector in the link's frame; positive angles turn about it by the right-hand rule
-    max_torque_nm: largest torque of the servo at the joint
+    max_torque_nm: largest torque of the joint's own servo
     awake_rad: its angle while the head is awake and looks straight ahead
     """
 

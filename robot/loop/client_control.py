@@ -1,6 +1,6 @@
-"""Control of the head by a client: a target to look at, or joints that are held.
+"""Control of the head by a client: a target to look at, joints that are held, a conversation.
 
-Without ``stay`` the control needs a heartbeat; if it is missing, the gaze models take over again.
+Without ``stay`` each needs a heartbeat; if it is missing, the gaze models take over again.
 Times are those of the ticks and heartbeats are commands, so a repeated run times out as recorded.
 """
 
@@ -9,7 +9,16 @@ from math import degrees, radians
 from msgspec.structs import replace
 
 from gazerig.gaze.angles import add, scale
-from gazerig.gaze.types import ORDERED, Face, GazeCommand, GazeState, Percept, Target, Vec3
+from gazerig.gaze.types import (
+    ORDERED,
+    Face,
+    GazeCommand,
+    GazeState,
+    Percept,
+    Target,
+    TurnState,
+    Vec3,
+)
 from gazerig.robot.model.commands import (
     HEARTBEAT_S,
     ControlCommand,
@@ -17,13 +26,19 @@ from gazerig.robot.model.commands import (
     Look,
     LookAt,
     LookAtDirection,
-    LookAtInHead,
     LookAtPerson,
     LookAtPixel,
+    Talk,
 )
-from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlState
 from gazerig.robot.model.kinematics import gaze_error
-from gazerig.robot.model.reply import ARRIVED_RAD
+from gazerig.robot.model.reply import (
+    ARRIVED_RAD,
+    CHARACTERS_PER_S,
+    NO_CLIENT_CONTROL,
+    NO_CONVERSATION,
+    ControlState,
+    ConversationState,
+)
 from gazerig.robot.model.types import JointAngles
 
 GONE_S = 2.0
@@ -275,10 +290,92 @@ def _look_text(command: Look) -> str:
             return f"look at person {person}"
         case LookAtPixel(pixel):
             return f"look at pixel {pixel[0]:.0f} {pixel[1]:.0f}"
-        case LookAtInHead(point):
-            return f"look at {_numbers(point)} of the head"
     return ""
 
 
 def _numbers(point: Vec3) -> str:
     return "{:g} {:g} {:g}".format(*(round(x, 2) for x in point))
+
+
+_GIVEN, _ESTIMATED = 0.9, 0.3
+"""Confidence of a planned end: given in seconds, and from the length of a text."""
+_LONGEST_S = 60.0
+"""Thinking or speaking ends this time after its planned end, or after its last report."""
+_SHOWN_CHARACTERS = 80
+"""Length of the text that each tick contains; the command contains the whole."""
+
+
+class Conversation:
+    """The present state of conversation and its client.
+
+    Attributes:
+        state: State at the present tick.
+    """
+
+    def __init__(self) -> None:
+        self.state = NO_CONVERSATION
+        self._lease = Lease()
+        self._reported_s = 0.0
+
+    @property
+    def active(self) -> bool:
+        """Return whether there is a conversation."""
+        return self.state.state != "idle"
+
+    def report(self, command: Talk, t_s: float) -> str:
+        """Enter the state that a client reports; return a message if it replaces another client.
+
+        Raises:
+            ValueError: There is no speech or thought to interrupt.
+        """
+        now, active = self.state, self.active
+        state: TurnState = "interrupted" if command.state == "interrupt" else command.state
+        if state == "interrupted" and now.state not in ("thinking", "speaking"):
+            raise ValueError(
+                f"there is nothing to interrupt: the state is {now.state}; report speaking or "
+                "thinking first"
+            )
+        other = self._lease.who if active and self._lease.who != command.who else ""
+        person = command.person if command.person is not None or not active else now.partner
+        self._lease.start(command.who, command.stay, t_s)
+        self._reported_s = t_s
+        repeated = not other and (state, person) == (now.state, now.partner)
+        number, since_s = (now.number, now.since_s) if repeated else (now.number + 1, t_s)
+        if state == "idle":
+            self.state = ConversationState(now.number + active, since_s=t_s)
+        else:
+            ends_s, confidence = _planned_end(command, t_s)
+            text = command.text[:_SHOWN_CHARACTERS]
+            self.state = ConversationState(
+                number, state, person, since_s, ends_s, confidence, text, command.who
+            )
+        return f"conversation: {command.who or 'a client'} takes over from {other}" if other else ""
+
+    def renew(self, who: str, t_s: float) -> bool:
+        """Record a heartbeat; return whether it came from the client of the conversation."""
+        return self.active and self._lease.renew(who, t_s)
+
+    def expiry_reason(self, t_s: float) -> str:
+        """Return the reason for an end now, "" if the state continues or is idle."""
+        now = self.state
+        if now.state == "idle":
+            return ""
+        if self._lease.has_lapsed(t_s):
+            return "not renewed"
+        late_s = t_s - max(now.ends_s or 0.0, self._reported_s)
+        if now.state in ("thinking", "speaking") and late_s > _LONGEST_S:
+            return f"no report for {_LONGEST_S:g} s; report the next state, or the same again"
+        return ""
+
+    def end(self, why: str, t_s: float) -> None:
+        """End the conversation without a request."""
+        self.state = ConversationState(self.state.number + 1, since_s=t_s, end_reason=why)
+
+
+def _planned_end(command: Talk, t_s: float) -> tuple[float | None, float]:
+    """Return the planned end of speech and its confidence; None and 0 if unknown."""
+    if command.seconds is not None:
+        return t_s + command.seconds, _GIVEN
+    if text := command.text.strip():
+        return t_s + len(text) / CHARACTERS_PER_S, _ESTIMATED
+    return None, 0.0

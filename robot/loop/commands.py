@@ -18,8 +18,7 @@ from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
 from gazerig.params import unknown_text
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.chooser import TargetChooser
-from gazerig.robot.loop.client_control import ClientControl
-from gazerig.robot.loop.conversation import Conversation
+from gazerig.robot.loop.client_control import ClientControl, Conversation
 from gazerig.robot.loop.stop import StopControl
 from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.commands import (
@@ -33,7 +32,6 @@ from gazerig.robot.model.commands import (
     Look,
     LookAt,
     LookAtDirection,
-    LookAtInHead,
     LookAtPerson,
     LookAtPixel,
     MoveOpponent,
@@ -53,7 +51,7 @@ from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, Ticket
 from gazerig.robot.model.scene import MovableOpponent
 from gazerig.robot.model.types import JointAngles
-from gazerig.robot.perception.pixel_to_world import PixelToWorld
+from gazerig.robot.perception.perception import PixelToWorld
 from gazerig.robot.safety.guard import Guard
 
 MAX_WAITING = 64
@@ -366,8 +364,6 @@ class CommandExecutor:
         match command:
             case LookAt(point):
                 return point
-            case LookAtInHead(point):
-                return add(p, rotate(R, point))
             case LookAtDirection(angles, frame, distance_m):
                 ahead = scale(direction(angles), distance_m)
                 return add(p, rotate(R, ahead) if frame == "head" else ahead)

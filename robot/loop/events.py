@@ -10,8 +10,7 @@ from gazerig.gaze.types import ORDERED, Target
 from gazerig.robot.loop.client_control import GONE_S
 from gazerig.robot.loop.head_state import EventKind, HeadEvent, HeadReport, head_state
 from gazerig.robot.loop.tick import Tick, target_name
-from gazerig.robot.model.control_source import FINISHED
-from gazerig.robot.model.reply import Progress
+from gazerig.robot.model.reply import FINISHED, Progress
 
 _MOST_EVENTS, _MOST_MESSAGES = 2000, 100
 """Number of stored events, and of messages besides."""

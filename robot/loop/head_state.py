@@ -24,7 +24,7 @@ from gazerig.gaze.types import (
     Vec3,
 )
 from gazerig.robot.loop.tick import Tick, cyclopean_direction, target_name
-from gazerig.robot.model.control_source import (
+from gazerig.robot.model.reply import (
     NO_CLIENT_CONTROL,
     NO_CONVERSATION,
     ControlSource,
@@ -76,11 +76,6 @@ class JointReading(Struct, frozen=True):
     age_s: float = 0.0
 
     @property
-    def desired_deg(self) -> float:
-        """Return ``desired_rad`` in degrees."""
-        return degrees(self.desired_rad)
-
-    @property
     def commanded_deg(self) -> float:
         """Return ``commanded_rad`` in degrees."""
         return degrees(self.commanded_rad)
@@ -101,8 +96,6 @@ class GazeReading(Struct, frozen=True):
         direction_rad: Measured (yaw, pitch) of the mean line of sight, world.
         head_m: Point midway between the eyes, world.
         head_rad: (yaw, pitch, roll) of the head.
-        left_eye_rad: (yaw, pitch) in the head.
-        right_eye_rad: (yaw, pitch) in the head.
         lids: Opening of the left and the right upper lid, 0 shut .. 1 open.
         phase: "fixate", "saccade" or "pursue"; "held" while joints are held, "stopped", "parking".
         blink: Whether a blink is in progress.
@@ -117,8 +110,6 @@ class GazeReading(Struct, frozen=True):
     direction_rad: Angles2
     head_m: Vec3
     head_rad: Angles3
-    left_eye_rad: Angles2
-    right_eye_rad: Angles2
     lids: Angles2
     phase: str
     blink: bool
@@ -138,7 +129,6 @@ class Person(Struct, frozen=True):
     Attributes:
         id: Number for ``look_at_person``; it is constant while the person is visible.
         position_m: Middle of the face, the nose, world.
-        velocity_m_s: Its velocity, world.
         facing: Unit vector out of the face, world.
         parts_m: Positions of the parts of the face, world: "left eye", "mouth" and so on; left and
             right are the person's own.
@@ -151,7 +141,6 @@ class Person(Struct, frozen=True):
 
     id: int
     position_m: Vec3
-    velocity_m_s: Vec3
     facing: Vec3
     parts_m: Mapping[str, Vec3]
     confidence: float
@@ -312,8 +301,6 @@ def _gaze(tick: Tick, source: ControlSource) -> tuple[GazeReading, str]:
         yaw_pitch(cyclopean_direction(tick)),
         pose.p_world_head_m,
         pose.head_rad,
-        pose.eye_left_rad,
-        pose.eye_right_rad,
         (pose.lid_left, pose.lid_right),
         phase,
         gaze.blink,
@@ -349,7 +336,6 @@ def _person(face: Face, age_s: float) -> Person:
     return Person(
         face.id,
         face.p_world_m,
-        face.v_world_m_s,
         (R[0][0], R[1][0], R[2][0]),
         parts,
         face.confidence,

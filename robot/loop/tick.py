@@ -8,7 +8,7 @@ from gazerig.gaze.attention.addressing import Addressing
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import PART_NAMES, GazeCommand, GazeState, Percept, Target, Vec3, body_name
 from gazerig.robot.model.commands import AnyCommand
-from gazerig.robot.model.control_source import (
+from gazerig.robot.model.reply import (
     NO_CLIENT_CONTROL,
     NO_CONVERSATION,
     ControlSource,

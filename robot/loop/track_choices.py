@@ -14,9 +14,8 @@ from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.track.track_player import BLEND_IN_S, SPEECH, PlayingTrack, TrackPlayer
 from gazerig.params import unknown_text
 from gazerig.robot.model.commands import EndTrack, Play, Speak, SyncTrack
-from gazerig.robot.model.control_source import SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.reply import CommandReply, TrackReply
+from gazerig.robot.model.reply import SHOWN_S, CommandReply, TrackReply, TrackState
 from gazerig.robot.model.track_fit import TrackFit, TrackRefused
 
 _MOST_KEPT = 64

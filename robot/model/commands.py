@@ -110,17 +110,6 @@ class LookAt(Look, frozen=True):
     pointer: bool = False
 
 
-class LookAtInHead(Look, frozen=True):
-    """Look at the world point that is now at a position in the head's frame.
-
-    Attributes:
-        p_head_m: Position in m, x ahead, y left, z up of the point midway between the eyes, along
-            the head's axes at the time of the command.
-    """
-
-    p_head_m: _Point
-
-
 class LookAtDirection(Look, frozen=True):
     """Look in a direction from the head's present position.
 
@@ -338,7 +327,7 @@ class Tune(Command, frozen=True):
 
 
 AnyCommand = (
-    Ask | LookAt | LookAtInHead | LookAtDirection | LookAtPerson | LookAtPixel | Jog | Express
+    Ask | LookAt | LookAtDirection | LookAtPerson | LookAtPixel | Jog | Express
     | SetLevel | Play | EndTrack | SyncTrack | Talk | Say | Speak | MoveOpponent | Renew | Stop
     | Resume | Tune
 )  # fmt: skip

@@ -2,18 +2,21 @@
 
 The joints are called first and second, the servos a and b. All angles are in rad; those of the
 servos are at their shafts, after sign, ratio and zero. The usual pair is a neck's pitch and roll.
+
+A joint a little outside its range, such as a head that sags, moves inside slowly. One that is far
+outside is more likely not where its servo reports it, and must get no torque.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from itertools import product
 from math import ceil, degrees, floor, radians
 from typing import Annotated
 
-from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S, FAR_DEG
+from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S, FAR_CAUSES, FAR_DEG
 from gazerig.drivers.types import ServoConfig
 from gazerig.params import Bounds
-from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.joint import JointLimit, JointParams
 
 Pair = tuple[float, float]
 
@@ -118,3 +121,31 @@ def _corners(pair: CouplingParams, joints: Mapping[str, JointParams]) -> list[Pa
     """Return the joint angles at which the servos are farthest from their middle."""
     one, other = (joints[name].limit() for name in pair.joints)
     return list(product((one.low_rad, one.high_rad), (other.low_rad, other.high_rad)))
+
+
+def far_outside(angle_rad: float, limit: JointLimit) -> str:
+    """Return where a joint is and why, if it is too far outside its range for torque; else ""."""
+    angle, low, high = map(degrees, (angle_rad, limit.low_rad, limit.high_rad))
+    beyond = max(low - angle, angle - high)
+    if beyond <= FAR_DEG:
+        return ""
+    return f"is at {angle:.0f} deg, {beyond:.0f} deg outside its range {low:.4g}..{high:.4g} deg: {FAR_CAUSES}"
+
+
+def find_far_outside(
+    joints: Mapping[str, JointParams], pairs: Collection[CouplingParams], steps: Mapping[str, float]
+) -> dict[str, str]:
+    """Return the text of ``far_outside`` of each joint that must get no torque.
+
+    Args:
+        joints: The joints of a rig.
+        pairs: Joints that two servos move together; both positions of a pair are needed.
+        steps: Measured servo positions by joint.
+    """
+    angles = {name: joints[name].angle_rad(at) for name, at in steps.items()}
+    for pair in pairs:
+        shafts = angles.pop(pair.first, None), angles.pop(pair.second, None)
+        if shafts[0] is not None and shafts[1] is not None:
+            angles[pair.first], angles[pair.second] = pair.joint_rad((shafts[0], shafts[1]))
+    texts = {name: far_outside(angle, joints[name].limit()) for name, angle in angles.items()}
+    return {name: text for name, text in texts.items() if text}

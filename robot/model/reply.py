@@ -1,19 +1,205 @@
-"""Replies to commands, and their outcomes from the replies and the progress of the head."""
+"""What clients are told: control of the head, conversation and tracks, replies and outcomes.
+
+The page, the status line, other programs, recordings and Python all use these values and texts.
+"""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import radians
 from typing import Literal
 
 from msgspec import Struct
 
+from gazerig.gaze.track.track import FINISHED as FINISHED
+from gazerig.gaze.types import TurnState
 from gazerig.robot.model.commands import Command
-from gazerig.robot.model.control_source import (
-    FINISHED,
-    NO_CLIENT_CONTROL,
-    ControlState,
-    TrackState,
-)
+
+CHARACTERS_PER_S = 15.0
+"""Rate of speech, for the end of a text without times: about 150 English words a minute."""
+SHOWN_S = 2.0
+"""Time for which an ended track is shown."""
+
+
+class ControlState(Struct, frozen=True):
+    """The newest control by a client, after a tick.
+
+    Attributes:
+        number: Number of the control since the start, 0 before the first.
+        active: Whether it is active.
+        arrived: Whether the measured gaze has reached the point, or the joints their angles.
+        error_rad: Measured error of the gaze or of the worst joint, 0 while not active.
+        end_reason: Reason for its end, "" while it is active.
+        kind: Kind while it is active: a person or program that chose the target, a person's mouse
+            pointer, or held joints.
+        who: Name of the client.
+        description: Command as text, e.g. "look at 1 0 0.3", "neck_yaw at 17.2 deg".
+        joints: Held joints.
+        limited: Error of a gaze that rests off its point, and the angles that limit it, else "".
+    """
+
+    number: int = 0
+    active: bool = False
+    arrived: bool = False
+    error_rad: float = 0.0
+    end_reason: str = ""
+    kind: Literal["person", "pointer", "joint"] = "person"
+    who: str = ""
+    description: str = ""
+    joints: tuple[str, ...] = ()
+    limited: str = ""
+
+    @property
+    def client(self) -> str:
+        """Return the client and its command, e.g. "ann: look at 1 0 0.3", "" if not active."""
+        return f"{self.who or 'a client'}: {self.description}" if self.active else ""
+
+
+NO_CLIENT_CONTROL = ControlState()
+
+
+class TrackState(Struct, frozen=True):
+    """One track after a tick; an ended one is shown for ``SHOWN_S``, the newest one always.
+
+    Attributes:
+        number: Number of the track since the start, from 1.
+        name: Its name.
+        position_s: Position in the track; below 0 while the motion begins before the sound.
+        duration_s: Its duration at its own speed.
+        speed: Factor on that speed.
+        loop: Whether it repeats until it is ended.
+        owns: Joints that gaze does not move meanwhile.
+        who: Name of the client, "" if unknown.
+        sound: Path of the sound, "" without one.
+        clock: Clock that the position follows.
+        end_reason: Reason for its end, ``FINISHED`` at its own end, "" while it plays.
+        limited: What the rig's limits changed, "" if nothing.
+        volume: Volume of the sound, 0..1.
+        cue: Name of the cue that it has passed last, "" before the first.
+        cues: Number of cues that it has passed.
+    """
+
+    number: int
+    name: str
+    position_s: float = 0.0
+    duration_s: float = 0.0
+    speed: float = 1.0
+    loop: bool = False
+    owns: tuple[str, ...] = ()
+    who: str = ""
+    sound: str = ""
+    clock: Literal["loop", "sound", "external"] = "loop"
+    end_reason: str = ""
+    limited: str = ""
+    volume: float = 1.0
+    cue: str = ""
+    cues: int = 0
+
+    @property
+    def is_playing(self) -> bool:
+        """Return whether it has not ended."""
+        return not self.end_reason
+
+
+class ConversationState(Struct, frozen=True):
+    """State of the conversation after a tick.
+
+    Attributes:
+        number: Number of the state since the start, 0 before the first; a plan that changes during
+            speech keeps it.
+        state: What the voice agent does; interrupted: it listens, after an interruption.
+        partner: Perception's number of the person, None if unknown.
+        since_s: Start of the state.
+        ends_s: Planned end of speech, None if unknown.
+        confidence: Confidence of the planned end, 0..1.
+        text: Beginning of the spoken text.
+        who: Name of the client, "" without one.
+        end_reason: Reason for an end that no client has requested, "" otherwise.
+    """
+
+    number: int = 0
+    state: TurnState = "idle"
+    partner: int | None = None
+    since_s: float = 0.0
+    ends_s: float | None = None
+    confidence: float = 0.0
+    text: str = ""
+    who: str = ""
+    end_reason: str = ""
+
+
+NO_CONVERSATION = ConversationState()
+
+ControlKind = Literal["gaze", "person", "pointer", "joint", "track", "stopped", "parking"]
+"""gaze: no client, the head chooses; person: a person or program chose the target; pointer: the
+target is a person's mouse pointer; joint: joints are held."""
+
+
+class ControlSource(Struct, frozen=True):
+    """The source of control, and its command.
+
+    Attributes:
+        kind: Kind of control.
+        who: Name of the client for display, "" for none or unknown.
+        description: "look at 1 0 0.3", "neck_yaw at 17.2 deg", a track's name, a stop's reason.
+        joints: Held joints, or those that tracks own.
+    """
+
+    kind: ControlKind = "gaze"
+    who: str = ""
+    description: str = ""
+    joints: tuple[str, ...] = ()
+
+    @property
+    def overrides_gaze(self) -> bool:
+        """Return whether something other than the gaze models moves or holds the head."""
+        return self.kind not in ("gaze", "track")
+
+
+def control_source(
+    stopped: str, parking: bool, lead: ControlState, tracks: Sequence[TrackState]
+) -> ControlSource:
+    """Return the source of control.
+
+    Args:
+        stopped: Reason for a stop, "" while the robot moves.
+        parking: Whether the run is over and the head moves to its parking pose.
+        lead: The newest control by a client.
+        tracks: The tracks.
+    """
+    if stopped:
+        return ControlSource("stopped", "", stopped)
+    if parking:
+        return ControlSource("parking")
+    if lead.active:
+        who = lead.who or "a client"
+        return ControlSource(lead.kind, who, lead.description, lead.joints)
+    if playing := [track for track in tracks if track.is_playing]:
+        # The newest, with a sound if one has it.
+        newest = max(playing, key=lambda track: (bool(track.sound), track.number))
+        owns = tuple(joint for track in playing for joint in track.owns)
+        names = " and ".join(track.name for track in playing)
+        return ControlSource("track", newest.who, names, owns)
+    return ControlSource()
+
+
+def control_sentence(leader: ControlSource) -> str:
+    """Return the source of control as a sentence, "ann holds neck_yaw at 17.2 deg"."""
+    match leader.kind:
+        case "gaze":
+            return "no client is in control: the head chooses its own targets"
+        case "person":
+            return f"{leader.who} makes it {leader.description}"
+        case "pointer":
+            return f"it looks at the pointer of {leader.who}"
+        case "joint":
+            return f"{leader.who} holds {leader.description}"
+        case "track":
+            return f"it plays {leader.description}" + (f" for {leader.who}" if leader.who else "")
+        case "stopped":
+            return f"stopped: {leader.description}; the torque is off"
+        case "parking":
+            return "it moves to its parking pose, then the torque goes off"
+
 
 ARRIVED_RAD = radians(1.0)
 """A gaze or joint has arrived if its measured error is below this."""
@@ -26,7 +212,7 @@ class TrackReply(Struct, frozen=True):
         name: Name of the track.
         duration_s: Time until everything is at rest again.
         limited: Where it is slower or smaller than defined, and what the rig lacks; "" if nothing.
-        number: Number of the track (``gazerig.robot.model.control_source.TrackState``).
+        number: Number of the track (``gazerig.robot.model.reply.TrackState``).
     """
 
     name: str

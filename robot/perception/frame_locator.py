@@ -28,8 +28,7 @@ from gazerig.gaze.types import Vec3, vec
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fault, rays
-from gazerig.robot.perception.face_pose import FacePose, face_pose
-from gazerig.robot.perception.mesh_reading import read_mesh
+from gazerig.robot.perception.face_pose import FacePose, face_pose, read_mesh
 
 _FACE_RADIUS_M = 0.1
 # Length from the hips of a person to the top of the head as the detector defines it, and the error

@@ -9,12 +9,8 @@ import numpy as np
 from gazerig.config.rig import Rig
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import Description
-from gazerig.robot.description.statics import (
-    STRONG_SHARE,
-    Statics,
-    moving_bodies,
-)
-from gazerig.robot.loop.sag import SagCompensation
+from gazerig.robot.description.statics import STRONG_SHARE, Statics, moving_bodies
+from gazerig.robot.loop.body import SagCompensation
 from gazerig.robot.model.kinematics import NECK
 from gazerig.robot.model.types import order_joints
 from gazerig.robot.model.weight import GEAR_FRICTION
@@ -33,7 +29,6 @@ def shape_of(rig: Rig) -> RigShape:
         rig.geometry,
         rig.joints,
         lid_ends(rig),
-        rig.couplings,
         rig.camera,
         rig.mass,
     )

@@ -28,8 +28,7 @@ from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.frames import CameraParams, fixed_mount
 from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.model.types import JointAngles
-from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.pixel_to_world import PixelToWorld
+from gazerig.robot.perception.perception import Perception, PixelToWorld
 from gazerig.robot.run.buses import RunBus, run_bus
 from gazerig.robot.run.cameras import (
     BrowserCamera,
@@ -308,7 +307,7 @@ def _tracks(rig: Rig, models: GazeModels, rig_file: str) -> TrackChoices:
 
 
 def _recorder(rig: Rig, options: RunOptions) -> "Recorder":
-    from gazerig.robot.description.urdf import urdf
+    from gazerig.robot.description.export import urdf
     from gazerig.robot.recording.recorder import Recorder  # imports file formats
 
     assert options.record is not None

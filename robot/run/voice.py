@@ -40,8 +40,7 @@ from gazerig.robot.model.commands import (
     SyncTrack,
     check_command,
 )
-from gazerig.robot.model.control_source import TrackState
-from gazerig.robot.model.reply import CommandTaker
+from gazerig.robot.model.reply import CommandTaker, TrackState
 
 STREAM_DELAY_S = 0.15
 """Time from the arrival of a stream's first piece until it is heard."""

@@ -7,9 +7,8 @@ import numpy as np
 
 from gazerig.gaze.types import Vec3
 from gazerig.robot.dashboard.feed.world_shapes import WorldPart
-from gazerig.robot.description.mesh import Mesh, Painted, paint
+from gazerig.robot.description.mesh import Mesh, Painted, add_texture, paint
 from gazerig.robot.description.people import head, torso
-from gazerig.robot.description.texture import add_texture
 from gazerig.robot.model.frames import Quaternion
 
 LEAVES_S = 60.0

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from page_stub import PICTURE, RUN, YOU, Stub, serving
 from shown_page import wait_for
 
-from gazerig.robot.model.control_source import ControlSource
+from gazerig.robot.model.reply import ControlSource
 
 LEAST_TEXT_PX = 13.0
 # Of each control some points are asked for what lies on top there. What a drawer holds may be

@@ -12,7 +12,7 @@ from page_person import STOP, Person, beside, saying
 from page_stub import PICTURE, RIG, RUN, YOU, Stub, serving
 from shown_page import wait_for
 
-from gazerig.robot.model.control_source import ControlSource, TrackState
+from gazerig.robot.model.reply import ControlSource, TrackState
 from gazerig.robot.net.topics import PanelContent
 
 GREY = cv2.imencode(".jpg", np.full((400, 640, 3), 120, np.uint8))[1].tobytes()

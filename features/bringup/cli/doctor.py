@@ -35,9 +35,9 @@ from gazerig.features.bringup.doctor.diagnostics import (
 )
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
+from gazerig.robot.model.coupling import find_far_outside
 from gazerig.robot.run.rig_description import neck_loads
 from gazerig.robot.run.rig_limits import bus_names
-from gazerig.robot.safety.start_range import find_far_outside
 
 app = typer.Typer()
 

@@ -43,7 +43,7 @@ def rig_in_world(
 def _body(rig: Rig, looks: bool) -> tuple[str, Mapping[str, bytes]]:
     """Return the body of a rig as MJCF, and the files that the MJCF names."""
     # Meshes and the texture writer: 30 MB that a control loop does not need.
-    from gazerig.robot.description.mjcf import mjcf
+    from gazerig.robot.description.export import mjcf
     from gazerig.robot.run.rig_description import description_of
 
     xml, assets = mjcf(description_of(rig), looks=looks)

@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, Protocol
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.mesh import Painted
-from gazerig.robot.description.texture import TexturedMesh
+from gazerig.robot.description.mesh import Painted, TexturedMesh
 from gazerig.robot.model.frames import Quaternion
 
 WorldFinish = Literal["skin", "plastic", "cloth", "flat"]

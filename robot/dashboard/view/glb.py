@@ -17,9 +17,9 @@ from gazerig.robot.description.mesh import (
     Colour,
     Mesh,
     Painted,
+    TexturedMesh,
     stored_shape,
 )
-from gazerig.robot.description.texture import TexturedMesh
 
 
 class Light(NamedTuple):

@@ -35,8 +35,8 @@ from gazerig.features.bringup.servo_setup import (
     find_alone,
     search_rates,
 )
+from gazerig.robot.model.coupling import far_outside
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.safety.start_range import far_outside
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.feetech.chain import build_feetech

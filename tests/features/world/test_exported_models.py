@@ -7,8 +7,7 @@ import pytest
 from described_rigs import SHIPPED
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.description.mjcf import mjcf
-from gazerig.robot.description.urdf import urdf
+from gazerig.robot.description.export import mjcf, urdf
 from gazerig.robot.run.rig_description import description_of
 
 pytestmark = pytest.mark.usefixtures("mujoco")

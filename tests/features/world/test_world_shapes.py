@@ -13,8 +13,7 @@ from gazerig.features.world.room import HOME
 from gazerig.features.world.run.run_world import world_scene
 from gazerig.features.world.shapes import SpecShapes
 from gazerig.robot.dashboard.feed.world_shapes import WorldPart
-from gazerig.robot.description.mesh import Painted
-from gazerig.robot.description.texture import TexturedMesh
+from gazerig.robot.description.mesh import Painted, TexturedMesh
 
 pytestmark = pytest.mark.usefixtures("mujoco")
 WORLDS = sorted(

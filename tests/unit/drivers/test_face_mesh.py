@@ -18,9 +18,8 @@ from gazerig.drivers.vision.face.mesh import MeshNetworks
 from gazerig.drivers.vision.model_files import FOLDER_VARIABLE
 from gazerig.gaze.types import Face
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.perception import mesh_reading
-from gazerig.robot.perception.face_pose import FacePose
-from gazerig.robot.perception.mesh_reading import EYES_SHUT, read_mesh
+from gazerig.robot.perception import face_pose as mesh_reading
+from gazerig.robot.perception.face_pose import EYES_SHUT, FacePose, read_mesh
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.track import Speech
 

@@ -13,8 +13,7 @@ from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wi
 from gazerig.robot.loop.conversation import Conversation
 from gazerig.robot.loop.head_state import HeadState, head_state
 from gazerig.robot.model.commands import LookAt, Renew, Talk, TalkOrder
-from gazerig.robot.model.control_source import ConversationState
-from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.model.reply import CommandReply, ConversationState
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

@@ -24,7 +24,6 @@ from gazerig.robot.model.commands import (
     Jog,
     LookAt,
     LookAtDirection,
-    LookAtInHead,
     LookAtPerson,
     LookAtPixel,
     Renew,
@@ -37,8 +36,11 @@ from gazerig.robot.model.commands import (
     check_command,
     read_request,
 )
-from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlSource, control_sentence
-from gazerig.robot.model.reply import ARRIVED_RAD
+from gazerig.robot.model.reply import (
+    NO_CLIENT_CONTROL,
+    ControlSource,
+    control_sentence,
+)
 from gazerig.robot.run.session import prepare_shutdown
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -323,15 +325,6 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
 
 
 # ---- Gaze targets of clients: points of two frames, directions, people, pixels; the end
-
-
-def test_a_point_of_the_head_is_where_the_head_had_it(running: Running):
-    before = running.go(0.006)[-1].pose
-    ticks = running.do(LookAtInHead((1.2, 0.3, 0.1), stay=True), 1.5)[1]
-    (point,) = {tick.target.p_world_m for tick in ticks}  # it stays while the head turns to it
-    seen = rotate_back(before.R_world_head, sub(point, before.p_world_head_m))
-    assert seen == pytest.approx((1.2, 0.3, 0.1), abs=1e-9)
-    assert ticks[-1].client_control.arrived and ticks[-1].client_control.error_rad <= ARRIVED_RAD
 
 
 @pytest.mark.parametrize("frame", ["world", "head"])

@@ -16,12 +16,9 @@ from described_rigs import SHIPPED, Poses, compare, random_angles, shipped
 from emulated_rig import EmulatedRig
 
 from gazerig.config.schema import Rig
-from gazerig.robot.description.build import joint_torques_nm
+from gazerig.robot.description.export import Model, mjcf, urdf
 from gazerig.robot.description.links import Description
-from gazerig.robot.description.mjcf import Mjcf, mjcf
-from gazerig.robot.description.urdf import Urdf, urdf
 from gazerig.robot.loop.body import Body
-from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.weight import CounterweightParams, HeadMassParams, MassParams
 from gazerig.robot.run.buses import rig_bus
 from gazerig.robot.run.rig_description import (
@@ -92,16 +89,12 @@ def _tree(data: bytes) -> dict[str, Any]:
     return tree
 
 
-def test_a_joint_has_the_torque_of_all_its_servos():
-    joint = shipped("desk").joints["neck_pitch"]
-    joints = {"neck_pitch": joint, "neck_roll": replace(joint, ratio=2.0, torque_limit=0.5)}
-    alone = joint_torques_nm(joints, {})
-    assert alone["neck_pitch"] == joint.model_facts.stall_torque_nm
-    assert alone["neck_roll"] == pytest.approx(alone["neck_pitch"])
-    pair = CouplingParams("neck_pitch", "neck_roll", 1.5, 1.0)
-    both = joint_torques_nm(joints, {"neck": pair})
-    assert both["neck_pitch"] == pytest.approx(1.5 * 2.0 * joint.model_facts.stall_torque_nm)
-    assert both["neck_roll"] == pytest.approx(2.0 * joint.model_facts.stall_torque_nm)
+def test_a_joint_has_the_torque_of_its_servo():
+    rig = shipped("desk")
+    joint = replace(rig.joints["neck_pitch"], torque_limit=0.5)
+    description = description_of(replace(rig, joints={**rig.joints, "neck_pitch": joint}))
+    (found,) = [one for one in description.joints if one.name == "neck_pitch"]
+    assert found.max_torque_nm == pytest.approx(0.5 * joint.model_facts.stall_torque_nm)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -130,9 +123,7 @@ def _in_mujoco(description: Description, angles: Mapping[str, float]) -> Poses:
     return _mujoco_poses(mjcf(description, looks=False), description, angles)
 
 
-def _in_pose(
-    text: Mjcf | Urdf, description: Description, angles: Mapping[str, float]
-) -> tuple[Any, Any]:
+def _in_pose(text: Model, description: Description, angles: Mapping[str, float]) -> tuple[Any, Any]:
     """Return MuJoCo's model and data of a description at joint angles."""
     import mujoco
 
@@ -144,9 +135,7 @@ def _in_pose(
     return model, data
 
 
-def _mujoco_poses(
-    text: Mjcf | Urdf, description: Description, angles: Mapping[str, float]
-) -> Poses:
+def _mujoco_poses(text: Model, description: Description, angles: Mapping[str, float]) -> Poses:
     _, data = _in_pose(text, description, angles)
     return {
         link.name: (

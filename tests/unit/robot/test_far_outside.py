@@ -12,10 +12,9 @@ import gazerig
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoMissing, SetupError
-from gazerig.robot.model.coupling import CouplingParams
+from gazerig.robot.model.coupling import CouplingParams, far_outside, find_far_outside
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.run import emulated
-from gazerig.robot.safety.start_range import far_outside, find_far_outside
 
 EYE = "left_eye_pan"
 FAR = 176.0

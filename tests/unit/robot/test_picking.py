@@ -13,7 +13,7 @@ from gazerig.gaze.types import Bodies, Face, Percept, Vec3
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.perception.pixel_to_world import USUAL_M, PixelToWorld, seen_distance_m
+from gazerig.robot.perception.perception import USUAL_M, PixelToWorld, seen_distance_m
 
 CAMERA = CameraParams(position_mm=(20.0, 0.0, 45.0), horizontal_field_deg=70.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -18,7 +18,7 @@ from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.head_state import HeadEvent, head_state
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.loop.tick_stream import TickStream
-from gazerig.robot.model.control_source import ConversationState, TrackState
+from gazerig.robot.model.reply import ConversationState, TrackState
 from gazerig.robot.net.topics import RunState
 from gazerig.robot.run.run import Run
 

@@ -33,7 +33,7 @@ from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Bodies, Face, Percept
 from gazerig.robot.loop.tick import MeasuredJoints, TorqueEnabled
 from gazerig.robot.model.clock import RealClock, SimulatedClock
-from gazerig.robot.model.control_source import ControlState, TrackState
+from gazerig.robot.model.reply import ControlState, TrackState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import writer
 from gazerig.robot.recording.read import BadRecording, RunRecording

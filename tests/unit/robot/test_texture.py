@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.mesh import Painted, move_mesh, stored_shape
+from gazerig.robot.description.mesh import (
+    Painted,
+    TexturedMesh,
+    add_texture,
+    move_mesh,
+    stored_shape,
+)
 from gazerig.robot.description.people import head, torso
-from gazerig.robot.description.texture import TexturedMesh, add_texture
 
 SHAPES: dict[str, Callable[[], Painted]] = {
     "eye": lambda: stored_shape("eye"),

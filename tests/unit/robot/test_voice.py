@@ -20,7 +20,7 @@ from gazerig.errors import Refused
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Say
-from gazerig.robot.model.control_source import TrackState
+from gazerig.robot.model.reply import TrackState
 from gazerig.robot.run import voice
 
 RATE = 16000
