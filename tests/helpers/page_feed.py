@@ -21,7 +21,7 @@ from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.net.topics import JointInfo, RigInfo, RunState
 from gazerig.robot.run.run import Run
 
-IN_TIME = LoopFigures(200.0, 0.0, 0.0, 0.0, 0, 0, 10.0)
+IN_TIME = LoopFigures(200.0, 0, 10.0, 0.0, 0.0)
 STATE = RunState("wait", "", "shy", health="bus ok", timing=IN_TIME)
 GREY = np.full((400, 640, 3), (140, 120, 100), np.uint8)
 """A picture of the size that the scene's camera has."""

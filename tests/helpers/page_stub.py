@@ -31,7 +31,7 @@ from gazerig.robot.net.topics import JointInfo, Picture, RigInfo, RunState, Seen
 YOU = "browser 1a2b"
 LIMITS = JointInfo(-1.0, 1.0, 55.0, 65.0, 4.5, 8.4, 0.4)
 RIG = RigInfo("desk", "/tmp/desk.yaml", False, False, "", "", dict.fromkeys(GAZE_JOINTS, LIMITS))
-IN_TIME = LoopFigures(200.0, 0.1, 0.5, 1.0, 0, 0, 10.0)
+IN_TIME = LoopFigures(200.0, 0, 10.0, 0.0, 1.0)
 RUN = RunState("wait", "none", "shy", "", "bus ok", 1, IN_TIME)
 PICTURE = Picture(
     1, 0.0, 640, 400, (320.0, 200.0), (SeenFace((260.0, 120.0, 120.0, 150.0), (), 0.9),), (), (),
