@@ -10,7 +10,7 @@ from commanded_robot import Running
 import gazerig
 from gazerig.gaze.attention.conversation import NOD
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
-from gazerig.robot.loop.conversation import Conversation
+from gazerig.robot.loop.client_control import Conversation
 from gazerig.robot.loop.head_state import HeadState, head_state
 from gazerig.robot.model.commands import LookAt, Renew, Talk, TalkOrder
 from gazerig.robot.model.reply import CommandReply, ConversationState
