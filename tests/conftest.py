@@ -92,7 +92,7 @@ def started() -> Iterator["Callable[[Rig], Run]"]:
 
 @pytest.fixture
 def running() -> Iterator["Running"]:
-    """A desk rig face to face with a person, two seconds on, that ticks on request."""
+    """A desk rig face to face with a person, a second on, that ticks on request."""
     from commanded_robot import running_desk
 
     with running_desk() as running:

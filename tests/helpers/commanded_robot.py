@@ -44,12 +44,12 @@ class Running:
 
 @contextmanager
 def running_desk() -> Iterator[Running]:
-    """Run a desk rig face to face with a person, for two seconds as yet."""
+    """Run a desk rig face to face with a person, for a second as yet."""
     made = simulated(scene="face-to-face", seed=3)
     made.robot.start(made.clock)
     try:
         running = Running(made)
-        running.go(2.0)
+        running.go(1.0)
         yield running
     finally:
         made.robot.stop()

@@ -106,7 +106,7 @@ _pieces = st.sampled_from(
 )
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(text=st.lists(_pieces, max_size=14).map("".join) | st.text(max_size=30))
 @example(text='"\\U00110000": 1')
 @example(text='"\\UE0000000": 1')

@@ -4,12 +4,6 @@ What every kind of bus promises is in tests/buses; here is what only one make do
 does not see.
 """
 
-import copy
-import struct
-from types import BuiltinMethodType, CellType, FunctionType, ModuleType
-from typing import Any
-from unittest.mock import patch
-
 import pytest
 from fakes.dynamixels import Rig as DynamixelRig
 from feedback_rows import rows
@@ -24,79 +18,14 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
-def _function(function: FunctionType, memo: dict[int, Any]) -> FunctionType:
-    if not function.__closure__:
-        return function
-    cells = tuple(CellType() for _ in function.__closure__)
-    made = FunctionType(
-        function.__code__, function.__globals__, function.__name__, function.__defaults__, cells
-    )
-    made.__kwdefaults__ = function.__kwdefaults__
-    memo[id(function)] = made
-    for cell, old in zip(cells, function.__closure__, strict=True):
-        cell.cell_contents = copy.deepcopy(old.cell_contents, memo)
-    return made
-
-
-def _method(method: BuiltinMethodType, memo: dict[int, Any]) -> Any:
-    owner = method.__self__
-    if owner is None or type(owner) is type(copy):
-        return method
-    return getattr(copy.deepcopy(owner, memo), method.__name__)
-
-
-def _same(thing: Any, memo: dict[int, Any]) -> Any:
-    return thing
-
-
-_UNCHANGING: dict[int, tuple[Any, ...]] = {}
-"""Tuples, also named ones, that were found to hold nothing that changes, by id: large tables.
-
-Kept, so that no other tuple gets the id.
-"""
-
-
-def _tuple(thing: tuple[Any, ...], memo: dict[int, Any]) -> tuple[Any, ...]:
-    if id(thing) in _UNCHANGING:
-        return thing
-    made: tuple[Any, ...] = _COPY_TUPLE(thing, memo)
-    if made is thing:
-        _UNCHANGING[id(thing)] = thing
-        return thing
-    return made if type(thing) is tuple else type(thing)(*made)
-
-
-_COPY_TUPLE = copy._deepcopy_dispatch[tuple]  # type: ignore[attr-defined]
-
-_WAYS = {
-    FunctionType: _function,
-    BuiltinMethodType: _method,
-    tuple: _tuple,
-    struct.Struct: _same,
-    ModuleType: _same,
-}
-
-
-def copied(thing: Any) -> Any:
-    """Return a deep copy that shares nothing that changes."""
-    named = {kind: _tuple for kind in tuple.__subclasses__() if hasattr(kind, "_fields")}
-    with patch.dict(copy._deepcopy_dispatch, {**named, **_WAYS}):  # type: ignore[attr-defined]
-        return copy.deepcopy(thing)
-
-
 @pytest.fixture
 def xl():
     return DynamixelRig().open()
 
 
-@pytest.fixture(scope="module")
-def started():
-    return StsRig().start()
-
-
 @pytest.fixture
-def sts(started):
-    return copied(started)
+def sts():
+    return StsRig().start()
 
 
 # --- torque comes on

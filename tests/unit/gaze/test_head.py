@@ -216,7 +216,7 @@ def ends(
     return degrees(arc), degrees(went), degrees(left)
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(MODELS, EYES, PLACES, PLACES, INTERESTS)
 def test_e65_the_head_never_goes_past_the_target_as_seen_from_where_it_comes(
     model: Model, eyes_deg: float, start: Angles2, place: Angles2, salience: float
@@ -226,7 +226,7 @@ def test_e65_the_head_never_goes_past_the_target_as_seen_from_where_it_comes(
     assert went + left == pytest.approx(arc, abs=1e-4), "along the great circle"
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(MODELS, EYES, PLACES, PLACES, INTERESTS, INTERESTS)
 def test_e65_less_interest_never_turns_the_head_further(
     model: Model, eyes_deg: float, start: Angles2, place: Angles2, one: float, other: float

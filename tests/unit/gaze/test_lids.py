@@ -198,7 +198,7 @@ def test_a_wink_shuts_both_lids_of_one_eye_and_opens_them_again(
 
 def test_no_two_blinks_are_alike():
     model = lids(3)
-    rows = np.array([model.step(k * DT, 0.0, None) for k in range(round(600.0 / DT))])
+    rows = np.array([model.step(k * DT, 0.0, None) for k in range(round(300.0 / DT))])
     edges = np.flatnonzero(np.diff(rows[:, 2]))
     lasting = DT * (edges[1::2] - edges[::2])[: len(edges) // 2]
     assert 0.02 < lasting.std() < 0.08 and 0.25 < lasting.mean() < 0.33
@@ -309,7 +309,7 @@ def fastest_per_s(params: LidParams) -> float:
     return blink + 4.0 * STEEPEST / GLIDE_S  # following changes as well, by up to 60 deg
 
 
-@settings(max_examples=60, phases=WITHOUT_SHRINKING)
+@settings(max_examples=30, phases=WITHOUT_SHRINKING)
 @given(admissible(), admissible(), st.lists(EVENTS, min_size=1, max_size=10), st.integers(0, 99))
 def test_lids_stay_within_bounds_and_never_jump(
     first: LidParams, other: LidParams, events: list[Event], seed: int

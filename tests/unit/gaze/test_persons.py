@@ -118,10 +118,11 @@ def shares(look_at: str, numbers: tuple[int, int, int]) -> list[float]:
     return [found.count(id) / len(found) for id in numbers]
 
 
-@pytest.mark.parametrize("numbers", [(4, 9, 2), (31, 5, 17)])
 @pytest.mark.parametrize(
-    ("trait", "person"), [("nearest", 0), ("newest", 1), ("waving", 1), ("looking", 2)]
-)
+    ("trait", "person", "numbers"),
+    [("nearest", 0, (4, 9, 2)), ("newest", 1, (31, 5, 17)), ("waving", 1, (4, 9, 2)),
+     ("looking", 2, (31, 5, 17))],
+)  # fmt: skip
 def test_e78_a_rule_finds_its_person_whatever_their_number(
     trait: str, person: int, numbers: tuple[int, int, int]
 ):

@@ -28,7 +28,7 @@ from gazerig.features.lab.simulated_run import simulate  # noqa: E402
 
 PAGE = Path(__file__).parents[3] / "docs" / "gaze.md"
 PROFILES = ("robot", "mitake", "nakamoto")
-SECONDS = 20.0
+SECONDS = 17.0
 _ROW = re.compile(
     r"^\| (?P<paper>[^|]+) \| (?P<what>[^|]+) \| `(?P<name>[^`|]+)` \| (?P<cells>.+) \|$"
 )
@@ -155,7 +155,7 @@ def test_e68_each_profile_looks_at_what_its_paper_has():
 
 @pytest.fixture(scope="module")
 def nakamoto() -> MeasuredRun:
-    return half_rate_run("face-to-face", "nakamoto", seconds=40.0)
+    return half_rate_run("face-to-face", "nakamoto", seconds=25.0)
 
 
 def test_e68_nakamoto_walks_as_its_table_with_no_look_away(nakamoto: MeasuredRun):
@@ -176,7 +176,7 @@ def test_e68_nakamoto_turns_the_head_beyond_20_deg_only(nakamoto: MeasuredRun):
 
 
 def test_e68_mitake_never_blinks_nor_leaves_a_face_that_stands():
-    run = half_rate_run("face-to-face", "mitake", seconds=20.0)
+    run = half_rate_run("face-to-face", "mitake", seconds=10.0)
     assert not run.blink.any() and np.ptp(run.lids_goal) == 0.0
     assert set(run.part) <= {"N", ""} and (run.part == "N").mean() > 0.8
     assert not any("away" in name for name in run.target_name)

@@ -296,8 +296,8 @@ RIG_OF = dict(
 
 
 @pytest.mark.parametrize("track", TRACKS)
-def test_no_joint_jumps_or_breaks_a_limit_at_400_random_moments(track: str):
-    angles, bounds = interrupted(track, RIG_OF[track], 400)
+def test_no_joint_jumps_or_breaks_a_limit_at_random_moments(track: str):
+    angles, bounds = interrupted(track, RIG_OF[track], 120)
     speed = np.abs(np.diff(angles, axis=0)).max(axis=0) / DT_S
     acceleration = np.abs(np.diff(angles, 2, axis=0)).max(axis=0) / DT_S**2
     assert speed.max() * DT_S > radians(0.1)  # something has moved
@@ -356,13 +356,13 @@ def long_track(seconds: float, seed: int) -> Track:
     return Track("a show", frames, cues={"middle": seconds / 2})
 
 
-def test_a_show_of_an_hour_with_200_corrections_keeps_all_limits():
+def test_a_show_of_an_hour_with_many_corrections_keeps_all_limits():
     it, random = show(hour=long_track(3600.0, 1)), np.random.default_rng(2)
     t = 0.0
     it.play("hour", t, loop=True)
     (voice,) = it.player.voices
     worst = 0.0
-    for _ in range(200):
+    for _ in range(60):
         off_s = float(random.choice([0.01, 0.1, -0.2, 2.0]))
         it.choices.sync(SyncTrack(1, max(0.0, voice.position_s(t) + off_s)), t)
         rows = []

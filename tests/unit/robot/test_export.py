@@ -27,9 +27,9 @@ Rows = list[dict[str, str]]
 
 @pytest.fixture(scope="module")
 def face() -> list[Tick]:
-    """Twenty-five seconds in front of a person."""
+    """Twenty seconds in front of a person."""
     ticks: list[Tick] = []
-    play(simulated(scene="face-to-face"), 25.0, ticks.append)
+    play(simulated(scene="face-to-face"), 20.0, ticks.append)
     return ticks
 
 

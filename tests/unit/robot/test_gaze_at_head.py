@@ -52,14 +52,14 @@ class Turning(EmptyScene):
         return (ScenePerson(self._p, way, None),)
 
 
-def found(scene: Turning, seconds: float = 10.0, seed: int = 0) -> list[Face]:
+def found(scene: Turning, seconds: float) -> list[Face]:
     """Return the face as perceived, once a frame, after half a second."""
     camera = SceneCamera(
         FrameParams(),
         scene,
         AT_EYES,
         lambda _: (LEVEL, (0.0, 0.0, 0.0)),
-        np.random.default_rng(seed),
+        np.random.default_rng(0),
     )
     camera.open()
     perception = Perception(AT_EYES, 69.0)
@@ -74,19 +74,20 @@ def found(scene: Turning, seconds: float = 10.0, seed: int = 0) -> list[Face]:
     return out
 
 
-@pytest.mark.parametrize("away_m", [0.7, 1.2, 2.5])
 @pytest.mark.parametrize(
-    ("off_deg", "looks"), [(0, True), (5, True), (-15, False), (20, False), (-30, False)]
-)
+    ("away_m", "off_deg", "looks"),
+    [(1.2, 0, True), (0.7, 5, True), (2.5, 5, True), (0.7, 20, False), (1.2, -15, False),
+     (2.5, -15, False), (1.2, -30, False)],
+)  # fmt: skip
 def test_e77_a_person_who_looks_at_the_head_is_known(away_m: float, off_deg: float, looks: bool):
-    each = found(Turning(away_m, off_deg, 0.1))
+    each = found(Turning(away_m, off_deg, 0.1), 8.0)
     assert len(each) > 200
     assert np.mean([face.looks_at_head is looks for face in each]) >= 0.95
     off = [degrees(face.off_head_rad or 0.0) for face in each]
     assert np.median(off) == pytest.approx(abs(off_deg), abs=6.0)
 
 
-@pytest.mark.parametrize("off_deg", [8.0, 10.0, 12.0])
+@pytest.mark.parametrize("off_deg", [8.0, 12.0])
 def test_e77_on_the_edge_the_answer_does_not_flicker(off_deg: float):
     each = [face.looks_at_head for face in found(Turning(1.2, off_deg), 30.0)]
     changes = sum(a != b for a, b in zip(each, each[1:], strict=False))

@@ -57,7 +57,7 @@ def test_every_goal_on_the_bus_is_inside_the_limits():
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     run_of = simulated(rig, seed=3, bus="ideal")
-    commands = np.array([tick.guard_result.command_rad for tick in ticks(run_of, 30.0)])
+    commands = np.array([tick.guard_result.command_rad for tick in ticks(run_of, 15.0)])
     speeds = np.diff(commands, axis=0) / 0.010
     for i, name in enumerate(GAZE_JOINTS):
         limit = rig.joints[name].limit()

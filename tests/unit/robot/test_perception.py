@@ -208,7 +208,7 @@ def body_at(x: float) -> DetectedPerson:
 @pytest.mark.parametrize("sway_m", [0.0, 0.003])
 def test_the_sway_of_who_stands_is_life_and_the_noise_of_a_photo_is_none(sway_m: float):
     perception, rng, shown = Perception(STILL, 69.0), np.random.default_rng(1), []
-    for k in range(1, 2000):
+    for k in range(1, 1000):
         face = face_at((sway_m * sin(0.06 * k), 0.0, 1.5))  # 0.3 Hz
         points = face.landmarks_px + rng.normal(0.0, 0.5, (5, 2))
         found = seen(perception, k, faces=(replace(face, landmarks_px=points),))

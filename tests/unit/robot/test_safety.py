@@ -18,6 +18,8 @@ from gazerig.robot.model.types import GuardResult
 from gazerig.robot.safety.guard import LATE_RAD_S2, SOFT_START_RAD_S2, Guard
 
 SLACK = 1e-9
+EACH_KIND = (0, 5, 8)
+"""The first joint, a lid and the last joint: those between have the limits of one of them."""
 
 
 def but(i: int, angle: float, others: float = 0.0) -> tuple[float, ...]:
@@ -60,7 +62,7 @@ def test_whoever_commands_is_told_what_became_of_every_joint():
     assert verdict.reasons == ("neck_yaw: out of range",)
 
 
-@pytest.mark.parametrize("joint", range(9))
+@pytest.mark.parametrize("joint", EACH_KIND)
 def test_range_is_swept_densely_at_its_edges(joint: int):
     limit = LIMITS[joint]
     for edge in (limit.low_rad, limit.high_rad):
@@ -72,7 +74,7 @@ def test_range_is_swept_densely_at_its_edges(joint: int):
             assert verdict.command_rad[joint - 1] == 0.0
 
 
-@pytest.mark.parametrize("joint", range(9))
+@pytest.mark.parametrize("joint", EACH_KIND)
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_speed_is_swept_densely_at_its_limit(joint: int, way: float):
     soft = tuple(limit._replace(accel_rad_s2=1e9) for limit in LIMITS)
@@ -83,7 +85,7 @@ def test_speed_is_swept_densely_at_its_limit(joint: int, way: float):
         assert (reason_of(verdict, GAZE_JOINTS[joint]) == "too fast") == (share > 1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("joint", range(9))
+@pytest.mark.parametrize("joint", EACH_KIND)
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_acceleration_is_swept_densely_at_its_limit(joint: int, way: float):
     for share in [*np.linspace(0.95, 1.05, 21).tolist(), 1.0 - 1e-12]:
@@ -93,7 +95,7 @@ def test_acceleration_is_swept_densely_at_its_limit(joint: int, way: float):
         assert (reason_of(verdict, GAZE_JOINTS[joint]) == "too hard") == (share > 1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("joint", range(9))
+@pytest.mark.parametrize("joint", EACH_KIND)
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_braking_before_the_end_of_the_range_is_swept_densely(joint: int, way: float):
     limit = LIMITS[joint]
@@ -112,7 +114,7 @@ def test_braking_before_the_end_of_the_range_is_swept_densely(joint: int, way: f
 @pytest.mark.parametrize("joint", [0, 6])
 @pytest.mark.parametrize("tick", [0.001, 0.005, 0.02, 0.1])
 def test_a_wish_that_jumps_is_met_without_running_past_it(joint: int, tick: float):
-    for jump in np.linspace(-0.5, 0.5, 15).tolist():
+    for jump in np.linspace(-0.5, 0.5, 5).tolist():
         guard, t, path = guarding(), 0.0, [0.0]
         for _ in range(max(40, int(1.5 / tick))):
             t += tick
@@ -144,7 +146,7 @@ def test_not_finite_wishes_hold_and_say_so():
         assert "neck_roll: not finite" in verdict.reasons
 
 
-@pytest.mark.parametrize("joint", range(9))
+@pytest.mark.parametrize("joint", EACH_KIND)
 def test_ages_of_joints_and_picture_are_swept_densely(joint: int):
     for off in [*np.linspace(-0.01, 0.01, 21).tolist(), -1e-6, 1e-6, inf, nan]:
         guard, t = guarding(), 1.0
@@ -255,7 +257,7 @@ class World:
         return reason_of(self.verdict, GAZE_JOINTS[self.joint])
 
 
-@pytest.mark.parametrize("joint", range(9))
+@pytest.mark.parametrize("joint", EACH_KIND)
 @pytest.mark.parametrize("lag_s", [0.0, 0.015, 0.03])
 def test_a_jammed_joint_is_found_within_200_ms_and_let_go(joint: int, lag_s: float):
     world = World(joint, lag_s)
@@ -342,7 +344,7 @@ def test_a_slow_start_is_no_jam():
         assert world.tick(0.5 if k < 300 else -0.5) != "not moving"
 
 
-@pytest.mark.parametrize("off_deg", np.linspace(2.5, 3.5, 21).tolist())
+@pytest.mark.parametrize("off_deg", np.linspace(2.5, 3.5, 11).tolist())
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_the_distance_is_swept_densely(off_deg: float, way: float):
     guard, found = guarding(), False
@@ -434,7 +436,7 @@ def world() -> ServoWorld:
     return ServoWorld()
 
 
-@pytest.mark.parametrize("celsius", np.linspace(50.0, 75.0, 101).tolist())
+@pytest.mark.parametrize("celsius", np.linspace(50.0, 75.0, 26).tolist())
 def test_heat_slows_a_joint_down_before_it_stops_it(world: ServoWorld, celsius: float):
     verdicts = [world.tick(0.5, temperature_c=celsius) for _ in range(60)]
     share = min(max(1.0 - 0.8 * (celsius - 55.0) / 10.0, 0.0), 1.0)
@@ -457,7 +459,7 @@ def test_a_hot_joint_goes_on_slowly_when_it_has_cooled(world: ServoWorld):
     assert [reason(verdict) for verdict in verdicts] == ["hot"] * 4 + ["starting slowly"]
 
 
-@pytest.mark.parametrize("load", [*np.linspace(0.3, 1.0, 29).tolist(), -0.6, -1.0])
+@pytest.mark.parametrize("load", [*np.linspace(0.3, 1.0, 15).tolist(), -0.6, -1.0])
 def test_load_slows_a_joint_down_before_it_stops_it(world: ServoWorld, load: float):
     stopped = slower = None
     for k in range(1000):
@@ -498,7 +500,7 @@ def test_short_bursts_of_load_strain_nothing(world: ServoWorld):
         assert world.tick(0.0, load=1.0 if k % 66 < 12 else 0.1).level == "ok"
 
 
-@pytest.mark.parametrize("volts", np.linspace(3.0, 7.5, 91).tolist())
+@pytest.mark.parametrize("volts", np.linspace(3.0, 7.5, 31).tolist())
 def test_voltage_slows_a_joint_down_before_it_stops_it(world: ServoWorld, volts: float):
     first_hold = None
     for k in range(160):
@@ -736,7 +738,7 @@ def test_one_joint_waits_at_its_wall_and_the_other_is_free():
     assert not world.crossed()
 
 
-@pytest.mark.parametrize("off", np.linspace(-0.3, 0.3, 25).tolist())
+@pytest.mark.parametrize("off", np.linspace(-0.3, 0.3, 13).tolist())
 def test_the_four_walls_are_swept_densely(off: float):
     for pitch, lid in ((-17.0 + off, 20.0), (-31.0 + off, 20.0), (-24.0, 9.0 + off)):
         world = PairWorld(LID, neck_pitch=-45.0 if pitch < -30.0 else 0.0).awake()

@@ -37,7 +37,7 @@ def has_line(lines, *words):
 
 
 @pytest.mark.parametrize("fault", ["lose {}", "truncate {} 5", "corrupt {}"])
-@every_kind(*BOARDS, why="the channels of a board do not answer one by one")
+@every_kind(*BOARDS)  # the channels of a board do not answer one by one
 def test_one_servo_that_is_not_heard_costs_at_most_two_percent_of_a_cycle(name, fault):
     bench = in_process(name, wire_time=True)
     bus = bench.hold()
@@ -48,11 +48,11 @@ def test_one_servo_that_is_not_heard_costs_at_most_two_percent_of_a_cycle(name, 
         bus.write(bench.steps([0.5] * 4))
         return bench.now_s() - began_s, missing
 
-    for _ in range(300):
+    for _ in range(150):
         cycle()
-    usual_s = mean(cycle()[0] for _ in range(400))
+    usual_s = mean(cycle()[0] for _ in range(200))
     bench.command(fault.format(bench.setups[2].id))
-    struck = [cycle() for _ in range(400)]
+    struck = [cycle() for _ in range(200)]
     # At first a damaged block of one packet for all may take its neighbour with it.
     assert {missing for _, missing in struck[8:]} == {(2,)}
     # The first time all of the reserve is waited: this computer might have paused.
@@ -73,10 +73,10 @@ def test_lost_late_cut_and_damaged_answers_are_never_data(name, fault):
     bench = in_process(name)
     bus = bench.hold()
     bench.ticks(bus, 0.3)
-    for duration in ("count 1", "count 5", "for 0.7"):
+    for duration, seconds in (("count 3", 0.3), ("for 0.7", 0.8)):
         lasting = fault if "count" in fault else f"{fault} {duration}"
         bench.command(lasting.format(bench.setups[1].id))
-        struck = bench.ticks(bus, 0.8)
+        struck = bench.ticks(bus, seconds)
         if fault in ONE and name in SMART and "delay" not in fault:
             assert not any({0, 2, 3} & set(f.missing) for f in struck[8:])
     bench.command("clear")
@@ -84,7 +84,7 @@ def test_lost_late_cut_and_damaged_answers_are_never_data(name, fault):
     assert bus.faults() == () or name in BOARDS  # which keep their counts of errors for a while
 
 
-@every_kind(*BOARDS, why="a board has wires of its own for each direction")
+@every_kind(*BOARDS)  # a board has wires of its own for each direction
 def test_an_adapter_that_echoes_costs_nothing(name):
     bench = in_process(name)
     bench.command("echo")
@@ -93,7 +93,7 @@ def test_an_adapter_that_echoes_costs_nothing(name):
     assert bus.health().errors == {}
 
 
-@every_kind(*BOARDS, why="a board does not measure its servos")
+@every_kind(*BOARDS)  # a board does not measure its servos
 def test_a_joint_that_a_hand_has_turned_is_believed_soon(name):
     bench = in_process(name)
     bus = bench.hold()
@@ -266,7 +266,7 @@ def test_a_second_open_changes_nothing(name):
     assert not has_line(bus.events(), "->")
 
 
-@every_kind(*FEETECH, *BOARDS, why="it has no watchdog and holds its last goal")
+@every_kind(*FEETECH, *BOARDS)  # it has no watchdog and holds its last goal
 def test_the_watchdog_stops_the_servos_of_a_host_that_falls_silent(name):
     bench = in_process(name)
     bus = bench.hold([s._replace(max_speed_steps_s=500.0) for s in bench.setups])
@@ -286,7 +286,7 @@ def test_the_watchdog_stops_the_servos_of_a_host_that_falls_silent(name):
 # --- what is named
 
 
-@every_kind(*BOARDS, why="a board does not measure its servos")
+@every_kind(*BOARDS)  # a board does not measure its servos
 def test_two_servos_with_one_id_are_named(name):
     bench = in_process(name)
     bus = bench.hold()
@@ -302,7 +302,7 @@ def test_two_servos_with_one_id_are_named(name):
     assert has_line(bus.events(), label(bench, 1), "second servo with its id")
 
 
-@every_kind(*BOARDS, why="a board does not know its servos")
+@every_kind(*BOARDS)  # a board does not know its servos
 def test_a_wrong_model_is_named_at_open(name):
     bench = in_process(name)
     other = "scs15" if name in FEETECH else "xl430-w250"
@@ -313,7 +313,7 @@ def test_a_wrong_model_is_named_at_open(name):
     assert label(bench, 2) in text and bench.kind.model in text and other in text
 
 
-@every_kind(*BOARDS, why="a board's servos have no firmware")
+@every_kind(*BOARDS)  # a board's servos have no firmware
 def test_a_firmware_that_is_old_or_unlike_its_neighbours_is_named_at_open(name):
     plain = in_process(name).bus()
     plain.open()
@@ -331,7 +331,7 @@ def test_a_firmware_that_is_old_or_unlike_its_neighbours_is_named_at_open(name):
 
 
 @pytest.mark.parametrize("low", [True, False])
-@every_kind(*BOARDS, why="a board does not measure its supply")
+@every_kind(*BOARDS)  # a board does not measure its supply
 def test_a_wrong_voltage_is_named_before_anything_moves(name, low):
     bench = in_process(name)
     volts = 16.0 if not low else 3.8 if name == "feetech" else 3.0
@@ -349,7 +349,7 @@ def test_a_wrong_voltage_is_named_before_anything_moves(name, low):
 
 
 @pytest.mark.parametrize("level", [0, 1])
-@every_kind(*BOARDS, why="a board has no such setting")
+@every_kind(*BOARDS)  # a board has no such setting
 def test_servos_that_answer_less_than_they_could_are_understood(name, level):
     bench = in_process(name)
     protocol, address, lock = (
