@@ -5,6 +5,7 @@ import resource
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from math import inf
 from typing import TYPE_CHECKING
 
 import child_processes
@@ -97,6 +98,13 @@ def running() -> Iterator["Running"]:
 
     with running_desk() as running:
         yield running
+
+
+@pytest.fixture
+def still_people_count(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let people count who have not moved, except in tests of life."""
+    if "sway_m" not in request.fixturenames:
+        monkeypatch.setattr("gazerig.robot.perception.track._COUNTS_S", inf)
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -17,6 +18,12 @@ _SIGNALS = (
     *(signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT),
     *(signal.SIGTTIN, signal.SIGTTOU, signal.SIGTSTP, signal.SIGUSR1),
 )
+_OF_MOST = (
+    *("gazerig.local_head", "gazerig.robot.cli.main", "gazerig.robot.cli.run"),
+    *("gazerig.robot.run.session", "gazerig.drivers.servo_bus.bus"),
+    *("gazerig.drivers.hobby_board.bus", "gazerig.drivers.bus.port_bus"),
+)
+"""Modules that nearly every program needs: imported once here, not again in each fork."""
 _keep: list[object] = []
 
 
@@ -34,6 +41,8 @@ class Branch(subprocess.Popen[Any]):
             preexec_fn()
             become(work, env)
 
+        for name in _OF_MOST:
+            import_module(name)
         gc.collect()  # an unclosed film would wait for its decoder's threads, which no fork has
         super().__init__(["fork"], preexec_fn=begin, **options)
 

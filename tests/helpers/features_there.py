@@ -1,5 +1,6 @@
 """Tests that need the features that the package ships: skipped if a folder was deleted."""
 
+import shutil
 from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
@@ -36,4 +37,9 @@ EVERY_FEATURE = all(map(is_there, _PARTS))
 
 needs_all_features: Callable[[Any], Any] = pytest.mark.skipif(
     not EVERY_FEATURE, reason="a feature is not there"
+)
+
+
+needs_espeak = pytest.mark.skipif(
+    shutil.which("espeak-ng") is None, reason="espeak-ng is not installed: apt install espeak-ng"
 )

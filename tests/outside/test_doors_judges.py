@@ -9,9 +9,9 @@ from typing import Any, get_args
 
 import pytest
 from aiohttp import web
+from fakes.neighbours import audio, conversation, event, realtime_server, run
 from fakes.talking_head import TalkingHead
 from fakes.voice_assistant import free_port
-from test_doors import audio, conversation, event, realtime_server, run
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 

@@ -135,14 +135,14 @@ def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]):
 def test_a_parameter_is_changed_marked_and_put_back(at_the_rig: tuple[Rig, Person]):
     rig, person = at_the_rig
     key = "gaze.lids.blinks_per_min"
-    before = rig.tuning.values()[key]
+    before = rig.tuning.get()[key]
     person.open("Tune")
     person.fill(beside("blinks", "input[type=number]"), "25")
     person.run(f"{beside('blinks', 'input[type=number]')}.blur()")
-    wait_for(lambda: rig.tuning.values()[key] == 25, "the value in force")
+    wait_for(lambda: rig.tuning.get()[key] == 25, "the value in force")
     wait_for(lambda: person.reads("● blinks", "1 not saved"), "the mark")
     person.click(saying("revert to the file"))
-    wait_for(lambda: rig.tuning.values()[key] == before, "what the file says")
+    wait_for(lambda: rig.tuning.get()[key] == before, "what the file says")
     wait_for(lambda: person.reads("all saved"), "no mark")
 
 

@@ -11,7 +11,6 @@ import threading
 from contextlib import ExitStack, closing, suppress
 
 import numpy as np
-import pytest
 from msgspec.structs import replace
 from page_feed import PageFeed, going_on
 from page_visitor import LOOKING, Visitor
@@ -71,8 +70,7 @@ def drained(there: ClientConnection) -> int:
     return taken
 
 
-@pytest.mark.parametrize("path", [SOCKET, VIEW])
-def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(path: str):
+def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig():
     heard: list[dict[str, object]] = []
 
     def serve(end: socket.socket) -> None:
@@ -88,7 +86,7 @@ def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(path: str):
         threading.Thread(target=answer, daemon=True).start()
 
     changes: dict[str, object] = {}
-    # Noise does not compress: what the deaf browser is owed soon fills all buffers.
+    # Noise does not compress: what the deaf browsers are owed soon fills all buffers.
     noise = np.random.default_rng(0).integers(0, 255, (8, 400, 640, 3)).astype(np.uint8)
     numbers = itertools.count()
     with running_page(serve=serve) as (page, url):
@@ -102,20 +100,24 @@ def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(path: str):
             newer = replace(percept, faces=(replace(face, id=number // 3),))
             feed.show(noise[number % len(noise)], percept=newer, **changes)
 
+        paths = (SOCKET, VIEW)
         with ExitStack() as stack:
             with going_on(show):
-                deaf = browser(visitor, path, deaf=True)
-                stack.enter_context(deaf)
-                reads_all = stack.enter_context(closing(Listener(visitor, path)))
-                listener = stack.enter_context(closing(Listener(visitor)))
-                wait_for(lambda: reads_all.bytes > OWED_BYTES, "what one who reads gets")
+                deaf = [browser(visitor, path, deaf=True) for path in paths]
+                for one in deaf:
+                    stack.enter_context(one)
+                read_all = [stack.enter_context(closing(Listener(visitor, path))) for path in paths]
+                owed = lambda: all(it.bytes > OWED_BYTES for it in read_all)  # noqa: E731
+                wait_for(owed, "what those who read get")
                 # Now as ever: others see the newest, a stop is heard, the button knows of it.
                 changes["stopped"] = "a test"
-                wait_for(lambda: listener.reads('"stopped":"a test"'), "the newest words")
-                seen = reads_all.bytes
-                wait_for(lambda: reads_all.bytes > seen, "more for who reads")
+                wait_for(lambda: read_all[0].reads('"stopped":"a test"'), "the newest words")
+                seen = [one.bytes for one in read_all]
+                wait_for(lambda: all(it.bytes > n for it, n in zip(read_all, seen, strict=True)),
+                         "more for those who read")  # fmt: skip
                 assert visitor.ask({"do": "stop", "why": "a test"}) == 200
                 wait_for(lambda: "stop" in [asked["do"] for asked in heard], "the stop")
                 wait_for(lambda: visitor.state()["stopped"] == "a test", "the newest state")
-            # It was deaf indeed: what it was owed was not all kept for it.
-            assert 0 < drained(deaf) < reads_all.bytes - 1_000_000
+            # They were deaf indeed: what they were owed was not all kept for them.
+            for there, reader in zip(deaf, read_all, strict=True):
+                assert 0 < drained(there) < reader.bytes - 1_000_000

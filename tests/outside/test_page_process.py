@@ -4,8 +4,9 @@ import os
 import signal
 import socket
 import subprocess
-import sys
+import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -13,13 +14,12 @@ from urllib.parse import urlsplit
 
 import child_processes
 import pytest
+from branch import Branch
 from page_visitor import Visitor
 from present import present
 from shown_page import free_port, running_page, wait_for
 
 from gazerig.robot.dashboard.feed.page_process import BEAT, URL, PageProcess
-
-REPOSITORY = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -33,9 +33,9 @@ def shared() -> Iterator[tuple[PageProcess, str, int]]:
             yield page, url, busy
 
 
-def page_here() -> int | None:
+def page_here(*others: int) -> int | None:
     """The process of the page that this one has started, alive or stopped."""
-    found = list(child_processes.running())
+    found = [pid for pid in child_processes.running() if pid not in others]
     assert len(found) < 2, found
     return found[0] if found else None
 
@@ -135,31 +135,26 @@ def test_a_page_that_hangs_is_ended_and_one_that_beats_is_not(beats: bool):
         theirs.close()
 
 
-PARENT = """
-import os, sys, time
-from gazerig.robot.dashboard.feed.page_process import PageProcess
-page = PageProcess("127.0.0.1", int(sys.argv[1]))
-page.open()
-while page.url() is None:
-    time.sleep(0.02)
-child = os.fork() if sys.argv[2] == "forks" else -1
-if child == 0:
+def own_a_page(port: int) -> None:
+    """Open a page, fork, and print both processes."""
+    page = PageProcess("127.0.0.1", port)
+    page.open()
+    while page.url() is None:
+        time.sleep(0.02)
+    child = os.fork()
+    if child != 0:
+        print(page_here(child), child, flush=True)
     time.sleep(60.0)
-print(child, flush=True)
-time.sleep(60.0)
-"""
 
 
-@pytest.mark.parametrize("habit", ["alone", "forks"])
-def test_page_ends_when_the_parent_is_killed(habit: str):
-    command = [sys.executable, "-c", PARENT, str(free_port()), habit]
-    with subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True) as parent:
+def test_page_ends_when_the_parent_is_killed():
+    """Even if a fork of it goes on, which holds its sockets."""
+    work = partial(own_a_page, free_port())
+    with Branch(work, stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
-        sibling = int(parent.stdout.readline())
-        (page,) = child_processes.running_as(parent.pid, "gazerig.robot.dashboard.page_main")
+        page, sibling = map(int, parent.stdout.readline().split())
         parent.kill()
         try:
             wait_for(lambda: not child_processes.command(page), "the end of the page")
         finally:
-            if sibling > 0:
-                os.kill(sibling, signal.SIGKILL)
+            os.kill(sibling, signal.SIGKILL)

@@ -45,7 +45,7 @@ def rigs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with rigs whose loops are slow."""
     folder = tmp_path_factory.mktemp("rigs")
     for rig in ("desk", "feetech"):
-        at_rate(folder, rig, 80.0)
+        at_rate(folder, rig, 40.0)
     return folder
 
 

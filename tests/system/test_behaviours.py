@@ -1,17 +1,16 @@
 """The score of a scene's events; and the papers' scenes through the whole robot."""
 
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import degrees, dist, pi, sin
-from typing import Any
+from statistics import median
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pytest
 from fakes.runs import play
 from gaze_targets import target
 from msgspec import structs
-from scene_score import BehaviourScore, PlannerScore
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
@@ -23,6 +22,207 @@ from gazerig.robot.run.surroundings import load_scene
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing, there_and_back
+
+
+class _EventOutcome(NamedTuple):
+    """Outcome of one event.
+
+    latency_s: "look": time from the event's start to the first look, None without one;
+        "return": time of the gaze elsewhere, None if it was never drawn away
+    """
+
+    seen: bool
+    latency_s: float | None
+    looked_s: float
+    event_s: float
+
+
+class _EventObservation:
+    """Observation of one event while it lasts."""
+
+    def __init__(self) -> None:
+        self._first_s: float | None = None
+        self._on = False
+        self._on_s = 0.0
+        self._off_s = 0.0
+
+    def update(self, on: bool, since_s: float, dt_s: float) -> None:
+        """Count one tick, ``since_s`` after the event's start."""
+        self._on = on
+        if not on:
+            self._off_s += dt_s
+            return
+        self._on_s += dt_s
+        if self._first_s is None:
+            self._first_s = since_s
+
+    def outcome(self, response: Literal["look", "return"]) -> _EventOutcome:
+        lasted_s = self._on_s + self._off_s
+        if response == "return":
+            away_s = self._off_s if self._off_s > 0.0 else None
+            return _EventOutcome(self._on, away_s, self._on_s, lasted_s)
+        return _EventOutcome(self._first_s is not None, self._first_s, self._on_s, lasted_s)
+
+
+class BehaviourScore:
+    """Scores a run, tick by tick."""
+
+    def __init__(
+        self,
+        events: Iterable[Event],
+        round_s: float,
+    ) -> None:
+        self._events = tuple(events)
+        self._round_s = round_s
+        self._observations: dict[int, _EventObservation] = {}
+        self._outcomes: dict[str, list[_EventOutcome]] = {event.name: [] for event in self._events}
+        self._first_s: float | None = None
+        self._last_s = 0.0
+        self._round = 0
+
+    def update(self, tick: Tick) -> None:
+        """Count one tick; the first one is the start of the scene."""
+        if self._first_s is None:
+            self._first_s = self._last_s = tick.t_s
+        dt_s, self._last_s = tick.t_s - self._last_s, tick.t_s
+        number, phase_s = divmod(tick.t_s - self._first_s, self._round_s)
+        if number != self._round:
+            self._round = int(number)
+            for i in tuple(self._observations):
+                self._close_event(i)
+        for i, event in enumerate(self._events):
+            if event.start_s <= phase_s < event.end_s:
+                watch, target = self._observations.setdefault(i, _EventObservation()), tick.target
+                away_m = dist(target.p_world_m, event.place_world_m)
+                on = target.kind == event.kind and away_m <= event.within_m
+                watch.update(on, phase_s - event.start_s, dt_s)
+            elif i in self._observations:
+                self._close_event(i)
+
+    def _close_event(self, i: int) -> None:
+        """Record the outcome of an event."""
+        event = self._events[i]
+        outcome = self._observations.pop(i).outcome(event.response)
+        self._outcomes[event.name].append(outcome)
+
+    def figures(self) -> dict[str, dict[str, float | int | None]]:
+        """Return for each name the number of events, the number seen, and statistics.
+
+        latency_s: median over the events seen (away: over those that drew the gaze away)
+        share: fraction of the events' time in which the gaze was on the expected target
+        """
+        return {name: _outcome_figures(answers) for name, answers in self._outcomes.items()}
+
+
+def _outcome_figures(outcomes: list[_EventOutcome]) -> dict[str, float | int | None]:
+    latencies = [answer.latency_s for answer in outcomes if answer.latency_s is not None]
+    lasted_s = sum(answer.event_s for answer in outcomes)
+    return {
+        "seen": sum(answer.seen for answer in outcomes),
+        "of": len(outcomes),
+        "latency_s": round(median(latencies), 4) if latencies else None,
+        "share": round(sum(a.looked_s for a in outcomes) / lasted_s, 4) if lasted_s > 0.0 else None,
+    }
+
+
+_LATE_S = 0.3
+"""Time after a punch within which a new guard is late, not false."""
+_COUNTER_S = 0.6
+"""Time after the end of a punch within which a new attack is a counter-attack."""
+
+
+class _Attack(NamedTuple):
+    start_s: float
+    looked: bool
+
+
+_Time = tuple[float, float, float]
+"""Start and end of an event, and the latest time of an answer to it."""
+
+
+class PlannerScore:
+    """Scores a planner, tick by tick; the first tick is the start of a round."""
+
+    def __init__(
+        self,
+        events: Iterable[Event],
+        round_s: float,
+    ) -> None:
+        self._events, self._round_s = tuple(events), round_s
+        self._first_s: float | None = None
+        self._last_s = 0.0
+        self._action = ""
+        self._guards: list[tuple[float, float]] = []
+        self._attacks: list[_Attack] = []
+
+    def update(self, tick: Tick) -> None:
+        """Count one tick."""
+        if self._first_s is None:
+            self._first_s = tick.t_s
+        self._last_s = now_s = tick.t_s - self._first_s
+        before, self._action = self._action, tick.target.plan.partition(":")[0]
+        if self._action == "guard":
+            start_s = self._guards.pop()[0] if before == "guard" else now_s
+            self._guards.append((start_s, now_s))
+        elif self._action == "attack":
+            start_s, looked = self._attacks.pop() if before == "attack" else (now_s, False)
+            looked = looked or tick.target.kind == "attack_target"
+            self._attacks.append(_Attack(start_s, looked))
+
+    def figures(self) -> dict[str, float | int | None]:
+        """Return the score; an empty dict if nothing was planned.
+
+        guards_in_time, punches: number of punches that met a guard at arrival, and of all punches
+        lead_ms: median time between the start of those guards and the arrival of the fist
+        false_guards_per_min: guards without a punch
+        attacks, open, counters: attacks begun; those into an open guard; those after a punch
+        looked_at: attacks during which the gaze was on the attacked place
+        """
+        if not self._guards and not self._attacks:
+            return {}
+        # Lead of the guard over the fist, for all punches that are over.
+        leads, punches = [], 0
+        thrown, openings = self._event_times("punch"), self._event_times("attack")
+        for _, end_s, due_s in thrown:
+            if end_s > self._last_s:
+                continue
+            punches += 1
+            # One tick before its end counts as its end.
+            in_force = [at_s for at_s, end_s in self._guards if at_s <= due_s <= end_s + 0.05]
+            if in_force:
+                leads.append(due_s - max(in_force))
+        false = sum(not _is_during(at_s, thrown, 0.0, _LATE_S) for at_s, _ in self._guards)
+        opens = sum(_is_during(one.start_s, openings, 0.1, 0.0) for one in self._attacks)
+        counters = sum(_is_during(one.start_s, thrown, 0.0, _COUNTER_S) for one in self._attacks)
+        return {
+            "punches": punches,
+            "guards_in_time": len(leads),
+            "lead_ms": round(1e3 * median(leads), 1) if leads else None,
+            "false_guards_per_min": round(60.0 * false / max(self._last_s, 1e-9), 2),
+            "attacks": len(self._attacks),
+            "open": opens,
+            "counters": counters,
+            "looked_at": sum(one.looked for one in self._attacks),
+        }
+
+    def _event_times(self, name: str) -> list[_Time]:
+        rounds = range(int(self._last_s // self._round_s) + 1)
+        return [
+            _time(event, self._round_s * number)
+            for number in rounds
+            for event in self._events
+            if event.name == name
+        ]
+
+
+def _time(event: Event, after_s: float) -> _Time:
+    due_s = event.end_s if event.due_s is None else event.due_s
+    return after_s + event.start_s, after_s + event.end_s, after_s + due_s
+
+
+def _is_during(at_s: float, times: Iterable[_Time], before_s: float, after_s: float) -> bool:
+    return any(start - before_s <= at_s <= end + after_s for start, end, _ in times)
+
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -65,10 +265,10 @@ def made_for(scene: str, seed: int = 0, rate_hz: float = 200.0) -> Run:
     return Run(rig, RunOptions(mock=True, fast=True, seed=seed, scene=scene))
 
 
-@pytest.fixture(scope="module", params=[0, 7])
-def boxing(request: pytest.FixtureRequest) -> Lived:
+@pytest.fixture(scope="module")
+def boxing() -> Lived:
     scene = load_scene("boxing")
-    return Lived(made_for("boxing", request.param, 100.0), scene, scene.round_s + 0.05)
+    return Lived(made_for("boxing", 0, 50.0), scene, scene.round_s + 0.05)
 
 
 def latency(figure: dict[str, float | int | None]) -> float:
@@ -219,7 +419,7 @@ def test_e48_back_on_the_face_within_a_second_of_a_distraction(way_m: Vec3):
         dice = np.random.default_rng(0)
         return SceneCamera(FrameParams(), scene, own._mount, own._head_pose, dice)
 
-    made = made_for("boxing", rate_hz=100.0)
+    made = made_for("boxing", rate_hz=50.0)
     made.robot.camera = before(made.robot.camera)
     lived = Lived(made, scene, 17.0)
     figure = lived.score.figures()["return"]
@@ -229,51 +429,14 @@ def test_e48_back_on_the_face_within_a_second_of_a_distraction(way_m: Vec3):
     assert 0.1 < figure["latency_s"] <= 1.0
     for start_s in scene.starts_s:
         away = [each for each in lived.within(start_s, start_s + 1.5) if each.target.kind == "hand"]
-        assert len(away) * 0.01 <= 1.0
+        assert len(away) / 50.0 <= 1.0
 
 
-def test_face_to_face_keeps_the_face_through_all_heights():
-    scene = load_scene("face-to-face")
-    lived = Lived(made_for("face-to-face", rate_hz=100.0), scene, scene.round_s + 0.05)
-    figure = lived.score.figures()["face"]
-    assert figure["seen"] == figure["of"] == 1
-    # Bouts of mutual gaze of 3.6 s on average and looks away of 0.6 s.
-    assert figure["share"] is not None and 0.8 < figure["share"] < 0.95
-    pitch = [degrees(each.pose.head_rad[1]) for each in lived.ticks]
-    assert max(pitch) > 8.0 and min(pitch) < -3.0
+# ---- A pinwheel that spins
 
 
-# ---- Scenes of several people, and a pinwheel that spins: what they hold, and what the gaze does.
-
-
-ARRIVES_S, LEAVES_S = 6.0, 55.0
-"""Arrival and departure of the third person of three-people."""
 PINWHEEL, SPIN_S = (0.75, 0.0, 0.06), (4.0, 7.0)
 """Place of the pinwheel of two-people, and when the wind first turns it."""
-
-
-def watched(scene: Scene, lived: Lived, start_s: float, end_s: float) -> dict[str, float]:
-    """Return the share of time for which each person and kind of thing is looked at."""
-    found: Counter[str] = Counter()
-    for t_s, tick in zip(lived.scene_s, lived.ticks, strict=True):
-        if start_s <= t_s < end_s:
-            name, people = tick.target.kind, scene.people(t_s)
-            if name == "face":
-                away = [dist(p.p_world_face_m, tick.target.p_world_m) for p in people]
-                name = f"person {int(np.argmin(away))}"
-            found[name] += 1
-    total = sum(found.values())
-    return {name: count / total for name, count in found.items()}
-
-
-def test_e79_among_three_people_all_are_looked_at_and_keep_their_identities():
-    scene = load_scene("three-people")
-    lived = Lived(made_for("three-people", 0, 50.0), scene, 45.0)
-    shares = watched(scene, lived, ARRIVES_S, min(45.0, LEAVES_S))
-    assert min(shares[f"person {k}"] for k in range(3)) > 0.08
-    assert sum(shares[f"person {k}"] for k in range(3)) > 0.8
-    ids = {face.id for tick in lived.ticks if tick.percept for face in tick.percept.faces}
-    assert len(ids) <= 4
 
 
 def test_e80_what_spins_draws_the_gaze_by_its_spin():

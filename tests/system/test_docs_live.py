@@ -11,7 +11,7 @@ from shutil import which
 import pytest
 from branch import Branch
 from branch import gazerig as gazerig_branch
-from command_line import GAZERIG, invoked
+from command_line import invoked
 from features_there import needs_all_features
 from papers import COMMANDS, blocks
 from shown_page import wait_for
@@ -65,12 +65,6 @@ def works(words: str, answers: str = "") -> str:
     return done.out + done.err
 
 
-def typed_alone(words: str) -> subprocess.Popen[str]:
-    """Type a command in a process that has no thread of a head."""
-    pipe, both = subprocess.PIPE, subprocess.STDOUT
-    return subprocess.Popen([*GAZERIG, *shlex.split(words)], stdout=pipe, stderr=both, text=True)
-
-
 def works_until_ctrl_c(process: subprocess.Popen[str], first: str) -> None:
     """Press Ctrl-C once a command that goes on has written ``first``."""
     try:
@@ -115,30 +109,25 @@ def _works_on_a_head(words: str) -> None:
     works("ctl revert")
 
 
-@pytest.mark.parametrize("words", TO_SERVOS)
-def test_a_command_to_servos_works(words: str, folder: Path):
+def test_commands_to_servos_work(folder: Path):
     """With emulated ones instead of those on a port."""
-    copy("maker" if COMMANDS[words] == "start.md" else "desk", folder / "myrig.yaml")
-    works(f"{words} --mock" + " --once" * (words == "monitor"), answers="y\n")
+    for words in TO_SERVOS:
+        copy("maker" if COMMANDS[words] == "start.md" else "desk", folder / "myrig.yaml")
+        works(f"{words} --mock" + " --once" * (words == "monitor"), answers="y\n")
 
 
-@pytest.fixture(scope="module")
-def recording(folder: Path) -> Path:
-    """A recording under the name that papers give theirs."""
+def test_commands_on_a_recording_work(folder: Path):
+    """On one under the name that papers give theirs."""
     copy("desk", folder / "my.yaml")
-    works("run my.yaml --mock --fast --seconds 5 --scene face-to-face --record evening.mcap")
-    return folder
-
-
-@pytest.mark.parametrize("words", ON_A_RECORDING)
-def test_a_command_on_a_recording_works(words: str, recording: Path):
-    works(words)
+    works("run my.yaml --mock --fast --seconds 1 --scene face-to-face --record evening.mcap")
+    for words in ON_A_RECORDING:
+        works(words)
 
 
 @pytest.mark.pty
-@pytest.mark.parametrize("words", ENDLESS)
-def test_a_command_that_runs_until_it_is_ended_works(words: str, folder: Path):
+def test_commands_that_run_until_they_are_ended_work(folder: Path):
     copy("desk", folder / "my.yaml")
-    work = gazerig_branch(*shlex.split(words.replace("/tmp/", f"{folder}/")))
-    pipe, both = subprocess.PIPE, subprocess.STDOUT
-    works_until_ctrl_c(Branch(work, stdout=pipe, stderr=both, text=True), "/")
+    for words in ENDLESS:
+        work = gazerig_branch(*shlex.split(words.replace("/tmp/", f"{folder}/")))
+        pipe, both = subprocess.PIPE, subprocess.STDOUT
+        works_until_ctrl_c(Branch(work, stdout=pipe, stderr=both, text=True), "/")

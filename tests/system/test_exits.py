@@ -9,6 +9,9 @@ import pytest
 from attack.exits import POOLS, case
 from branch import Branch
 
+RATE_HZ = 50.0
+"""Of the loops: no exit depends on it, and a quarter of the work is enough."""
+
 
 def begin(code: str, words: list[str], **options: Any) -> "subprocess.Popen[bytes]":
     """Start a program in a branch of this process."""
@@ -41,7 +44,7 @@ def begin(code: str, words: list[str], **options: Any) -> "subprocess.Popen[byte
     ],
 )
 def test_no_servo_keeps_its_torque(kind: str, interface: str, exit_: str):
-    row = case(kind, interface, exit_, begin)
+    row = case(kind, interface, exit_, begin, RATE_HZ)
     assert row.void == "" and row.of > 0
     assert row.powered == 0
     if interface in POOLS:

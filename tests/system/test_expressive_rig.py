@@ -55,7 +55,7 @@ def test_a_blink_shuts_the_lids_of_a_sad_face():
     made = started(apply_changes(load_rig("expressive"), {"gaze.lids.law": "nakamoto"}))
     made.robot.command(Express("sad"))
     lid, widest, narrowest = NAMES.index("left_upper_lid"), -90.0, 90.0
-    for tick in ticks(made, 3000)[201:]:
+    for tick in ticks(made, 1600)[201:]:
         angle = degrees(tick.desired_rad[lid])
         widest, narrowest = max(widest, angle), min(narrowest, angle)
     made.close()

@@ -11,11 +11,66 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from command_line import figures
 from fakes.films import write_film
 from features_there import needs_all_features
-from light_python import LightPython
 
 import gazerig
+
+_SERVES = """
+import atexit, json, os, sys, threading, traceback
+import gazerig.robot.run.session
+print("loaded", flush=True)
+for line in sys.stdin:
+    asked = json.loads(line)
+    fork = os.fork()
+    if fork == 0:
+        for stream, file in enumerate(asked["said"], 1):
+            os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND), stream)
+        status = 0
+        try:
+            os.chdir(asked["folder"])
+            exec(asked["code"], {"__name__": "__main__"})
+        except BaseException:
+            traceback.print_exc()
+            status = 1
+        threading._shutdown()
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    print(os.waitstatus_to_exitcode(os.waitpid(fork, 0)[1]), flush=True)
+"""
+
+
+class LightPython:
+    """Runs code in a process that has imported gazerig.robot.run.session alone."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._count = folder, 0
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _SERVES], stdin=pipe, stdout=pipe, text=True
+        )
+        assert self._process.stdout is not None and self._process.stdout.readline() == "loaded\n"
+
+    def run(self, code: str, folder: Path) -> tuple[str, str]:
+        """Run code in a folder; return what it wrote to its standard output and error."""
+        self._count += 1
+        said = [self._folder / f"{self._count}.{stream}" for stream in ("out", "err")]
+        asked = {"code": code, "folder": str(folder), "said": [str(file) for file in said]}
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._process.stdin.write(f"{json.dumps(asked)}\n")
+        self._process.stdin.flush()
+        status = self._process.stdout.readline()
+        out, err = (file.read_text(encoding="utf-8") for file in said)
+        assert status == "0\n", err
+        return out, err
+
+    def close(self) -> None:
+        """End it."""
+        self._process.communicate()
+
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -48,12 +103,15 @@ def python(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LightPython]:
     light.close()
 
 
+def _code(*commands: tuple[str, ...], absent: Sequence[str]) -> str:
+    return _WITHOUT.replace("COMMANDS", repr(commands)).replace("ABSENT", repr(absent))
+
+
 def without_extras(
     python: LightPython, folder: Path, *commands: tuple[str, ...], absent: Sequence[str] = OF_EXTRAS
 ) -> tuple[list[str], list[str]]:
     """Run commands without some packages; return their exit codes and output."""
-    code = _WITHOUT.replace("COMMANDS", repr(commands)).replace("ABSENT", repr(absent))
-    out, err = python.run(code, folder)
+    out, err = python.run(_code(*commands, absent=absent), folder)
     return re.findall(r"^exit (\d+)$", out, re.MULTILINE), err.splitlines()
 
 
@@ -76,21 +134,6 @@ def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_d
     spreads = f"distributed is not installed: pip install -e '{ROOT}[cluster]'"
     assert (codes, said) == (["2"] * 5, [writes, writes, spreads, sees, places])
     assert not list(tmp_path.iterdir())
-
-
-@needs_all_features
-def test_the_head_runs_without_extras(python: LightPython, tmp_path: Path):
-    codes, said = without_extras(
-        python,
-        tmp_path,
-        ("run", "--mock", "--fast", "--seconds", "1", "--summary", "run.json"),
-        ("check", "desk"),
-        ("run", "desk", "--mock", "--fast", "--no-page", "--seconds", "1"),
-        ("report", "--help"),
-        absent=(*OF_EXTRAS, "trimesh"),  # which also loads half a second
-    )
-    assert codes == ["0"] * 4, said
-    assert (tmp_path / "run.json").is_file()
 
 
 @needs_all_features
@@ -190,39 +233,37 @@ def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_pat
 # ---- Without the folders of features/ the rest runs as before, and names what is missing.
 
 
-COMMAND = "run desk --mock --fast --no-page --scene visitor --seconds 0.5 --seed 0 --summary -"
+RUN_COMMAND = ("run", "desk", "--mock", "--fast", "--no-page", "--scene", "visitor",
+               "--seconds", "0.5", "--seed", "0", "--summary", "run.json")  # fmt: skip
 
 
-@pytest.fixture
-def package(tmp_path: Path) -> Path:
-    """A folder with the package by links, its features left out."""
-    top = tmp_path / "gazerig"
-    (top / "features").mkdir(parents=True)
+@needs_all_features
+def test_without_extras_and_without_features_the_head_runs_with_the_same_bytes(
+    python: LightPython, tmp_path: Path
+):
+    codes, said = without_extras(
+        python,
+        tmp_path,
+        RUN_COMMAND,
+        ("check", "desk"),
+        ("report", "--help"),
+        absent=(*OF_EXTRAS, "trimesh"),  # which also loads half a second
+    )
+    assert codes == ["0"] * 3, said
+    core = tmp_path / "core"
+    (core / "gazerig" / "features").mkdir(parents=True)
     for entry in Path(gazerig.__path__[0]).iterdir():
         if entry.name not in ("features", "__pycache__"):
-            (top / entry.name).symlink_to(entry.resolve())
-    return tmp_path
-
-
-def run_command(words: str, package: Path | None = None) -> subprocess.CompletedProcess[str]:
-    path = {"PYTHONPATH": str(package)} if package else {}
-    main = "from gazerig.robot.cli.entry_point import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", main, *words.split()],
-        capture_output=True, text=True, cwd=package, env={**os.environ, **path},
+            (core / "gazerig" / entry.name).symlink_to(entry.resolve())
+    helps = [(command, "--help") for command in ("study", "report", "scan", "import")]
+    done = subprocess.run(
+        [sys.executable, "-c", _code(RUN_COMMAND, ("--help",), *helps, absent=())],
+        capture_output=True, text=True, cwd=core, env={**os.environ, "PYTHONPATH": str(core)},
     )  # fmt: skip
-
-
-def test_without_features_a_run_has_the_same_bytes(package: Path):
-    whole, core = (
-        json.loads(run_command(COMMAND, place).stdout)["bus"] for place in (None, package)
-    )
-    assert core["tx_sha256"] == whole["tx_sha256"]
-
-
-def test_without_features_their_commands_name_what_is_missing(package: Path):
-    listed = run_command("--help", package).stdout
-    assert " run " in listed and " study " not in listed
-    for command in ("study", "report", "scan", "import"):
-        done = run_command(f"{command} --help", package)
-        assert done.returncode == 2 and "No module named 'gazerig.features." in done.stderr
+    assert re.findall(r"^exit (\d+)$", done.stdout, re.MULTILINE) == ["0", "0", *["2"] * 4]
+    assert " run " in done.stdout and " study " not in done.stdout
+    assert done.stderr.count("No module named 'gazerig.features.") == len(helps)
+    with_all = figures("desk", "--no-page", "--scene", "visitor", "--seconds", "0.5", "--seed", "0")
+    for folder in (tmp_path, core):
+        run = json.loads((folder / "run.json").read_text())
+        assert run["bus"]["tx_sha256"] == with_all["bus"]["tx_sha256"]

@@ -74,7 +74,7 @@ def test_a_viewer_reads_the_description_of_the_rig(tmp_path: Path):
 
 @pytest.fixture(scope="module")
 def maker(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
-    return recorded(tmp_path_factory.mktemp("six") / "maker.mcap", load_rig("maker"), 4.2)
+    return recorded(tmp_path_factory.mktemp("six") / "maker.mcap", load_rig("maker"), 2.2)
 
 
 # --- recordings

@@ -20,46 +20,48 @@ import gazerig as gazerig_package
 from gazerig.config.faults import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.features.lab.report.gaze_trace import PHASES
-from gazerig.features.lab.simulated_run import simulate
+from gazerig.features.lab.simulated_run import SimulatedRun, simulate
 from gazerig.robot.run.options import RunOptions
 
 
 @pytest.fixture(scope="module")
-def half(tmp_path_factory: pytest.TempPathFactory) -> str:
+def slow(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The desk rig at half its rate, for tests that do not concern the rate."""
     return at_rate(tmp_path_factory.mktemp("rigs"), "desk", 100.0)
 
 
 @pytest.fixture(scope="module")
-def visitor(half: str) -> dict[str, Any]:
+def visitor(slow: str) -> SimulatedRun:
     """One round of the visitor: comes, moves, waves, leaves and comes back."""
-    return figures(half, "--seconds", "44", "--seed", "1")
+    asked = RunOptions(True, True, seed=1, scene="visitor", rig=slow, seconds=44.0)
+    return simulate(load_rig(slow), asked)
 
 
 @pytest.mark.slow
-def test_summary_tells_all_it_promises(visitor: dict[str, Any]):
+def test_summary_tells_all_it_promises(visitor: SimulatedRun):
+    figures: dict[str, Any] = visitor.figures
     promised = {
         "seconds", "wall_seconds", "ticks", "overruns", "faces_seen", "pictures", "fixations",
         "saccades", "blinks", "target_share", "bus", "stopped_by",
     }  # fmt: skip
-    assert promised <= set(visitor)
-    assert {"tx_bytes", "rx_bytes", "errors"} <= set(visitor["bus"])
-    assert visitor["stopped_by"] == "seconds" and visitor["overruns"] == 0
-    assert visitor["ticks"] == pytest.approx(44 * 100, abs=2)
+    assert promised <= set(figures)
+    assert {"tx_bytes", "rx_bytes", "errors"} <= set(figures["bus"])
+    assert figures["stopped_by"] == "seconds" and figures["overruns"] == 0
+    assert figures["ticks"] == pytest.approx(44 * 100, abs=2)
 
 
-def test_the_head_looks_at_the_visitor(visitor: dict[str, Any]):
-    share = visitor["target_share"]
+def test_the_head_looks_at_the_visitor(visitor: SimulatedRun):
+    figures: dict[str, Any] = visitor.figures
+    share = figures["target_share"]
     nobody = sum(share.get(kind, 0.0) for kind in ("rest", "search", "glance"))
     assert share["face"] > 0.6 and share["hand"] > 0.02 and nobody > 0.02
-    assert visitor["bus"]["errors"] == {}
-    assert 1.5 < visitor["saccades"] / visitor["seconds"] < 5.5
-    assert 5 <= visitor["blinks"] <= 40
+    assert figures["bus"]["errors"] == {}
+    assert 1.5 < figures["saccades"] / figures["seconds"] < 5.5
+    assert 5 <= figures["blinks"] <= 40
 
 
-def test_the_eyes_rest_on_what_the_head_looks_at(half: str):
-    asked = RunOptions(True, True, seed=1, scene="visitor", rig=half, seconds=44.0)
-    trace = simulate(load_rig(half), asked).trace
+def test_the_eyes_rest_on_what_the_head_looks_at(visitor: SimulatedRun):
+    trace = visitor.trace
     resting = trace.slow() & (trace.column("phase") != PHASES.index("saccade"))
     off_deg = trace.column("off").mean(axis=1)[resting]
     assert np.median(off_deg) < 0.3
@@ -67,23 +69,29 @@ def test_the_eyes_rest_on_what_the_head_looks_at(half: str):
     assert np.percentile(off_deg, 95.0) < 6.5
 
 
-def bytes_sent(*words: str) -> str:
-    digest: str = figures(*words)["bus"]["tx_sha256"]
-    return digest
+def photo(path: Path) -> Path:
+    data = pytest.importorskip("skimage.data", reason="scikit-image ships the photo")
+    cv2.imwrite(str(path), np.ascontiguousarray(data.astronaut()[:, :, ::-1]))
+    return path
 
 
 @pytest.mark.slow
-def test_e59_same_seed_same_bytes_in_another_process(half: str):
-    words = (half, "--seconds", "5", "--seed", "1")
-    done = gazerig("run", "--mock", "--fast", "--summary", "-", *words)
+def test_e59_before_a_photo_same_seed_same_bytes_in_another_process(slow: str, tmp_path: Path):
+    words = (slow, "--video", str(photo(tmp_path / "photo.png")), "--seconds", "2", "--seed")
+    done = gazerig("run", "--mock", "--fast", "--summary", "-", *words, "1")
     assert done.returncode == 0, done.stderr
     one: dict[str, Any] = json.loads(done.stdout)
-    again = figures(*words)
+    again = figures(*words, "1")
     assert one.pop("wall_seconds") > 0.0 and again.pop("wall_seconds") > 0.0
     assert again == one
+    assert again["faces_seen"] == again["pictures"] >= 17
+    assert again["target_share"]["face"] > 0.8  # after a reaction time
     assert re.fullmatch(r"[0-9a-f]{64}", again["bus"]["tx_sha256"])
-    short = ("--seconds", "1", "--seed")
-    assert bytes_sent(*short, "1") != bytes_sent(*short, "2")
+
+
+def test_another_seed_gives_other_bytes(slow: str):
+    one, two = (figures(slow, "--seconds", "1", "--seed", seed)["bus"] for seed in "12")
+    assert one["tx_sha256"] != two["tx_sha256"]
 
 
 # --- Ends of the command run in real time: by a signal
@@ -119,23 +127,6 @@ def test_signals_park_and_switch_torque_off(tmp_path: Path):
         run = json.loads(out)
         assert run["stopped_by"] == name
         assert run["target_share"].get("face", 0.0) > 0.0
-
-
-# --- The command run before a photo and a film: faces in them are found and looked at
-
-
-def photo(path: Path) -> Path:
-    data = pytest.importorskip("skimage.data", reason="scikit-image ships the photo")
-    cv2.imwrite(str(path), np.ascontiguousarray(data.astronaut()[:, :, ::-1]))
-    return path
-
-
-def test_a_photo_is_looked_at_and_gives_the_same_bytes_twice(tmp_path: Path):
-    picture = photo(tmp_path / "photo.png")
-    runs = [figures("--video", str(picture), "--seconds", "2") for _ in range(2)]
-    assert runs[0]["faces_seen"] == runs[0]["pictures"] >= 17
-    assert runs[0]["target_share"]["face"] > 0.8  # after a reaction time
-    assert runs[0]["bus"] == runs[1]["bus"]
 
 
 # --- Errors of users, in one line before a run begins; check and schema

@@ -1,10 +1,10 @@
 """A rig of Feetech SCS servos: found, examined, set up, moved, run and let go like any other."""
 
 import json
+from pathlib import Path
 
 import pytest
 from command_line import invoked
-from scs_rig import scs_text
 from served_rigs import hide_real_ports, served
 
 from gazerig.config.load import ConfigError
@@ -18,6 +18,18 @@ from gazerig.robot.guardian.release_plan import ReleasePlan
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+SHIPPED = Path(__file__).parents[2] / "config" / "rigs" / "feetech.yaml"
+
+
+def scs_text(neck: str = "scs15") -> str:
+    """Write the rig; ``neck``: the model of the neck's servos."""
+    eyes, head = SHIPPED.read_text(encoding="utf-8").split("\n  neck_yaw:")
+    eyes = eyes.replace("model: sts3215", "model: scs0009")
+    text = f"{eyes}\n  neck_yaw:{head.replace('model: sts3215', f'model: {neck}')}"
+    text = text.replace("zero_step: 2048", "zero_step: 512").replace("name: feetech", "name: scs")
+    return text.replace("  rate_hz: 200", "  rate_hz: 50")
+
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")
 

@@ -49,7 +49,7 @@ def played(made: Run, track: str) -> tuple[CommandReply, list[Tick]]:
     return reply, first + ticks(made, int(reply.track.duration_s / DT) + 60)
 
 
-@pytest.mark.parametrize("name", ("desk", "expressive", "feetech", "maker"))
+@pytest.mark.parametrize("name", ("desk", "expressive"))
 def test_joints_follow_tracks_and_the_eyes_stay_on_the_point(
     name: str, started: Callable[[Rig], Run]
 ):

@@ -1,6 +1,7 @@
 """Tracks from the command line, from Python, on the page, from menus and by rules."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from ticked_rig import TickedRig, connected, gazerig
@@ -77,7 +78,9 @@ def test_a_visitor_who_waves_is_nodded_to():
         rig="desk", mock=True, fast=True, scene="visitor", seconds=20, rules="greeting"
     )
     said: list[str] = []
-    session.Session(Run(load_rig("desk"), options), lambda: None, said.append).run()
+    rig = load_rig("desk")
+    rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
+    session.Session(Run(rig, options), lambda: None, said.append).run()
     (nod,) = [line for line in said if "track" in line]
     at_s = float(nod.split(" s: ")[0])
     assert 17.5 < at_s < 19.0 and "for rule wait: nod takes 1.0 s" in nod  # the wave begins at 17.5

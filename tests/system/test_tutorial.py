@@ -1,18 +1,92 @@
 """Every command and every piece of YAML of the tutorial is tried, step by step."""
 
+import re
 import runpy
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import pytest
+import yaml
 from command_line import invoked
 from features_there import skip_without
-from tutorial import commands, steps, write_files
+from papers import ROOT
 
 import gazerig
 
+TUTORIAL = ROOT / "docs/tutorial.md"
+_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+class Block(NamedTuple):
+    """Code of one step: language, text, and the file that the words before it name last."""
+
+    step: int
+    language: str
+    text: str
+    file: str
+
+
+def steps() -> list[str]:
+    """Return the text of each step, without the text before the first."""
+    text = TUTORIAL.read_text(encoding="utf-8")
+    found = re.split(r"^## (\d+)\. ", text, flags=re.MULTILINE)
+    assert [int(number) for number in found[1::2]] == list(range(1, len(found) // 2 + 1))
+    return found[2::2]
+
+
+def blocks() -> Iterator[Block]:
+    """Return every block in order."""
+    for number, text in enumerate(steps(), 1):
+        end = 0
+        for match in _BLOCK.finditer(text):
+            named = re.findall(r"`([\w/]+\.(?:yaml|py|csv))`", text[end : match.start()])
+            end = match.end()
+            # The rest of a step's YAML belongs to the head, whose file only step 2 must name.
+            file = named[-1] if named else "myhead.yaml"
+            yield Block(number, match[1], match[2], file)
+
+
+def commands(step: int) -> list[str]:
+    """Return what a step types, without gazerig and remarks."""
+    lines = [
+        line
+        for b in blocks()
+        if b.step == step and b.language == "sh"
+        for line in b.text.splitlines()
+    ]
+    assert all(line.startswith(("gazerig ", "python ")) for line in lines), lines
+    return [line.split("  #")[0].strip() for line in lines]
+
+
+def write_files(folder: Path, step: int) -> None:
+    """Write the files as they are after a step."""
+    for block in blocks():
+        path = folder / block.file
+        if block.step > step:
+            return
+        path.parent.mkdir(exist_ok=True)
+        if block.language == "python":
+            path.write_text(block.text, encoding="utf-8")
+        elif block.language == "yaml":
+            here = yaml.safe_load(path.read_text(encoding="utf-8")) if path.exists() else {}
+            _merge(here, yaml.safe_load(block.text), path.name)
+            with path.open("w", encoding="utf-8") as file:
+                yaml.safe_dump(here, file, sort_keys=False)
+
+
+def _merge(into: Any, more: Any, place: str) -> None:
+    """Add what a block shows; what is already there is not changed by a step."""
+    for key, value in more.items():
+        if key not in into:
+            into[key] = value
+        else:
+            assert isinstance(value, dict), f"{place}: {key} is in the file already"
+            _merge(into[key], value, f"{place}.{key}")
+
+
 pytestmark = pytest.mark.usefixtures("simulated_wires")
-STEPS = range(1, len(steps()) + 1)
 
 
 @pytest.fixture
@@ -21,20 +95,23 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("step", STEPS)
-def test_every_command_of_a_step_works(step: int, folder: Path):
-    write_files(folder, step)
-    for line in commands(step):
-        words = shlex.split(line)
-        if words[0] == "gazerig" and words[1] != "ctl":
-            skip_without(words[1])
-            tried(line, *words[1:])
+def test_every_command_of_every_step_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for step in range(1, len(steps()) + 1):
+        folder = tmp_path / str(step)
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        write_files(folder, step)
+        for line in commands(step):
+            words = shlex.split(line)
+            if words[0] == "gazerig" and words[1] != "ctl":
+                skip_without(words[1])
+                tried(line, *words[1:])
 
 
 def tried(line: str, *words: str) -> str:
     """Type a command, a run of it in simulated time; give what it wrote."""
     if words[0] == "run":
-        words = (*_without(words, "--seconds", "--summary"), "--fast", "--seconds", "2")
+        words = (*_without(words, "--seconds", "--summary"), "--fast", "--seconds", "1")
     done = invoked(*words)
     assert done.code == 0, f"{line}: {done.err}"
     return done.out + done.err
@@ -73,9 +150,3 @@ def test_the_program_greets_the_visitor(
     assert commands(8) == ["python greet.py"]
     runpy.run_path("greet.py", run_name="__main__")
     assert capsys.readouterr().out == "hello, 1\n"
-
-
-def head(folder: Path, step: int) -> str:
-    """Return the path of the head as it is after a step."""
-    write_files(folder, step)
-    return str(folder / "myhead.yaml")

@@ -13,10 +13,10 @@ from features_there import skip_without
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, SetupError
 from gazerig.robot.cli.run import report_faults
+from gazerig.robot.loop.joint_faults import JointFaults
 from gazerig.robot.loop.loop import Robot
 from gazerig.robot.loop.power_down import SAME_REQUEST_S, Interrupts, PowerDown
 from gazerig.robot.run import session
-from gazerig.robot.run.figures import Summary
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.run import Run
 from gazerig.sim_mock.device import Device
@@ -233,15 +233,15 @@ def test_no_memory_in_the_loop_leaves_by_the_door(
 def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(
     devices: list[Device], monkeypatch: pytest.MonkeyPatch
 ):
-    def broken(self: Summary, tick: object) -> None:
+    def broken(self: JointFaults, tick: object) -> None:
         raise RuntimeError("plug-in")
 
-    monkeypatch.setattr(Summary, "update", broken)
+    monkeypatch.setattr(JointFaults, "update", broken)
     said: list[str] = []
     figures = ran("desk", said, 1.0)
     assert figures["stopped_by"] == "seconds" and figures["ticks"] >= 199 and on(devices[0]) == 0
     assert [line for line in said if "plug-in" in line] == [
-        "the summary failed (RuntimeError: plug-in); the rig continues without it"
+        "the watch for faults failed (RuntimeError: plug-in); the rig continues without it"
     ]
 
 
@@ -278,7 +278,7 @@ def test_a_joint_that_does_not_move_is_said_counted_and_in_the_exit_code(
     def jam(made: Run) -> None:
         devices[0].faults.command("stick 7")
 
-    figures = ran("desk", said, 15.0, jam)
+    figures = ran("desk", said, 8.0, jam)
     about = [line for line in said if "neck_yaw: not moving" in line]
     assert about and about[0].endswith("not moving: held") and len(about) <= 4
     assert figures["joint_faults"]["neck_yaw"]["not moving"] >= 1
@@ -310,7 +310,7 @@ def begun(words: list[str], breaks: str, **options: Any) -> Branch:
 )
 def test_no_servo_stays_on(rig: str, command: str, way: str):
     skip_without(command)
-    with bench(rig) as at:
+    with bench(rig, 50.0) as at:
         row = attack(at, command, way, begun)
     assert not row.void and row.code is not None and row.on == 0, row
     assert row.off_park_deg < 6.0, row

@@ -1,12 +1,12 @@
 """Pictures of a world: where points land, and what is left out."""
 
 from collections.abc import Iterator
+from functools import cache
 from math import radians
 from typing import Any
 
 import numpy as np
 import pytest
-from rendering import renders as renders
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.types import ImageArray
@@ -20,6 +20,33 @@ from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.scene import PinholeView
 from gazerig.sim_mock.scenes.script import PersonScript, SceneScript
+
+
+@cache
+def why_not() -> str:
+    """Return why nothing can render here, "" where something can."""
+    from gazerig.drivers.errors import SetupError
+
+    try:
+        from gazerig.features.world.gl_context import import_mujoco
+    except ModuleNotFoundError as error:
+        return str(error)
+    try:
+        mujoco = import_mujoco()
+        from gazerig.features.world.renderer import Renderer
+
+        Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 16, 16).close()
+    except SetupError as error:
+        return str(error)
+    return ""
+
+
+@pytest.fixture(scope="session")
+def renders() -> None:
+    """Skip the test without a renderer."""
+    if reason := why_not():
+        pytest.skip(reason)
+
 
 pytestmark = pytest.mark.usefixtures("renders")
 

@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_coupling import COUPLING
 from world_rigs import WorldBench, arm, read, write
 
 from gazerig.config.schema import load_rig
+from gazerig.robot.model.coupling import CouplingParams
 
 pytestmark = pytest.mark.usefixtures("mujoco")
+COUPLING = CouplingParams("neck_pitch", "neck_roll", 1.5, 1.2)
 STEP = 200
 """Steps of 4096 that a joint is sent."""
 

@@ -296,13 +296,15 @@ class Row(NamedTuple):
     void: str
 
 
-def case(kind: str, interface: str, exit_: str, begin: Begin = fresh) -> Row:
-    """Run one case."""
+def case(
+    kind: str, interface: str, exit_: str, begin: Begin = fresh, rate_hz: float | None = None
+) -> Row:
+    """Run one case, with another rate of the loops if one is given."""
     with ExitStack() as stack:
         names = [kind]
         if interface == "two heads":
             names.append("feetech" if kind != "feetech" else "desk")
-        benches = [stack.enter_context(bench(name)) for name in names]
+        benches = [stack.enter_context(bench(name, rate_hz)) for name in names]
         of = sum(len(one.rig.joints) for one in benches)
         try:
             target = stack.enter_context(held(interface, benches, begin))

@@ -36,6 +36,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "helpers"))
 from board_rig import on_pca9685
 from child_processes import running_as
 from present import present
+from slow_rigs import at_rate
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.run.emulated import emulated_lines
@@ -120,9 +121,12 @@ class Bench(NamedTuple):
 
 
 @contextlib.contextmanager
-def bench(name: str) -> Iterator[Bench]:
+def bench(name: str, rate_hz: float | None = None) -> Iterator[Bench]:
+    """Emulate the servos of a rig, whose loop may have another rate than the shipped one."""
     with TemporaryDirectory() as folder, PtyBuses() as buses:
         file = on_pca9685(folder) if name == "pca9685" else name
+        if rate_hz is not None:
+            file = at_rate(Path(folder), file, rate_hz)
         rig = load_rig(file)
         (path,) = buses.start(emulated_lines(rig)).values()
         yield Bench(name, file, rig, buses, path)

@@ -6,7 +6,6 @@ algorithms, which set their thresholds by the noise, would have none either.
 """
 
 import csv
-from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -47,10 +46,6 @@ class Marks(NamedTuple):
 
     ours: np.ndarray
     theirs: np.ndarray
-
-
-Judge = Callable[[Exported], np.ndarray]
-"""Samples -> (k, 2) onset and end of each saccade, in s."""
 
 
 def exported(run: MeasuredRun) -> Exported:
@@ -101,9 +96,6 @@ def remodnav_saccades(run: Exported) -> np.ndarray:
     )
     spans = [(e["start_time"], e["end_time"]) for e in events if e["label"] in ("SACC", "ISAC")]
     return run.time_s[0] + np.array(spans).reshape(-1, 2)
-
-
-JUDGES: dict[str, Judge] = {"pymovements": pymovements_saccades, "remodnav": remodnav_saccades}
 
 
 def marks(run: Exported, seen: np.ndarray) -> Marks:

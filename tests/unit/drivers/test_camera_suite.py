@@ -4,7 +4,7 @@ import time
 from typing import Any
 
 import pytest
-from test_webcam import Capture
+from stand_in import Capture
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.webcam import Webcam

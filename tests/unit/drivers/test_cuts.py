@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from present import present
 from seeing import row_09_identities as row
-from test_perception import Neck, face_at
+from seen_people import Neck, face_at
 
 from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
 from gazerig.drivers.vision.cut_detector import CutDetector

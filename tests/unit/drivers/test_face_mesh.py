@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from posed_faces import CAMERA, angle_between, turned
 from present import present
 from seeing.material import portrait
-from test_face_pose import CAMERA, angle_between, turned
-from test_gaze_at_head import AT_EYES, standing
+from seen_people import AT_EYES, standing
 
 from gazerig.drivers.types import DetectedFace, Detections, FaceMesh
 from gazerig.drivers.vision.body_detector import BodyDetector

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 from present import present
-from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at
-from test_perception import seen as percept_at
+from seen_people import HEIGHT, LENS, STILL, WIDTH, face_at
+from seen_people import seen as percept_at
 
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
 from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection

@@ -1,7 +1,6 @@
 """Playback of sounds: time of each part, position, files, speech programs and the process."""
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from features_there import needs_espeak
 
 from gazerig.drivers.sound import espeak
 from gazerig.drivers.sound.params import SILENT_DEVICE
@@ -148,10 +148,6 @@ def test_a_bad_file_is_one_message_with_its_name_and_the_remedy(
 
 
 # --- speech programs
-
-needs_espeak = pytest.mark.skipif(
-    shutil.which("espeak-ng") is None, reason="espeak-ng is not installed: apt install espeak-ng"
-)
 
 
 @needs_espeak

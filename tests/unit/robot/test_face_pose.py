@@ -1,46 +1,23 @@
 """Poses come back out of the pictures they made, and what is no face from its front does not."""
 
-from math import atan2, cos, degrees, hypot, pi, radians, sin
+from math import atan2, degrees, pi, radians
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from posed_faces import CAMERA, angle_between, image_of, turned
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.face_pose import FacePose, face_pose
 
-CAMERA = intrinsics_of_view(radians(65.0), 640, 480)
-
-
-def turned(yaw_rad: float, pitch_rad: float, roll_rad: float) -> np.ndarray:
-    """R_camera_face of a face that looks along the optical axis, then turns: z, y, x."""
-    frontal = np.array([(0, 1, 0), (0, 0, -1), (-1, 0, 0)], float)
-    cy, sy, cp, sp = cos(yaw_rad), sin(yaw_rad), cos(pitch_rad), sin(pitch_rad)
-    cr, sr = cos(roll_rad), sin(roll_rad)
-    Rz = np.array([(cy, -sy, 0), (sy, cy, 0), (0, 0, 1)])
-    Ry = np.array([(cp, 0, -sp), (0, 1, 0), (sp, 0, cp)])
-    Rx = np.array([(1, 0, 0), (0, cr, -sr), (0, sr, cr)])
-    return frontal @ Rz @ Ry @ Rx
-
 
 def yaw_of(R_camera_face: np.ndarray) -> float:
     """Yaw of a face about its upright axis, + to its own left; 0 along the optical axis."""
     outward = R_camera_face[:, 0]
     return atan2(outward[0], -outward[2])
-
-
-def angle_between(R: np.ndarray, S: np.ndarray) -> float:
-    """Angle of the rotation from one to the other."""
-    axis = R.T @ S - (R.T @ S).T
-    sine = hypot(axis[0, 1], axis[0, 2], axis[1, 2]) / 2
-    return atan2(sine, (np.trace(R.T @ S) - 1) / 2)
-
-
-def image_of(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    return project(LANDMARKS_FACE_M @ R.T + p, CAMERA)
 
 
 def reprojection_px(pose: FacePose, landmarks_px: np.ndarray) -> float:

@@ -6,7 +6,7 @@ from math import radians
 import numpy as np
 import pytest
 from present import present
-from test_perception import STILL, face_at, picture, standing
+from seen_people import STILL, face_at, picture, standing
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.source import Shot

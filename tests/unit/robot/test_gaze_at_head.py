@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 from attention_scene import attention, looking
 from fakes.scenes import EmptyScene
-from stand_in import StandIn
-from test_face_pose import CAMERA, image_of, turned
+from posed_faces import CAMERA, image_of, turned
+from seen_people import AT_EYES, standing
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer, is_off_frame
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.gaze.angles import rotation
-from gazerig.gaze.types import PARTS, Angles2, Angles3, Bodies, Face, Mat3, Percept, Vec3
-from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.gaze.types import PARTS, Angles2, Bodies, Face, Percept, Vec3
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.track import looks_at_head
@@ -24,20 +23,6 @@ from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import ScenePerson
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-AT_EYES = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
-
-
-class Neck(StandIn):
-    """A head that never moves."""
-
-    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
-        return LEVEL, (0.0, 0.0, 0.0)
-
-
-def standing() -> PoseHistory:
-    poses = PoseHistory(Neck())
-    poses.remember(0.0, (0.0, 0.0, 0.0))
-    return poses
 
 
 class Turning(EmptyScene):

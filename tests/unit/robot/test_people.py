@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from present import present
+from seen_people import HEIGHT, LENS, STILL, WIDTH, face_at
+from seen_people import seen as percept_at
 from skimage.data import astronaut, cat
-from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at, still_people_count  # noqa: F401
-from test_perception import seen as percept_at
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.source import Shot
@@ -34,6 +34,7 @@ from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
 
+pytestmark = pytest.mark.usefixtures("still_people_count")
 MODELS = Path(sys.prefix) / "models"
 NEEDS_NETWORK = pytest.mark.skipif(
     not (MODELS / PEOPLE.file).exists(), reason=f"needs {PEOPLE.file}: make test fetches it"

@@ -1,64 +1,22 @@
 """From detections to a percept: distances, whose motion is whose, what the head's turn leaves."""
 
 from dataclasses import replace
-from math import inf, radians, sin
+from math import sin
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from stand_in import StandIn
+from seen_people import HEIGHT, LENS, STILL, WIDTH, face_at, seen
 
-from gazerig.drivers.camera.pinhole import intrinsics_of_view
-from gazerig.drivers.types import Clothing, DetectedFace, DetectedPerson, Detections, MovingBlob
-from gazerig.gaze.angles import rotation
-from gazerig.gaze.types import Angles3, Mat3, Percept, Vec3
-from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
-from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.drivers.types import Clothing, DetectedPerson, MovingBlob
+from gazerig.gaze.types import Percept, Vec3
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
+from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.perception import Perception
 
-WIDTH, HEIGHT = 640, 400
-LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)
-# A face that looks into the camera: its axes in the camera frame.
-FRONTAL = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
-STILL = CameraMount(CameraParams(mount="base", position_mm=(0.0, 0.0, 0.0)))
-
-
-@pytest.fixture(autouse=True)
-def still_people_count(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let people count who have not moved, except in tests of life."""
-    if "sway_m" not in request.fixturenames:
-        monkeypatch.setattr("gazerig.robot.perception.track._COUNTS_S", inf)
-
-
-class Neck(StandIn):
-    """A head that turns about the origin."""
-
-    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
-        return rotation(head_rad), (0.0, 0.0, 0.0)
-
-
-def standing() -> PoseHistory:
-    poses = PoseHistory(Neck())
-    poses.remember(0.0, (0.0, 0.0, 0.0))
-    return poses
-
-
-def face_at(p_camera_m: Vec3, size: float = 1.0) -> DetectedFace:
-    points = project(size * LANDMARKS_FACE_M @ FRONTAL.T + p_camera_m, LENS)
-    (x, y), (right, bottom) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    return DetectedFace((x, y, right - x, bottom - y), points, 0.9)
-
-
-def picture(number: int, **found: Any) -> Detections:
-    return Detections(number / 30, number, WIDTH, HEIGHT, **found)
-
-
-def seen(perception: Perception, number: int, **found: Any) -> Percept:
-    percept = perception.see(picture(number, **found), standing())
-    assert percept is not None
-    return percept
+pytestmark = pytest.mark.usefixtures("still_people_count")
 
 
 def depth_of(face_m: float, wall_m: float = 3.0, width: int = 60) -> NDArray[np.float32]:

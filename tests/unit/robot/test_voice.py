@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fakes.waiting import wait_for
-from test_sound import needs_espeak
+from features_there import needs_espeak
 
 import gazerig
 from gazerig.drivers.sound.espeak import SpokenText
