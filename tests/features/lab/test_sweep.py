@@ -2,14 +2,12 @@
 
 import csv
 import io
-import json
 import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from time import sleep
 
 import pytest
 from command_line import Invoked, invoked
@@ -77,31 +75,23 @@ def test_ctrl_c_leaves_the_rows_of_what_is_finished(desk_rig: Rig, alone: list[R
 # ---- Several machines
 
 
-def dask(command: str, *words: str) -> "subprocess.Popen[bytes]":
-    module = f"distributed.cli.dask_{command}"
-    return subprocess.Popen([sys.executable, "-m", module, *words], stderr=subprocess.DEVNULL)
-
-
 @pytest.fixture
 def cluster(tmp_path: Path) -> Iterator[tuple[str, list["subprocess.Popen[bytes]"]]]:
-    """Start a scheduler and two workers on the loopback; return its address and the workers."""
+    """Start a scheduler here and two workers; return its address and the workers."""
     distributed = pytest.importorskip("distributed")
-    file = tmp_path / "scheduler.json"
-    words = "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)
-    started = [dask("scheduler", *words)]
-    try:
-        while not (file.exists() and file.read_text()):
-            sleep(0.05)
-        address = json.loads(file.read_text())["address"]
-        words = address, "--no-nanny", "--no-dashboard", "--nthreads", "1", "--host", "127.0.0.1"
-        started += [dask("worker", *words, "--local-directory", str(tmp_path)) for _ in range(2)]
-        with distributed.Client(address) as client:
-            client.wait_for_workers(2)
-        yield address, started[1:]
-    finally:
-        for process in started:
-            process.kill()
-            process.wait()
+    words = "-m", "distributed.cli.dask_worker", "--no-nanny", "--no-dashboard", "--nthreads", "1"
+    where = "--host", "127.0.0.1", "--local-directory", str(tmp_path)
+    with distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None) as here:
+        command = [sys.executable, *words, *where, here.scheduler_address]
+        workers = [subprocess.Popen(command, stderr=subprocess.DEVNULL) for _ in range(2)]
+        try:
+            with distributed.Client(here.scheduler_address) as client:
+                client.wait_for_workers(2)
+            yield here.scheduler_address, workers
+        finally:
+            for process in workers:
+                process.kill()
+                process.wait()
 
 
 def test_a_worker_that_is_killed_loses_no_run_and_repeats_none(
