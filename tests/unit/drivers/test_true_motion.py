@@ -76,7 +76,7 @@ def test_true_joints_keep_range_speed_and_acceleration_whatever_is_wished(
 
 
 @pytest.mark.slow
-@settings(max_examples=16, deadline=None, phases=DRAWN)
+@settings(max_examples=10, deadline=None, phases=DRAWN)
 @given(
     name=st.sampled_from(NAMES),
     seed=st.integers(0, 1000),
@@ -100,7 +100,7 @@ def where_from(rig: Rig, rng: np.random.Generator) -> dict[str, float]:
     }
 
 
-@settings(max_examples=16, deadline=None, phases=DRAWN)
+@settings(max_examples=10, deadline=None, phases=DRAWN)
 @given(name=st.sampled_from(("desk", "feetech")), seed=st.integers(0, 10_000), again=st.booleans())
 def test_joints_come_from_anywhere_slowly_at_start_and_at_resume(
     rigs: dict[str, Rig], name: str, seed: int, again: bool

@@ -297,7 +297,7 @@ RIG_OF = dict(
 
 @pytest.mark.parametrize("track", TRACKS)
 def test_no_joint_jumps_or_breaks_a_limit_at_random_moments(track: str):
-    angles, bounds = interrupted(track, RIG_OF[track], 120)
+    angles, bounds = interrupted(track, RIG_OF[track], 80)
     speed = np.abs(np.diff(angles, axis=0)).max(axis=0) / DT_S
     acceleration = np.abs(np.diff(angles, 2, axis=0)).max(axis=0) / DT_S**2
     assert speed.max() * DT_S > radians(0.1)  # something has moved

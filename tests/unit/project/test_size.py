@@ -1,9 +1,7 @@
 """No folder grows: code tokens, without comments and docstrings; the numbers only go down."""
 
-import ast
 import re
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
@@ -23,6 +21,7 @@ LARGEST = {
     "features/world": 33_960,
     "tests": 381_250,
 }
+OPENING, CLOSING = set("([{"), set(")]}")
 TOKEN = re.compile(
     r"""(?P<comment>\#[^\n]*)
     |(?P<string>[bfru]{0,2}
@@ -37,27 +36,18 @@ TOKEN = re.compile(
 def code_tokens(text: str) -> int:
     """Count the tokens of a module, without layout, comments and docstrings.
 
-    By one expression, a twentieth of the time of tokenize; a formatted string is one token.
+    By one expression, a fraction of the time of tokenize; a formatted string is one token. A text
+    that begins a line outside all brackets is a docstring.
     """
-    starts = set(docstring_lines(ast.parse(text)))
-    count = line = end = 0
+    count = depth = 0
     for token in TOKEN.finditer(text):
-        line += text.count("\n", end, token.start())
-        end = token.start()
-        docstring = token.lastgroup == "string" and line + 1 in starts
-        count += not docstring and token.lastgroup != "comment"
+        if token.lastgroup == "comment":
+            continue
+        word = token[0]
+        depth += (word in OPENING) - (word in CLOSING)
+        line = text[text.rfind("\n", 0, token.start()) + 1 : token.start()]
+        count += not (token.lastgroup == "string" and depth == 0 and not line.strip())
     return count
-
-
-def docstring_lines(node: ast.AST) -> Iterator[int]:
-    """Yield the first line of each statement that is a text alone."""
-    for field in ("body", "orelse", "finalbody", "handlers", "cases"):
-        for part in getattr(node, field, ()):
-            match part:
-                case ast.Expr(value=ast.Constant(value=str())):
-                    yield part.lineno
-                case _:
-                    yield from docstring_lines(part)
 
 
 def test_no_folder_is_larger_than_it_was():
