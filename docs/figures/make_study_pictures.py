@@ -7,12 +7,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 TESTS = Path(__file__).parents[2] / "tests"
-sys.path[:0] = [str(TESTS / "helpers"), str(TESTS / "features" / "study")]
+sys.path.insert(0, str(TESTS / "helpers"))
 
 from browser import Browser, browsing  # noqa: E402
 from PIL import Image  # noqa: E402
 from shown_page import free_port, wait_for  # noqa: E402
-from study_helpers import Program  # noqa: E402
+from study_program import Program  # noqa: E402
 
 OUT = Path(__file__).parent
 GAP_PX = 20

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "helpers"))
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "features" / "world"))
 
 import cv2
 import numpy as np

@@ -7,12 +7,14 @@ import sys
 from collections.abc import Callable
 from contextlib import nullcontext
 from math import hypot
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from fakes.talking_head import TalkingHead
 from papers import ROOT
+from slow_rigs import at_rate
 
 import gazerig
 
@@ -23,13 +25,15 @@ Shown = Callable[..., list[str]]
 
 
 @pytest.fixture
-def shown(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Shown:
+def shown(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Shown:
     """Return what runs an example and returns the lines that it prints."""
     opened = gazerig.open
 
     def in_simulated_time(rig: str = "desk", **options: Any) -> gazerig.SimulatedHead:
         assert options.pop("mock", False) or options.pop("fast", False), "it would move real servos"
-        return opened(rig, fast=True, **options)
+        return opened(at_rate(tmp_path, rig, 50.0), fast=True, **options)
 
     def run(name: str, *words: str) -> list[str]:
         monkeypatch.setattr(gazerig, "open", in_simulated_time)

@@ -198,12 +198,9 @@ with_mujoco = pytest.mark.skipif(
 
 
 @pytest.mark.pty
-@pytest.mark.parametrize("eyes", ["scene", "film, page"])
-def test_the_process_of_the_loop_imports_little(eyes: str, python: LightPython, tmp_path: Path):
-    options: dict[str, object] = {"scene": "visitor"}
-    if eyes != "scene":
-        film = write_film(tmp_path / "film.avi", 5, 25.0)
-        options = {"video": film, "page": "127.0.0.1:8770"}
+def test_the_process_of_the_loop_imports_little(python: LightPython, tmp_path: Path):
+    film = write_film(tmp_path / "film.avi", 5, 25.0)
+    options = {"video": film, "page": "127.0.0.1:8770"}
     text, _ = python.run(RUN.format(options=options, later=LATER), tmp_path)
     said = {line.split()[0]: set(line.split()[1:]) for line in text.splitlines() if line}
     assert said["PACKAGES"] >= {"numpy", "serial", "gazerig"}

@@ -52,7 +52,9 @@ def looked_at(scene: StillPeople, seconds: float, seed: int) -> np.ndarray:
     def before(own: Camera) -> Camera:
         assert isinstance(own, SceneCamera)
         rng = np.random.default_rng(seed)
-        return SceneCamera(FrameParams(), scene, own._mount, own._head_pose, rng, own._locate)
+        return SceneCamera(
+            FrameParams(rate_hz=15.0), scene, own._mount, own._head_pose, rng, own._locate
+        )
 
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=50.0))

@@ -2,25 +2,21 @@
 
 import itertools
 import json
-import re
 import signal
-import subprocess
 import time
-import urllib.error
-import urllib.request
 from collections import Counter
 from collections.abc import Callable, Iterator
-from http.cookiejar import CookieJar
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from branch import Branch, gazerig
 from browser import browsing
 from command_line import invoked
 from shown_page import free_port
+from slow_rigs import at_rate
+from study_program import Program
 
 from gazerig.config.load import ConfigError
 from gazerig.config.shipped_files import shipped_names
@@ -98,46 +94,6 @@ def events(session: StudySession) -> list[str]:
         values: list[Any] = [kinds[item.kind] for _, item in session.items()]
         assert session.handle(PageEvent(session.page, do[step], values, [900.0] * len(values)))
     return steps
-
-
-class Program:
-    """The command ``gazerig study run``, and a browser without a window."""
-
-    def __init__(self, *words: str) -> None:
-        self.process = Branch(gazerig("study", "run", *words), stderr=subprocess.PIPE, text=True)
-        assert self.process.stderr is not None
-        self.said = ""
-        for line in self.process.stderr:
-            self.said += line
-            if found := re.search(r"participant: (http://\S+)/\?token=(\S+)", line):
-                break
-        else:
-            raise AssertionError(self.said)
-        self.url, self.token = found.groups()
-        self._opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
-        self.fetch(f"/?token={self.token}")
-
-    def fetch(self, path: str, body: dict[str, Any] | None = None) -> tuple[int, bytes]:
-        data = None if body is None else json.dumps(body).encode()
-        request = urllib.request.Request(
-            self.url + path, data, {"Origin": self.url} if data else {}
-        )
-        for _ in range(300):
-            try:
-                with self._opener.open(request, timeout=30.0) as answer:
-                    return answer.status, answer.read()
-            except urllib.error.HTTPError as error:
-                return error.code, error.read()
-            except urllib.error.URLError:  # it does not listen yet
-                assert self.process.poll() is None, self.said
-        raise AssertionError("no answer")
-
-    def page(self) -> dict[str, Any]:
-        found: dict[str, Any] = json.loads(self.fetch("/page")[1])
-        return found
-
-    def do(self, page: dict[str, Any], do: str, **more: Any) -> int:
-        return self.fetch("/event", {"page": page["page"], "do": do, **more})[0]
 
 
 Start = Callable[..., Program]
@@ -305,6 +261,7 @@ def _see_film(one: Program) -> None:
 def test_a_session_with_a_live_head(tmp_path: Path, program: Start):
     path = tmp_path / "head.yaml"
     shipped = (HOME / "studies" / "nakamoto_2.yaml").read_text()
+    shipped = shipped.replace("rig: expressive", f"rig: {at_rate(tmp_path, 'expressive', 50.0)}")
     path.write_text(shipped.replace("seconds: 30", "seconds: 2"))
     one = program(str(path), "--mock")
     assert one.do(one.page(), "consent") == 200
@@ -371,8 +328,10 @@ def test_films_are_rendered_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     from gazerig.drivers.camera.film import Film
 
     monkeypatch.setattr(film, "SIZE_PX", 96)
+    monkeypatch.setattr(film, "RATE_HZ", 5.0)
     path = tmp_path / "film.yaml"
     shipped = (HOME / "studies" / "nakamoto_1.yaml").read_text()
+    shipped = shipped.replace("gaze.scanpath.model:", "loop.rate_hz: 50.0, gaze.scanpath.model:")
     path.write_text(shipped.replace("seconds: 30", "seconds: 2"))
     study = load_study(str(path))
     try:
@@ -382,7 +341,7 @@ def test_films_are_rendered_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ends = []
     for one in made.values():
         *_, last = Film(one).play_once()
-        assert last.start_s + 0.04 == pytest.approx(2.0, 0.05)
+        assert last.start_s + 0.2 == pytest.approx(2.0, 0.05)
         ends.append(last.read().image)
     assert not any(key in one.name for key, one in made.items())
     assert len(ends) == 2 and np.ptp(ends[0]) > 50 and (ends[0] != ends[1]).mean() > 0.02

@@ -36,7 +36,7 @@ FAST = RunOptions(
 
 
 def test_a_head_in_a_world_finds_the_person_there():
-    made = simulate(load_rig("desk"), replace(FAST, seconds=8.0))
+    made = simulate(load_rig("desk"), replace(FAST, seconds=5.0))
     assert int(str(made.figures["faces_seen"])) > 100
     off_deg = made.trace.column("off").mean(axis=1)
     assert np.median(off_deg[made.trace.slow()]) < 1.0

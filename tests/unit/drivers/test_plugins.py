@@ -30,7 +30,7 @@ from gazerig.robot.run.cameras import place_camera, real_camera
 from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.options import RunOptions, parse_camera
 
-DESK = Path(__file__).parents[2] / "config" / "rigs" / "desk.yaml"
+DESK = Path(__file__).parents[3] / "config" / "rigs" / "desk.yaml"
 
 RULE = """
     from dataclasses import dataclass
