@@ -5,12 +5,15 @@ the same texts, and after an error nothing is changed. Pure.
 """
 
 import dataclasses
+import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from gazerig.config.load import ConfigError, validate_rules
+from gazerig.config.load import ConfigError, shipped_path, validate_rules
 from gazerig.config.rig import GazeConfig, Rig
 from gazerig.config.schema import RULES, refusal
+from gazerig.config.shipped_files import file_in_folders, is_path
 from gazerig.params import Declaration, declarations, unknown_text
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import Parameter
@@ -180,3 +183,64 @@ def _differences(before: Any, after: Any, key: str) -> Iterator[tuple[str, Value
             yield from _differences(old.get(step, ...), after.get(step), below)
     elif before != after:
         yield key, after
+
+
+_KIND_OF_KEY = {
+    "gaze.scanpath.transition_matrix": "scanpaths",
+    "profile": "profiles",
+    "character": "characters",
+}
+"""Keys of a rig that contain a shipped name or a file, and the kind of the names."""
+_FILE_KEYS = re.compile(r"track_files|sound\.folders")
+"""Other keys that contain files."""
+_LOCAL_KEYS = re.compile(r"(doors|bus\.port|buses\..+\.port|sound\.voice)(\..+)?")
+"""Keys that start programs or open devices of this computer."""
+_LOCAL = (
+    "starts a program or opens a device of the head's computer, so it cannot be set over the network: "
+    "set it in the rig's file or with gazerig ctl set on that computer"
+)
+
+
+class AllowedFolder:
+    """A folder; files in it and below it may be named."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder.resolve()
+
+    def check_file(
+        self, given: str, kind: str = "", key: str = "", start: Path | None = None
+    ) -> str:
+        """Return a shipped name unchanged, or the full path of a file in the folder.
+
+        Args:
+            given: Name or path.
+            kind: Kind of the accepted shipped names, e.g. "characters"; "" for none.
+            key: Key for the message of a fault.
+            start: Base of relative paths; None: the folder.
+
+        Raises:
+            gazerig.config.load.ConfigError: the file, after resolving links, is outside the folder.
+        """
+        if kind and not is_path(given):
+            shipped_path(kind, given)
+            return given
+        try:
+            return file_in_folders([self.folder], given, start)
+        except ValueError as error:
+            raise refusal(key, str(error)) from None
+
+    def check_changes(self, changes: Mapping[str, object]) -> None:
+        """Check new values of a rig's keys: the files they name, and keys that stay with its owner.
+
+        Relative paths start at the working folder, as when the files are opened.
+
+        Raises:
+            gazerig.config.load.ConfigError: a key may not be set, or a file may not be named.
+        """
+        for key, value in flatten_changes(changes).items():
+            if _LOCAL_KEYS.fullmatch(key):
+                raise refusal(key, _LOCAL)
+            if key in _KIND_OF_KEY or _FILE_KEYS.fullmatch(key):
+                for file in value if isinstance(value, list | tuple) else (value,):
+                    if isinstance(file, str) and file:
+                        self.check_file(file, _KIND_OF_KEY.get(key, ""), key, Path.cwd())

@@ -1,24 +1,26 @@
-"""Writing values into a user's YAML file, atomically and with a backup.
+"""Values and configurations as YAML, written into a user's file atomically and with a backup.
 
 Comments and the order of keys stay (ruamel's round trip). The new text is checked as a separate
 file before it replaces the old one, which stays in the folder; its name then contains the time.
 """
 
 import io
+import json
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from gazerig.config.entries import parse
-from gazerig.config.load import ConfigError, Document, read_yaml
+from gazerig.config.load import ConfigError, Document, find_file, load, read_yaml
 from gazerig.config.parameters import flatten_changes, merge, nest, to_plain, value_of
-from gazerig.config.save_text import format_value
 from gazerig.config.schema import load_rig, refusal
 from gazerig.config.shipped_files import SHIPPED
+from gazerig.config.tracks import TrackSet, load_track, track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import output_file
 from gazerig.robot.model.parameter import ParamChange, SavedFile
@@ -82,6 +84,39 @@ def save(
     return SavedFile(target, backup, found)
 
 
+class RigLayers(NamedTuple):
+    """Requested files of a rig, each a shipped name or a path."""
+
+    name: str
+    character: str | None
+    profile: str | None
+
+
+def save_layers(
+    layers: RigLayers, to: str | None, wanted: Mapping[str, Any], now: datetime
+) -> SavedFile:
+    """Write values into a rig's file; character and profile must not override any of them.
+
+    Args:
+        layers: The rig's file, and the files merged over it.
+        to: A new file for a copy with the values; None: the rig's own.
+        wanted: Values by dotted key.
+        now: Time for the backup's name.
+
+    Raises:
+        gazerig.config.load.ConfigError: see ``save``; or ``to`` exists or is not a
+            YAML file.
+    """
+    own, source = find_file("rigs", layers.name), None
+    if to is not None:
+        if os.path.lexists(to) or not to.endswith((".yaml", ".yml")):
+            rule = "already exists, or its name does not end in .yaml; choose another name"
+            raise refusal("", rule, to)
+        layers, own, source = layers._replace(name=to), Path(to), own
+    check = partial(load_rig, character=layers.character, profile=layers.profile)
+    return save(own, wanted, now, check, source)
+
+
 def propose(
     path: Path, changes: Mapping[str, Any]
 ) -> tuple[Document, str, tuple[ParamChange, ...]]:
@@ -141,3 +176,66 @@ def _put(holder: Any, wanted: Mapping[str, Any], at: int = 0) -> None:
                 held[i] = item
         elif not (isinstance(held, dict | list) and holder[key].ca.items):
             holder[key] = value
+
+
+_PLAIN_TEXT = re.compile(r"(?!(?i:null|true|false|yes|no|on|off|y|n)$)[A-Za-z/][\w./-]*")
+
+
+def format_value(value: Any) -> str:
+    """Return a value as YAML on one line: JSON, and simple words without quotes."""
+    match value:
+        case Mapping():
+            pairs = [f"{format_value(key)}: {format_value(one)}" for key, one in value.items()]
+            return f"{{{', '.join(pairs)}}}"
+        case list() | tuple():
+            return f"[{', '.join(map(format_value, value))}]"
+        case str() if _PLAIN_TEXT.fullmatch(value):
+            return value
+    return json.dumps(value, ensure_ascii=False, default=int)  # a number of numpy
+
+
+def params_text(params: Any) -> str:
+    """Return a dataclass of parameters, or nested mappings, as YAML.
+
+    ``gazerig.config.load.load`` reads exactly the same values.
+    """
+    return "".join(_lines(to_plain(params)))
+
+
+def tracks_text(files: Sequence[str]) -> str:
+    """Return the rig's own tracks as one YAML text, "" without any.
+
+    Raises:
+        gazerig.config.load.ConfigError: one has a fault.
+    """
+    found = {}
+    for file in files:
+        track = load_track(find_file("tracks", file))
+        # A rerun plays no sound, and its track is another file.
+        found[track_name(file)] = replace(track, sound=Path(track.sound).name)
+    return params_text(TrackSet(found)) if found else ""
+
+
+def track_files(text: Path, folder: Path) -> tuple[str, ...]:
+    """Write each track of a text from ``tracks_text`` to a separate file; return the files.
+
+    Raises:
+        gazerig.config.load.ConfigError: the text has a fault.
+    """
+    files = []
+    for name, track in load(text, TrackSet).tracks.items():
+        file = folder / f"{name}.yaml"
+        file.write_text(params_text(track), encoding="utf-8")
+        files.append(str(file))
+    return tuple(files)
+
+
+def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:
+    """Return mappings as YAML, one key per line."""
+    for key, value in values.items():
+        start = f"{'  ' * depth}{format_value(key)}:"
+        if isinstance(value, dict) and value:
+            yield f"{start}\n"
+            yield from _lines(value, depth + 1)
+        else:
+            yield f"{start} {format_value(value)}\n"

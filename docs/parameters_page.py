@@ -5,7 +5,7 @@ from dataclasses import MISSING, fields, is_dataclass
 from typing import Any
 
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import format_value
+from gazerig.config.save import format_value
 from gazerig.params import Declaration, declarations
 
 _HEAD = """# Every parameter of a rig

@@ -17,7 +17,7 @@ from matplotlib.patches import Arc, Circle, Ellipse, FancyBboxPatch, Rectangle, 
 
 from gazerig.config.schema import load_rig  # noqa: E402
 from gazerig.robot.cli.new import MECHANISMS  # noqa: E402
-from gazerig.robot.description.parts import EYE_RADIUS  # noqa: E402
+from gazerig.robot.description.links import EYE_RADIUS  # noqa: E402
 
 HERE = Path(__file__).parent
 INK, SOFT, EYE, SKIN = "#2c3136", "#9aa3a9", "#1c6ea4", "#f3e3d3"

@@ -12,7 +12,7 @@ import typer
 from msgspec import Struct
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.save_text import format_value
+from gazerig.config.save import format_value
 from gazerig.drivers.errors import SetupError, install_command
 from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.robot.cli.check import good_text

@@ -3,35 +3,37 @@
 The neck turns yaw, pitch, roll about axes through one point.
 The head carries eyes that pan and tilt about their centres, lids that turn about an axis through
 both eyes' centres, and any other joints of the rig. Angles are those of the rig's joints,
-with their signs (robot/model/kinematics.py).
+with their signs (robot/model/kinematics.py). Masses and inertias follow from shapes and materials;
+lengths in metres, tensors about the centre of mass.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from math import radians
 from typing import NamedTuple
 
+import numpy as np
+
 from gazerig.gaze.angles import add, rotation, scale, sub
-from gazerig.gaze.types import Vec3
-from gazerig.robot.description import mass
+from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.description.links import (
     CAMERA,
-    OPTICAL_FRAME,
-    ORIGIN,
-    Description,
-    Ellipsoid,
-    Link,
-    LinkJoint,
-    Visual,
-)
-from gazerig.robot.description.parts import (
     CHIN,
     FACE_PARTS,
     FLOOR_M,
     LOWER_REST,
+    MIDDLE,
+    OPTICAL_FRAME,
+    ORIGIN,
     SIDES,
     UPPER_REST,
+    Description,
+    Ellipsoid,
     HeadMeasures,
+    Inertia,
+    Link,
+    LinkJoint,
+    Visual,
     ear_look,
     face_look,
     hinge,
@@ -39,13 +41,140 @@ from gazerig.robot.description.parts import (
     meeting_rad,
     tube,
 )
+from gazerig.robot.description.mesh import stored_shell
 from gazerig.robot.model.frames import OPTICAL, CameraParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, NECK, GeometryParams, LidEnds
 from gazerig.robot.model.types import further_joints
 from gazerig.robot.model.weight import MassParams
 
-BASE, HEAD = "base_link", mass.HEAD
+HEAD_KG, _REFERENCE_M = 0.6, 0.0619
+"""Mass of a whole head (skull, servos, eyes, lids) with this distance between the eyes."""
+SERVO_KG = 0.023
+"""Servo of the size of an XC330 or of models smaller than the STS3215."""
+_SERVO_HALF_M: Vec3 = (0.010, 0.013, 0.017)
+
+HEAD = "head"
+_CONTENT_HALF: Vec3 = (1.5, 1.1, 0.6)
+"""Half axes of a head's contents (servos, frame, counterweight), in distances between the eyes."""
+
+
+def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[Inertia]) -> Inertia:
+    """Return the inertia of the head without the links that it carries, in the head's frame.
+
+    Args:
+        params: mass parameters of the rig; the mass of its head includes all carried links.
+        measures: dimensions of the head.
+        carried: eyes, lids and all other carried links, in the head's frame.
+    """
+    rest, unit = join_inertias(carried), measures.interocular_m
+    whole = params.head.mass_kg
+    if whole is None:
+        # The shell grows with its surface, the mechanism does not.
+        made = HEAD_KG * (0.5 + 0.5 * (unit / _REFERENCE_M) ** 2)
+        whole = max(made, 2.0 * rest.mass_kg)
+    kg, com = whole - rest.mass_kg, None
+    if params.head.com_mm is not None:
+        com = _from_pivot(params.head.com_mm, measures)
+        com = add(com, scale(sub(com, rest.com_m), rest.mass_kg / kg))
+    own = filled(shell("skull", unit), kg, unit, measures.scaled(MIDDLE), com)
+    weights = [
+        Inertia(one.mass_kg, _from_pivot(one.position_mm, measures), np.zeros((3, 3)))
+        for one in params.counterweights.values()
+    ]
+    return join_inertias((own, *weights)) if weights else own
+
+
+def carried_links(links: Iterable[Link]) -> list[Inertia]:
+    """Return the inertias of links that the head carries, in its frame, all joints at 0."""
+    at: dict[str, Vec3] = {HEAD: ORIGIN}
+    found = []
+    for link in links:
+        p = at[link.name] = add(at.get(link.parent or "", ORIGIN), link.p_m)
+        if link.inertia is not None:
+            found.append(link.inertia._replace(com_m=add(p, link.inertia.com_m)))
+    return found
+
+
+def _from_pivot(position_mm: Vec3, measures: HeadMeasures) -> Vec3:
+    return add(scale(position_mm, 1e-3), measures.pivot_m)
+
+
+def servo(times: float = 1.0) -> Inertia:
+    """Return a servo with its bracket, as a box at the centre of its link."""
+    mass = times * (SERVO_KG + 0.012)
+    x, y, z = (half * half / 3.0 for half in _SERVO_HALF_M)
+    return Inertia(mass, (0.0, 0.0, 0.0), np.diag((mass * (y + z), mass * (x + z), mass * (x + y))))
+
+
+def shell(name: str, unit_m: float) -> Inertia:
+    """Return a thin shell of constant thickness in the frame of its shape.
+
+    Args:
+        name: name of the shell.
+        unit_m: the distance between the eyes, or the radius of a lid or an ear.
+    """
+    mass, x, y, z, xx, yy, zz, xy, xz, yz = stored_shell(name)
+    tensor = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))) * unit_m**4
+    return Inertia(mass * unit_m**2, scale((x, y, z), unit_m), tensor)
+
+
+def shell_of(look: Visual) -> Inertia:
+    """Return the mass of a thin part in the frame of its link."""
+    factors = np.broadcast_to(look.scale, 3)
+    R = np.array(look.R) * np.sign(factors)
+    return in_parent_frame(shell(str(look.shape), abs(float(factors[0]))), R, look.p_m)
+
+
+def filled(
+    shell: Inertia, mass_kg: float, unit_m: float, middle_m: Vec3, com_m: Vec3 | None = None
+) -> Inertia:
+    """Return a shell with its contents: a homogeneous ellipsoid of servos, frame and ballast.
+
+    Args:
+        shell: the skull.
+        mass_kg: total mass.
+        unit_m: distance between the eyes, which scales the contents.
+        middle_m: centre of the contents.
+        com_m: total centre of mass, which determines the contents' position; None: middle_m does.
+    """
+    rest = mass_kg - shell.mass_kg
+    if rest <= 0.05 * mass_kg:  # a very large head has a thinner shell
+        tensor = shell.tensor_kg_m2 * (mass_kg / shell.mass_kg)
+        return Inertia(mass_kg, shell.com_m if com_m is None else com_m, tensor)
+    middle = middle_m
+    if com_m is not None:
+        moment = mass_kg * np.array(com_m) - shell.mass_kg * np.array(shell.com_m)
+        middle = _vector(moment / rest)
+    x, y, z = ((half * unit_m) ** 2 / 5.0 for half in _CONTENT_HALF)
+    tensor = np.diag((rest * (y + z), rest * (x + z), rest * (x + y)))
+    return join_inertias((shell, Inertia(rest, middle, tensor)))
+
+
+def join_inertias(parts: Iterable[Inertia]) -> Inertia:
+    """Join several bodies in the same frame to one."""
+    bodies = tuple(parts)
+    mass = sum(body.mass_kg for body in bodies)
+    com = sum((body.mass_kg * np.array(body.com_m) for body in bodies), np.zeros(3)) / mass
+    tensor = np.zeros((3, 3))
+    for body in bodies:
+        off = np.array(body.com_m) - com  # the parallel-axis theorem
+        tensor += body.tensor_kg_m2 + body.mass_kg * ((off @ off) * np.eye(3) - np.outer(off, off))
+    return Inertia(mass, _vector(com), tensor)
+
+
+def in_parent_frame(one: Inertia, R: Floats, p_m: Vec3) -> Inertia:
+    """Return the inertia of a body in a parent frame, in which the body's frame has this pose."""
+    com = R @ one.com_m + p_m
+    return Inertia(one.mass_kg, _vector(com), R @ one.tensor_kg_m2 @ R.T)
+
+
+def _vector(values: Floats) -> Vec3:
+    x, y, z = np.asarray(values, float).tolist()
+    return x, y, z
+
+
+BASE = "base_link"
 
 _AXES: dict[str, Vec3] = {
     "yaw": (0.0, 0.0, 1.0), "pan": (0.0, 0.0, 1.0), "pitch": (0.0, -1.0, 0.0),
@@ -84,7 +213,7 @@ def head_mass_fault(rig: RigShape) -> str:
     given_kg = rig.mass.head.mass_kg
     links = describe(rig._replace(mass=MassParams())).links
     at = [link.name for link in links].index(HEAD)
-    rest_kg = sum(one.mass_kg for one in mass.carried_links(links[at + 1 :]))
+    rest_kg = sum(one.mass_kg for one in carried_links(links[at + 1 :]))
     if given_kg is None or given_kg > 1.01 * rest_kg:
         return ""
     return (
@@ -155,7 +284,7 @@ class _Builder:
             joint = self._joint(name, _AXES[name.rpartition("_")[2]])
             place = (0.0, 0.0, height - at)
             self._links.append(
-                Link(link, parent, place, joint=joint, inertia=mass.servo(), visuals=looks)
+                Link(link, parent, place, joint=joint, inertia=servo(), visuals=looks)
             )
             parent, at = link, height
         return parent, add((0.0, 0.0, pivot - at), self._eyes_m)
@@ -193,7 +322,7 @@ class _Builder:
             if f"{side}_upper_lid" in lids and f"{side}_lower_lid" not in lids:
                 still = lid_look(f"{side}_still_lid", measures, False, self._lid_meeting_rad(side))
                 looks.append(still._replace(p_m=measures.scaled(_EYE, side)))
-        inertia = mass.head_inertia(self._rig.mass, measures, mass.carried_links(carried))
+        inertia = head_inertia(self._rig.mass, measures, carried_links(carried))
         bodies = measures.bodies()
         return Link(HEAD, neck, p_m, inertia=inertia, visuals=tuple(looks), collisions=bodies)
 
@@ -211,12 +340,12 @@ class _Builder:
             joint = self._joint(name, _AXES[turn], follows)
             name = link_name(joint.name)
             self._links.append(
-                Link(name, parent, place, joint=joint, inertia=mass.shell("gimbal", radius))
+                Link(name, parent, place, joint=joint, inertia=shell("gimbal", radius))
             )
             parent, place = name, ORIGIN
         name = f"{side}_eye"
         look = Visual(name, "eye", "eye", scale=radius)
-        self._links.append(Link(name, parent, place, inertia=mass.shell_of(look), visuals=(look,)))
+        self._links.append(Link(name, parent, place, inertia=shell_of(look), visuals=(look,)))
 
     def _add_lid(self, name: str) -> None:
         """Add a lid whose edge meets the other lid's at the rig's shut angle."""
@@ -238,12 +367,12 @@ class _Builder:
             look = face_look(name, self._measures)
             self._add_shell(joint, place, look._replace(p_m=sub(look.p_m, place)))
         else:
-            inertia = mass.servo(0.3)
+            inertia = servo(0.3)
             self._links.append(Link(link_name(name), HEAD, place, joint=joint, inertia=inertia))
 
     def _add_shell(self, joint: LinkJoint, p_m: Vec3, look: Visual) -> None:
         """Add a thin part of the head that a joint moves."""
-        inertia = mass.shell_of(look)
+        inertia = shell_of(look)
         name = link_name(joint.name)
         self._links.append(Link(name, HEAD, p_m, joint=joint, inertia=inertia, visuals=(look,)))
 

@@ -16,9 +16,8 @@ import numpy as np
 
 from gazerig.gaze.angles import angles_of, compose, turn_about
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.description.links import Description, Link, Visual
+from gazerig.robot.description.links import FLOOR_M, Description, Link, Visual
 from gazerig.robot.description.mesh import add_texture
-from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.model.frames import quaternion
 
 

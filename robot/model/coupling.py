@@ -17,6 +17,7 @@ from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S, FAR_CAUSES, FAR_DEG
 from gazerig.drivers.types import ServoConfig
 from gazerig.params import Bounds
 from gazerig.robot.model.joint import JointLimit, JointParams
+from gazerig.robot.model.types import order_joints
 
 Pair = tuple[float, float]
 
@@ -115,6 +116,29 @@ def pair_setups(
             far_steps=radians(FAR_DEG) * steepest,
         )
     return found
+
+
+def servo_setups(
+    joints: Mapping[str, JointParams],
+    park_rad: Mapping[str, float],
+    gentle_deg_s: float = ENTRY_DEG_S,
+    pairs: Collection[CouplingParams] = (),
+) -> tuple[ServoConfig, ...]:
+    """Return the configuration of all servos for a bus.
+
+    Args:
+        joints: The joints by name.
+        park_rad: Parking pose by joint, default 0; the assumed start of servos without feedback.
+        gentle_deg_s: Highest speed at which joints outside their ranges move inside.
+        pairs: Joints that two servos move together.
+    """
+    coupled: dict[str, ServoConfig] = {}
+    for pair in pairs:
+        coupled |= pair_setups(pair, joints, park_rad, gentle_deg_s)
+    return tuple(
+        coupled.get(name) or joints[name].setup(name, park_rad.get(name, 0.0), gentle_deg_s)
+        for name in order_joints(joints)
+    )
 
 
 def _corners(pair: CouplingParams, joints: Mapping[str, JointParams]) -> list[Pair]:

@@ -14,8 +14,8 @@ from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.gaze.angles import rotate
+from gazerig.robot.description.build import in_parent_frame
 from gazerig.robot.description.links import Description
-from gazerig.robot.description.mass import in_parent_frame
 from gazerig.robot.description.statics import moving_bodies
 from gazerig.robot.model.coupling import pair_setups
 from gazerig.robot.model.weight import weight_nm

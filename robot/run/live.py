@@ -15,6 +15,7 @@ from pathlib import Path
 from gazerig.config.load import find_file, shipped_names
 from gazerig.config.parameters import (
     LIVE_LIMITS,
+    AllowedFolder,
     apply_changes,
     differences,
     parameters,
@@ -23,8 +24,7 @@ from gazerig.config.parameters import (
     values,
 )
 from gazerig.config.rig import Rig
-from gazerig.config.rig_files import AllowedFolder, RigLayers, save_layers
-from gazerig.config.save_text import format_value
+from gazerig.config.save import RigLayers, format_value, save_layers
 from gazerig.config.schema import NO_CHARACTER, load_rig, load_walk
 from gazerig.config.shipped_files import is_path
 from gazerig.robot.model.commands import Tune, Value

@@ -14,7 +14,7 @@ from msgspec import structs
 
 from gazerig.config.load import ConfigError, load
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import track_files
+from gazerig.config.save import track_files
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.loop import Tick

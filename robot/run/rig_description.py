@@ -9,8 +9,7 @@ import numpy as np
 from gazerig.config.rig import Rig
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import Description
-from gazerig.robot.description.statics import STRONG_SHARE, Statics, moving_bodies
-from gazerig.robot.loop.body import SagCompensation
+from gazerig.robot.description.statics import STRONG_SHARE, SagCompensation, Statics, moving_bodies
 from gazerig.robot.model.kinematics import NECK
 from gazerig.robot.model.types import order_joints
 from gazerig.robot.model.weight import GEAR_FRICTION

@@ -8,7 +8,7 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.track.animation import NEUTRAL, FaceRange, FaceTables
 from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.types import Angles2, Vec3
-from gazerig.robot.loop.body import servo_setups
+from gazerig.robot.model.coupling import servo_setups
 from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.kinematics import LIDS, NECK, LidEnds
 from gazerig.robot.model.types import further_joints, order_joints

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from gazerig.config.faults import ConfigError
 from gazerig.config.parameters import apply_changes, start_note
 from gazerig.config.rig import Rig
-from gazerig.config.rig_files import RigLayers
+from gazerig.config.save import RigLayers
 from gazerig.config.shipped_files import shipped_names
 from gazerig.config.tracks import tracks_of
 from gazerig.drivers.camera.source import FrameSource

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 from gazerig.config.parameters import apply_changes
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import params_text, tracks_text
+from gazerig.config.save import params_text, tracks_text
 from gazerig.config.schema import load_rig, load_rules, load_walk
 from gazerig.robot.model.commands import Value
 from gazerig.robot.recording.run_info import RunInfo, versions

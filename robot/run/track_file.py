@@ -12,7 +12,7 @@ import numpy as np
 
 from gazerig.config.load import ConfigError
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import format_value
+from gazerig.config.save import format_value
 from gazerig.config.shipped_files import is_path
 from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError

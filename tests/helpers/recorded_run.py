@@ -9,7 +9,7 @@ import numpy as np
 from fakes.runs import simulated
 from msgspec.structs import replace
 
-from gazerig.config.save_text import params_text
+from gazerig.config.save import params_text
 from gazerig.config.schema import load_rig, load_walk
 from gazerig.drivers.types import Detections
 from gazerig.robot.loop.loop import Tick, run

@@ -11,9 +11,10 @@ from gazerig.robot.dashboard.feed.rig_feed import ShownHead
 from gazerig.robot.dashboard.view.glb import FINISHES, FLAT, glow_disc, painted_glb
 from gazerig.robot.dashboard.view.scene_node import set_pose
 from gazerig.robot.description.build import RigShape, describe
-from gazerig.robot.description.links import CAMERA, Description
-from gazerig.robot.description.parts import (
+from gazerig.robot.description.links import (
+    CAMERA,
     FLOOR_M,
+    Description,
     HeadMeasures,
 )
 from gazerig.robot.model.frames import quaternion

@@ -9,8 +9,8 @@ import viser
 from gazerig.gaze.types import PARTS, Face, Percept, Vec3
 from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glow_disc, painted_glb
 from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose
+from gazerig.robot.description.links import FLOOR_M
 from gazerig.robot.description.mesh import Colour
-from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.description.people import SHIRTS, head, part_of, torso
 from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.loop.tick import Tick

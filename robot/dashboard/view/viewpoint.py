@@ -7,7 +7,7 @@ from gazerig.gaze.angles import add, sub
 from gazerig.gaze.types import Vec3
 from gazerig.robot.dashboard.feed.rig_feed import ShownHead
 from gazerig.robot.dashboard.view.head_view import head_dimensions, pivot_m
-from gazerig.robot.description.parts import CHIN, TOP
+from gazerig.robot.description.links import CHIN, TOP
 
 _HEAD_SHARE = 0.64
 """Share of the canvas's height that the head fills."""

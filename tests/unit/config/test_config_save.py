@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from present import present
 
 from gazerig.config.load import ConfigError, load, read_yaml, shipped_path
-from gazerig.config.save import propose, save
-from gazerig.config.save_text import format_value
+from gazerig.config.save import format_value, propose, save
 from gazerig.config.schema import Rig, load_rig
 from gazerig.params import Bounds, Unit
 from gazerig.robot.model.parameter import ParamChange

@@ -8,7 +8,7 @@ import pytest
 from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
-from gazerig.config.rig_files import AllowedFolder
+from gazerig.config.parameters import AllowedFolder
 from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.model.parameter import SavedFile
 from gazerig.robot.run.requests import RequestHandler

@@ -10,7 +10,7 @@ from fakes.runs import simulated
 
 from gazerig.config.load import ConfigError
 from gazerig.config.parameters import values
-from gazerig.config.rig_files import RigLayers
+from gazerig.config.save import RigLayers
 from gazerig.config.schema import load_rig
 from gazerig.robot.model.commands import Command, Tune
 from gazerig.robot.run.live import ParamStore
