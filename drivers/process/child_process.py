@@ -4,7 +4,7 @@ A child runs with the same interpreter. It imports no module from the working fo
 has its own session, as Ctrl-C in the terminal is for the program, which ends its children in order.
 Its numerics run in one thread, to leave the control loop's core free. A child ends when its pipe or
 socket is closed; its parent waits for it or kills it. Only the camera's process is started by
-``multiprocessing`` (drivers/camera/process.py), as its parts hold memory that both share.
+``multiprocessing`` (drivers/camera/worker.py), as its parts hold memory that both share.
 """
 
 import os

@@ -16,10 +16,9 @@ from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
 from gazerig.params import unknown_text
-from gazerig.robot.loop.body import Body
+from gazerig.robot.loop.body import Body, StopControl
 from gazerig.robot.loop.chooser import TargetChooser
 from gazerig.robot.loop.client_control import ClientControl, Conversation
-from gazerig.robot.loop.stop import StopControl
 from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.commands import (
     NO_TRACK,

@@ -307,7 +307,7 @@ class Resume(ClientCommand, frozen=True):
     """Switch the torque on again after a stop, at the present angles, and continue slowly.
 
     Only the client that stopped may resume, or one with ``confirmed``; the rules are in
-    ``gazerig.robot.loop.stop``.
+    ``gazerig.robot.loop.body``.
 
     Attributes:
         confirmed: A person has confirmed that no hand is in the mechanism.
