@@ -4,11 +4,10 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import count
+from math import isfinite
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
-
-import numpy as np
 
 from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
 from gazerig.drivers.camera.params import CameraRecovery
@@ -56,14 +55,15 @@ def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
     view. If a face or a landmark is farther outside than the size of the face, the detector is
     wrong, usually because its pixels belong to another frame size.
     """
-    points = face.landmarks_px
-    if not len(points):
-        return False  # a face without points: its consumer reports that
-    # The last row is the centre. Points that are not numbers are reported by the consumer, too.
-    points = np.vstack((points, points.mean(axis=0)))
-    low, high = -0.5, np.array([width_px, height_px]) - 0.5
-    *outside_px, centre_px = np.maximum(low - points, points - high).max(axis=1)
-    return bool(centre_px > 0.0 or max(outside_px) > np.ptp(points, axis=0).max())
+    points = face.landmarks_px.tolist()
+    if not points or not isfinite(sum(map(sum, points))):
+        return False  # the consumer reports points that are missing or not numbers
+    columns = face.landmarks_px.T.tolist()
+    points.append([sum(column) / len(column) for column in columns])
+    *outside_px, centre_px = [
+        max(-x, x - width_px + 1, -y, y - height_px + 1) - 0.5 for x, y in points
+    ]
+    return bool(centre_px > 0.0 or max(outside_px) > max(max(a) - min(a) for a in columns))
 
 
 class FrameAnalyzer:
@@ -104,8 +104,9 @@ class FrameAnalyzer:
         shot = self._orientation.turn_shot(shot)
         height, width = shot.image.shape[:2]
         image, t_s = shot.image, shot.captured_s
-        found_faces = self._detector.find(image)
-        faces = tuple([face for face in found_faces if not is_off_frame(face, width, height)])
+        faces = tuple(
+            [face for face in self._detector.find(image) if not is_off_frame(face, width, height)]
+        )
         faces_s = perf_counter()
         find_people = getattr(self._detector, "people", None)
         people = () if find_people is None else find_people(image, t_s)
@@ -286,9 +287,8 @@ def unused_path(file: Path) -> Path:
 
 def detection_error(failure: BaseException) -> CameraError:
     """Return the error that ended the detection, as the control loop reports it."""
-    if isinstance(failure, CameraError):
-        return CameraError(str(failure))
-    if (named := plugin_error(failure)) is not None:
+    named = failure if isinstance(failure, CameraError) else plugin_error(failure)
+    if named:
         return CameraError(str(named))
     return CameraError(
         f"detection in the camera frames failed ({type(failure).__name__}: "

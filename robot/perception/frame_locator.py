@@ -267,6 +267,8 @@ def _depth_ratio(
 
 def _is_flat(face: DetectedFace, found: Detections) -> bool:
     """Return whether a face is in one plane with what is beside and above it."""
+    if found.depth_m is None:
+        return False
     (x, y), side = face.landmarks_px.mean(axis=0).tolist(), float(np.ptp(face.landmarks_px[:, 1]))
     middle, *around = (
         _depth(found, (x + (across - 0.5) * side, y + (down - 0.5) * side, side, side))
