@@ -97,6 +97,8 @@ class Drift:
         breath_rad = min_jerk(breaths) * _BREATH_RAD * sin(2.0 * pi * breaths)
         yaw, pitch, roll = self._wander.step(t_s)
         drift = share * yaw, share * (breath_rad + pitch), share * roll
+        if speech_share == 0.0:
+            return drift
         return add(drift, scale(self._speech.step(t_s), share * speech_share))
 
 

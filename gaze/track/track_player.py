@@ -139,12 +139,15 @@ class TrackPlayer:
     @property
     def speech(self) -> PlayingTrack | None:
         """Return the speech that plays."""
-        return next((voice for voice in self.playing if voice.name == SPEECH), None)
+        for voice in self.voices:
+            if voice.name == SPEECH and not voice.end_reason:
+                return voice
+        return None
 
     @property
     def replaces_gaze(self) -> bool:
         """Return whether a track gives the head's angles."""
-        return any([channel < len(HEAD_CHANNELS) for channel in self.owned])
+        return min(self.owned, default=len(HEAD_CHANNELS)) < len(HEAD_CHANNELS)
 
     def play(self, voice: PlayingTrack) -> None:
         """Begin a track at its time."""
