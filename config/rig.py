@@ -171,7 +171,7 @@ class Rig(PluginSections):
     levels: Annotated[Mapping[str, LevelParams],
         "values 0..1 that a program sets many times per second, such as a jaw's opening from loudness"] = field(default_factory=dict)
     doors: Annotated[tuple[str, ...],
-        "voice stacks that take part, each in a process of its own: NAME [ADDRESS] [--bind HOST:PORT], as for gazerig door"] = ()
+        "voice stacks, each in a process of its own: NAME [ADDRESS] [--bind HOST:PORT] [--addressed], as for gazerig door"] = ()
     # fmt: on
 
     @property

@@ -3,9 +3,9 @@
 import asyncio
 import os
 import signal
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from ipaddress import ip_address
 from typing import Any, NamedTuple
 
 import gazerig
@@ -17,18 +17,12 @@ _STEADY_S = 10.0
 """A connection that lasted this long makes the next wait the first again."""
 _ORDER_EVERY_S = 0.02
 """Shortest time between two orders: of a flood, only the newest orders reach the head."""
-_LOOK_S = 2.0
-"""Time without orders after which the door checks that the head still runs."""
+_LOOK_S, _WATCH_S = 2.0, 0.1
+"""Time without orders after which the door looks at the head: whether it still runs, and who
+addresses it."""
+_LOOPBACK = ("127.0.0.1", "::1", "localhost")
 _MAX_LINES = 40
 """Different messages that are reported about one neighbour."""
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether a host's name or address is reached from this computer only."""
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 class Address(NamedTuple):
@@ -50,6 +44,10 @@ class Address(NamedTuple):
         return cls(host.strip("[]"), int(port))
 
 
+Listener = Callable[[int | None], Awaitable[object]]
+"""Tells a neighbour which person addresses the head from now on, None if nobody does."""
+
+
 class DoorLink:
     """Passes a neighbour's orders on to a running head, without ever waiting for it.
 
@@ -62,17 +60,23 @@ class DoorLink:
         say: Receives one line per message.
         address: Address of the neighbour.
         bind: Where to listen, HOST:PORT.
+        watches: Whether to tell the neighbour who addresses the head.
+
+    Attributes:
+        addressed_by: The person who addresses the head and whom the agent may hear, None without.
+        may_interrupt: Whether the agent may be interrupted: it hears while the head speaks, too.
     """
 
     def __init__(
-        self,
-        connect: Callable[[], Any],
-        say: Callable[[str], None],
-        address: str = "",
-        bind: str = "",
-    ) -> None:
+        self, connect: Callable[[], Any], say: Callable[[str], None], address: str = "",
+        bind: str = "", watches: bool = False,
+    ) -> None:  # fmt: skip
         self.connect, self._say = connect, say
-        self.address, self.bind = address, bind
+        self.address, self.bind, self.watches = address, bind, watches
+        self.addressed_by: int | None = None
+        self.may_interrupt = False
+        self._listeners: set[Listener] = set()
+        self._begun: set[asyncio.Task[None]] = set()
         self._pending: TurnOrder | None = None
         self._last: TurnOrder | None = None
         self._news = asyncio.Event()
@@ -88,14 +92,49 @@ class DoorLink:
             self._pending = self._last = orders[-1]
             self._news.set()
 
+    def begin(self, work: Coroutine[Any, Any, None]) -> None:
+        """Begin work that nothing waits for."""
+        task = asyncio.ensure_future(work)
+        self._begun.add(task)
+        task.add_done_callback(self._begun.discard)
+
+    @contextmanager
+    def on_addressed(self, listener: Listener) -> Iterator[None]:
+        """Call a function in this block, at its begin and when ``addressed_by`` changes."""
+        self._listeners.add(listener)
+        self.begin(self._tell(listener))
+        try:
+            yield
+        finally:
+            self._listeners.discard(listener)
+
+    def _watch(self, state: Any) -> None:
+        """Tell the neighbour who addresses the head in a state."""
+        if self.watches:
+            speaks = state.conversation.state == "speaking" or any(
+                track.name == "speech" and not track.end_reason for track in state.tracks
+            )
+            hears = self.may_interrupt or not speaks
+            self._address(state.addressed_by if hears else None)
+
+    def _address(self, person: int | None) -> None:
+        if person != self.addressed_by:
+            self.addressed_by = person
+            for listener in self._listeners:
+                self.begin(self._tell(listener))
+
+    async def _tell(self, listener: Listener) -> None:
+        try:
+            if self.watches:
+                await listener(self.addressed_by)
+        except Exception as error:  # of the neighbour's own package
+            self.report(f"the neighbour is not told who addresses the head: {error}")
+
     def report(self, line: str) -> None:
         """Report a line to the user, each different line once until ``report_again``."""
-        if line in self._reported or len(self._reported) > _MAX_LINES:
-            return
-        self._reported.add(line)
-        if len(self._reported) > _MAX_LINES:
-            line = "more messages about this neighbour are not shown"
-        self._say(line)
+        if line not in self._reported and len(self._reported) < _MAX_LINES:
+            self._reported.add(line)
+            self._say(line)
 
     def report_again(self) -> None:
         """Forget what was reported, after a connection that worked."""
@@ -113,22 +152,21 @@ class DoorLink:
         try:
             await self._pass_on(head)
         finally:
+            self._address(None)
             await asyncio.to_thread(head.__exit__, None, None, None)
 
     async def _pass_on(self, head: Any) -> None:
         """Pass orders on until the head ends."""
         while True:
-            try:
-                await asyncio.wait_for(self._news.wait(), _LOOK_S)
-            except TimeoutError:
-                await asyncio.to_thread(lambda: head.state)
-                continue
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._news.wait(), _WATCH_S if self.watches else _LOOK_S)
             self._news.clear()
             order, self._pending = self._pending, None
             if order is not None:
                 if refused := await asyncio.to_thread(_perform, head, order):
                     self.report(f"the head refuses {order.state}: {refused}")
                 await asyncio.sleep(_ORDER_EVERY_S)
+            self._watch(await asyncio.to_thread(lambda: head.state))
 
     async def keep(
         self, attempt: Callable[[], Awaitable[object]], neighbour: str, remedy: str = "",
@@ -192,7 +230,7 @@ class Door:
 
     def run(
         self, head: int | str | None = None, address: str = "", bind: str = "",
-        say: Callable[[str], None] = print, ends_with_input: bool = False,
+        say: Callable[[str], None] = print, ends_with_input: bool = False, addressed: bool = False,
     ) -> None:  # fmt: skip
         """Run the door until Ctrl-C or SIGTERM.
 
@@ -202,12 +240,14 @@ class Door:
             bind: HOST:PORT to listen on, "" for the usual one on this computer only.
             say: Receives one line per message.
             ends_with_input: End when standard input is closed, i.e. with the parent process.
+            addressed: Let the neighbour listen, without a wake word, when a person addresses the
+                head.
 
         Raises:
             gazerig.Error: the door cannot open; the message has the remedy.
         """
         bind = bind or self.bind
-        if bind and not is_loopback(Address.parse(bind).host):
+        if bind and Address.parse(bind).host not in _LOOPBACK:
             say(f"listening on {bind}: every program on this network can steer the conversation")
 
         link = DoorLink(
@@ -217,6 +257,7 @@ class Door:
             say,
             address or self.address,
             bind,
+            addressed,
         )
         try:
             asyncio.run(self._serve(link, ends_with_input))

@@ -2,7 +2,8 @@
 
 The door joins the room with LIVEKIT_URL and LIVEKIT_TOKEN of its environment, subscribes to the
 agent's sound only, which moves the mouth, and publishes nothing. Its events are read by the names
-of their fields, so they fit several versions.
+of their fields, so they fit several versions. With addressed, it calls the agent's methods
+start_turn, end_turn and cancel_turn, those of LiveKit's example push_to_talk.py.
 """
 
 import asyncio
@@ -12,7 +13,7 @@ from typing import Any
 
 import gazerig
 from gazerig.doors.door import Door, DoorLink
-from gazerig.doors.spoken_sound import MouthSound
+from gazerig.doors.spoken_sound import SpokenSound
 from gazerig.doors.turn_taking import Orders, TurnTaking
 
 ATTRIBUTE = "lk.agent.state"
@@ -45,9 +46,12 @@ class LiveKit:
 
 
 async def follow_room(
-    link: DoorLink, room: Any, token: str, options: Any = None,
-    listen: Callable[[Any], AsyncIterator[bytes]] | None = None,
-) -> None:  # fmt: skip
+    link: DoorLink,
+    room: Any,
+    token: str,
+    options: Any,
+    listen: Callable[[Any], AsyncIterator[bytes]],
+) -> None:
     """Join a room and follow its agent until the room is closed.
 
     Args:
@@ -55,10 +59,9 @@ async def follow_room(
         room: A ``livekit.rtc.Room``.
         token: Access token of a participant who may subscribe.
         options: ``RoomOptions`` without automatic subscription.
-        listen: Returns the samples of a track as they are heard, at RATE_HZ, one channel; None:
-            the mouth does not move.
+        listen: Returns the samples of a track as they are heard, at RATE_HZ, one channel.
     """
-    mouth = MouthSound(link)
+    mouth = SpokenSound(link, volume=0.0)
     states, closed, moving = LiveKit(), asyncio.Event(), set[asyncio.Task[None]]()
 
     def take(message: Mapping[str, str]) -> None:
@@ -68,7 +71,7 @@ async def follow_room(
         """Follow changed attributes, and subscribe to the sound of an agent."""
         if ATTRIBUTE in attributes:
             take({ATTRIBUTE: attributes[ATTRIBUTE]})
-        if listen is not None and participant is not None and ATTRIBUTE in participant.attributes:
+        if participant is not None and ATTRIBUTE in participant.attributes:
             for publication in participant.track_publications.values():
                 if publication.kind == _AUDIO and not publication.subscribed:
                     publication.set_subscribed(True)
@@ -87,22 +90,41 @@ async def follow_room(
         if ATTRIBUTE in participant.attributes:
             take({ATTRIBUTE: "idle"})
 
+    has_turn = False
+
+    async def tell(person: int | None) -> None:
+        """Open or close the turn of the agents, as their push-to-talk does."""
+        nonlocal has_turn
+        ends, has_turn = has_turn and states.talk.state != "speaking", person is not None
+        method = "start_turn" if has_turn else "end_turn" if ends else "cancel_turn"
+        for identity, participant in room.remote_participants.items():
+            if ATTRIBUTE in participant.attributes:
+                try:
+                    await room.local_participant.perform_rpc(
+                        destination_identity=identity, method=method, payload=""
+                    )
+                except Exception as error:  # RpcError of the package, which tests do without
+                    link.report(
+                        f"the agent has not taken the turn ({method}: {error}); register "
+                        "start_turn, end_turn and cancel_turn as in docs/talk.md"
+                    )
+
     room.on("participant_attributes_changed", change)
     room.on("participant_connected", join)
     room.on("track_published", lambda publication, participant: change({}, participant))
-    if listen is not None:
-        room.on(
-            "track_subscribed",
-            lambda track, *of: moving.add(asyncio.ensure_future(move_mouth(listen(track)))),
-        )
+    room.on(
+        "track_subscribed",
+        lambda track, *of: moving.add(asyncio.ensure_future(move_mouth(listen(track)))),
+    )
     room.on("participant_disconnected", leave)
     room.on("disconnected", lambda *reason: closed.set())
     try:
-        await room.connect(link.address, token, *([options] if options is not None else []))
+        await room.connect(link.address, token, options)
         link.report(f"connected to {link.address}")
         for participant in room.remote_participants.values():
             join(participant)
-        await closed.wait()
+        with link.on_addressed(tell):
+            await closed.wait()
     finally:
         link.send(states.talk.end())
         mouth.shut()

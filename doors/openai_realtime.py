@@ -13,18 +13,15 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from aiohttp import ClientSession, ClientWebSocketResponse, WSMsgType, web
+from aiohttp import ClientSession, ClientWebSocketResponse, WSMessage, WSMsgType, web
 
 from gazerig.doors.door import Door, DoorLink
-from gazerig.doors.spoken_sound import MouthSound
+from gazerig.doors.spoken_sound import SpokenSound
 from gazerig.doors.turn_taking import Orders, TurnTaking, field
-from gazerig.doors.web_socket import ERRORS, Intake, listen
+from gazerig.doors.web_socket import ERRORS, MAX_BYTES, listen
 
-_MAX_BYTES = 16_000_000
 _PCM, _PCM_HZ = ("audio/pcm", "pcm16"), 24_000
-"""16 bits a sample, the default."""
-_G711, _G711_HZ = ("audio/pcmu", "audio/pcma", "g711_ulaw", "g711_alaw"), 8_000
-"""8 bits a sample."""
+"""16 bits a sample, the default; the formats of telephones have 8."""
 _AUDIO = ("response.output_audio.delta", "response.audio.delta")
 _AUDIO_DONE = ("response.output_audio.done", "response.audio.done")
 _PASSED_ON = ("authorization", "openai-", "api-key", "user-agent", "x-")
@@ -44,19 +41,28 @@ class OpenAIRealtime:
 
     def __init__(self) -> None:
         self.talk = TurnTaking("listening", streams_text=True)
-        self._bytes_per_s, self.rate_hz = 2 * _PCM_HZ, _PCM_HZ
+        self.rate_hz = _PCM_HZ
         self._audio_s = 0.0
         self._complete = False
+        self._session_type = ""
+        self._detection: dict[str, Any] = {}
+        self._detects = self._hears = False
 
     def take(self, message: Mapping[str, Any], now_s: float) -> Orders:
         """Return the orders for a server event; other events are ignored."""
         talk = self.talk
         match message.get("type"):
-            case "session.created" | "session.updated":
-                self._read_format(field(message, "session", dict, {}))
+            case "session.created" | "session.updated" as kind:
+                session = field(message, "session", dict, {})
+                self._read_format(session)
+                if kind == "session.created":
+                    self._session_type = field(session, "type", str, "")
+                    self.read_detection(session)
             case "input_audio_buffer.speech_started":
+                self._hears = True
                 return talk.partner_speaks()
             case "input_audio_buffer.speech_stopped" | "input_audio_buffer.committed":
+                self._hears = False
                 return talk.partner_pauses()
             case "response.created":
                 self._complete = False
@@ -66,12 +72,14 @@ class OpenAIRealtime:
             case kind if kind in _AUDIO:
                 # Base64: four characters for three bytes.
                 length = len(field(message, "delta", str, "")) * 3 // 4
-                self._audio_s += length / self._bytes_per_s
+                if self.rate_hz:
+                    self._audio_s += length / (2 * self.rate_hz)
                 return talk.speak(now_s) if length else ()
             case "response.output_audio_transcript.delta" | "response.audio_transcript.delta":
                 return talk.add_text(field(message, "delta", str, ""), now_s)
             case kind if kind in _AUDIO_DONE:
-                return talk.speak(now_s, self._audio_s) if talk.state == "speaking" else ()
+                seconds = self._audio_s or None
+                return talk.speak(now_s, seconds) if talk.state == "speaking" else ()
             case "output_audio_buffer.stopped" | "output_audio_buffer.cleared":
                 return talk.end_speech()
             case "response.done":
@@ -98,11 +106,38 @@ class OpenAIRealtime:
         output = field(field(session, "audio", dict, {}), "output", dict, {})
         audio = field(output, "format", dict, {})
         name = str(audio.get("type") or session.get("output_audio_format"))
-        if name in _G711:
-            self._bytes_per_s, self.rate_hz = _G711_HZ, 0
-        elif name in _PCM:
+        if name in _PCM:
             self.rate_hz = field(audio, "rate", int, 0) or _PCM_HZ
-            self._bytes_per_s = 2 * self.rate_hz
+        elif name != "None":
+            self.rate_hz = 0
+
+    def read_detection(self, session: Mapping[str, Any]) -> None:
+        """Read how a session, or the program's update of it, wants turns to be detected."""
+        place = field(field(session, "audio", dict, {}), "input", dict, session)
+        if "turn_detection" in place:
+            self._detection = field(place, "turn_detection", dict, {})
+            self._detects = bool(self._detection)
+
+    @property
+    def may_interrupt(self) -> bool:
+        """Return whether the person may interrupt an answer, the default."""
+        return bool(self._detection.get("interrupt_response", True))
+
+    def detect_turns(self, addressed: bool) -> tuple[Mapping[str, Any], ...]:
+        """Return the messages to the server that let it detect turns only while addressed.
+
+        A turn that was begun is heard to its end. What was heard before the turns are detected is
+        no part of them.
+        """
+        detects = addressed or self._hears
+        if not self._detection or detects == self._detects:
+            return ()
+        self._detects = detects
+        session: dict[str, Any] = {"turn_detection": self._detection if detects else None}
+        if self._session_type:  # it is none of the beta
+            session = {"type": self._session_type, "audio": {"input": session}}
+        update = {"type": "session.update", "session": session}
+        return ({"type": "input_audio_buffer.clear"}, update) if detects else (update,)
 
 
 async def serve(link: DoorLink) -> None:
@@ -113,18 +148,13 @@ async def serve(link: DoorLink) -> None:
             name: value for name, value in request.headers.items()
             if name.lower().startswith(_PASSED_ON)
         }  # fmt: skip
-        offered = request.headers.get("Sec-WebSocket-Protocol", "")
-        protocols = tuple(one.strip() for one in offered.split(",") if one.strip())
         url = link.address.rstrip("/") + str(request.rel_url)
         try:
             async with (
                 ClientSession() as session,
-                session.ws_connect(
-                    url, headers=kept, protocols=protocols, max_msg_size=_MAX_BYTES
-                ) as server,
+                session.ws_connect(url, headers=kept, max_msg_size=MAX_BYTES) as server,
             ):
-                chosen = (server.protocol,) if server.protocol else ()
-                program = web.WebSocketResponse(protocols=chosen, max_msg_size=_MAX_BYTES)
+                program = web.WebSocketResponse(max_msg_size=MAX_BYTES)
                 await program.prepare(request)
                 await _relay(link, program, server)
                 return program
@@ -139,27 +169,33 @@ async def _relay(
     link: DoorLink, program: web.WebSocketResponse, server: ClientWebSocketResponse
 ) -> None:
     """Relay a session until one side ends it."""
-    events = OpenAIRealtime()
-    intake, mouth = Intake(link, events), MouthSound(link)
+    events, mouth = OpenAIRealtime(), SpokenSound(link, volume=0.0)
+
+    async def tell(person: int | None) -> None:
+        link.may_interrupt = events.may_interrupt
+        for message in events.detect_turns(person is not None) if link.watches else ():
+            await server.send_json(message)
 
     async def upwards() -> None:
         async for message in program:
             await _pass(server, message.type, message.data)
+            if event := _event(message, '"session.update"'):
+                events.read_detection(field(event, "session", dict, {}))
+                await tell(link.addressed_by)
         await server.close(code=program.close_code or 1000)
 
     async def downwards() -> None:
         async for message in server:
             await _pass(program, message.type, message.data)
-            if message.type == WSMsgType.TEXT:
-                with contextlib.suppress(ValueError, RecursionError):
-                    if isinstance(event := json.loads(message.data), dict):
-                        intake.translate(event)
-                        if pcm := events.sound(event):
-                            mouth.add(pcm, events.rate_hz)
-                        elif event.get("type") in _AUDIO_DONE:
-                            mouth.end()
-                        elif events.talk.state != "speaking":
-                            mouth.shut()
+            if event := _event(message):
+                link.send(events.take(event, link.now_s()))
+                if pcm := events.sound(event):
+                    mouth.add(pcm, events.rate_hz)
+                elif event.get("type") in _AUDIO_DONE:
+                    mouth.end()
+                elif events.talk.state != "speaking":
+                    mouth.shut()
+                await tell(link.addressed_by)
         await program.close(code=server.close_code or 1000)
 
     async def look() -> None:
@@ -169,13 +205,23 @@ async def _relay(
 
     tasks = [asyncio.ensure_future(one()) for one in (upwards, downwards, look)]
     try:
-        await asyncio.wait(tasks[:2], return_when=asyncio.FIRST_COMPLETED)
+        with link.on_addressed(tell):
+            await asyncio.wait(tasks[:2], return_when=asyncio.FIRST_COMPLETED)
     finally:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        intake.end()
+        link.send(events.talk.end())
         mouth.shut()
+
+
+def _event(message: WSMessage, kind: str = "") -> dict[str, Any]:
+    """Return the event of a message whose text contains a kind, {} if it has none."""
+    if message.type == WSMsgType.TEXT and kind in message.data:
+        with contextlib.suppress(ValueError, RecursionError):
+            if isinstance(event := json.loads(message.data), dict):
+                return event
+    return {}
 
 
 async def _pass(

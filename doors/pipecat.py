@@ -1,11 +1,12 @@
 """Door to Pipecat: RTVI messages over a WebSocket.
 
-A client program forwards the RTVI messages that it receives to the door. Messages:
-docs.pipecat.ai/client/rtvi-standard.
+A client program forwards the RTVI messages that it receives to the door, and with addressed those
+of the door to the bot. Messages: docs.pipecat.ai/client/rtvi-standard.
 """
 
 from collections.abc import Mapping
 from typing import Any
+from uuid import uuid4
 
 from gazerig.doors.door import Door, DoorLink
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage, field
@@ -55,6 +56,11 @@ class Pipecat:
                 self._has_text = False
                 return talk.end_speech()
         return ()
+
+    def addressed(self, person: int | None) -> Mapping[str, Any]:
+        """Return a client's message, for the client to pass on to the bot."""
+        data = {"t": "addressed", "d": {"person": person}}
+        return {"label": "rtvi-ai", "type": "client-message", "id": str(uuid4()), "data": data}
 
 
 async def serve(link: DoorLink) -> None:

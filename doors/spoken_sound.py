@@ -3,8 +3,8 @@
 import asyncio
 import contextlib
 import queue
-from collections.abc import Callable, Iterator
-from typing import Any
+import threading
+from collections.abc import Iterator
 
 import gazerig
 from gazerig.doors.door import DoorLink
@@ -14,138 +14,96 @@ WIDTH = 2
 _PIECE_S = 0.04
 _MOST_PIECES = 15_000
 """Pieces that wait: ten minutes."""
-_RETRY_S = 10.0
-"""Time without further attempts after a failure."""
-_LONGEST_END_S, _LOOK_S = 3.0, 0.05
-"""Longest wait for the end of a sound after its last piece, and how often it is looked for."""
+_LOOK_S, _MOST_LOOKS = 0.05, 60
+"""How often the end of a sound is looked for after its last piece, 3 s at most."""
 
 
 class SpokenSound:
-    """A sound that the head says while it arrives; ``say`` is called in a thread.
-
-    Args:
-        rate_hz: Rate of the samples.
-        channels: 1 or 2.
-        volume: Factor 0..1; 0: only the mouth moves.
-
-    Attributes:
-        is_cut: Whether it has ended at once.
-    """
-
-    def __init__(self, rate_hz: int, channels: int, volume: float = 1.0) -> None:
-        self._rate_hz, self._channels, self._volume = rate_hz, channels, volume
-        self.is_cut = False
-        self._pieces: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-
-    def split(self, pcm: bytes) -> Iterator[tuple[bytes, float]]:
-        """Return the pieces of samples, and the duration of each, s."""
-        frame = WIDTH * self._channels
-        step = frame * round(_PIECE_S * self._rate_hz)
-        for at in range(0, len(pcm), step):
-            piece = pcm[at : at + step]
-            yield piece, len(piece) / frame / self._rate_hz
-
-    def feed(self, piece: bytes) -> None:
-        """Add a piece of samples: signed, 16 bits, channels interleaved; of a flood, none."""
-        if self._pieces.qsize() < _MOST_PIECES:
-            self._pieces.put(piece)
-
-    def end(self) -> None:
-        """End the sound."""
-        self._pieces.put(b"")
-
-    def cut(self) -> None:
-        """End the sound at once, without the pieces that wait."""
-        self.is_cut = True
-        with contextlib.suppress(queue.Empty):
-            while True:
-                self._pieces.get_nowait()
-        self.end()
-
-    def say(self, connect: Callable[[], Any]) -> str:
-        """Let the head say it until it is heard; return why that fails, "" if it does not.
-
-        Args:
-            connect: Returns a connection to the head, of which this has its own.
-        """
-        try:
-            head = connect()
-            try:
-                order = head.say(
-                    self._read(), rate_hz=self._rate_hz, channels=self._channels,
-                    volume=self._volume,
-                )  # fmt: skip
-                if self.is_cut:
-                    with contextlib.suppress(gazerig.Refused):  # it has ended
-                        head.end_track("speech")
-                for _ in range(round(_LONGEST_END_S / _LOOK_S)):
-                    if not any(
-                        track.name == "speech" and not track.end_reason
-                        for track in head.state.tracks
-                    ):
-                        break
-                    head.sleep(_LOOK_S)
-                return str(order.reply.refused or "")
-            finally:
-                head.__exit__(None, None, None)
-        except gazerig.Error as error:
-            return str(error)
-
-    def _read(self) -> Iterator[bytes]:
-        while piece := self._pieces.get():
-            yield piece
-
-
-class MouthSound:
-    """Moves the head's mouth by speech that the neighbour plays itself; nothing waits for it.
+    """Sounds of one source, which the head says one after the other; nothing waits for it.
 
     Args:
         link: The head.
+        volume: Factor 0..1; 0: only the mouth moves, to a sound that the neighbour plays itself.
+
+    Attributes:
+        heard: Ends when the newest sound has been heard, None before the first.
     """
 
-    def __init__(self, link: DoorLink) -> None:
-        self._link = link
-        self._sound: SpokenSound | None = None
+    def __init__(self, link: DoorLink, volume: float = 1.0) -> None:
+        self._link, self._volume = link, volume
+        self._pieces: queue.SimpleQueue[bytes] | None = None
+        self._cut = threading.Event()
         self._rest = b""
-        self._saying: asyncio.Task[None] | None = None
-        self._next_s = 0.0
+        self.heard: asyncio.Task[None] | None = None
 
     def add(self, pcm: bytes, rate_hz: int, channels: int = 1) -> None:
-        """Add speech that is heard from now on, after what was added before.
+        """Add samples, heard after what was added before; of a flood, none.
 
         Args:
             pcm: Samples, signed, 16 bits, channels interleaved.
             rate_hz: Rate of the samples.
             channels: 1 or 2.
         """
-        if self._sound is None:
-            if self._link.now_s() < self._next_s:
-                return
-            self._sound, self._rest = SpokenSound(rate_hz, channels, volume=0.0), b""
-            self._saying = asyncio.ensure_future(self._say(self._sound, self._saying))
+        if self._pieces is None:
+            self._pieces, self._rest = queue.SimpleQueue(), b""
+            sound = self._read(self._pieces, self._cut), self._cut, rate_hz, channels
+            self.heard = asyncio.ensure_future(self._hear(self.heard, *sound))
+        frame = WIDTH * channels
         pcm = self._rest + pcm
-        whole = len(pcm) - len(pcm) % (WIDTH * channels)
+        whole = len(pcm) - len(pcm) % frame
         self._rest = pcm[whole:]
-        for piece, _ in self._sound.split(pcm[:whole]):
-            self._sound.feed(piece)
+        step = frame * round(_PIECE_S * rate_hz)
+        for at in range(0, whole, step):
+            if self._pieces.qsize() < _MOST_PIECES:
+                self._pieces.put(pcm[at : min(at + step, whole)])
 
-    def end(self) -> None:
-        """End the speech after what was added."""
-        if self._sound is not None:
-            self._sound.end()
-            self._sound = None
+    def end(self) -> "asyncio.Task[None] | None":
+        """End the sound after what was added; return ``heard``, None if nothing was added."""
+        if self._pieces is None:
+            return None
+        self._pieces.put(b"")
+        self._pieces = None
+        return self.heard
 
     def shut(self) -> None:
-        """End the speech at once."""
-        if self._sound is not None:
-            self._sound.cut()
-            self._sound = None
+        """End all sounds at once."""
+        self._cut.set()
+        self._cut = threading.Event()
+        self.end()
 
-    async def _say(self, sound: SpokenSound, before: "asyncio.Task[None] | None") -> None:
+    async def _hear(
+        self, before: "asyncio.Task[None] | None", pieces: Iterator[bytes], cut: threading.Event,
+        rate_hz: int, channels: int,
+    ) -> None:  # fmt: skip
         if before is not None:
             await before
-        if failed := await asyncio.to_thread(sound.say, self._link.connect):
-            self._next_s = self._link.now_s() + _RETRY_S
-            if self._sound is sound:
-                self._sound = None
-            self._link.report(f"the mouth does not move: {failed}")
+        try:
+            refused = await asyncio.to_thread(self._say, pieces, cut, rate_hz, channels)
+        except gazerig.Error as error:
+            refused = str(error)
+        if refused:
+            self._link.report(f"the sound is not said: {refused}")
+
+    def _say(
+        self, pieces: Iterator[bytes], cut: threading.Event, rate_hz: int, channels: int
+    ) -> str:
+        """Let the head say a sound until it is heard; return why it refuses, "" if it does not.
+
+        Raises:
+            gazerig.Error: the head has ended, or does not say it.
+        """
+        with self._link.connect() as head:  # its own, because it waits
+            order = head.say(pieces, rate_hz=rate_hz, channels=channels, volume=self._volume)
+            for _ in range(_MOST_LOOKS):
+                if cut.is_set():
+                    with contextlib.suppress(gazerig.Refused):  # it has ended
+                        head.end_track("speech")
+                if not any(t.name == "speech" and not t.end_reason for t in head.state.tracks):
+                    break
+                head.sleep(_LOOK_S)
+            return str(order.reply.refused or "")
+
+    @staticmethod
+    def _read(pieces: queue.SimpleQueue[bytes], cut: threading.Event) -> Iterator[bytes]:
+        while not cut.is_set() and (piece := pieces.get()):
+            yield piece

@@ -12,13 +12,6 @@ from gazerig.doors.door import Door, DoorLink
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage, field
 from gazerig.doors.web_socket import follow_socket
 
-_OTHERS = frozenset(
-    ("zeroconf", "button_controls_disabled", "timer_ticking", "timer_updated", "timer_ringing",
-     "media_player_playing", "volume_changed", "volume_muted", "light_command", "button_press",
-     "button_lock_changed")
-)  # fmt: skip
-"""Events that are not part of a conversation."""
-
 
 class VoiceAssistant:
     """Events of one connection as orders."""
@@ -27,10 +20,10 @@ class VoiceAssistant:
         self.talk = TurnTaking()
 
     def take(self, message: Mapping[str, Any], now_s: float) -> Orders:
-        """Return the orders for an event.
+        """Return the orders for an event; events of timers, volume and lights are ignored.
 
         Raises:
-            UnknownMessage: the event is not in the API.
+            UnknownMessage: it is not an event.
         """
         talk, data = self.talk, field(message, "data", dict, {})
         match message.get("event"):
@@ -48,13 +41,16 @@ class VoiceAssistant:
                 return talk.end()
             case "muted":
                 return talk.end() if data.get("muted") is True else ()
-            case other if other in _OTHERS:
-                return ()
-            case other:
+            case None:
                 raise UnknownMessage(
-                    f"event {other!r} is not in the peripheral API that this door knows; it is "
-                    "ignored; check that the address is that of a Linux Voice Assistant"
+                    "a message without an event is ignored; check that the address is that of a "
+                    "Linux Voice Assistant"
                 )
+        return ()
+
+    def addressed(self, person: int | None) -> Mapping[str, str] | None:
+        """Return the command to listen, as at a press of its button."""
+        return {"command": "start_listening"} if person is not None else None
 
 
 async def serve(link: DoorLink) -> None:

@@ -9,14 +9,11 @@ from urllib.parse import urlsplit
 
 from aiohttp import ClientError, ClientSession, ClientWebSocketResponse, WSMsgType, web
 
-from gazerig.doors.admission import MOST, page_refusal, user_refusal
 from gazerig.doors.door import Address, DoorLink
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
 
-MAX_BYTES = 4_000_000
+MAX_BYTES = 16_000_000
 """Longest message."""
-_MAX_PER_S = 500
-"""Messages per second that are read; of a flood, the rest waits at its sender."""
 _HEARTBEAT_S = 20.0
 ERRORS = (OSError, TimeoutError, ClientError)
 """Errors of a connection."""
@@ -34,9 +31,12 @@ class Translator(Protocol):
             UnknownMessage: the door does not know it.
         """
 
+    def addressed(self, person: int | None) -> Mapping[str, Any] | None:
+        """Return the message that a person addresses the head, or that nobody does."""
+
 
 class Intake:
-    """Reads the messages of one connection: bad ones are reported once, and a flood is slowed.
+    """Reads the messages of one connection; bad ones are reported once.
 
     Args:
         link: The head.
@@ -45,20 +45,24 @@ class Intake:
 
     def __init__(self, link: DoorLink, translator: Translator) -> None:
         self._link, self._translator = link, translator
-        self._second_s, self._count = link.now_s(), 0
 
     async def read(self, socket: ClientWebSocketResponse | web.WebSocketResponse) -> None:
         """Read the messages of a connection until it ends, and with it the conversation."""
-        try:
-            async for message in socket:
-                if message.type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                    await self.take(message.data)
-        finally:
-            self.end()
 
-    async def take(self, text: str | bytes) -> None:
+        async def tell(person: int | None) -> None:
+            if (message := self._translator.addressed(person)) is not None:
+                await socket.send_json(message)
+
+        try:
+            with self._link.on_addressed(tell):
+                async for message in socket:
+                    if message.type in (WSMsgType.TEXT, WSMsgType.BINARY):
+                        self.take(message.data)
+        finally:
+            self._link.send(self._translator.talk.end())
+
+    def take(self, text: str | bytes) -> None:
         """Read one message."""
-        await self.slow_down()
         try:
             message = json.loads(text)
             if not isinstance(message, dict):
@@ -69,28 +73,10 @@ class Intake:
                 "neighbour's address and version"
             )
             return
-        self.translate(message)
-
-    def translate(self, message: Mapping[str, Any]) -> None:
-        """Send the orders for a message to the head."""
         try:
             self._link.send(self._translator.take(message, self._link.now_s()))
         except UnknownMessage as error:
             self._link.report(str(error))
-
-    async def slow_down(self) -> None:
-        """Count a message; wait for the next second if there were too many."""
-        now_s = self._link.now_s()
-        if now_s - self._second_s >= 1.0:
-            self._second_s, self._count = now_s, 0
-        self._count += 1
-        if self._count > _MAX_PER_S:
-            self._link.report(f"more than {_MAX_PER_S} messages a second: they are slowed down")
-            await asyncio.sleep(self._second_s + 1.0 - now_s)
-
-    def end(self) -> None:
-        """End the conversation with the connection."""
-        self._link.send(self._translator.talk.end())
 
 
 async def follow_socket(
@@ -147,7 +133,7 @@ async def listen(
 ) -> None:
     """Accept WebSockets at the link's bind address, for ever.
 
-    Web pages and, on the loopback, other users of this computer are refused.
+    Web pages are refused.
 
     Args:
         link: The head.
@@ -157,37 +143,41 @@ async def listen(
     Raises:
         OSError: the port is not free.
     """
-    connections: set[asyncio.Transport] = set()
+    host, port = Address.parse(link.bind)
 
     async def admit(request: web.Request) -> web.StreamResponse:
-        transport = request.transport
-        if transport is None:
-            raise web.HTTPForbidden  # it has disconnected
-        port = transport.get_extra_info("sockname")[1]
-        refused = page_refusal(link.bind, port, request.headers)
-        if refused := refused or user_refusal(link.bind, transport):
+        if refused := page_refusal(port, request.headers.get("Origin")):
             link.report(refused)
             raise web.HTTPForbidden(text=refused)
-        if not web.WebSocketResponse().can_prepare(request):
-            raise web.HTTPUpgradeRequired
-        if len(connections) >= MOST:
-            link.report(f"more than {MOST} connections at once: the newest is refused")
-            raise web.HTTPServiceUnavailable
-        connections.add(transport)
-        try:
-            return await handle(request)
-        finally:
-            connections.discard(transport)
+        return await handle(request)
 
     app = web.Application()
     app.router.add_get("/{path:.*}", admit)
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.5, handler_cancellation=True)
     await runner.setup()
     try:
-        host, port = Address.parse(link.bind)
         await web.TCPSite(runner, host, port).start()
         link.report(f"waiting for {neighbour} on ws://{link.bind}")
         await asyncio.Event().wait()
     finally:
         with contextlib.suppress(asyncio.CancelledError):
             await runner.cleanup()
+
+
+def page_refusal(port: int, origin: str | None) -> str:
+    """Return why a request is refused as that of a web page, "" if it is not.
+
+    Browsers write the page's address into Origin, also if its name leads to this computer (DNS
+    rebinding); no page has the door's own.
+
+    Args:
+        port: Port of the door.
+        origin: The header of the request, None without it.
+    """
+    own = [f"http://{name}:{port}" for name in ("127.0.0.1", "[::1]", "localhost")]
+    if origin is None or origin in own:
+        return ""
+    return (
+        f"a web page of {origin or 'no address':.60} was refused; let a program connect, which "
+        "sends no Origin"
+    )

@@ -1,26 +1,25 @@
-"""Door to Wyoming, the protocol of Rhasspy and Home Assistant: a ``snd`` service.
+"""Door to Wyoming, the protocol of Rhasspy and Home Assistant: ``snd`` and ``wake`` services.
 
 The head plays the sound and moves its mouth by it. The same port accepts the events of a satellite
-(``--event-uri``): detection, voice-started and -stopped, transcript, synthesize. Events:
+(``--event-uri``): detection, voice-started and -stopped, transcript, synthesize. With addressed, it
+also detects a wake word that is no word (``--wake-uri``): a person addresses the head. Events:
 github.com/OHF-Voice/wyoming; the package ``wyoming`` reads and writes them.
 """
 
 import asyncio
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import gazerig
-from gazerig.doors.admission import MOST, user_refusal
 from gazerig.doors.door import Address, Door, DoorLink
 from gazerig.doors.spoken_sound import WIDTH, SpokenSound
 from gazerig.doors.turn_taking import Orders, TurnTaking, field
 
-_MAX_CHUNKS = 64
-"""Chunks of sound that wait; a neighbour that sends more is slowed down."""
-_AHEAD_S = 1.0
-"""Sound that the head has before it is heard."""
-_MAX_BYTES, _MAX_LINE = 1_000_000, 65_536
+_WAKE, _LOOK = "look", "look at the head"
+"""The wake word that is a look, and how it is said."""
+_MAX_LINE = 65_536
 
 
 class Wyoming:
@@ -62,16 +61,19 @@ class Wyoming:
         return ()
 
 
-def _limit_events(reader: asyncio.StreamReader) -> None:
-    """Let a stream refuse to read a huge event."""
-    read = reader.readexactly
+@dataclass
+class _Wake:
+    """A connection that waits for a wake word.
 
-    async def read_limited(n: int) -> bytes:
-        if not isinstance(n, int) or n > _MAX_BYTES:
-            raise ValueError(f"an event of {n} bytes; the limit is {_MAX_BYTES}")
-        return await read(n)
+    Attributes:
+        name: What it waits for.
+        timestamp: Time of the newest audio-chunk.
+        is_detected: Whether it was detected in the present audio.
+    """
 
-    reader.readexactly = read_limited  # type: ignore[method-assign]
+    name: str
+    timestamp: int | None = None
+    is_detected: bool = False
 
 
 class Satellite:
@@ -83,171 +85,149 @@ class Satellite:
 
     def __init__(self, link: DoorLink) -> None:
         self._link, self._events = link, Wyoming()
-        self._sounds: list[asyncio.Queue[Any]] = []
-        self._said = set[SpokenSound]()
-        self._opening: asyncio.Future[str] | None = None
+        self._sounds: list[SpokenSound] = []
+        self._wakes: dict[asyncio.StreamWriter, _Wake] = {}
+        self._calls = False
 
     async def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Read one connection to its end."""
-        refused = user_refusal(self._link.bind, writer.transport)
-        if not refused and len(self._sounds) >= MOST:
-            refused = f"more than {MOST} connections at once: the newest is refused"
-        if refused:
-            self._link.report(refused)
-            await _refuse(writer, refused)
-            return
-        _limit_events(reader)
-        sounds: asyncio.Queue[Any] = asyncio.Queue(_MAX_CHUNKS)
-        if self._opening is None:  # so that the first sound does not wait for the loudspeaker
-            silence = SpokenSound(16_000, 1)
-            silence.feed(bytes(640 * WIDTH))
-            silence.end()
-            self._opening = asyncio.ensure_future(
-                asyncio.to_thread(silence.say, self._link.connect)
-            )
-        self._sounds.append(sounds)
-        player = asyncio.ensure_future(self._play(sounds, writer))
+        sound = SpokenSound(self._link)
+        if not self._sounds:  # so that the first sound does not wait for the loudspeaker
+            sound.add(bytes(640 * WIDTH), 16_000)
+            sound.end()
+        self._sounds.append(sound)
         try:
-            await self._read(reader, writer, sounds)
+            while (event := await _read_event(reader)) is not None:
+                if event.type in ("describe", "ping"):
+                    await _answer(event, writer, self._link.watches)
+                elif event.type == "detect" or writer in self._wakes:
+                    await self._follow_wake(event, writer)
+                else:
+                    self._take(event, sound)
+                    if event.type == "audio-stop" and (heard := sound.end()) is not None:
+                        self._link.begin(self._report_played(sound, heard, writer))
         except (ConnectionError, asyncio.IncompleteReadError):
             pass  # it has disconnected
-        except (ValueError, AttributeError, KeyError, TypeError) as error:
+        except Exception as error:  # of the package: it checks no field
             self._link.report(
                 f"a connection is closed, because it sent no Wyoming event ({error}); check the "
                 "neighbour's address and version"
             )
         finally:
-            player.cancel()
-            await asyncio.gather(player, return_exceptions=True)
-            self._sounds.remove(sounds)
+            sound.end()
+            self._sounds.remove(sound)
+            self._wakes.pop(writer, None)
             if not self._sounds:
                 self._link.send(self._events.talk.end())
             writer.close()
 
-    def _report_sound(self, refused: str) -> None:
-        if refused:
-            self._link.report(f"no sound is heard: {refused}")
-
-    async def _read(
-        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, sounds: asyncio.Queue[Any]
-    ) -> None:  # fmt: skip
-        """Read events until the connection ends.
-
-        Raises:
-            ValueError, AttributeError, KeyError, TypeError: an event is malformed.
-        """
-        from wyoming.audio import AudioChunk, AudioStart
-        from wyoming.event import async_read_event, async_write_event
-
-        while True:
-            event = await async_read_event(reader)
-            if event is None:
-                if not reader.at_eof():
-                    raise ValueError("not a line of JSON, or too long")
-                return
-            if event.type == "describe":
-                await async_write_event(_info(), writer)
-                continue
-            if event.type == "ping":
-                from wyoming.ping import Ping, Pong
-
-                await async_write_event(Pong(text=Ping.from_event(event).text).event(), writer)
-                continue
-            message: dict[str, Any] = {"type": event.type, "data": event.data}
-            if event.type == "audio-start":
-                await sounds.put(_check_audio(AudioStart.from_event(event)))
-            elif event.type == "audio-chunk":
-                chunk = _check_audio(AudioChunk.from_event(event))
-                message["audio_s"] = chunk.seconds
-                await sounds.put(chunk)
-            elif event.type == "audio-stop":
-                await sounds.put(None)
-            orders = self._events.take(message, self._link.now_s())
-            self._link.send(orders)
-            if any(order.state == "interrupt" for order in orders):
-                for sound in self._said:
-                    sound.cut()
-                for waiting in self._sounds:
-                    while not waiting.empty():
-                        waiting.get_nowait()
-                    waiting.put_nowait(None)
-
-    async def _play(self, sounds: asyncio.Queue[Any], writer: asyncio.StreamWriter) -> None:
-        """Let the head say the sounds of a connection, at the pace at which they are heard."""
+    def _take(self, event: Any, sound: SpokenSound) -> None:
+        """Follow an event, and let the head say the sound."""
         from wyoming.audio import AudioChunk, AudioChunkConverter
+
+        message: dict[str, Any] = {"type": event.type, "data": event.data}
+        if event.type == "audio-chunk":
+            chunk = AudioChunk.from_event(event)
+            message["audio_s"] = chunk.seconds
+            if self._events.talk.state == "speaking":  # it is not interrupted
+                pcm = AudioChunkConverter(width=WIDTH).convert(chunk).audio
+                sound.add(pcm, chunk.rate, chunk.channels)
+        orders = self._events.take(message, self._link.now_s())
+        self._link.send(orders)
+        if any(order.state == "interrupt" for order in orders):
+            for one in self._sounds:
+                one.shut()
+
+    async def _report_played(
+        self, sound: SpokenSound, heard: "asyncio.Task[None]", writer: asyncio.StreamWriter
+    ) -> None:
+        """Tell the neighbour when a sound has been heard; it may have disconnected before."""
         from wyoming.event import async_write_event
         from wyoming.snd import Played
 
-        while True:
-            start = await sounds.get()
-            if start is None or isinstance(start, AudioChunk):
-                continue
-            link, channels = self._link, start.channels
-            convert = AudioChunkConverter(start.rate, WIDTH, channels).convert
-            sound = SpokenSound(start.rate, channels)
-            if self._opening is not None:
-                self._report_sound(await asyncio.shield(self._opening))
-            self._said.add(sound)
-            saying = asyncio.ensure_future(asyncio.to_thread(sound.say, link.connect))
-            begin_s, sent_s = link.now_s(), 0.0
-            try:
-                while (chunk := await sounds.get()) is not None:
-                    if not isinstance(chunk, AudioChunk):
-                        continue
-                    for piece, seconds in sound.split(convert(chunk).audio):
-                        if not sound.is_cut:
-                            sound.feed(piece)
-                            sent_s += seconds
-                            await asyncio.sleep(begin_s + sent_s - _AHEAD_S - link.now_s())
-            finally:
-                sound.end()
-                self._said.discard(sound)
-            self._report_sound(await saying)
-            if not sent_s:  # an event of a satellite that has another loudspeaker
-                continue
-            if not sound.is_cut:
-                await asyncio.sleep(begin_s + sent_s - link.now_s())
-            if sounds.empty():
-                link.send(self._events.take({"type": "played"}, link.now_s()))
+        await heard
+        if sound.heard is heard:  # no other one follows
+            self._link.send(self._events.take({"type": "played"}, self._link.now_s()))
+        with suppress(ConnectionError):
+            await async_write_event(Played().event(), writer)
+
+    async def address(self, person: int | None) -> None:
+        """Detect the wake word for all that wait, once whenever a person addresses the head."""
+        self._calls = person is not None
+        for writer in tuple(self._wakes) if self._calls else ():
             with suppress(ConnectionError):
-                await async_write_event(Played().event(), writer)
+                await self._detect(writer)
+
+    async def _detect(self, writer: asyncio.StreamWriter) -> None:
+        from wyoming.event import async_write_event
+        from wyoming.wake import Detection
+
+        wake, self._calls = self._wakes[writer], False
+        wake.is_detected = True
+        await async_write_event(Detection(wake.name, wake.timestamp).event(), writer)
+
+    async def _follow_wake(self, event: Any, writer: asyncio.StreamWriter) -> None:
+        """Follow an event of a connection that waits for a wake word; its sound is not said."""
+        from wyoming.event import async_write_event
+        from wyoming.wake import Detect, NotDetected
+
+        if event.type == "detect":
+            self._wakes[writer] = _Wake((Detect.from_event(event).names or [_WAKE])[0])
+        wake = self._wakes[writer]
+        if event.type == "audio-chunk":
+            wake.timestamp = event.data.get("timestamp")
+        elif event.type == "audio-stop" and not wake.is_detected:
+            await async_write_event(NotDetected().event(), writer)
+        elif event.type != "audio-stop":
+            wake.is_detected = False
+            if self._calls:
+                await self._detect(writer)
 
 
-async def _refuse(writer: asyncio.StreamWriter, reason: str) -> None:
-    """Tell a neighbour why it is disconnected."""
-    from wyoming.error import Error
-    from wyoming.event import async_write_event
-
-    with suppress(ConnectionError):
-        await async_write_event(Error(text=reason).event(), writer)
-    writer.close()
-
-
-def _check_audio(sound: Any) -> Any:
-    """Return an AudioStart or AudioChunk.
+async def _read_event(reader: asyncio.StreamReader) -> Any:
+    """Return the next event, None at the end of the connection.
 
     Raises:
-        ValueError: the samples cannot be read.
+        ValueError: it is none.
     """
-    rate, width, channels = sound.rate, sound.width, sound.channels
-    if not (8_000 <= rate <= 192_000 and width in (1, 2, 4) and channels in (1, 2)):
-        raise ValueError(f"audio of {channels} channels, {width} bytes, {rate} Hz")
-    if len(getattr(sound, "audio", b"")) % (width * channels):
-        raise ValueError("an audio-chunk with a part of a sample")
-    return sound
+    from wyoming.event import async_read_event
+
+    event = await async_read_event(reader)
+    if event is None and not reader.at_eof():
+        raise ValueError("not a line of JSON, or too long")
+    return event
 
 
-def _info() -> Any:
+async def _answer(event: Any, writer: asyncio.StreamWriter, wakes: bool) -> None:
+    """Answer a question about the service; wakes: whether it is a wake service."""
+    from wyoming.event import async_write_event
+    from wyoming.ping import Ping, Pong
+
+    if event.type == "ping":
+        answer = Pong(text=Ping.from_event(event).text).event()
+    else:
+        answer = _info(wakes)
+    await async_write_event(answer, writer)
+
+
+def _info(wakes: bool) -> Any:
     """Return the event that describes the service."""
     from wyoming.audio import AudioFormat
-    from wyoming.info import Attribution, Info, SndProgram
+    from wyoming.info import Attribution, Info, SndProgram, WakeModel, WakeProgram
 
-    owner = Attribution("gazerig", "https://pypi.org/project/gazerig")
-    program = SndProgram(
-        name="gazerig", attribution=owner, installed=True, version=gazerig.__version__,
-        description="A head that speaks", snd_format=AudioFormat(22_050, WIDTH, 1),
-    )  # fmt: skip
-    return Info(snd=[program]).event()
+    about: dict[str, Any] = {
+        "attribution": Attribution("gazerig", "https://pypi.org/project/gazerig"),
+        "installed": True, "version": gazerig.__version__,
+    }  # fmt: skip
+    snd = SndProgram(
+        "gazerig",
+        description="A head that speaks",
+        snd_format=AudioFormat(22_050, WIDTH, 1),
+        **about,
+    )
+    look = WakeModel(_WAKE, description=_LOOK, phrase=_LOOK, languages=[], **about)
+    wake = WakeProgram("gazerig", description="A head that is looked at", models=[look], **about)
+    return Info(snd=[snd], wake=[wake] if wakes else []).event()
 
 
 async def serve(link: DoorLink) -> None:
@@ -262,10 +242,15 @@ async def serve(link: DoorLink) -> None:
     except ImportError as error:
         raise gazerig.Error(f"{error}: pip install 'gazerig[doors]'") from None
     host, port = Address.parse(link.bind)
-    server = await asyncio.start_server(Satellite(link).accept, host, port, limit=_MAX_LINE)
-    link.report(f"waiting for a Wyoming satellite on tcp://{link.bind} (--snd-uri, --event-uri)")
+    satellite = Satellite(link)
+    server = await asyncio.start_server(satellite.accept, host, port, limit=_MAX_LINE)
+    wake_uri = ", --wake-uri" if link.watches else ""
+    link.report(
+        f"waiting for a Wyoming satellite on tcp://{link.bind} (--snd-uri, --event-uri{wake_uri})"
+    )
     try:
-        await asyncio.Event().wait()
+        with link.on_addressed(satellite.address):
+            await asyncio.Event().wait()
     finally:
         server.close()
 

@@ -25,6 +25,10 @@ def door(
             metavar="HOST:PORT", help="Where to listen; the usual port on this computer only."
         ),
     ] = "",
+    addressed: Annotated[
+        bool,
+        typer.Option("--addressed", help="Let it listen, without a wake word, when looked at."),
+    ] = False,
     head: Annotated[
         str | None,
         typer.Option(
@@ -43,7 +47,7 @@ def door(
                 print(f"{one.name:<16} {load_door(one.name).summary}")
             return
         try:
-            load_door(name).run(head, address, bind, say)
+            load_door(name).run(head, address, bind, say, addressed=addressed)
         except SetupError:
             raise
         except Error as error:

@@ -24,15 +24,10 @@ _MAX_LINE = 400
 
 
 class RunnableDoor(Protocol):
-    """The object of a door's entry point."""
+    """The object of a door's entry point; see ``gazerig.doors.door.Door``."""
 
     summary: str
-
-    def run(
-        self, head: int | str | None = None, address: str = "", bind: str = "",
-        say: Callable[[str], None] = ..., ends_with_input: bool = False,
-    ) -> None:  # fmt: skip
-        """Run the door until it is ended; see ``gazerig.doors.door.Door.run``."""
+    run: Callable[..., None]
 
 
 def load_door(name: str) -> RunnableDoor:
@@ -119,9 +114,13 @@ def main() -> int:
     parser.add_argument("name")
     parser.add_argument("address", nargs="?", default="")
     parser.add_argument("--bind", default="")
+    parser.add_argument("--addressed", action="store_true")
     entry = parser.parse_args()
     try:
-        load_door(entry.name).run(entry.pid, entry.address, entry.bind, say, ends_with_input=True)
+        load_door(entry.name).run(
+            entry.pid, entry.address, entry.bind, say,
+            ends_with_input=True, addressed=entry.addressed,
+        )  # fmt: skip
     except Error as error:
         say(str(error))
         return 2

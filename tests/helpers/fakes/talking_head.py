@@ -1,6 +1,7 @@
 """A head that records the orders of a conversation, and is awaited instead of a clock."""
 
 import asyncio
+import threading
 from collections.abc import Callable, Iterable
 from types import SimpleNamespace
 from typing import Any
@@ -17,8 +18,12 @@ class TalkingHead:
         self.mouths: list[tuple[int, int, bytes]] = []
         self.ended_tracks: list[str] = []
         self.said: list[str] = []
+        self.addressed_by: int | None = None
 
     def connect(self) -> "TalkingHead":
+        return self
+
+    def __enter__(self) -> "TalkingHead":
         return self
 
     def __exit__(self, *raised: object) -> None:
@@ -26,12 +31,13 @@ class TalkingHead:
 
     @property
     def state(self) -> object:
-        return self._order()
+        conversation = SimpleNamespace(state=self.last or "idle")
+        return SimpleNamespace(tracks=(), conversation=conversation, addressed_by=self.addressed_by)
 
     def _order(self, *order: Any) -> Any:
         if order:
             self.orders.append(order)
-        return SimpleNamespace(reply=SimpleNamespace(refused=""), tracks=())
+        return SimpleNamespace(reply=SimpleNamespace(refused=""))
 
     def listening(self, person: int | None = None) -> Any:
         return self._order("listening")
@@ -53,8 +59,11 @@ class TalkingHead:
     def say(
         self, pieces: Iterable[bytes], *, rate_hz: int, channels: int, volume: float = 1.0
     ) -> Any:
-        sounds = self.sounds if volume else self.mouths
-        sounds.append((rate_hz, channels, b"".join(pieces)))
+        said = b""
+        for piece in pieces:
+            said += piece
+            threading.Event().wait(len(piece) / (2 * channels * rate_hz))
+        (self.sounds if volume else self.mouths).append((rate_hz, channels, said))
         return self._order()
 
     def end_track(self, track: str = "") -> Any:

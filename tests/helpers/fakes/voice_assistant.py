@@ -24,6 +24,7 @@ class Assistant:
     def __init__(self) -> None:
         self.port = free_port()
         self.sockets: list[web.WebSocketResponse] = []
+        self.commands: list[str] = []
         self.loop: asyncio.AbstractEventLoop
 
     async def __aenter__(self) -> "Assistant":
@@ -42,8 +43,8 @@ class Assistant:
         await socket.prepare(request)
         self.sockets.append(socket)
         await socket.send_json(lva("snapshot", muted=False))
-        async for _ in socket:
-            pass
+        async for message in socket:
+            self.commands.append(message.json()["command"])
         return socket
 
     async def send(self, *messages: Any) -> None:

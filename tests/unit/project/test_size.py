@@ -13,7 +13,7 @@ LARGEST = {
     "robot": 119_750,
     "robot/dashboard": 21_800,
     "gazerig": 12_900,
-    "doors": 8_510,
+    "doors": 8_500,
     "features/animation": 5_440,
     "features/bringup": 33_850,
     "features/lab": 25_960,
