@@ -155,10 +155,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> "Recorded":
     """A run in which one of everything is ordered."""
     from recorded_run import ordered, record
 
-    from gazerig.robot.loop import stop
+    from gazerig.robot.loop import body
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stop, "MIN_HOLD_S", 0.1)  # a shorter run
+        patch.setattr(body, "MIN_HOLD_S", 0.1)  # a shorter run
         return record(tmp_path_factory.mktemp("runs") / "run.mcap", 1.5, ordered)
 
 

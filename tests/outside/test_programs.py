@@ -31,7 +31,7 @@ from websockets.typing import Origin
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.dashboard.door import page_door
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
-from gazerig.robot.loop import stop
+from gazerig.robot.loop import body
 from gazerig.robot.model.commands import Jog, LookAt, Resume
 from gazerig.robot.net.client import RobotClient
 
@@ -96,7 +96,7 @@ def rig() -> Iterator[Rig]:
     address = f"127.0.0.1:{free_port()}"
     with pytest.MonkeyPatch.context() as patch, (folder / "log").open("w") as log:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))
-        patch.setattr(stop, "MIN_HOLD_S", HELD_S)
+        patch.setattr(body, "MIN_HOLD_S", HELD_S)
         words = ("run", file, "--mock", "--bus", "ideal", "--name", "eva", "--no-browser",
                  "--page", address)  # fmt: skip
         process = Branch(gazerig(*words), stdout=log, stderr=log, env=dict(os.environ), cwd=folder)

@@ -15,7 +15,7 @@ from command_line import invoked
 from slow_rigs import at_rate
 
 import gazerig
-from gazerig.robot.loop import stop
+from gazerig.robot.loop import body
 
 RATE = "loop.rate_hz"
 
@@ -30,8 +30,8 @@ def rig() -> Iterator[str]:
     folder = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))
-        patch.setattr(stop, "MIN_HOLD_S", 0.0)
-        patch.setattr(stop, "MIN_RESUME_GAP_S", 0.0)
+        patch.setattr(body, "MIN_HOLD_S", 0.0)
+        patch.setattr(body, "MIN_RESUME_GAP_S", 0.0)
         yield at_rate(folder, "desk", 80.0)
     shutil.rmtree(folder)
 
@@ -114,7 +114,7 @@ def test_stop_and_resume(head: gazerig.Head):
 
 def test_stop_stops_every_rig_that_runs(head: gazerig.Head, rig: str):
     def run() -> None:
-        stop.MIN_HOLD_S = 0.0
+        body.MIN_HOLD_S = 0.0
         with opened(rig):
             print("open", flush=True)
             signal.pause()

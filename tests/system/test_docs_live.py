@@ -19,7 +19,7 @@ from shown_page import wait_for
 import gazerig
 from gazerig.config.load import shipped_path
 from gazerig.drivers.sound.sound_file import write_wav
-from gazerig.robot.loop import stop
+from gazerig.robot.loop import body
 
 pytestmark = [needs_all_features, pytest.mark.usefixtures("simulated_wires")]
 
@@ -47,8 +47,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("live")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))
-        patch.setattr(stop, "MIN_HOLD_S", 0.0)
-        patch.setattr(stop, "MIN_RESUME_GAP_S", 0.0)
+        patch.setattr(body, "MIN_HOLD_S", 0.0)
+        patch.setattr(body, "MIN_RESUME_GAP_S", 0.0)
         patch.chdir(folder)
         yield folder
 

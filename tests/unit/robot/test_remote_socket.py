@@ -22,7 +22,7 @@ from branch import Branch
 from fakes.runs import simulated
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.loop import client_control, stop
+from gazerig.robot.loop import body, client_control
 from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.loop import Robot, Tick
 from gazerig.robot.model.commands import Get, LookAt, ReadMenus, Request, Resume, Stop, Value
@@ -102,8 +102,8 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture(scope="module")
 def beat() -> Iterator[Beat]:
     with pytest.MonkeyPatch.context() as patch, Beat() as running_robot:
-        patch.setattr(stop, "MIN_HOLD_S", 0.0)
-        patch.setattr(stop, "MIN_RESUME_GAP_S", 0.0)
+        patch.setattr(body, "MIN_HOLD_S", 0.0)
+        patch.setattr(body, "MIN_RESUME_GAP_S", 0.0)
         yield running_robot
 
 
