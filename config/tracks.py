@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 from gazerig.config.load import (
-    Check,
     ConfigError,
     ConfigFault,
     find_file,
@@ -23,7 +22,7 @@ _GAZE_JOINT = (
     "is a joint of gaze: write head_yaw_deg, head_pitch_deg, head_roll_deg, eyes_yaw_deg, "
     "eyes_pitch_deg or lids of the frame instead"
 )
-_LARGEST = 20_000_000  # bytes, for MAX_FRAMES
+_LARGEST = 20_000_000  # bytes: a show of four hours
 
 
 def load_track(path: Path) -> Track:
@@ -32,17 +31,21 @@ def load_track(path: Path) -> Track:
     Raises:
         gazerig.config.load.ConfigError: lists every fault.
     """
-    checks: list[Check[Track]] = [_names, partial(_sound_file, path)]
-    track = load(path, Track, checks=checks, largest=_LARGEST)
+    track = load(path, Track, checks=[partial(_faults, path)], largest=_LARGEST)
     return replace(track, sound=str(path.parent / track.sound)) if track.sound else track
 
 
-def _sound_file(path: Path, track: Track) -> Iterable[tuple[str, str]]:
+def _faults(path: Path, track: Track) -> Iterable[tuple[str, str]]:
+    yield from track.faults()
     try:
         if track.sound:
             file_in_folders([path.parent], track.sound)
     except ValueError as error:
         yield "sound", f"{error}; put the sound next to the track's file"
+    for i, frame in enumerate(track.frames):
+        for joint in frame.joints_deg:
+            if joint in GAZE_JOINTS:
+                yield f"frames.{i}.joints_deg.{joint}", _GAZE_JOINT
 
 
 @cache
@@ -82,19 +85,3 @@ def track_name(file: str) -> str:
         return name
     rule = "the file name is the track's name: lower-case letters, digits and _, beginning with a letter, at most 40 characters"
     raise ConfigError([ConfigFault(file, None, "", rule)])
-
-
-def _names(track: Track) -> Iterable[tuple[str, str]]:
-    yield from track.faults()
-    for cue in track.cues:
-        if not JOINT_NAME.fullmatch(cue):
-            yield f"cues.{cue}", "not a name; use lower-case letters, digits and _"
-    for i, name in enumerate(track.owns):
-        if not JOINT_NAME.fullmatch(name):
-            yield f"owns.{i}", "not the name of a joint; write neck, eyes, lids or a joint"
-    for i, frame in enumerate(track.frames):
-        for joint in frame.joints_deg:
-            if joint in GAZE_JOINTS:
-                yield f"frames.{i}.joints_deg.{joint}", _GAZE_JOINT
-            elif not JOINT_NAME.fullmatch(joint):
-                yield f"frames.{i}.joints_deg.{joint}", "not the name of a joint"

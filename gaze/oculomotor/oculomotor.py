@@ -160,17 +160,17 @@ class Oculomotor:
                 _add_offset(wanted[0], offset.eyes_rad),
                 _add_offset(wanted[1], offset.eyes_rad),
             )
-        if (owned := offset.owned) is not None:
-            wanted = owned.mix_eye(wanted[0]), owned.mix_eye(wanted[1])
+        if offset.owned:
+            wanted = offset.mix_eye(wanted[0]), offset.mix_eye(wanted[1])
         left, right = self._clip_eyes(wanted)
         limited = () if (left, right) == wanted else self._limited_angles(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
         if offset.lids != NO_OFFSET.lids:
             lids = lids.scale(offset.lids)
         head = self._add_drift(head, offset.head_rad, t_s)
-        if owned is not None:
-            head = self._head.clip_to_range(owned.mix_head(head))
-            lids = lids.replace(owned.mix_lids(lids.openings))
+        if offset.owned:
+            head = self._head.clip_to_range(offset.mix_head(head))
+            lids = lids.replace(offset.mix_lids(lids.openings))
         phase: Phase = (
             "saccade" if place.is_in_saccade
             else "pursue" if norm(velocity) > MOVING_M_S

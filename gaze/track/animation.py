@@ -13,9 +13,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
-from gazerig.gaze.track.pose_offset import NO_OFFSET, OwnedPose, PoseOffset
-from gazerig.gaze.track.track import POSE_CHANNELS
-from gazerig.gaze.track.track_player import TrackPlayer
+from gazerig.gaze.track.player import TrackPlayer
+from gazerig.gaze.track.pose_offset import PoseOffset
 from gazerig.gaze.types import Floats
 from gazerig.params import Bounds, unknown_text
 
@@ -41,16 +40,11 @@ class LevelParams:
 
 
 class FaceRange(NamedTuple):
-    """Offsets of an expression or a level at 0 and at 1, and the time of a step between them."""
+    """An expression or a level: flat offsets from rest at 0, their change to 1, time of a step."""
 
-    low: PoseOffset
-    high: PoseOffset
+    low: Floats
+    gain: Floats
     smoothing_s: float
-
-    @property
-    def gain(self) -> Floats:
-        """Return the difference of both, flat."""
-        return np.subtract(self.high.to_flat(), self.low.to_flat())
 
 
 class FaceTables(NamedTuple):
@@ -58,6 +52,11 @@ class FaceTables(NamedTuple):
 
     expressions: Mapping[str, FaceRange]
     levels: Mapping[str, FaceRange]
+
+    @property
+    def ranges(self) -> dict[str, FaceRange]:
+        """Return all by their names."""
+        return {**self.expressions, **self.levels}
 
 
 NO_TABLES = FaceTables({}, {})
@@ -78,22 +77,19 @@ class Animation:
     def __init__(self, joints: tuple[str, ...] = (), tables: FaceTables = NO_TABLES) -> None:
         self.tracks = TrackPlayer(len(joints))
         self._tables = tables
-        self._ranges = {**tables.expressions, **tables.levels}
-        self._gains = {name: one.gain for name, one in self._ranges.items()}
-        rest = np.array(NO_OFFSET._replace(joints_rad=(0.0,) * len(joints)).to_flat())
-        self._low = rest + sum([one.low.to_flat() - rest for one in self._ranges.values()])
+        self._gains = [one.gain for one in tables.ranges.values()]
+        self._low: Floats = sum([one.low for one in tables.ranges.values()], self.tracks.rest)
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Begin at rest at a time."""
         self._blends = {
-            name: MinimumJerkBlend((1.0 if name == NEUTRAL else 0.0,), one.smoothing_s)
-            for name, one in self._ranges.items()
+            name: MinimumJerkBlend((float(name == NEUTRAL),), one.smoothing_s)
+            for name, one in self._tables.ranges.items()
         }
         self.expression = NEUTRAL
         self._until_s: dict[str, float] = {}
-        self._shares = dict.fromkeys(self._ranges, 0.0)
-        self._speaks = False
+        self._mouth, self._speaks = 1.0, False
         self._face, self._at_rest = self._low, False
         self.tracks.reset()
         self._sum = PoseOffset.from_flat(self._low.tolist())
@@ -149,34 +145,28 @@ class Animation:
         moved = tracks.step(t_s)
         self._speak(t_s)
         if not self._at_rest:
-            self._shares = {name: blend.step(t_s)[0] for name, blend in self._blends.items()}
-            self._face = self._low.copy()
-            for name, share in self._shares.items():
-                self._face += share * self._gains[name]
+            shares = {name: blend.step(t_s)[0] for name, blend in self._blends.items()}
+            self._mouth = shares.get(MOUTH, 1.0)
+            parts = zip(shares.values(), self._gains, strict=True)
+            self._face = sum([share * gain for share, gain in parts], self._low)
             self._at_rest = all([blend.is_at_rest for blend in self._blends.values()])
         flat = self._face + moved
         flat[_LIDS] = self._face[_LIDS] * (1.0 + moved[_LIDS])
-        values: list[float] = flat.tolist()
-        self._sum = PoseOffset.from_flat(values)
-        if tracks.owned:
-            owned, first = OwnedPose(tracks.owned), len(POSE_CHANNELS)
-            joints = [owned.mix(first + i, value) for i, value in enumerate(values[first:])]
-            self._sum = self._sum._replace(joints_rad=tuple(joints), owned=owned)
+        self._sum = PoseOffset.from_flat(flat.tolist(), tracks.owned)
         return self._sum
 
     def _speak(self, t_s: float) -> None:
         """Let the mouth follow a speech that knows its openings; it shuts at the end of any."""
         speech = self.tracks.speech
-        if MOUTH not in self._tables.levels:
-            return
-        if speech is not None and speech.motion.mouth is not None:
-            at_s = speech.position_s(t_s) + speech.lead_s
-            self.set_level(MOUTH, float(np.interp(at_s, *speech.motion.mouth)), t_s)
-        elif speech is None and self._speaks:
-            self.set_level(MOUTH, 0.0, t_s)
+        if MOUTH in self._tables.levels:
+            if speech is not None and speech.motion.mouth is not None:
+                opening = np.interp(speech.time_s(t_s), *speech.motion.mouth)
+                self.set_level(MOUTH, float(opening), t_s)
+            elif speech is None and self._speaks:
+                self.set_level(MOUTH, 0.0, t_s)
         self._speaks = speech is not None
 
     @property
     def loudness(self) -> float | None:
         """Return the loudness 0..1 of a speech by its mouth, 1 without one; None: no speech."""
-        return self._shares.get(MOUTH, 1.0) if self.tracks.speech is not None else None
+        return self._mouth if self.tracks.speech is not None else None

@@ -8,20 +8,41 @@ from gazerig.gaze.types import Angles2, Angles3
 
 _EYES, _LIDS = POSE_CHANNELS.index("eyes_yaw"), POSE_CHANNELS.index(LID_CHANNELS[0])
 
+Owned = Mapping[int, tuple[float, float]]
+"""Value, and share 0..1, of each channel that tracks give instead of gaze."""
 
-class OwnedPose:
-    """Values of the channels that tracks give instead of gaze, in one tick.
 
-    Args:
-        shares: Value and share, 0..1, of each channel.
+class PoseOffset(NamedTuple):
+    """Offset that is added to the pose by gaze.
+
+    head_rad: added to the head's (yaw, pitch, roll); the eyes compensate it
+    eyes_rad: added to both eyes' (yaw, pitch) in the head
+    lids: factors on the openings of the left and right upper and the left and right lower lid
+    joints_rad: angles of the joints that gaze does not move, in their order
+    owned: what tracks give instead of gaze
     """
 
-    def __init__(self, shares: Mapping[int, tuple[float, float]]) -> None:
-        self._shares = shares
+    head_rad: Angles3 = (0.0, 0.0, 0.0)
+    eyes_rad: Angles2 = (0.0, 0.0)
+    lids: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    joints_rad: tuple[float, ...] = ()
+    owned: Owned = {}
+
+    def to_flat(self) -> tuple[float, ...]:
+        """Return all values as one sequence: head, eyes, lids, joints."""
+        return (*self.head_rad, *self.eyes_rad, *self.lids, *self.joints_rad)
+
+    @classmethod
+    def from_flat(cls, values: Sequence[float], owned: Owned = {}) -> "PoseOffset":  # noqa: B006
+        """Return the offset from the result of ``to_flat``."""
+        yaw, pitch, roll, eye_yaw, eye_pitch, a, b, c, d, *joints = values
+        offset = cls((yaw, pitch, roll), (eye_yaw, eye_pitch), (a, b, c, d), (), owned)
+        mixed = [offset.mix(len(POSE_CHANNELS) + i, angle) for i, angle in enumerate(joints)]
+        return offset._replace(joints_rad=tuple(mixed))
 
     def mix(self, channel: int, value: float) -> float:
         """Return the value of a channel for the value by gaze."""
-        owned, share = self._shares.get(channel, (0.0, 0.0))
+        owned, share = self.owned.get(channel, (0.0, 0.0))
         return value + share * (owned - value)
 
     def mix_head(self, head: Angles3) -> Angles3:
@@ -39,33 +60,6 @@ class OwnedPose:
         mixed = [self.mix(_LIDS + i, opening) for i, opening in enumerate(openings)]
         a, b, c, d = [min(max(one, 0.0), 1.0) for one in mixed]
         return a, b, c, d
-
-
-class PoseOffset(NamedTuple):
-    """Offset that is added to the pose by gaze.
-
-    head_rad: added to the head's (yaw, pitch, roll); the eyes compensate it
-    eyes_rad: added to both eyes' (yaw, pitch) in the head
-    lids: factors on the openings of the left and right upper and the left and right lower lid
-    joints_rad: angles of the joints that gaze does not move, in their order
-    owned: angles that tracks give instead of gaze, None without such a track
-    """
-
-    head_rad: Angles3 = (0.0, 0.0, 0.0)
-    eyes_rad: Angles2 = (0.0, 0.0)
-    lids: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    joints_rad: tuple[float, ...] = ()
-    owned: OwnedPose | None = None
-
-    def to_flat(self) -> tuple[float, ...]:
-        """Return all values as one sequence: head, eyes, lids, joints."""
-        return (*self.head_rad, *self.eyes_rad, *self.lids, *self.joints_rad)
-
-    @classmethod
-    def from_flat(cls, values: Sequence[float]) -> "PoseOffset":
-        """Return the offset from the result of ``to_flat``."""
-        yaw, pitch, roll, eye_yaw, eye_pitch, a, b, c, d, *joints = values
-        return cls((yaw, pitch, roll), (eye_yaw, eye_pitch), (a, b, c, d), tuple(joints))
 
 
 NO_OFFSET = PoseOffset()

@@ -2,7 +2,7 @@
 
 A frame sets head, eyes, lids and further joints at a time, relative to their positions by gaze. A
 channel without a value in a frame continues to the next frame that has one. Between the frames
-everything moves with least jerk (``gazerig.gaze.track.minimum_jerk_curve``), from rest and back
+everything moves with least jerk (``gazerig.gaze.track.curves``), from rest and back
 to rest.
 """
 
@@ -18,8 +18,6 @@ MIN_SPEED, MAX_SPEED = 0.1, 4.0
 """Range of factors on the original speed of a track."""
 MAX_COUNT = 20
 """Most rounds of a track by one command."""
-MAX_FRAMES = 200_000
-"""Largest number of frames of a track."""
 MAX_DURATION_S = 4 * 3600.0
 """Longest track."""
 LIMIT_SHARE = 0.8
@@ -31,6 +29,8 @@ FINISHED = "finished"
 HEAD_CHANNELS = ("head_yaw", "head_pitch", "head_roll")
 EYE_CHANNELS = ("eyes_yaw", "eyes_pitch")
 LID_CHANNELS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
+GROUPS = {"neck": HEAD_CHANNELS, "eyes": EYE_CHANNELS, "lids": LID_CHANNELS}
+"""Groups of channels that a track may own by one name."""
 POSE_CHANNELS = (*HEAD_CHANNELS, *EYE_CHANNELS, *LID_CHANNELS)
 """The channels of all rigs, in the order of PoseOffset.flat(); further joints follow them."""
 LID_GROUPS: Mapping[str, tuple[str, ...]] = {
@@ -118,16 +118,10 @@ class Track:
         """Yield the faults between its parts: key, and rule."""
         if not self.frames and not self.sound:
             yield "frames", "a track needs at least one frame, or a sound"
-        if len(self.frames) > MAX_FRAMES:
-            yield "frames", f"a track has at most {MAX_FRAMES} frames; omit some"
         for i, (one, other) in enumerate(pairwise(self.frames)):
             if other.time_s <= one.time_s:
                 rule = f"must be later than the previous frame, which is at {one.time_s:g} s"
                 yield f"frames.{i + 1}.time_s", rule
-        last_s = max([frame.time_s for frame in self.frames], default=MAX_DURATION_S)
-        for cue, time_s in self.cues.items():
-            if time_s > last_s and not self.sound:
-                yield f"cues.{cue}", f"is after the last frame, which is at {last_s:g} s"
 
 
 def rest_value(channel: str) -> float:

@@ -37,12 +37,15 @@ def _track_lines(rig: "Rig") -> Iterator[str]:
     """Return how a rig plays each of its own tracks."""
     from gazerig.config.load import find_file
     from gazerig.config.tracks import load_track
+    from gazerig.robot.model.reply import TrackReply
     from gazerig.robot.model.track_fit import TrackRefused
-    from gazerig.robot.run.track_file import fit_to_rig
+    from gazerig.robot.run.rig_limits import limits, track_fit
 
     for file in rig.track_files:
         path = find_file("tracks", file)
         try:
-            yield f"{file}: {fit_to_rig(rig, path.stem, load_track(path)).text()}"
+            motion = track_fit(rig).motion(load_track(path), limits(rig.joints))
+            reply = TrackReply(path.stem, motion.duration_s, motion.limited)
+            yield f"{file}: {reply.text()}"
         except TrackRefused as refused:
             yield f"{file}: {rig.name} cannot play it: {refused}"

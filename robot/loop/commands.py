@@ -200,8 +200,11 @@ class CommandExecutor:
         }
         if animation.expressions:
             menus["expression"] = _put_first(animation.expression, animation.expressions)
-        names = (NO_TRACK, *self.tracks.names)
-        menus["track"] = _put_first(self.tracks.playing or NO_TRACK, names)
+        infos = self.tracks.all_tracks(self._guard.limits)
+        names = [one.name for one in infos if not one.refused]
+        newest = animation.tracks.playing[-1:]
+        present = newest[0].state.name if newest else NO_TRACK
+        menus["track"] = _put_first(present, (NO_TRACK, *names))
         return menus
 
     def refuse_impossible(self, command: Command) -> None:
@@ -229,7 +232,7 @@ class CommandExecutor:
             case Say():
                 raise ValueError("this run has no voice")
             case Play() | Speak():
-                self.tracks.require(command, self._guard.limits)
+                self.tracks.prepare(command, self._guard.limits)
 
     # --- execution, in the loop's thread
 
@@ -237,8 +240,9 @@ class CommandExecutor:
         """Return a command as it is executed, with everything that a recording needs."""
         if isinstance(command, Ask) and command.menu == "track":
             command = Play("" if command.choice == NO_TRACK else command.choice)
-        if isinstance(command, Play) and command.track:
-            return self.tracks.complete(command, self._guard.limits)
+        if isinstance(command, Play):
+            with suppress(ValueError):  # its execution reports it
+                return self.tracks.prepare(command, self._guard.limits)
         frame = self._detections
         if frame is None or not isinstance(command, LookAtPixel):
             return command
@@ -268,8 +272,8 @@ class CommandExecutor:
                 return self._play(command, t_s)
             case EndTrack():
                 return self.tracks.end(command, t_s)
-            case SyncTrack():
-                self.tracks.sync(command, t_s)
+            case SyncTrack(number, position_s, clock):
+                self._animation.tracks.sync(number, clock, position_s, t_s)
             case Express(name, strength):
                 self._animation.express(name, strength)
             case SetLevel(name, value):
@@ -289,7 +293,7 @@ class CommandExecutor:
             case Stop():
                 self.stop.halt(command, t_s)
                 self.lead.end(f"stopped: {command.why}")
-                self.tracks.drop_present(t_s)
+                self._animation.tracks.drop(t_s)
             case Resume() if self.stop.reason:
                 goals = self.stop.resume(command, t_s)
                 if isinstance(goals, CommandReply):
@@ -386,7 +390,7 @@ class CommandExecutor:
 
     def _jog(self, command: Jog, t_s: float) -> CommandReply:
         """Move the given joints and hold the others; without any, free the joints."""
-        if command.angles_rad and (dropped := self.tracks.drop_present(t_s)):
+        if command.angles_rad and (dropped := self._animation.tracks.drop(t_s)):
             self._messages.append(f"track {dropped} ends: a client controls the joints")
         self._change_control(lambda: self.lead.jog(command, self.commanded_rad, t_s))
         if command.angles_rad:
@@ -459,11 +463,14 @@ class CommandExecutor:
     def _play_unasked(self, command: Play, t_s: float) -> None:
         """Play a track unless a client or a show moves the head."""
         tracks, limits = self.tracks, self._guard.limits
-        if self.stop.reason or self.lead.state.active or tracks.ends_show(command, limits):
+        if self.stop.reason or self.lead.state.active:
             return
-        reply = self._play(tracks.complete(command, limits), t_s)
-        if reply.refused:
-            self._messages.append(f"track for {command.who} {reply.text()}")
+        prepared: Play | Speak = command
+        with suppress(ValueError):  # ``_play`` reports it
+            if tracks.ends_show(command, limits):
+                return
+            prepared = tracks.prepare(command, limits)
+        self._play(prepared, t_s)
 
 
 def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> None:

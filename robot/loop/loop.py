@@ -290,7 +290,7 @@ class Robot:
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events,
             commands, stop.reason,
             lead.measure(target, pose, gaze, joints.position_rad, converges, t_s),
-            self._executor.tracks.states(t_s),
+            self.animation.tracks.states(t_s),
             conversation=conversation.state,
             addressed=self._addressing.step(percept, pose.p_world_head_m, t_s),
         )  # fmt: skip

@@ -10,14 +10,13 @@ from typing import Literal
 
 from msgspec import Struct
 
+from gazerig.gaze.track.player import TrackState as TrackState
 from gazerig.gaze.track.track import FINISHED as FINISHED
 from gazerig.gaze.types import TurnState
 from gazerig.robot.model.commands import Command
 
 CHARACTERS_PER_S = 15.0
 """Rate of speech, for the end of a text without times: about 150 English words a minute."""
-SHOWN_S = 2.0
-"""Time for which an ended track is shown."""
 
 
 class ControlState(Struct, frozen=True):
@@ -55,49 +54,6 @@ class ControlState(Struct, frozen=True):
 
 
 NO_CLIENT_CONTROL = ControlState()
-
-
-class TrackState(Struct, frozen=True):
-    """One track after a tick; an ended one is shown for ``SHOWN_S``, the newest one always.
-
-    Attributes:
-        number: Number of the track since the start, from 1.
-        name: Its name.
-        position_s: Position in the track; below 0 while the motion begins before the sound.
-        duration_s: Its duration at its own speed.
-        speed: Factor on that speed.
-        loop: Whether it repeats until it is ended.
-        owns: Joints that gaze does not move meanwhile.
-        who: Name of the client, "" if unknown.
-        sound: Path of the sound, "" without one.
-        clock: Clock that the position follows.
-        end_reason: Reason for its end, ``FINISHED`` at its own end, "" while it plays.
-        limited: What the rig's limits changed, "" if nothing.
-        volume: Volume of the sound, 0..1.
-        cue: Name of the cue that it has passed last, "" before the first.
-        cues: Number of cues that it has passed.
-    """
-
-    number: int
-    name: str
-    position_s: float = 0.0
-    duration_s: float = 0.0
-    speed: float = 1.0
-    loop: bool = False
-    owns: tuple[str, ...] = ()
-    who: str = ""
-    sound: str = ""
-    clock: Literal["loop", "sound", "external"] = "loop"
-    end_reason: str = ""
-    limited: str = ""
-    volume: float = 1.0
-    cue: str = ""
-    cues: int = 0
-
-    @property
-    def is_playing(self) -> bool:
-        """Return whether it has not ended."""
-        return not self.end_reason
 
 
 class ConversationState(Struct, frozen=True):

@@ -3,14 +3,17 @@
 from collections.abc import Mapping
 from math import radians
 
+import numpy as np
+
 from gazerig.config.rig import Rig
 from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.track.animation import NEUTRAL, FaceRange, FaceTables
 from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
-from gazerig.gaze.types import Angles2, Vec3
+from gazerig.gaze.types import Angles2, Floats, Vec3
 from gazerig.robot.model.coupling import servo_setups
 from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.kinematics import LIDS, NECK, LidEnds
+from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.model.types import further_joints, order_joints
 
 EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
@@ -109,21 +112,30 @@ def park_rad(rig: Rig) -> dict[str, float]:
 
 def face_tables(rig: Rig) -> FaceTables:
     """Return the pose offsets of expressions and levels."""
-    rest = pose_offset(rig, {})
+
+    def change(angles_deg: Mapping[str, float]) -> Floats:
+        rest, moved = pose_offset(rig, {}), pose_offset(rig, angles_deg)
+        return np.subtract(moved.to_flat(), rest.to_flat())
+
     faces = {NEUTRAL: {}, **rig.expressions} if rig.expressions else {}
     expressions = {
-        name: FaceRange(rest, pose_offset(rig, angles), rig.expression_blend_s)
+        name: FaceRange(change({}), change(angles), rig.expression_blend_s)
         for name, angles in faces.items()
     }
     levels = {
         name: FaceRange(
-            pose_offset(rig, {level.joint: level.low_deg}),
-            pose_offset(rig, {level.joint: level.high_deg}),
-            level.smoothing_ms / 1e3,
+            change({one.joint: one.low_deg}),
+            change({one.joint: one.high_deg - one.low_deg}),
+            one.smoothing_ms / 1e3,
         )
-        for name, level in rig.levels.items()
+        for name, one in rig.levels.items()
     }
     return FaceTables(expressions, levels)
+
+
+def track_fit(rig: Rig) -> TrackFit:
+    """Return the fit of tracks to a rig."""
+    return TrackFit(rig.names, lid_spans(rig), face_tables(rig))
 
 
 def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:

@@ -26,7 +26,6 @@ from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClock
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.frames import CameraParams, fixed_mount
-from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception, PixelToWorld
 from gazerig.robot.run.buses import RunBus, run_bus
@@ -50,14 +49,13 @@ from gazerig.robot.run.rig_description import (
 )
 from gazerig.robot.run.rig_limits import (
     face_parts_m,
-    face_tables,
-    lid_spans,
     limits,
     park_rad,
+    track_fit,
 )
 from gazerig.robot.run.run_rig import run_info, with_options
 from gazerig.robot.run.surroundings import RunRoom, refuse_missing_rules, scene_of, world
-from gazerig.robot.run.track_file import TrackFolder
+from gazerig.robot.run.track_folder import TrackFolder
 from gazerig.robot.run.voice import RunVoice
 from gazerig.robot.safety.guard import Guard
 
@@ -300,7 +298,7 @@ def _tracks(rig: Rig, models: GazeModels, rig_file: str) -> TrackChoices:
     return TrackChoices(
         tracks_of(rig.track_files),
         models.animation.tracks,
-        TrackFit(rig.names, lid_spans(rig), face_tables(rig)),
+        track_fit(rig),
         rig.gaze.oculomotor.eye_lag_ms / 1e3,
         TrackFolder(rig_file).changes,
     )

@@ -23,10 +23,10 @@ from gazerig.drivers.sound.playback import SoundEvent
 from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
 from gazerig.drivers.sound.sound_file import check_sound, read_samples, write_wav
 from gazerig.drivers.sound.speech import speak
-from gazerig.gaze.mouth.mouth import Mouth, phoneme_closures
 from gazerig.gaze.track.animation import MOUTH
+from gazerig.gaze.track.mouth import Mouth, phoneme_closures
+from gazerig.gaze.track.player import SPEECH
 from gazerig.gaze.track.track import FINISHED
-from gazerig.gaze.track.track_player import SPEECH
 from gazerig.gaze.types import Floats
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.clock import Clock

@@ -1,1 +1,0 @@
-"""Mouth: opening of a jaw from sound, with lips closed on b, m and p."""
