@@ -13,6 +13,8 @@ from gazerig.gaze.types import Floats
 
 _SHARES = np.linspace(0.0, 1.0, 25)
 """Places between two keys at which limits are checked."""
+_LEAST_S = 0.02
+"""Length of a track that has no motion of its own."""
 _ROUNDS, _KEPT = 12, 1.0 + 1e-3
 """Corrections of single segments, and the ratio to a limit that counts as kept."""
 _GROWING = np.array([min_jerk(share) for share in np.linspace(0.0, 1.0, 81)])[:, None]
@@ -72,7 +74,8 @@ class Motion:
         self.owns: tuple[str, ...] = ()
         self.cues = sorted((time_s, name) for name, time_s in track.cues.items())
         times = [times_s for _, times_s, _ in rows]
-        self._positions = np.unique(np.concatenate(([0.0, sound_s, *track.cues.values()], *times)))
+        length_s = sound_s if rows else max(sound_s, _LEAST_S)
+        self._positions = np.unique(np.concatenate(([0.0, length_s, *track.cues.values()], *times)))
         self._times = self._positions / speed
         self._slow_down(rows)
         self.duration_s, self.length_s = float(self._times[-1]), float(self._positions[-1])

@@ -76,6 +76,9 @@ class TrackFit:
         """
         bounds, limited = self._bounds(limits), list[str]()
         rows, lacking = self._keys(track)
+        if not (rows or track.sound or sound_s):
+            names = ", ".join(lacking) or "lids"
+            raise TrackRefused(f"this rig has none of the joints that it moves: {names}")
         for i, (channel, times_s, values) in enumerate(rows):
             kept = np.clip(values, bounds.low[channel], bounds.high[channel])
             worst = np.abs(values - kept).argmax()
@@ -84,32 +87,23 @@ class TrackFit:
                 limited.append(f"{_joint_name(self._channels[channel])} moves {share:.0%} as far")
             rows[i] = channel, times_s, kept
         members = {channel for name in track.owns for channel in _members(name)}
-        owned = [
-            i
-            for i, channel in enumerate(self._channels)
-            if channel in members.intersection(self._of_joints)
-        ]
-        motion = Motion(track, rows, bounds, frozenset(owned), speed, sound_s)
-        motion.owns = tuple(
-            [
-                joint
-                for joint, channel in zip(self._joints, self._of_joints, strict=True)
-                if channel in members
-            ]
-        )
+        owned = members.intersection(self._of_joints)
+        indices = frozenset([self._channels.index(channel) for channel in owned])
+        motion = Motion(track, rows, bounds, indices, speed, sound_s)
+        pairs = zip(self._joints, self._of_joints, strict=True)
+        motion.owns = tuple([joint for joint, channel in pairs if channel in owned])
         if motion.slowed_by > 1.0 + _SLOWED:
             slow = _joint_name(self._channels[motion.slowest])
             limited.insert(0, f"slower by {motion.slowed_by:.2f} for {slow}")
         if lacking:
-            names = dict.fromkeys(map(_joint_name, lacking))
-            limited.append(f"without {', '.join(names)}")
+            limited.append(f"without {', '.join(dict.fromkeys(map(_joint_name, lacking)))}")
         motion.limited = "; ".join(limited)
         return motion
 
     def speech(self, command: Speak, limits: Limits) -> Motion:
         """Return the motion of a speech: none but that of a level, whose channels it takes."""
         track = Track(SPEECH, sound=command.sound, volume=command.volume)
-        motion = Motion(track, (), self._bounds(limits), sound_s=command.duration_s)
+        motion = self.motion(track, limits, sound_s=command.duration_s)
         if (level := self._ranges.get(command.level)) is not None:
             motion.channels = frozenset(np.flatnonzero(level.gain).tolist())
             if command.mouth:
@@ -138,9 +132,6 @@ class TrackFit:
         """Return a track's keys on the rig's channels, and what the rig lacks.
 
         The eyes of a rig without a neck move instead, unless the track moves them as well.
-
-        Raises:
-            TrackRefused: Nothing is left.
         """
         keys: dict[str, list[tuple[float, float]]] = {}
         for frame in track.frames:
@@ -165,10 +156,6 @@ class TrackFit:
                 rows.append((self._channels.index(name), times_s, values - rest))
             elif name not in LID_CHANNELS:
                 lacking.append(name)
-        if not rows and not track.sound:
-            raise TrackRefused(
-                f"this rig has none of the joints that it moves: {', '.join(lacking or moved)}"
-            )
         lacking += [name for name in track.owns if not {*_members(name)} & {*self._of_joints}]
         return rows, lacking
 

@@ -15,11 +15,11 @@ from gazerig.config.save import format_value
 from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.gaze.track.key_fit import GRID_S, fit_keys
 from gazerig.gaze.track.track import EYE_CHANNELS, HEAD_CHANNELS, LID_CHANNELS
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.reply import TrackReply
 from gazerig.robot.model.track_fit import TrackRefused, channel_of_joint
+from gazerig.robot.run.key_fit import GRID_S, fit_keys
 from gazerig.robot.run.rig_limits import limits, track_fit
 
 TOLERANCE_DEG = 0.7

@@ -16,7 +16,6 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track, shipped_tracks
 from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.track.curves import Curves, key_states
-from gazerig.gaze.track.key_fit import fit_keys
 from gazerig.gaze.track.motion import Motion
 from gazerig.gaze.track.player import TrackPlayer, Voice
 from gazerig.gaze.track.pose_offset import PoseOffset
@@ -27,6 +26,7 @@ from gazerig.robot.model.commands import EndTrack, Play
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.track_fit import TrackRefused
 from gazerig.robot.model.types import JointAngles, further_joints
+from gazerig.robot.run.key_fit import fit_keys
 from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.rig_limits import limits, pose_offset, track_fit
 
@@ -139,6 +139,11 @@ def test_what_a_rig_lacks_is_left_out_and_named():
         fitted(Track("a yawn", (KeyFrame(0.3, joints_deg={"jaw": 9.0}),)))
     mouth = KeyFrame(0.3, head_pitch_deg=5.0, levels={"mouth": 1.0})
     assert fitted(Track("a word", (mouth,), owns=("tail",))).limited == "without mouth, tail"
+
+
+def test_a_track_of_a_sound_alone_moves_nothing():
+    motion = fitted(Track("a song", sound="song.wav"))
+    assert not motion.channels and not sampled(motion).any() and motion.limited == ""
 
 
 def test_a_frame_names_expressions_as_levels():
