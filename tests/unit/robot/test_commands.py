@@ -417,21 +417,14 @@ def test_leads_are_counted_and_their_ends_have_reasons(running: Running):
 # ---- The source of control of the head is one value with the same words everywhere.
 
 
-def test_by_itself_it_says_what_it_looks_at(running: Running):
+def test_who_controls_the_head_is_said_in_tick_and_state(running: Running):
     tick = running.go(0.1)[-1]
     assert tick.control_source == ControlSource() and not tick.control_source.overrides_gaze
     state = head_state(tick)
     assert state.headline.startswith("looks at person 1") and state.gaze.kind == "face"
     assert state.gaze.part in PART_NAMES.values() and state.saliences[0].id == 1
-
-
-def test_a_held_joint_is_named_with_who_and_nothing_else(running: Running):
-    running.order(Jog((("neck_yaw", 0.3),), who="ann"))
-    running.go(0.2)
-    running.order(Jog((("neck_yaw", 0.1), ("neck_pitch", 0.1)), who="ann"))
-    for _ in range(6):
-        running.order(Jog((("neck_yaw", 0.3),), who="ann"))
-        tick = running.go(0.5)[-1]
+    running.do(Jog((("neck_yaw", 0.1), ("neck_pitch", 0.1)), who="ann"))
+    tick = running.do(Jog((("neck_yaw", 0.3),), who="ann"), 0.2)[1][-1]
     leads = tick.control_source
     assert (leads.kind, leads.who) == ("joint", "ann")
     assert leads.joints == ("neck_yaw", "neck_pitch")
@@ -440,35 +433,18 @@ def test_a_held_joint_is_named_with_who_and_nothing_else(running: Running):
     assert (state.gaze.target, state.gaze.phase) == ("neck_yaw and neck_pitch held", "held")
     assert state.gaze.reason == state.headline
     assert (state.gaze.kind, state.gaze.part, state.saliences) == ("joint", None, ())
-
-
-@pytest.mark.parametrize(
-    ("pointer", "kind", "said"),
-    [
+    for pointer, kind, said in (
         (False, "person", "ann makes it look at 1 0.2 0.3"),
         (True, "pointer", "it looks at the pointer of ann"),
-    ],
-)
-def test_a_point_and_a_pointer_are_led_by_who_chose_them(
-    running: Running, pointer: bool, kind: str, said: str
-):
-    for _ in range(10):
-        running.order(LookAt((1.0, 0.2, 0.3), who="ann", pointer=pointer))
-        tick = running.go(0.2)[-1]
-    assert tick.control_source.kind == kind
-    assert head_state(tick).headline == said
-
-
-def test_stopped_says_that_and_nothing_else(running: Running):
-    running.order(Jog((("neck_yaw", 0.3),), who="ann"))
-    running.go(0.2)
-    running.order(Stop("STOP was pressed", who="ann"))
-    state = head_state(running.go(0.5)[-1])
+    ):
+        tick = running.do(LookAt((1.0, 0.2, 0.3), who="ann", pointer=pointer), 0.2)[1][-1]
+        assert tick.control_source.kind == kind
+        assert head_state(tick).headline == said
+    state = head_state(running.do(Stop("STOP was pressed", who="ann"), 0.5)[1][-1])
     assert state.control_source.kind == state.gaze.target == state.gaze.phase == "stopped"
     assert state.headline == state.gaze.reason == "stopped: STOP was pressed; the torque is off"
     running.go(2.0)
-    running.order(Resume(who="ann"))
-    assert running.go(0.1)[-1].control_source == ControlSource()
+    assert running.do(Resume(who="ann"), 0.1)[1][-1].control_source == ControlSource()
 
 
 def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running):
