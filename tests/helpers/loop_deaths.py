@@ -122,17 +122,6 @@ class Driven(NamedTuple):
                 return None
             time.sleep(0.005)
 
-    def still_after_s(self, since_s: float, timeout_s: float) -> float | None:
-        """Return the time from then until the last servo stops moving; None where some go on."""
-        before, moved_s = self.places(), since_s
-        while time.monotonic() - since_s < timeout_s:
-            time.sleep(0.03)
-            places = self.places()
-            if any(abs(a - b) > 0.5 for a, b in zip(places, before, strict=True)):
-                moved_s = time.monotonic()
-            before = places
-        return moved_s - since_s if timeout_s - (moved_s - since_s) > 0.5 else None
-
 
 @contextmanager
 def driven(kind: str, guarded: bool = True) -> Iterator[Driven]:

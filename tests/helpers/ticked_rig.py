@@ -67,14 +67,3 @@ def gazerig(*words: str, typed: str = "") -> str:
     if done.exception is not None and not isinstance(done.exception, SystemExit):
         raise done.exception
     return done.stdout + done.stderr
-
-
-class Outbox:
-    """Requests of a page, in place of a robot."""
-
-    def __init__(self) -> None:
-        self.asked: list[tuple[Command, str]] = []
-
-    def command(self, command: Command, who: str) -> bool:
-        self.asked.append((command, who))
-        return True

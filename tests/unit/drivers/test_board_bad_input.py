@@ -38,13 +38,6 @@ def test_a_file_that_cannot_be_right(tmp_path: Path, was: str, written: str, rep
     assert reported in jog(on_pca9685(tmp_path, SECTION.replace(was, written)))
 
 
-def test_a_channel_that_no_board_has(tmp_path: Path):
-    path = Path(on_pca9685(tmp_path))
-    text = path.read_text(encoding="utf-8").replace("id: 0\n", "id: 16\n", 1)
-    path.write_text(text, encoding="utf-8")
-    assert "joints.eyes_pan.id: the board has channels 0 to 15" in jog(str(path))
-
-
 @pytest.mark.parametrize(
     ("device", "rig", "reported"),
     [
