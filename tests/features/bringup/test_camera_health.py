@@ -39,21 +39,24 @@ class Unseen:
 class Remembered:
     """Finds the faces of a picture once; the detector keeps nothing from one to the next."""
 
-    detector = MtcnnDetector(FaceDetectorParams())
-    found: dict[bytes, Any] = {}
+    def __init__(self) -> None:
+        self._detector, self._found = MtcnnDetector(FaceDetectorParams()), dict[bytes, Any]()
 
     def find(self, image: np.ndarray) -> Any:
         key = image.tobytes()
-        if key not in self.found:
-            self.found[key] = self.detector.find(image)
-        return self.found[key]
+        if key not in self._found:
+            self._found[key] = self._detector.find(image)
+        return self._found[key]
+
+
+remembered = cache(Remembered)
 
 
 def looked(
     images: list[np.ndarray], detector: Any = None, **how: Any
 ) -> tuple[list[tuple[float, str]], Detections]:
     """Return the reports on frames with their times, and the last detections."""
-    analyzer = FrameAnalyzer(detector or Remembered(), **how)
+    analyzer = FrameAnalyzer(detector or remembered(), **how)
     told: list[tuple[float, str]] = []
     for k, image in enumerate(images):
         found = analyzer.analyze(Shot(PERIOD_S * k, k + 1, image))
@@ -62,18 +65,15 @@ def looked(
 
 
 @pytest.mark.parametrize(
-    ("bad", "begins", "ends"),
+    ("spoilt", "begins", "ends"),
     [
-        (room()[::2, ::2] // 16, "camera: the picture is too dark: ", "bright enough again"),
-        (
-            np.zeros((HEIGHT // 2, WIDTH // 2, 3), np.uint8),
-            "camera: the picture is black: uncover",
-            "bright",
-        ),
+        (lambda good: good // 16, "camera: the picture is too dark: ", "bright enough again"),
+        (np.zeros_like, "camera: the picture is black: uncover", "bright"),
     ],
 )
-def test_a_bad_picture_is_told_as_it_begins_and_as_it_ends(bad, begins, ends):
+def test_a_bad_picture_is_told_as_it_begins_and_as_it_ends(spoilt, begins, ends):
     good = room()[::2, ::2]
+    bad = spoilt(good)
     told, found = looked([good] * 12 + [bad] * 40, Unseen())
     assert len(told) == 1 and told[0][1].startswith(begins)
     assert found.conditions == (told[0][1].removeprefix("camera: "),)
@@ -83,15 +83,16 @@ def test_a_bad_picture_is_told_as_it_begins_and_as_it_ends(bad, begins, ends):
 
 
 @pytest.mark.parametrize(
-    "image",
+    "picture",
     [
-        np.asarray(room()),
-        np.asarray(room(0)),
-        noisy(room() // 4, 4.0, np.random.default_rng(2)),
-        np.full((HEIGHT, WIDTH, 3), 200, np.uint8),
+        room,
+        lambda: room(0),
+        lambda: noisy(room() // 4, 4.0, np.random.default_rng(2)),
+        lambda: np.full((HEIGHT, WIDTH, 3), 200, np.uint8),
     ],
 )
-def test_good_pictures_are_left_alone(image):
+def test_good_pictures_are_left_alone(picture):
+    image = picture()
     for turns_film in (False, True):
         told, found = looked([image] * 40, turns_film=turns_film)
         assert (told, found.conditions, found.width_px) == ([], (), WIDTH)

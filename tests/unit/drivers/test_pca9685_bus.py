@@ -3,8 +3,6 @@
 import errno
 
 import pytest
-from board_rig import SECTION, on_pca9685
-from command_line import typed
 from pca9685_world import BOARD, GRAIN, QUICK, SPEED_STEPS_S, SMBus, World, setup
 from smbus2 import i2c_msg
 
@@ -278,11 +276,3 @@ def test_a_path_says_what_kind_of_port_it_is(tmp_path):
     link.symlink_to("/dev/i2c-3")
     assert isinstance(port_at_path(str(link)), I2cPort)
     assert "no I2C bus" in open_failure_text("/dev/i2c-99", errno.ENOENT)
-
-
-def test_a_rig_without_its_i2c_bus_is_told_to_switch_it_on(tmp_path, capfd):
-    file = on_pca9685(tmp_path, SECTION.replace("i2c-1", "i2c-97"))
-    assert typed("doctor", file) in (1, 2)
-    out, err = capfd.readouterr()
-    assert "I2C bus" in out + err and "switch I2C on" in out + err
-    assert "serial port" not in out + err and "adaptor" not in out + err
