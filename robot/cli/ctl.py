@@ -5,20 +5,19 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import degrees
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import msgspec
 import typer
-from typer.core import TyperGroup
 
-from gazerig.config.faults import ConfigError
+from gazerig.config.faults import ConfigFault
 from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.drivers.sound.params import KINDS
 from gazerig.params import unknown_text
-from gazerig.robot.cli import animation
 from gazerig.robot.cli.options import PidOption
 from gazerig.robot.cli.terminal import FAULT, clear_errors, confirm, say
 from gazerig.robot.model.commands import (
+    NO_TRACK,
     AnyCommand,
     Ask,
     Command,
@@ -27,11 +26,14 @@ from gazerig.robot.model.commands import (
     LookAt,
     LookAtPerson,
     Parameters,
+    Play,
     ReadMenus,
     Resume,
     Revert,
     Save,
+    Say,
     Stop,
+    Tracks,
     Unsaved,
 )
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
@@ -44,19 +46,11 @@ ctl = typer.Typer(
 )
 app = typer.Typer()
 app.add_typer(ctl)
-ctl.add_typer(animation.app)
 
 _LAST_MESSAGES = 5
 _NEGATIVE = {"ignore_unknown_options": True}
 """Click settings: -3 is a number, not an option."""
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-
-
-@ctl.callback()
-def select_rig(context: typer.Context, rig: PidOption = None) -> None:
-    """Control a rig that runs in another terminal: parameters, gaze target, behaviour."""
-    if rig is not None and isinstance(context.command, TyperGroup):
-        context.default_map = {name: {"pid": rig} for name in context.command.commands}
 
 
 @contextlib.contextmanager
@@ -220,6 +214,38 @@ def look(
 
 
 @ctl.command()
+def play(
+    track: Annotated[
+        str | None,
+        typer.Argument(help="A track, e.g. nod; none ends all tracks; without it, all are listed."),
+    ] = None,
+    pid: PidOption = None,
+) -> None:
+    """Play a track on the running head, or list all tracks with their fit to this rig."""
+    with connect(pid, "play") as rig:
+        if track is None:
+            for one in rig.ask(Tracks(), tuple[dict[str, Any], ...]):
+                say(_track_line(one))
+            return
+        say(rig.send(Play("" if track == NO_TRACK else track)).text())
+
+
+@ctl.command(name="say")
+def say_aloud(
+    what: Annotated[
+        str,
+        typer.Argument(metavar="FILE | TEXT", help="A sound file, by its ending, or a text."),
+    ],
+    pid: PidOption = None,
+) -> None:
+    """Say a sound file or a text on the running head, with the mouth of a rig that has one."""
+    with connect(pid, "say") as rig:
+        if Path(what).suffix.lower() in KINDS and Path(what).is_file():
+            what = str(Path(what).absolute())
+        say(rig.send(Say(what)).text())
+
+
+@ctl.command()
 def do(
     command: Annotated[
         str,
@@ -305,17 +331,14 @@ def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:
     """Read KEY VALUE KEY VALUE ... with values as YAML.
 
     Raises:
-        SetupError: a value is missing or not YAML, or a key is given twice.
+        SetupError: a value is missing or not YAML.
     """
     if len(pairs) % 2:
         raise SetupError(
             f"{pairs[-1]}: a value is missing; gazerig ctl set KEY VALUE [KEY VALUE ...]"
         )
-    keys = pairs[::2]
-    for key in keys:
-        if keys.count(key) > 1:
-            raise SetupError(f"{key}: duplicate key; give it one value")
-    return {key: read_value(key, text) for key, text in zip(keys, pairs[1::2], strict=True)}
+    rows = zip(pairs[::2], pairs[1::2], strict=True)
+    return {key: read_value(key, text) for key, text in rows}
 
 
 def read_value(key: str, text: str) -> Any:
@@ -324,15 +347,13 @@ def read_value(key: str, text: str) -> Any:
     Raises:
         SetupError: it is not a YAML value.
     """
-    with TemporaryDirectory(prefix="gazerig-value-") as folder:
-        file = Path(folder) / "value.yaml"
-        file.write_text(f"value: {text}\n", encoding="utf-8")
-        try:
-            from gazerig.config.load import read_yaml
+    from gazerig.config.entries import parse
 
-            held = read_yaml(file).data
-        except ConfigError as error:
-            raise SetupError(f"{key}: {error.faults[0].rule}") from None
+    faults: list[ConfigFault] = []
+    document = parse("", f"value: {text}\n", faults)
+    if document is None or faults:
+        raise SetupError(f"{key}: {faults[0].rule}")
+    held = document.data
     if set(held) != {"value"}:
         raise SetupError(f"{key}: {text!r} is more than one value; write lists as [1, 2]")
     return held["value"]
@@ -380,6 +401,14 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
         f"not saved: {_count_text(unsaved)}; gazerig ctl save saves" if unsaved else "all saved",
         *(f"said: {text}" for text in now["said"][-_LAST_MESSAGES:]),
     ]
+
+
+def _track_line(track: Mapping[str, Any]) -> str:
+    head = f"{track['name']:<14}{track['description']}"
+    if track["refused"]:
+        return f"{head}; not on this rig: {track['refused']}"
+    limited = track["limited"] and f"; {track['limited']}"
+    return f"{head} ({track['duration_s']:.1f} s{limited})"
 
 
 def _table(found: Iterable[Parameter], values: dict[str, Any], unsaved: set[str]) -> Iterator[str]:

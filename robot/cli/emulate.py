@@ -1,7 +1,5 @@
 """Command emulate: servos on a pseudo-terminal, which any program can open."""
 
-import json
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -14,8 +12,7 @@ from gazerig.robot.run.emulated import emulated_lines
 from gazerig.sim_mock.device_spec import EXAMPLE, line_of
 from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.line import BusSettings
-from gazerig.sim_mock.pty.server import ServerSettings, run
-from gazerig.sim_mock.pty.server import say as say_line
+from gazerig.sim_mock.pty.server import ServerSettings, run, say
 
 app = typer.Typer()
 
@@ -66,15 +63,7 @@ def emulate(
             )
             for name, device in devices.items()
         )
-        say = _print_answer if sys.stdout.isatty() else say_line
         try:
             run(ServerSettings(buses), say, heed_ctrl_c=True)
         except ValueError as error:
             raise SetupError(str(error)) from None
-
-
-def _print_answer(line: str) -> None:
-    """Print an answer; on a terminal, long texts are printed as they are, not as JSON."""
-    answer = json.loads(line)
-    text = answer.get("ok", answer.get("error", ""))
-    print(text if "\n" in text else line, flush=True)

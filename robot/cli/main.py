@@ -21,7 +21,7 @@ gazerig makes an animatronic head look at people. What next?
 Without hardware:
   gazerig run --mock                    a head looks at a visitor, in your browser
   gazerig report --scene face-to-face   compare that gaze with people's, in one HTML file
-  gazerig new my.yaml                   your own rig file, from three questions
+  gazerig new my.yaml                   your own rig file; lists boards, joints and cameras
 
 With a servo adapter (docs/start.md lists suitable ones):
   gazerig scan                          which servos answer; changes nothing

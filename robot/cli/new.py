@@ -1,6 +1,5 @@
-"""Command new: a new rig's file from a few answers, the shortest working one."""
+"""Command new: a new rig's file, the shortest working one."""
 
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,13 +14,14 @@ from gazerig.config.faults import ConfigError
 from gazerig.config.save import format_value
 from gazerig.drivers.errors import SetupError, install_command
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.cli.check import good_text
+from gazerig.params import unknown_text
+from gazerig.robot.cli.rig_files import good_text
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
 
 app = typer.Typer()
 
 _BOARD, _JOINTS, _CAMERA = "none", "eyes-lids", "webcam"
-"""Defaults if there is no option and nobody can be asked."""
+"""Defaults of the options."""
 
 
 class _Drive(Struct, frozen=True):
@@ -126,19 +126,19 @@ def new(
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Write a new rig's YAML from a few answers, check it, and print the next command."""
+    """Write a new rig's YAML, check it, and print the next command."""
     with clear_errors():
         if file.suffix not in (".yaml", ".yml"):
             raise SetupError(f"{file}: a rig's file ends in .yaml: gazerig new {file.stem}.yaml")
         refuse_existing(file, force=force)
         mechanisms = {name: one.summary for name, one in MECHANISMS.items()}
-        chosen = _choose("Which board drives the servos?", "board", board, BOARDS, _BOARD)
-        wanted = _choose(
-            "Which joints do the servos move? (a mechanism, or names of joints: eyes_pan,eyes_tilt,jaw)",
-            "joints", joints, mechanisms, _JOINTS, others=True,
-        )  # fmt: skip
-        seen = _choose("Which camera does the head use?", "camera", camera, CAMERAS, _CAMERA)
-        rig = NewRig(file.stem, chosen, joints_of(wanted), seen)
+        wanted = joints or _usual("joints", mechanisms, _JOINTS)
+        rig = NewRig(
+            file.stem,
+            _choice("board", board, BOARDS, _BOARD),
+            joints_of(wanted),
+            _choice("camera", camera, CAMERAS, _CAMERA),
+        )
         from gazerig.config.schema import load_rig
 
         write_file(file, rig_text(rig), force)
@@ -151,42 +151,23 @@ def new(
             print(line)
 
 
-def _choose(
-    question: str, option: str, given: str | None, choices: Mapping[str, str], usual: str,
-    others: bool = False,
-) -> str:  # fmt: skip
-    """Return a choice: the value of an option, an answer by name or number, or the default.
-
-    Args:
-        question: Its text.
-        option: The option that answers it.
-        given: The value of that option.
-        choices: Choices with their descriptions.
-        usual: Default, chosen with Enter and if nobody can answer.
-        others: Whether names of joints are valid too.
+def _choice(option: str, given: str | None, choices: Mapping[str, str], usual: str) -> str:
+    """Return the value of an option, or its default.
 
     Raises:
-        SetupError: the option's value is invalid, or there is no answer.
+        SetupError: the value is unknown.
     """
-    names = list(choices)
-    if given is not None:
-        if given not in choices and not (others and given):
-            raise SetupError(f"--{option} {given}: expected {', '.join(names)}")
-        return given
-    if not sys.stdin.isatty():
-        say(f"{option}: {usual} ({choices[usual]}); choices for --{option}: {', '.join(names)}")
-        return usual
+    if given is not None and given not in choices:
+        raise SetupError(unknown_text(f"--{option}", given, choices))
+    return given or _usual(option, choices, usual)
 
-    def read(answer: str) -> str:
-        if answer.isdecimal() and 0 < int(answer) <= len(names):
-            return names[int(answer) - 1]
-        if answer in choices or (others and "_" in answer):
-            return answer
-        raise typer.BadParameter(f"{answer!r} is not a choice: give a number or a name")
 
-    lines = (f"  {number}  {name:10} {choices[name]}" for number, name in enumerate(names, 1))
-    text = "\n".join((question, *lines, "choice"))
-    return str(typer.prompt(text, str(names.index(usual) + 1), value_proc=read, err=True))
+def _usual(option: str, choices: Mapping[str, str], usual: str) -> str:
+    """Return the default of an option, and print its choices."""
+    say(f"{option}: {usual}; --{option} NAME chooses another one:")
+    for name, summary in choices.items():
+        say(f"  {name:10} {summary}")
+    return usual
 
 
 def next_steps(rig: NewRig, file: str) -> Iterable[str]:

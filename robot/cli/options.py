@@ -3,12 +3,16 @@
 from collections.abc import Callable
 from dataclasses import fields
 from inspect import Parameter, Signature
-from typing import Annotated, Any, TypeVar, get_type_hints
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
-from gazerig.robot.cli.terminal import RigArgument
+from gazerig.robot.cli.terminal import RigArgument, say
 from gazerig.robot.run.options import Option, RunOptions
+
+if TYPE_CHECKING:
+    from gazerig.robot.model.reply import TrackReply
 
 F = TypeVar("F", bound=Callable[..., Any])
 DEFAULT_RIG = "desk"
@@ -49,6 +53,7 @@ MockOption = Annotated[bool, run_option("mock")]
 PortOption = Annotated[str | None, run_option("port")]
 CameraOption = Annotated[str | None, run_option("camera")]
 OakOption = Annotated[bool, run_option("oak")]
+FolderOption = Annotated[Path, typer.Option("--folder", help="Folder for the track's file.")]
 NoBrowserOption = Annotated[bool, run_option("no_browser")]
 
 
@@ -69,3 +74,9 @@ def add_run_options(command: F) -> F:
             )
     command.__signature__ = Signature(declared)  # type: ignore[attr-defined]
     return command
+
+
+def print_track_fit(rig_name: str, path: Path, reply: "TrackReply") -> None:
+    """Print how a rig plays a track, and how to use it."""
+    say(f"{path}: on {rig_name} {reply.text()}")
+    say(f"use it: in a folder tracks/ beside the rig's file, gazerig ctl play {path.stem} finds it")

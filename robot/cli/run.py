@@ -54,12 +54,12 @@ def run(**given: Any) -> None:
         from gazerig.robot.run.session import Session
 
         browse = open_page if not asked.no_browser and is_desktop_here() else None
-        opening = StartLine("" if asked.fast else start_text(asked))
         with exit_on_signals():
             made = Run(run_rig(asked), asked)
+        if not asked.fast:
+            made.notes = (start_text(asked), *made.notes)
         with record_signals() as stopped:
-            session = Session(made, stopped, opening.say, shows, opening.update, browse)
-            figures = session.run()
+            figures = Session(made, stopped, say_publicly, shows, browse=browse).run()
         if summary is not None:
             text = json.dumps(figures, indent=2) + "\n"
             if summary == "-":
@@ -70,26 +70,9 @@ def run(**given: Any) -> None:
         raise typer.Exit(FAULT)
 
 
-class StartLine:
-    """Message output with a first line that describes the run, unless the run is refused.
-
-    Args:
-        line: Description of the run; "" prints nothing.
-    """
-
-    def __init__(self, line: str) -> None:
-        self._line = line
-
-    def say(self, line: str) -> None:
-        """Print a line, after the first one; a log does not get the token of the page."""
-        self.update(None)
-        say(line if sys.stderr.isatty() else hide_token(line))
-
-    def update(self, tick: object) -> None:
-        """Print the first line once the head runs."""
-        if self._line:
-            line, self._line = self._line, ""
-            say(line)
+def say_publicly(line: str) -> None:
+    """Print a line; a log does not get the token of the page."""
+    say(line if sys.stderr.isatty() else hide_token(line))
 
 
 def start_text(asked: RunOptions) -> str:

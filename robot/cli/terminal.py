@@ -1,4 +1,4 @@
-"""Terminal output: message lines, one status line, errors, and Ctrl-C as a request to stop.
+"""Terminal: message lines, one status line, errors, Ctrl-C as a request to stop, and single keys.
 
 A thread writes the message lines, so that a pipe without a reader, a terminal stopped with Ctrl-S
 or a full disk delays no caller. Lines that cannot be written are dropped and counted.
@@ -11,16 +11,19 @@ import atexit
 import contextlib
 import logging
 import os
+import re
 import select
 import shlex
 import shutil
 import signal
 import stat
 import sys
+import termios
 import threading
 import traceback
+import tty
 from collections.abc import Callable, Iterator
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, NoReturn, Self
 
 import typer
 
@@ -280,3 +283,51 @@ def _write(text: str, wiped: bool = False, status: bool = False) -> None:
     with contextlib.suppress(OSError, ValueError):
         stderr.write(text)
         stderr.flush()
+
+
+# --- single keys
+
+_ARROWS = {"A": "up", "B": "down", "C": "right", "D": "left"}
+# Arrow keys in both modes of a terminal (ECMA-48 CSI, or SS3), other keys that send sequences, and
+# single characters.
+_KEY = re.compile(r"\x1b(?:\[[0-9;?]*|O)(?P<code>[A-Za-z~])|(?P<typed>.)", re.DOTALL)
+_BEGUN = re.compile(r"\x1b(?:\[[0-9;?]*|O)?$")
+
+
+def split_keys(text: str) -> tuple[list[str], str]:
+    """Return the typed keys one by one, and the start of an incomplete sequence.
+
+    A letter is returned unchanged, an arrow key as "up", "down", "left" or "right". Other keys that
+    send sequences are omitted.
+    """
+    begun = _BEGUN.search(text)
+    end = begun.start() if begun is not None else len(text)
+    keys = (found["typed"] or _ARROWS.get(found["code"]) for found in _KEY.finditer(text[:end]))
+    return [key for key in keys if key is not None], text[end:]
+
+
+class TerminalInput:
+    """Standard input without line buffering and echo; Ctrl-C remains a signal; restored on exit."""
+
+    def __enter__(self) -> Self:
+        """Switch line buffering and echo off."""
+        self._before = termios.tcgetattr(sys.stdin)
+        tty.setcbreak(sys.stdin, termios.TCSANOW)
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        """Switch them on again; unread keys are discarded."""
+        # Not TCSAFLUSH, which would wait for a terminal that was stopped with Ctrl-S.
+        with contextlib.suppress(termios.error, OSError):  # it may not exist any more
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
+            termios.tcsetattr(sys.stdin, termios.TCSANOW, self._before)
+
+    def text(self) -> str | None:
+        """Return the typed text, "" for none, None if the terminal does not exist any more."""
+        if not select.select([sys.stdin.fileno()], [], [], 0.0)[0]:
+            return ""
+        try:
+            data = os.read(sys.stdin.fileno(), 256)
+        except OSError:
+            data = b""
+        return data.decode(errors="replace") if data else None

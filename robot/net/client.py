@@ -40,7 +40,6 @@ from gazerig.robot.model.commands import (
     Stop,
     Talk,
     Value,
-    check_command,
     set_client,
     verb,
 )
@@ -308,10 +307,6 @@ class RobotClient:
             heartbeat.end()
 
     def _command(self, command: Command) -> CommandReply:
-        try:
-            command = check_command(command)
-        except ValueError as error:
-            raise RequestRejected(str(error)) from None
         if isinstance(command, Stop) and self._lock.locked() and self._dial is not None:
             # A thread waits on this connection, e.g. until a text is spoken.
             try:

@@ -225,19 +225,19 @@ SILENT_S = 1.5
 """Silence after which a browser counts as gone."""
 
 
-def browser_worker(
-    rig: Rig, now_s: Callable[[], float], pictures: JpegSlot, before: int
-) -> CameraWorker:
-    """Return the process that analyses a browser's images; ``before``: number of earlier ones."""
+def browser_worker(rig: Rig, now_s: Callable[[], float], pictures: JpegSlot) -> CameraWorker:
+    """Return the process that analyses a browser's images; its scene is not the simulated one."""
     locate = FrameLocator(None, radians(FIELD_DEG))
     motion = partial(MotionSource, rig.motion, None, locate.field_rad, None)
     source = partial(BrowserSource, pictures)
-    parts = CameraParts(source, detector_of(rig, None), motion, locate, before=before)
+    parts = CameraParts(source, detector_of(rig, None), motion, locate, before=1)
     return CameraWorker(parts, now_s)
 
 
 class BrowserCamera:
     """A browser's own camera, used instead of an emulated rig's while its images arrive.
+
+    Its process starts with the first image and stays until the end of the run.
 
     The images arrive through the page's process, and are analysed in a camera process like those
     of a webcam. The head looks at the person in front of the browser; when they end, the simulated
@@ -254,7 +254,7 @@ class BrowserCamera:
 
     def __init__(
         self,
-        make: Callable[[JpegSlot, int], CameraWorker],
+        make: Callable[[JpegSlot], CameraWorker],
         now_s: Callable[[], float],
         use: Callable[[Camera | None], None],
         report: Callable[[str], None],
@@ -264,7 +264,6 @@ class BrowserCamera:
         self._pictures = JpegSlot()
         self._worker: CameraWorker | None = None
         self._starting: threading.Thread | None = None
-        self._begun = 1
         self._closed = False
         self._fault = ""
 
@@ -272,7 +271,7 @@ class BrowserCamera:
         """Store an image of a browser; called from one thread other than the loop's."""
         if self._closed or not self._pictures.put(jpeg, self._now_s()):
             return
-        if self._worker is None and (self._starting is None or not self._starting.is_alive()):
+        if self._starting is None:
             self._starting = threading.Thread(
                 target=self._start, name="browser camera", daemon=True
             )
@@ -280,8 +279,7 @@ class BrowserCamera:
 
     def _start(self) -> None:
         """Start the process, which takes a second; the scene continues meanwhile."""
-        worker = self._make(self._pictures, self._begun)
-        self._begun += 1
+        worker = self._make(self._pictures)
         try:
             worker.open()
         except SetupError as error:
@@ -296,29 +294,28 @@ class BrowserCamera:
 
         Called by the loop in each tick.
         """
-        worker, now_s, was_in_use = self._worker, self._now_s(), self.in_use
+        worker, now_s = self._worker, self._now_s()
         fault, self._fault = self._fault, ""
         if fault:
             self._report(fault)
-        if worker is None:
+        if self.in_use:
+            if now_s - self._pictures.came_s > SILENT_S:
+                return self._switch(None, "the browser's camera has ended: the scene continues")
             return False
-        if now_s - self._pictures.came_s > SILENT_S:
-            self._worker = None
-            if self.in_use:
-                self._switch(None, "the browser's camera has ended: the scene continues")
-            threading.Thread(target=worker.close, name="browser camera", daemon=True).start()
-        elif not self.in_use and worker.latest(now_s) is not None:
-            self._switch(
-                worker,
-                "using a browser's camera; its unknown field of view is assumed to be "
-                f"{FIELD_DEG:g} deg; the scene pauses",
-            )
-        return self.in_use != was_in_use
+        found = worker.latest(now_s) if worker is not None else None
+        if found is None or now_s - found.captured_s > SILENT_S:
+            return False
+        return self._switch(
+            worker,
+            "using a browser's camera; its unknown field of view is assumed to be "
+            f"{FIELD_DEG:g} deg; the scene pauses",
+        )
 
-    def _switch(self, camera: Camera | None, line: str) -> None:
+    def _switch(self, camera: Camera | None, line: str) -> bool:
         self.in_use = camera is not None
         self._use(camera)
         self._report(line)
+        return True
 
     def close(self) -> None:
         """End the process; safe to call twice."""

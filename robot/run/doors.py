@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import Protocol, cast
 
-from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import DOOR, find
 from gazerig.drivers.process import child_process
 from gazerig.drivers.process.visible_text import visible
@@ -36,11 +35,7 @@ def load_door(name: str) -> RunnableDoor:
     Raises:
         PluginError: no package has it, or it cannot be imported; the message lists the doors.
     """
-    found = find(DOOR, name)
-    door = found.load()
-    if not callable(getattr(door, "run", None)):
-        raise PluginError(f"{found.label} is not a Door of gazerig.doors.door")
-    return cast(RunnableDoor, door)
+    return cast(RunnableDoor, find(DOOR, name).load())
 
 
 class DoorProcesses:

@@ -84,7 +84,7 @@ class RunOptions:
     pixels: Annotated[bool, Option("Draw the scene, and detect in it; needs --fast.", is_shown=False)] = False
     no_pictures: Annotated[bool, Option("Compute what the camera of a world sees, without pictures.", is_shown=False)] = False
     rig: str = "desk"
-    name: Annotated[str | None, Option("Name of this head for gazerig ctl --rig.", "NAME")] = None
+    name: Annotated[str | None, Option("Name of this head for --rig of gazerig ctl.", "NAME")] = None
     port: Annotated[str | None, Option("Serial port instead of the rig's.", "PORT")] = None
     bus: Annotated[str | None, Option("Substitute for servos: emulated or ideal.", "NAME")] = None
     rate: Annotated[float | None, Option("Rate of the loop instead of the rig's.", "HZ", 20.0, 1000.0, is_shown=False)] = None

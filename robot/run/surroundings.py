@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from gazerig.config.load import find_file, load
-from gazerig.config.shipped_files import is_path, shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.plugins import SURROUNDINGS, find
 from gazerig.gaze.attention.top_down import TopDownParams
@@ -27,14 +26,6 @@ if TYPE_CHECKING:
     from gazerig.robot.run.buses import RunBus
     from gazerig.robot.run.cameras import CameraView
 
-KIND = "scenes"
-"""Folder of the shipped scenes."""
-
-
-def scene_names() -> tuple[str, ...]:
-    """Return the names of the shipped scenes."""
-    return shipped_names(KIND)
-
 
 def load_scene(name_or_path: str, seed: int = 0) -> FacesScene:
     """Return a simulated scene.
@@ -44,15 +35,9 @@ def load_scene(name_or_path: str, seed: int = 0) -> FacesScene:
         seed: Seed of acts with a random time.
 
     Raises:
-        gazerig.config.load.ConfigError: the file has faults.
-        SetupError: the name is unknown.
+        gazerig.config.load.ConfigError: the name is unknown, or the file has faults.
     """
-    if not is_path(name_or_path) and name_or_path not in scene_names():
-        raise SetupError(
-            f"--scene {name_or_path}: unknown; scenes: {', '.join(scene_names())}; "
-            "or give the path of a script (.yaml)"
-        )
-    script = load(find_file(KIND, name_or_path), SceneScript, checks=(faults,))
+    script = load(find_file("scenes", name_or_path), SceneScript, checks=(faults,))
     return FacesScene(Path(name_or_path).stem, script, seed)
 
 

@@ -212,7 +212,7 @@ def test_the_end_of_the_block_parks_whatever_ends_it():
     ("options", "error", "words"),
     [
         ({"rig": "dusk"}, gazerig.ConfigError, "did you mean"),
-        ({"scene": "moon"}, gazerig.SetupError, "unknown; scenes"),
+        ({"scene": "visitr"}, gazerig.ConfigError, "did you mean .visitor."),
         ({"scene": "visitor", "video": "x.avi"}, gazerig.SetupError, "exclude each other"),
         ({"video": "/nowhere.avi"}, gazerig.SetupError, "nowhere.avi"),
     ],

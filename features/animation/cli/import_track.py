@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from gazerig.config.schema import load_rig
+from gazerig.robot.cli.options import FolderOption, print_track_fit
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
-from gazerig.robot.cli.tracks import FolderOption, print_track_fit
 
 app = typer.Typer()
 

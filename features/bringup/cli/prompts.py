@@ -13,8 +13,7 @@ from gazerig.drivers.files.file_input import read_limited
 from gazerig.features.bringup.calibration.face_steering import Key
 from gazerig.features.bringup.calibration.hobby_calibration import HobbyServoAccess
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
-from gazerig.robot.cli.key_input import TerminalInput, split_keys
-from gazerig.robot.cli.terminal import say, status
+from gazerig.robot.cli.terminal import TerminalInput, say, split_keys, status
 
 LOOK_S = 0.03
 """Period at which a joint is read during a question: more than 20 times a second."""

@@ -31,7 +31,7 @@ from gazerig.features.bringup.hand_recording import (
 )
 from gazerig.features.bringup.telemetry import Monitor
 from gazerig.gaze.track.track import MAX_DURATION_S
-from gazerig.robot.cli.options import PidOption
+from gazerig.robot.cli.options import FolderOption, PidOption, print_track_fit
 from gazerig.robot.cli.terminal import (
     INTERRUPTED,
     ForceOption,
@@ -40,7 +40,6 @@ from gazerig.robot.cli.terminal import (
     record_signals,
     say,
 )
-from gazerig.robot.cli.tracks import FolderOption, print_track_fit
 from gazerig.robot.loop.head_state import HeadState
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.net.client import RobotClient

@@ -8,7 +8,7 @@ from shown_page import free_port, wait_for
 
 import gazerig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.cli.run import StartLine
+from gazerig.robot.cli.run import say_publicly
 from gazerig.robot.dashboard.door.token_file import read_token
 
 GOOD = "Zk3-_mcd94kfuw82kd01xy"
@@ -64,11 +64,11 @@ def test_an_address_is_told_without_a_token_that_is_kept_or_would_be_logged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     line = "the page is at http://127.0.0.1:8080/?token=ab_c-D1"
-    StartLine("").say(line)
+    say_publicly(line)
     hidden = "the page is at http://127.0.0.1:8080/; gazerig ctl rigs shows it with its token\n"
     assert capsys.readouterr().err == hidden
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-    StartLine("").say(line)
+    say_publicly(line)
     assert capsys.readouterr().err.endswith(f"{line}\n")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     file, said = tmp_path / "token", list[str]()

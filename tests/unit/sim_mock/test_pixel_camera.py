@@ -11,6 +11,7 @@ import pytest
 from fakes.scenes import EmptyScene
 from present import present
 
+from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
@@ -22,7 +23,7 @@ from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.scene import PinholeView
 from gazerig.robot.perception.face_pose import face_pose
-from gazerig.robot.run.surroundings import load_scene, scene_names
+from gazerig.robot.run.surroundings import load_scene
 from gazerig.sim_mock.cameras.drawn_scene import DrawnScene
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.cameras.rendered import PixelCamera
@@ -126,7 +127,7 @@ def test_a_real_detector_finds_drawn_faces_where_they_are(mtcnn: MtcnnDetector, 
     assert np.degrees(np.mean(directions)) < 0.5
 
 
-@pytest.mark.parametrize("name", scene_names())
+@pytest.mark.parametrize("name", shipped_names("scenes"))
 def test_every_scene_can_be_sent_and_drawn(name: str):
     scene = DrawnScene(load_scene(name))
     sent = pickle.loads(pickle.dumps(scene))

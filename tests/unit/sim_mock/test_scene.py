@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gazerig.config.faults import ConfigError
-from gazerig.robot.run.surroundings import load_scene, scene_names
+from gazerig.config.shipped_files import shipped_names
+from gazerig.robot.run.surroundings import load_scene
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 from gazerig.sim_mock.scenes.scene import Scene
 
@@ -29,7 +30,7 @@ def times(scene: Scene) -> list[float]:
     return np.arange(0.0, scene.round_s + 0.5, DT_S).tolist()
 
 
-@pytest.mark.parametrize("name", scene_names())
+@pytest.mark.parametrize("name", shipped_names("scenes"))
 def test_nobody_jumps_and_no_thing_is_faster_than_a_fist(name: str):
     scene = load_scene(name)
     before_people, before = scene.people(0.0), {t.id: t for t in scene.things(0.0)}
