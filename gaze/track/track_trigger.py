@@ -13,10 +13,6 @@ class TrackTrigger:
     """Trigger of the tracks of rules."""
 
     def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the last target and the time of the last track."""
         self._named_by: str | None = None
         self._played_s: dict[str, float] = {}
 
