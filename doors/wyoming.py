@@ -106,8 +106,8 @@ class Satellite:
                     self._take(event, sound)
                     if event.type == "audio-stop" and (heard := sound.end()) is not None:
                         self._link.begin(self._report_played(sound, heard, writer))
-        except (ConnectionError, asyncio.IncompleteReadError):
-            pass  # it has disconnected
+        except (ConnectionError, asyncio.IncompleteReadError, asyncio.CancelledError):
+            pass  # it has disconnected, or the door ends
         except Exception as error:  # of the package: it checks no field
             self._link.report(
                 f"a connection is closed, because it sent no Wyoming event ({error}); check the "
