@@ -63,6 +63,14 @@ def restored_ctrl_c() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def chromium_ends() -> Iterator[None]:
+    """End the Chromium that a worker's tests have shared, if there was one."""
+    yield
+    if "browser" in sys.modules:
+        sys.modules["browser"].end_chromium()
+
+
 @pytest.fixture(autouse=True)
 def no_process_outlives_its_test() -> Iterator[None]:
     """End what a test has started and left, and fail it; fixtures of a wider scope end theirs."""

@@ -1,5 +1,6 @@
 """A headless Chromium, controlled through its debugging port."""
 
+import atexit
 import base64
 import itertools
 import json
@@ -8,12 +9,13 @@ import shutil
 import signal
 import subprocess
 import tempfile
-import urllib.request
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
+import child_processes
 import pytest
 from page_visitor import PATIENCE_S
 from shown_page import wait_for
@@ -44,28 +46,14 @@ def chromium() -> str | None:
     return next((path for name in names if (path := shutil.which(name))), None)
 
 
-class Browser:
-    """One tab of a headless Chromium, driven through its debugging port."""
+class DebuggingSocket:
+    """Sends commands of the debugging protocol to a browser or a tab."""
 
-    def __init__(
-        self, debugging_port: int, window_px: tuple[int, int], drawing: str = SLOW_DRAWING
-    ) -> None:
-        self.width_px, height_px = window_px
+    def __init__(self, url: str) -> None:
         self._ids = itertools.count(1)
         self.asked_for: list[str] = []
-        with urllib.request.urlopen(f"http://127.0.0.1:{debugging_port}/json/list") as answer:
-            tab = next(t for t in json.load(answer) if t["type"] == "page")
-        self._socket = connect(
-            tab["webSocketDebuggerUrl"],
-            max_size=None,
-            ping_interval=None,
-            close_timeout=0.5,  # the browser is killed in any case
-        )
-        self.ask("Network.enable")
-        self.ask("Page.enable")
-        self.ask("Page.addScriptToEvaluateOnNewDocument", source=drawing)
-        shape = {"width": self.width_px, "height": height_px, "deviceScaleFactor": 1}
-        self.ask("Emulation.setDeviceMetricsOverride", **shape, mobile=False)
+        # It is closed in any case: the browser need not confirm.
+        self._socket = connect(url, max_size=None, ping_interval=None, close_timeout=0.5)
 
     def ask(self, method: str, **params: object) -> dict[str, Any]:
         """Send one command of the debugging protocol and return its answer."""
@@ -77,6 +65,22 @@ class Browser:
                 self.asked_for.append(answer["params"]["request"]["url"])
             if answer.get("id") == number:
                 return cast("dict[str, Any]", answer["result"])
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class Browser(DebuggingSocket):
+    """One tab of a headless Chromium, driven through its debugging port."""
+
+    def __init__(self, url: str, window_px: tuple[int, int], drawing: str = SLOW_DRAWING) -> None:
+        super().__init__(url)
+        self.width_px, height_px = window_px
+        self.ask("Network.enable")
+        self.ask("Page.enable")
+        self.ask("Page.addScriptToEvaluateOnNewDocument", source=drawing)
+        shape = {"width": self.width_px, "height": height_px, "deviceScaleFactor": 1}
+        self.ask("Emulation.setDeviceMetricsOverride", **shape, mobile=False)
 
     def go(self, url: str) -> None:
         self.ask("Page.navigate", url=url)
@@ -100,9 +104,6 @@ class Browser:
         answer = self.ask("Page.captureScreenshot", format="png", optimizeForSpeed=True, **what)
         return base64.b64decode(answer["data"])
 
-    def close(self) -> None:
-        self._socket.close()
-
 
 CHROMIUM_FLAGS = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
@@ -114,31 +115,65 @@ CHROMIUM_FLAGS = (
 )
 
 
-@contextmanager
-def browsing(
-    window_px: tuple[int, int] = WINDOW_PX, drawing: str = SLOW_DRAWING
-) -> Iterator[Browser]:
-    """Open a browser that first runs a script about drawing on every page."""
-    program = chromium()
-    if program is None:
-        pytest.skip("no chromium, chromium-browser or google-chrome in the path")
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        process = subprocess.Popen(
-            [program, *CHROMIUM_FLAGS, f"--user-data-dir={folder}", "about:blank"],
+class Chromium:
+    """A headless Chromium, whose tabs have cookies and storage of their own."""
+
+    def __init__(self, program: str) -> None:
+        self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        self._process = subprocess.Popen(
+            [program, *CHROMIUM_FLAGS, f"--user-data-dir={self._folder.name}", "about:blank"],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
+        child_processes.SHARED.add(self._process.pid)
+        # It writes them into its folder once it listens.
+        file = Path(self._folder.name) / "DevToolsActivePort"
+        wait_for(lambda: file.exists() and file.read_text().count("\n") == 1, "the browser")
+        port, path = file.read_text().splitlines()
+        self._address = f"ws://127.0.0.1:{port}"
+        self._control = DebuggingSocket(self._address + path)
+
+    @contextmanager
+    def tab(self, window_px: tuple[int, int], drawing: str) -> Iterator[Browser]:
+        context = self._control.ask("Target.createBrowserContext")["browserContextId"]
+        asked = {"url": "about:blank", "browserContextId": context}
+        target = self._control.ask("Target.createTarget", **asked)["targetId"]
+        address = f"{self._address}/devtools/page/{target}"
         try:
-            with closing(Browser(debugging_port(Path(folder)), window_px, drawing)) as browser:
+            with closing(Browser(address, window_px, drawing)) as browser:
                 yield browser
         finally:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            self._control.ask("Target.disposeBrowserContext", browserContextId=context)
+
+    def end(self) -> None:
+        self._control.close()
+        os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        self._folder.cleanup()
 
 
-def debugging_port(folder: Path) -> int:
-    """The port that Chromium writes into its folder once it listens."""
-    file = folder / "DevToolsActivePort"
-    wait_for(lambda: file.exists() and "\n" in file.read_text(), "the browser")
-    return int(file.read_text().splitlines()[0])
+@cache
+def shared_chromium(program: str) -> Chromium:
+    """Return the one of this process, which ends with it, or with its tests: see conftest.py."""
+    atexit.register(end_chromium)
+    return Chromium(program)
+
+
+def end_chromium() -> None:
+    """End it, if a test has started it."""
+    if shared_chromium.cache_info().currsize:
+        shared_chromium(str(chromium())).end()
+        shared_chromium.cache_clear()
+
+
+@contextmanager
+def browsing(
+    window_px: tuple[int, int] = WINDOW_PX, drawing: str = SLOW_DRAWING
+) -> Iterator[Browser]:
+    """Open a tab that first runs a script about drawing on every page."""
+    program = chromium()
+    if program is None:
+        pytest.skip("no chromium, chromium-browser or google-chrome in the path")
+    with shared_chromium(program).tab(window_px, drawing) as browser:
+        yield browser

@@ -14,6 +14,8 @@ from pathlib import Path
 
 GRACE_S = 10.0
 """Time in which a process that a test has ended may exit, on a busy machine."""
+SHARED: set[int] = set()
+"""Processes that serve many tests, and are no one's to end: a browser."""
 _PROC = Path("/proc")
 
 
@@ -23,7 +25,7 @@ def running() -> dict[int, str]:
     kept = {getattr(one, name, None) for one in own for name in ("_pid", "_forkserver_pid")}
     found = {}
     for pid in children(os.getpid()):
-        if pid not in kept and (words := command(pid)):
+        if pid not in kept | SHARED and (words := command(pid)):
             found[pid] = words
     return found
 

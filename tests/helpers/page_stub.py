@@ -43,7 +43,7 @@ TRACKS = (
 MENUS = {
     "behaviour": ["wait", "guard", "attack"], "conversation": ["none", "talk", "listen", "think"],
     "track": ["none", "nod", "wave", "shake", "surprised", "sleepy"], "lids": ["wink left", "wink right"],
-    "expression": ["neutral", "happy", "sad"],
+    "expression": ["neutral", "happy", "sad"], "character": ["none", "bold", "shy", "boxer"],
 }  # fmt: skip
 VIEW = """<!doctype html><title>no head</title><body style="margin:0;height:100vh"><script>
 // A camera 1 m ahead of the neck base and 0.2 m above, which looks back along the x axis.

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import inf, nextafter
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from fakes.runs import VISIT, record
 from msgspec import structs
-from recorded_rigs import RecordedRun
 from recorded_run import exact
 
 from gazerig.config.schema import load_rig
@@ -38,6 +38,13 @@ from gazerig.robot.run.rerun import rerun
 from gazerig.robot.run.run import Run
 
 NECK_YAW = 6
+
+
+class RecordedRun(NamedTuple):
+    recording: RunRecording
+    ticks: list[Tick]
+
+
 PUPPET: dict[int, tuple[Command, ...]] = {
     40: (Ask("conversation", "talk"), Ask("lids", "wink left")),
     80: (LookAt((1.0, 0.3, 0.3)),),

@@ -9,18 +9,15 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from fakes.runs import VISIT, record
+from fakes.runs import VISIT, play, record, simulated
 from mcap.reader import make_reader
 from msgspec import structs
-from recorded_rigs import RecordedRun, recorded
-from recorded_run import exact
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.cli import recordings
 from gazerig.robot.loop.loop import Tick
 from gazerig.robot.recording.export_csv import GazeExport
-from gazerig.robot.run.rerun import rerun
 from gazerig.robot.run.run import Run
 from gazerig.robot.run.session import Session
 
@@ -69,22 +66,12 @@ def test_a_viewer_reads_the_description_of_the_rig(tmp_path: Path):
     assert {one["name"] for one in json.loads(state.data)["joints"]} <= joints
 
 
-# --- Runs of a rig of six hobby servos without a neck: recorded, done again, reported, exported
-
-
 @pytest.fixture(scope="module")
-def maker(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
-    return recorded(tmp_path_factory.mktemp("six") / "maker.mcap", load_rig("maker"), 2.2)
-
-
-# --- recordings
-
-
-def test_a_run_of_six_joints_is_done_again_to_the_bit(maker: RecordedRun):
-    seen: list[Tick] = []
-    found = rerun(maker.recording, on_tick=seen.append)
-    assert found.is_same and found.sent_bytes_same and found.notes == ()
-    assert list(map(exact, seen)) == list(map(exact, maker.ticks))
+def maker() -> list[Tick]:
+    """Two seconds of a rig of six hobby servos without a neck."""
+    ticks: list[Tick] = []
+    play(simulated("maker"), 2.2, ticks.append)
+    return ticks
 
 
 # --- exports
@@ -100,19 +87,19 @@ def table(ticks: Sequence[Tick], stem: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_cells_of_joints_that_a_rig_lacks_are_empty(maker: RecordedRun, tmp_path: Path):
-    rows = table(maker.ticks, tmp_path / "six")
+def test_cells_of_joints_that_a_rig_lacks_are_empty(maker: list[Tick], tmp_path: Path):
+    rows = table(maker, tmp_path / "six")
     assert {row["head_yaw_deg"] for row in rows} == {""}
-    lower_right = maker.ticks[300].pose.lower_right
+    lower_right = maker[300].pose.lower_right
     assert float(rows[300]["right_lower_lid"]) == pytest.approx(lower_right, abs=6e-4)
     assert "" not in {row["x_deg"] for row in rows}
 
 
-def test_a_linkage_without_an_answer_loses_both_eyes(maker: RecordedRun, tmp_path: Path):
+def test_a_linkage_without_an_answer_loses_both_eyes(maker: list[Tick], tmp_path: Path):
     silent = [
         structs.replace(tick, joints=structs.replace(tick.joints, missing=missing))
         for tick, missing in zip(
-            maker.ticks[100:103], [("eyes_tilt",), ("right_lower_lid",), ()], strict=True
+            maker[100:103], [("eyes_tilt",), ("right_lower_lid",), ()], strict=True
         )
     ]
     rows = table(silent, tmp_path / "silent")

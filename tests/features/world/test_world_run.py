@@ -162,14 +162,15 @@ def test_the_script_takes_over_again_after_a_second(scene: WorldScene):
 
 def test_the_recording_of_a_moved_opponent_repeats_to_the_bit(tmp_path: Path):
     def order(number: int, made: Run) -> None:
-        if number % 10 == 0 and (p_m := path(0.005 * number)) is not None:
+        if number % 5 == 0 and (p_m := path(0.01 * number)) is not None:
             made.robot.command(MoveOpponent(p_m))
 
     options = replace(BOXING, character="strong_boxer")
     rig = with_options(load_rig("desk", "strong_boxer"), options)
+    rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     ticks: list[Tick] = record(tmp_path / "run.mcap", rig, 3.0, options, order)
     assert any(tick.target.plan.startswith("guard") for tick in ticks)
     ordered = [one for tick in ticks for one in tick.commands]
     assert len(ordered) == 40 and all(isinstance(one, MoveOpponent) for one in ordered)
     found = rerun(RunRecording(tmp_path / "run.mcap"))
-    assert found.is_same and found.agreeing_ticks == found.ticks == 599
+    assert found.is_same and found.agreeing_ticks == found.ticks == 299

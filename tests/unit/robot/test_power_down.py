@@ -115,7 +115,12 @@ def ask(clock: Seconds, number: signal.Signals = signal.SIGINT, after_s: float =
 
 def test_a_second_request_skips_parking_and_none_reaches_the_torque_off():
     head, clock = Head(), Seconds()
-    head.during_parking = lambda: ask(clock)
+
+    def skipped() -> None:
+        ask(clock)
+        head.did.append("left off where it is safe")
+
+    head.during_parking = skipped
 
     def impatient() -> None:
         for _ in range(5):
@@ -126,7 +131,7 @@ def test_a_second_request_skips_parking_and_none_reaches_the_torque_off():
         leaving.switch_on(lambda: None)
         ask(clock)
         leaving.cause = interrupts() or ""
-    assert head.did == ["park", "off"]
+    assert head.did == ["park", "left off where it is safe", "off"]
     assert head.said == ["stopped by SIGINT: not parked (interrupted), torque off"]
 
 
