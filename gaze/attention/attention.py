@@ -19,6 +19,7 @@ from msgspec.structs import replace
 from gazerig.gaze.angles import add, norm, scale, sub
 from gazerig.gaze.attention.bottom_up import OWN_MOTION, BottomUp
 from gazerig.gaze.attention.face_memory import FaceMemory
+from gazerig.gaze.attention.finding import Finding, Sought
 from gazerig.gaze.attention.habituation import Habituation, HabituationParams
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.persons import Persons
@@ -191,6 +192,10 @@ class Attention:
         if (share, partner) != (self._share, self._partner) and share is not None:
             self._turned_s = self._reported_s = self._changed_s = t_s
         self._share, self._partner = share, None if share is None else partner
+
+    def search(self, sought: Sought, place: Vec3 | None, t_s: float) -> Finding:
+        """Return a search for a person with this reach; place: where it was seen last."""
+        return Finding(sought, place, self._idle.params, t_s)
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the target at ``t_s``."""

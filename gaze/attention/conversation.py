@@ -171,6 +171,8 @@ class ConversationGaze:
         attention: chooses among people.
         rng: draws looks away.
         turn_rng: draws the times of turns, and the head's own rates.
+
+    search: the search of the attention for a person
     """
 
     def __init__(
@@ -183,6 +185,7 @@ class ConversationGaze:
         turn_rng: np.random.Generator,
     ) -> None:
         self._attention, self._rng, self._turn_rng = attention, rng, turn_rng
+        self.search = attention.search
         self._own = exp(_INDIVIDUAL * float(turn_rng.standard_normal()))
         self._followed = FollowedLook(turn_rng)
         self.retune(looks_away, aversion, signs)

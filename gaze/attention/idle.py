@@ -100,11 +100,14 @@ class IdleParams:
 
 
 class Idle:
-    """Idle gaze: the target when attention has none."""
+    """Idle gaze: the target when attention has none.
+
+    params: the present parameters
+    """
 
     def __init__(self, params: IdleParams, rng: np.random.Generator) -> None:
         self._rng = rng
-        self._params = params
+        self.params = params
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
@@ -122,7 +125,7 @@ class Idle:
 
     def retune(self, params: IdleParams) -> None:
         """Change the parameters, from the next phase on."""
-        changed, self._params = params.explores != self._params.explores, params
+        changed, self.params = params.explores != self.params.explores, params
         if changed and not self._now.is_lost:
             self._start_rest(self._t_s)
 
@@ -180,13 +183,13 @@ class Idle:
             is_lost=True,
         )
         self._gone = replace(gone, p_world_m=there)
-        self._until_s = t_s + self._params.hold_ms / 1e3
+        self._until_s = t_s + self.params.hold_ms / 1e3
         self._search_until_s = self._until_s + SEARCH_S
         self._aside_s = self._search_until_s + _ASIDE_S[0]
 
     def _start_next_phase(self, t_s: float) -> None:
         """Start the next phase at ``t_s``, when the duration of the last one is over."""
-        if not self._params.explores:
+        if not self.params.explores:
             self._start_rest(t_s)
         elif self._gone is not None and t_s < self._search_until_s:
             self._search(self._gone, t_s)
@@ -204,7 +207,7 @@ class Idle:
         self._gone = None
         self._now = _idle_target("rest", -1, REST_M, t_s, "no one in sight")
         rest_s = self._draw_s(_REST_S) if self._count else _FIRST_REST_S
-        self._until_s = t_s + rest_s if self._params.explores else inf
+        self._until_s = t_s + rest_s if self.params.explores else inf
 
     def _search(self, gone: Target, t_s: float) -> None:
         """Start a search fixation: first a step in the direction of the loss, then around."""
@@ -217,7 +220,7 @@ class Idle:
         yaw, pitch = yaw_pitch(rel)
         to_yaw = yaw + share * out[0] + spread * float(rng.standard_normal())
         to_pitch = pitch + share * out[1] + 0.3 * spread * float(rng.standard_normal())
-        limit = radians(self._params.reach_deg)
+        limit = radians(self.params.reach_deg)
         here = self._yaw_pitch_now()[0]
         size = radians(_SEARCH_DEG) * float(rng.uniform(2.0, 4.0)) / 3.0
         step = size if to_yaw >= here else -size
@@ -231,7 +234,7 @@ class Idle:
     def _reachable(self, point: Vec3) -> Vec3:
         """Return a point, moved to at most one step beyond the range to the side."""
         rel = sub(point, _EYE)
-        (yaw, pitch), most = yaw_pitch(rel), radians(self._params.reach_deg + _SEARCH_DEG)
+        (yaw, pitch), most = yaw_pitch(rel), radians(self.params.reach_deg + _SEARCH_DEG)
         if abs(yaw) <= most:
             return point
         return add(_EYE, scale(direction((most if yaw > 0.0 else -most, pitch)), norm(rel)))
@@ -241,14 +244,14 @@ class Idle:
 
     def _is_far_aside(self) -> bool:
         """Return whether a search or a look at a thing has ended far from straight ahead."""
-        most_deg = _SEARCH_DEG if self._gone else self._params.glance_deg[0] + _ROUNDING_DEG
+        most_deg = _SEARCH_DEG if self._gone else self.params.glance_deg[0] + _ROUNDING_DEG
         aside_deg = abs(degrees(self._yaw_pitch_now()[0]))
         return self._now.kind in (SEARCH, "glance") and aside_deg > most_deg
 
     def _look_aside(self, t_s: float) -> None:
         """Look far to the other side."""
         self._side = -self._side
-        place = self._side * radians(self._params.reach_deg), 0.0
+        place = self._side * radians(self.params.reach_deg), 0.0
         self._look(SEARCH, place, REST_M[0], t_s, "looking about, no one in sight")
         self._until_s = t_s + float(self._rng.uniform(*_STAYS_ASIDE_S))
         self._aside_s = self._until_s + float(self._rng.uniform(*_ASIDE_S))
@@ -258,7 +261,7 @@ class Idle:
         soon = yaw_pitch(add(rel, scale(v_world_m_s, 0.05)))
         now = yaw_pitch(rel)
         yaw, pitch = wrap(soon[0] - now[0]), soon[1] - now[1]
-        size, aside = hypot(yaw, pitch), radians(min(18.0, self._params.reach_deg / 2.0))
+        size, aside = hypot(yaw, pitch), radians(min(18.0, self.params.reach_deg / 2.0))
         if size / 0.05 < radians(_LEAVING_DEG_S):
             return (0.0, 0.0)
         return yaw / size * aside, pitch / size * aside
@@ -278,7 +281,7 @@ class Idle:
 
     def _other_places(self, here: Angles2, t_s: float) -> list[Vec3]:
         """Return the places of things within reach and one shift, except the present target."""
-        most, far = radians(self._params.reach_deg), radians(self._params.glance_deg[0])
+        most, far = radians(self.params.reach_deg), radians(self.params.glance_deg[0])
         least, way = radians(_LEAST_DEG), direction(here)
         return [
             place
@@ -290,7 +293,7 @@ class Idle:
 
     def _draw_glance_point(self, here: Angles2) -> Angles2:
         """Draw the next point, by the size of shifts and the preference for the middle."""
-        rng, (wide, high) = self._rng, self._params.glance_deg
+        rng, (wide, high) = self._rng, self.params.glance_deg
         yaw, pitch = degrees(here[0]), degrees(here[1])
         far = _eccentricity_cost(yaw / wide, pitch / high)
         for _ in range(_TRIES):

@@ -9,8 +9,10 @@ from math import degrees, radians
 from msgspec.structs import replace
 
 from gazerig.gaze.angles import add, scale
+from gazerig.gaze.attention.finding import Finding, found
 from gazerig.gaze.types import (
     ORDERED,
+    SEARCH,
     Face,
     GazeCommand,
     GazeState,
@@ -22,6 +24,7 @@ from gazerig.gaze.types import (
 from gazerig.robot.model.commands import (
     HEARTBEAT_S,
     ControlCommand,
+    Find,
     Jog,
     Look,
     LookAt,
@@ -36,6 +39,7 @@ from gazerig.robot.model.reply import (
     CHARACTERS_PER_S,
     NO_CLIENT_CONTROL,
     NO_CONVERSATION,
+    NOT_FOUND,
     ControlState,
     ConversationState,
 )
@@ -81,6 +85,7 @@ class ClientControl:
     Attributes:
         point: Point to look at, world frame, None without one.
         face: Last observation of the person to look at, None without one.
+        search: Search for a person, None without one.
         pose_rad: Held joint angles, empty while the models move the joints.
         state: State at the last tick.
 
@@ -91,6 +96,7 @@ class ClientControl:
     def __init__(self, names: tuple[str, ...]) -> None:
         self.point: Vec3 | None = None
         self.face: Face | None = None
+        self.search: Finding | None = None
         self.pose_rad: JointAngles = ()
         self.state = NO_CLIENT_CONTROL
         self._names, self._jogged = names, dict[str, float]()
@@ -103,12 +109,12 @@ class ClientControl:
     @property
     def has_target(self) -> bool:
         """Return whether a client has chosen the gaze's target."""
-        return self.point is not None or self.face is not None
+        return self.point is not None or self.face is not None or self.search is not None
 
     @property
     def needs_camera(self) -> bool:
         """Return False if a client has chosen a point or joints, which need no camera."""
-        return not self.state.active or self.face is not None
+        return not self.state.active or (self.has_target and self.point is None)
 
     def look(
         self,
@@ -117,6 +123,7 @@ class ClientControl:
         point: Vec3 | None = None,
         face: Face | None = None,
         seen_s: float = 0.0,
+        search: Finding | None = None,
     ) -> None:
         """Look at a point or a person, without both free the gaze; joints are no longer held.
 
@@ -126,10 +133,12 @@ class ClientControl:
             point: Its point in the world.
             face: The visible face of its person.
             seen_s: Time of the frame that shows the face.
+            search: Search for its person.
         """
         before = self.state
         self.end(f"{command.who or 'a client'} looks elsewhere")
         self.point, self.face, self._seen_s = point, face, seen_s
+        self.search = search
         self._look = command
         self._shifts += 1
         if self.has_target:
@@ -153,7 +162,7 @@ class ClientControl:
                 self.state = replace(state, arrived=self.state.arrived)
             return
         if command.who != self._lease.who:
-            self.point = self.face = None
+            self.point = self.face = self.search = None
         angles = dict(zip(self._names, self.pose_rad or now_rad, strict=True))
         angles.update(command.angles_rad)
         self.pose_rad = tuple(angles.values())
@@ -174,12 +183,14 @@ class ClientControl:
             return "not renewed"
         if self.face is not None and t_s - self._seen_s > GONE_S:
             return f"person {self.face.id} is gone"
+        if self.search is not None and self.search.has_given_up(t_s):
+            return NOT_FOUND
         return ""
 
     def end(self, why: str) -> None:
         """End the control: the gaze models move the head again."""
         self._shifts += self.has_target
-        self.point = self.face = None
+        self.point = self.face = self.search = None
         self.pose_rad = ()
         self._jogged.clear()
         if self.state.active:
@@ -190,7 +201,9 @@ class ClientControl:
         chosen = self.chosen_target(percept, t_s)
         if chosen is None:
             return target
-        return replace(chosen, shift=target.shift + self._shifts, saliences=target.saliences)
+        looks = -chosen.id if chosen.kind == SEARCH else 0  # each look has its own number
+        shift = target.shift + self._shifts + looks
+        return replace(chosen, shift=shift, saliences=target.saliences)
 
     def chosen_target(self, percept: Percept | None, t_s: float) -> Target | None:
         """Return the client's target, None without one."""
@@ -199,6 +212,12 @@ class ClientControl:
                 self.point, (0.0, 0.0, 0.0), t_s, ORDERED, -1, 1.0, True, None,
                 self._shifts, "a user chose this point",
             )  # fmt: skip
+        if self.search is not None:
+            if percept is None or (wanted := self.search.face(percept)) is None:
+                return self.search.step(t_s)
+            self.face, self._seen_s, self.search = wanted, percept.captured_s, None
+            self._shifts += 1
+            self.state = replace(self.state, found=found(wanted))
         if self.face is None:
             return None
         for face in percept.faces if percept is not None else ():
@@ -228,7 +247,7 @@ class ClientControl:
             converges: Whether each eye pans separately.
             t_s: Time of the tick.
         """
-        if not self.state.active:
+        if not self.state.active or self.search is not None:
             return self.state
         limited = ""
         if self.pose_rad:
@@ -288,6 +307,8 @@ def _look_text(command: Look) -> str:
             return f"look in direction {degrees(yaw):.1f} {degrees(pitch):.1f} deg{of}"
         case LookAtPerson(person):
             return f"look at person {person}"
+        case Find(sought):
+            return f"find {sought}"
         case LookAtPixel(pixel):
             return f"look at pixel {pixel[0]:.0f} {pixel[1]:.0f}"
     return ""

@@ -27,6 +27,7 @@ from gazerig.robot.model.commands import (
     ControlCommand,
     EndTrack,
     Express,
+    Find,
     Jog,
     Look,
     LookAt,
@@ -173,7 +174,7 @@ class CommandExecutor:
         self.conversation = Conversation()
         self.commanded_rad: JointAngles = ()
         self.opponent: tuple[MovableOpponent, Callable[[], float | None]] | None = None
-        self._known: set[int] = set()
+        self._known: dict[int, Vec3] = {}
         self._taken_over = False
         self.reset()
 
@@ -324,7 +325,7 @@ class CommandExecutor:
         """Remember a frame and its people, whom commands may name although they are out of view."""
         self._detections, self._percept = detections, percept
         if percept is not None:
-            self._known.update(face.id for face in percept.faces)
+            self._known |= {face.id: face.p_world_m for face in percept.faces}
 
     def _choose(self, menu: str, choice: str, t_s: float) -> None:
         if menu == "behaviour":
@@ -348,6 +349,10 @@ class CommandExecutor:
         if isinstance(command, LookAtPerson):
             face, captured_s = self._face(command.id)
             self._change_control(lambda: self.lead.look(command, t_s, face=face, seen_s=captured_s))
+        elif isinstance(command, Find):
+            place = self._known.get(command.sought) if isinstance(command.sought, int) else None
+            search = self._robot.conversation_gaze.search(command.sought, place, t_s)
+            self._change_control(lambda: self.lead.look(command, t_s, search=search))
         else:
             point = self._point(command)
             self._change_control(lambda: self.lead.look(command, t_s, point))

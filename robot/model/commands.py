@@ -134,6 +134,16 @@ class LookAtPerson(Look, frozen=True):
     id: _Number
 
 
+class Find(Look, frozen=True):
+    """Search for a person, look at the one who is found and follow.
+
+    Attributes:
+        sought: Perception's number, or a side of the head on which anybody is wanted.
+    """
+
+    sought: _Number | Literal["left", "right", "anybody"] = "anybody"
+
+
 class LookAtPixel(Look, frozen=True):
     """Look at the object at a pixel of a camera frame.
 
@@ -327,7 +337,7 @@ class Tune(Command, frozen=True):
 
 
 AnyCommand = (
-    Ask | LookAt | LookAtDirection | LookAtPerson | LookAtPixel | Jog | Express
+    Ask | LookAt | LookAtDirection | LookAtPerson | LookAtPixel | Find | Jog | Express
     | SetLevel | Play | EndTrack | SyncTrack | Talk | Say | Speak | MoveOpponent | Renew | Stop
     | Resume | Tune
 )  # fmt: skip

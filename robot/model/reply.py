@@ -10,6 +10,7 @@ from typing import Literal
 
 from msgspec import Struct
 
+from gazerig.gaze.attention.finding import Found
 from gazerig.gaze.track.player import TrackState as TrackState
 from gazerig.gaze.track.track import FINISHED as FINISHED
 from gazerig.gaze.types import TurnState
@@ -34,6 +35,7 @@ class ControlState(Struct, frozen=True):
         description: Command as text, e.g. "look at 1 0 0.3", "neck_yaw at 17.2 deg".
         joints: Held joints.
         limited: Error of a gaze that rests off its point, and the angles that limit it, else "".
+        found: Person whom a search has found, None without one.
     """
 
     number: int = 0
@@ -46,6 +48,7 @@ class ControlState(Struct, frozen=True):
     description: str = ""
     joints: tuple[str, ...] = ()
     limited: str = ""
+    found: Found | None = None
 
     @property
     def client(self) -> str:
@@ -54,6 +57,8 @@ class ControlState(Struct, frozen=True):
 
 
 NO_CLIENT_CONTROL = ControlState()
+NOT_FOUND = "nobody was found"
+"""Reason for the end of a search."""
 
 
 class ConversationState(Struct, frozen=True):
@@ -227,15 +232,16 @@ CommandTaker = Callable[[Command], Ticket | None]
 """Accepts a command for the next tick, like Robot.command; returns None if there is no reply."""
 
 
-Outcome = Literal["arrived", "refused", "out of reach", "taken over", "timed out"]
+Outcome = Literal["arrived", "refused", "out of reach", "not found", "taken over", "timed out"]
 """How an order ended.
 
 arrived: the gaze was measured within 1 degree of the point, or the joint within 1 degree of its
-    angle; a track has ended; any other order was accepted
+    angle; a track has ended; any other order was accepted. ``Order.why`` gives a found person
 refused: nothing was done; ``Order.why`` gives the reason
 out of reach: the gaze rests more than 1 degree off the point, at the limits of the joints.
     ``Order.why`` gives the error, and the angles that limit it. The order keeps control, and the
     head goes as far as it can
+not found: a search has found nobody
 taken over: another source controls the head now, or control has ended; ``Order.why`` gives
     the reason
 timed out: none of these within the given time
@@ -277,7 +283,7 @@ def command_outcome(reply: CommandReply, now: Progress) -> tuple[Outcome, str] |
     if control.number > reply.control_number:
         return "taken over", control.client or control.end_reason
     if control.arrived:
-        return "arrived", ""
+        return "arrived", control.found.text() if control.found is not None else ""
     if not control.active:
-        return "taken over", control.end_reason
+        return "not found" if control.end_reason == NOT_FOUND else "taken over", control.end_reason
     return ("out of reach", control.limited) if control.limited else None

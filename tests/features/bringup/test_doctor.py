@@ -8,7 +8,7 @@ import pytest
 from msgspec import structs
 from present import present
 
-from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.feetech.memory_table import REGISTERS
 from gazerig.drivers.i2c.transfers import write
 from gazerig.drivers.maestro.board import MaestroParams
@@ -38,7 +38,6 @@ from gazerig.features.bringup.servo_setup import (
 from gazerig.robot.model.coupling import far_outside
 from gazerig.robot.model.joint import JointLimit
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
-from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
@@ -548,49 +547,6 @@ def test_another_model_is_refused_and_left_alone(kind):
     with pytest.raises(ServoMissing, match=r"this is model number \d+, neck_yaw \(servo 7\) wants"):
         bench.assign()
     assert bytes(bench.chain[1].memory.bytes[:40]) == before
-
-
-# --- Dynamixel servos, packet by packet
-
-
-class StubbornPort(InProcessPort):
-    """A port whose servo refuses writes to one address."""
-
-    address = None
-
-    def write(self, data):
-        if data[7] == 0x03 and data[8] == self.address:
-            self._waiting += status(data[4], 7, b"")
-            return
-        super().write(data)
-
-
-@pytest.mark.parametrize(
-    ("address", "says"),
-    [
-        (7, r"the id 7 \(error 7\); it answered last as id 1 at 57600"),
-        (8, rf"{BAUD} bit/s \(error 7\); it answered last as id 7 at 57600"),
-    ],
-)
-def test_a_refusal_says_where_the_servo_answers_now(address, says):
-    bench = Bench()
-    bench.port = StubbornPort(bench.chain)
-    bench.port.address = address
-    with pytest.raises(ServoFault, match=says):
-        bench.assign()
-
-
-@pytest.mark.parametrize("address", [7, 8])
-def test_a_lost_confirmation_does_not_matter(address):
-    class Lossy(InProcessPort):
-        def write(self, data):
-            super().write(data)
-            if data[7] == 0x03 and data[8] == address:
-                self.drain()
-
-    bench = Bench()
-    bench.port = Lossy(bench.chain)
-    assert bench.assign()[0] == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
 
 
 # --- Searching a port for every kind: servos are found, and none is moved or changed
