@@ -104,6 +104,7 @@ class AsyncHead:
     look_at = _order(Head.look_at)
     look_towards = _order(Head.look_towards)
     look_at_person = _order(Head.look_at_person)
+    find = _order(Head.find)
     look_at_pixel = _order(Head.look_at_pixel)
     look_freely = _order(Head.look_freely)
     jog = _order(Head.jog)
@@ -127,6 +128,7 @@ class AsyncHead:
     save = _call(Head.save)
     revert = _call(Head.revert)
     menus = _call(Head.menus)
+    picture = _call(Head.picture)
 
     async def state(self) -> HeadState:
         """Return the newest tick of the control loop."""

@@ -9,6 +9,7 @@ from typing import Any, Literal, Self
 
 from gazerig.drivers.sound.params import KINDS
 from gazerig.errors import HeadEnded, Refused
+from gazerig.gaze.attention.finding import Sought
 from gazerig.robot.loop.head_state import (
     EventKind,
     GazeReading,
@@ -24,6 +25,7 @@ from gazerig.robot.model.commands import (
     Command,
     EndTrack,
     Express,
+    Find,
     Frame,
     Get,
     Jog,
@@ -34,6 +36,7 @@ from gazerig.robot.model.commands import (
     MoveOpponent,
     Play,
     ReadMenus,
+    ReadPicture,
     Request,
     Resume,
     Revert,
@@ -108,7 +111,7 @@ class Order:
 
     @property
     def why(self) -> str:
-        """Return why the order was refused, taken over or out of reach, "" if it was not."""
+        """Return why the order was refused, taken over or out of reach, or who was found."""
         return self._why if self.outcome is not None else ""
 
     def wait(self, timeout_s: float | None = 10.0) -> Outcome:
@@ -218,6 +221,17 @@ class Head(ABC):
             for_s: seconds until the order gives up control.
         """
         return self._send(LookAtPerson(id, stay=self._stay, for_s=for_s))
+
+    def find(self, sought: Sought = "anybody") -> Order:
+        """Search for a person for at most 7.5 s; look at the one who is found, and follow.
+
+        ``Order.wait`` returns "arrived" or "not found", ``Order.why`` who is where; the numbers are
+        in ``state.client_control.found``.
+
+        Args:
+            sought: ``Person.id``, or "left" or "right" for anybody on that side of the head.
+        """
+        return self._send(Find(sought, stay=self._stay))
 
     def look_at_pixel(
         self, x_px: float, y_px: float, *, distance_m: float | None = None,
@@ -502,6 +516,14 @@ class Head(ABC):
     def people(self) -> tuple[Person, ...]:
         """Return the people who are visible."""
         return self.state.people
+
+    def picture(self) -> bytes:
+        """Return the newest picture of the camera, a JPEG.
+
+        Raises:
+            Refused: there is none.
+        """
+        return bytes(self._ask(ReadPicture(), bytes))
 
     def states(self, rate_hz: float = 50.0, *, seconds: float | None = None) -> Iterator[HeadState]:
         """Return an iterator over the newest states; states that are not read in time are dropped.

@@ -278,7 +278,7 @@ class SimulatedHead(LocalHead):
             self._tick()
 
     def run_until(self, condition: Callable[[HeadState], Any], timeout_s: float = 60.0) -> bool:
-        """Step until a condition is true; return whether it became true.
+        """Step until a condition is true; return whether it is.
 
         Args:
             condition: is called with the state after each tick.
@@ -287,12 +287,9 @@ class SimulatedHead(LocalHead):
         Raises:
             HeadEnded: a fault has ended the head.
         """
-        end_s = self.time_s + timeout_s - 1e-9
-        while self.time_s < end_s:
-            self._tick()
-            if condition(self.state):
-                return True
-        return False
+        self._tick()
+        self._pause(lambda: condition(self.state), timeout_s)
+        return bool(condition(self.state))
 
     def _say_stream(
         self, pieces: Iterable[bytes], rate_hz: int, channels: int, volume: float

@@ -308,7 +308,7 @@ def _look_text(command: Look) -> str:
         case LookAtPerson(person):
             return f"look at person {person}"
         case Find(sought):
-            return f"find {sought}"
+            return f"find person {sought}" if isinstance(sought, int) else f"find {sought}"
         case LookAtPixel(pixel):
             return f"look at pixel {pixel[0]:.0f} {pixel[1]:.0f}"
     return ""

@@ -351,7 +351,7 @@ class CommandExecutor:
             self._change_control(lambda: self.lead.look(command, t_s, face=face, seen_s=captured_s))
         elif isinstance(command, Find):
             place = self._known.get(command.sought) if isinstance(command.sought, int) else None
-            search = self._robot.conversation_gaze.search(command.sought, place, t_s)
+            search = self._gaze.search(command.sought, place, t_s)
             self._change_control(lambda: self.lead.look(command, t_s, search=search))
         else:
             point = self._point(command)

@@ -424,6 +424,10 @@ class ReadMenus(Request, frozen=True, tag="menus"):
     """Behaviours, modes of conversation, lid movements, characters; the present one first."""
 
 
+class ReadPicture(Request, frozen=True, tag="picture"):
+    """The newest picture of the camera as a JPEG, in JSON base64."""
+
+
 class Tracks(Request, frozen=True):
     """Tracks, and why the rig refuses them."""
 
@@ -476,7 +480,9 @@ class Fault(Request, frozen=True):
     text: str
 
 
-Question = Hello | ReadStatus | State | ReadMenus | Tracks | Parameters | Get | Unsaved
+Question = (
+    Hello | ReadStatus | State | ReadMenus | ReadPicture | Tracks | Parameters | Get | Unsaved
+)
 Change = Set | Save | Revert | SayPiece | Fault
 SLOW: frozenset[str] = frozenset((*map(verb, get_args(Change)), "say"))
 """Requests that may read or write files."""

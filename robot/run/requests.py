@@ -23,6 +23,7 @@ from gazerig.robot.model.commands import (
     Hello,
     Parameters,
     ReadMenus,
+    ReadPicture,
     ReadStatus,
     Request,
     Resume,
@@ -167,6 +168,8 @@ class RequestHandler:
         match request:
             case ReadMenus():
                 return {**self._run.robot.menus(), "character": params.characters()}
+            case ReadPicture():
+                return self._picture()
             case SayPiece():
                 return self._say_piece(request)
             case Parameters(prefix):
@@ -193,6 +196,15 @@ class RequestHandler:
         if self._confined:
             self._run.params.confined.check_changes(changes)
         return self._run.params.set(changes)
+
+    def _picture(self) -> bytes:
+        tick = self._feed.newest
+        seen = tick.detections if tick is not None else None
+        if seen is None or seen.image is None:
+            raise ValueError("there is no picture: no camera runs, or the scene is not drawn")
+        import cv2  # a program that asks for no picture does not wait for it
+
+        return bytes(cv2.imencode(".jpg", seen.image)[1])
 
     def _say_piece(self, piece: SayPiece) -> float:
         """Say a piece of a stream; return the length that has not been heard, s."""
