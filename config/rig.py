@@ -29,6 +29,7 @@ from gazerig.gaze.oculomotor.head import HeadParams
 from gazerig.gaze.oculomotor.pursuit import PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
+from gazerig.gaze.schedule import TrackStart
 from gazerig.gaze.track.animation import LevelParams
 from gazerig.params import Bounds, Choices, Unit, Unlisted
 from gazerig.robot.model.clock import LoopParams
@@ -164,6 +165,7 @@ class Rig(PluginSections):
     guard: Annotated[GuardParams, "safety"] = GuardParams()
     gaze: Annotated[GazeConfig, "gaze models"] = GazeConfig()
     track_files: Annotated[tuple[str, ...], "YAML files with further tracks, relative to this file; file names are track names"] = ()
+    schedule: Annotated[Mapping[str, TrackStart], "tracks that start by themselves, by name"] = field(default_factory=dict)
     sound: Annotated[SoundParams, "loudspeaker and voice"] = SoundParams()
     expressions: Annotated[Mapping[str, Mapping[str, _Degrees]], Unit("deg"),
         "facial expressions: name -> joint -> angle added to it; for a lid, to the open lid"] = field(default_factory=dict)

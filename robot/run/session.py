@@ -7,8 +7,11 @@ it. Then the observers are closed, the recording last, and the processes of the 
 import contextlib
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from datetime import datetime
+from functools import partial
 
 from gazerig.drivers.errors import SetupError
+from gazerig.gaze.schedule import Schedule
 from gazerig.robot.loop.events import group_events, is_register_change
 from gazerig.robot.loop.joint_faults import JointFaults
 from gazerig.robot.loop.loop import LoopCount, Tick, TickLoop
@@ -16,6 +19,7 @@ from gazerig.robot.loop.power_down import Again, Interrupts, PowerDown
 from gazerig.robot.loop.tick_stream import Observers
 from gazerig.robot.loop.timing import SWITCH_INTERVAL, frozen_objects
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.commands import Play
 from gazerig.robot.run.observers import RunObservers
 from gazerig.robot.run.run import Run
 
@@ -135,6 +139,8 @@ class Session:
                 self._say(f"{tick.t_s - self._start_s:.2f} s: {event}")
 
         observers.add("the log", print_events)
+        if starts := self._run.rig.schedule:
+            observers.add("the schedule", partial(self._start_tracks, Schedule(starts)))
         if self._watch is not None:
             observers.add("the program", self._watch)
         return observers
@@ -144,6 +150,24 @@ class Session:
         if self._last is not None:
             self._target_s[tick.target.kind] += tick.t_s - self._last.t_s
         self._last = tick
+
+    def _start_tracks(self, schedule: Schedule, tick: Tick) -> None:
+        """Order the tracks that start now, unless a client or another show leads.
+
+        In simulated time a run begins at midnight: the same seed gives the same bytes.
+        """
+        now, run = datetime.now(), self._run
+        day_s = 3600.0 * now.hour + 60.0 * now.minute + now.second + 1e-6 * now.microsecond
+        if run.options.fast:
+            day_s = tick.t_s - self._start_s
+        shows = any(track.owns and track.is_playing for track in tick.tracks)
+        leads = shows or tick.stopped or tick.controlled_by
+        for name in schedule.due(tick.percept, tick.t_s, day_s):
+            try:
+                if not leads:
+                    run.robot.command(Play(name, who="schedule"))
+            except ValueError as error:
+                run.robot.report(f"schedule: {error}")
 
     def _stop_reason(self, seconds: float) -> str | None:
         """Return the reason for ending the run now, None while it continues."""
