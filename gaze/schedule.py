@@ -1,8 +1,9 @@
-"""When the tracks of a show start by themselves: at a time of day, at an interval, with visitors."""
+"""Starts of tracks that no program orders: times of day, intervals, people who come and go."""
 
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from datetime import datetime, time
 from typing import Annotated, Literal
 
 from gazerig.gaze.types import Percept
@@ -30,15 +31,20 @@ class TrackStart:
         Raises:
             ValueError: one is not a time of day.
         """
-        for time in self.at:
-            if not _TIME.fullmatch(time):
-                raise ValueError(f'at: {time!r} is no time of day; write "00:00" to "23:59"')
+        for text in self.at:
+            if not _TIME.fullmatch(text):
+                raise ValueError(f'at: {text!r} is no time of day; write "00:00" to "23:59"')
 
     @property
     def times_s(self) -> list[float]:
         """Return the times of day in seconds since midnight."""
-        found = [_TIME.fullmatch(time) for time in self.at]
+        found = [_TIME.fullmatch(text) for text in self.at]
         return [3600.0 * int(one[1]) + 60.0 * int(one[2]) for one in found if one is not None]
+
+
+def seconds_of_day(now: datetime) -> float:
+    """Return the time since midnight."""
+    return (now - datetime.combine(now, time())).total_seconds()
 
 
 class Schedule:

@@ -42,25 +42,13 @@ class CameraBench:
     wait: Callable[[], None] = lambda: time.sleep(0.001)  # noqa: TID251 - for its thread
     lose: Callable[[], None] | None = None
 
-    def until(self, done: Callable[[], object]) -> None:
-        """Wait until a condition is true."""
+    def next_frame(self, camera: Camera, after: int = 0) -> Detections:
+        """Wait for a frame with a higher number, and return it."""
         end_s = time.monotonic() + LONGEST_S  # noqa: TID251
-        while not done():
+        while (frame := camera.latest(self.now_s())) is None or frame.number <= after:
             assert time.monotonic() < end_s, "the camera hangs"  # noqa: TID251
             self.wait()
-
-    def next_frame(self, camera: Camera, after: int = 0) -> Detections:
-        """Return a frame with a higher number."""
-        newest: list[Detections] = []
-
-        def has_come() -> object:
-            frame = camera.latest(self.now_s())
-            if frame is not None and frame.number > after:
-                newest.append(frame)
-            return newest
-
-        self.until(has_come)
-        return newest[0]
+        return frame
 
 
 class _NoDetections:

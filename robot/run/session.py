@@ -11,7 +11,7 @@ from datetime import datetime
 from functools import partial
 
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.schedule import Schedule
+from gazerig.gaze.schedule import Schedule, seconds_of_day
 from gazerig.robot.loop.events import group_events, is_register_change
 from gazerig.robot.loop.joint_faults import JointFaults
 from gazerig.robot.loop.loop import LoopCount, Tick, TickLoop
@@ -156,18 +156,16 @@ class Session:
 
         In simulated time a run begins at midnight: the same seed gives the same bytes.
         """
-        now, run = datetime.now(), self._run
-        day_s = 3600.0 * now.hour + 60.0 * now.minute + now.second + 1e-6 * now.microsecond
-        if run.options.fast:
-            day_s = tick.t_s - self._start_s
-        shows = any(track.owns and track.is_playing for track in tick.tracks)
-        leads = shows or tick.stopped or tick.controlled_by
+        robot, since_s = self._run.robot, tick.t_s - self._start_s
+        day_s = since_s if self._run.options.fast else seconds_of_day(datetime.now())
+        source = tick.control_source
         for name in schedule.due(tick.percept, tick.t_s, day_s):
+            if source.overrides_gaze or source.joints:
+                continue
             try:
-                if not leads:
-                    run.robot.command(Play(name, who="schedule"))
+                robot.command(Play(name, who="schedule"))
             except ValueError as error:
-                run.robot.report(f"schedule: {error}")
+                robot.report(f"schedule: {error}")
 
     def _stop_reason(self, seconds: float) -> str | None:
         """Return the reason for ending the run now, None while it continues."""

@@ -123,6 +123,35 @@ def test_the_own_door_passes_words_on(monkeypatch: pytest.MonkeyPatch, shown: Sh
     assert head.states == ["listening", "speaking"]
 
 
+def test_desks_keys_and_buttons_start_tracks(monkeypatch: pytest.MonkeyPatch, shown: Shown):
+    def play(track: str) -> Any:
+        return SimpleNamespace(reply=SimpleNamespace(text=lambda: track))
+
+    def serve(address: object, desk: dict[str, Callable[..., None]]) -> Any:
+        return SimpleNamespace(serve_forever=lambda: desk["/play"]("/play", "nod"))
+
+    class Desk(dict[str, Callable[..., None]]):
+        map = dict.__setitem__
+
+    monkeypatch.setattr(gazerig, "connect", lambda **_: nullcontext(SimpleNamespace(play=play)))
+    key = SimpleNamespace(type="note_on", velocity=9, note=60)
+    presses = iter((None,))
+    button = SimpleNamespace(wait_for_press=lambda: next(presses), wait_for_release=bool)
+    packages: dict[str, dict[str, dict[str, Any]]] = {
+        "osc": {"dispatcher": {"Dispatcher": Desk}, "osc_server": {"BlockingOSCUDPServer": serve}},
+        "midi": {"mido": {"open_input": lambda: nullcontext([key])}},
+        "gpio": {"gpiozero": {"Button": lambda pin: button}},
+    }
+    for example, modules in packages.items():
+        with pytest.raises(SystemExit, match="pip install"):
+            shown(f"{example}.py")
+        for name, content in modules.items():
+            prefix = "pythonosc." if example == "osc" else ""
+            monkeypatch.setitem(sys.modules, f"{prefix}{name}", SimpleNamespace(**content))
+        with nullcontext() if example != "gpio" else pytest.raises(StopIteration):
+            shown(f"{example}.py")
+
+
 @pytest.mark.slow
 def test_the_sweep_shows_what_speeds_do_and_repeats_itself(shown: Shown):
     lines = shown("sweep.py")
