@@ -31,7 +31,7 @@ sys.path.insert(0, str(TESTS.parent / "helpers"))
 LONG_S, LONG_SEEDS = 300.0, 3
 SHORT_S = 60.0
 SHORT = (
-    *(f"human/{number}" for number in (43, 44, 1, 2, 42, 14, 4, 6, 9, 10, 11, 13, 15, 17, 48)),
+    *(f"human/{number}" for number in (44, 1, 2, 42, 14, 4, 6, 9, 10, 11, 13, 15, 17, 48)),
     *(f"seeing/{number}" for number in (2, 3, 5, 11)),
 )
 """Rows whose figures settle in a short run; the gain of human/35 scatters by .01 between seeds."""

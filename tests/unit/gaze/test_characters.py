@@ -89,16 +89,6 @@ def test_the_bold_look_at_a_face_more_than_the_shy():
     assert shy < bold - 0.1
 
 
-@pytest.mark.parametrize("rig", shipped_names("rigs"))
-@pytest.mark.parametrize("character", CHARACTERS)
-def test_a_character_changes_one_rule_of_those_a_rig_has_by_default(rig: str, character: str):
-    rules = load_rig(rig, character).gaze.top_down.rules
-    assert {"wait", "guard", "attack"} <= set(rules)
-    assert rules["wait"].look_at == "face"
-    if character in ("shy", "sleepy"):
-        assert rules["wait"].salience < load_rig(rig).gaze.top_down.rules["wait"].salience
-
-
 def test_a_rig_of_its_own_rules_keeps_them_alone_under_a_character(tmp_path: Path):
     own = tmp_path / "own.yaml"
     text = shipped_path("rigs", "maker").read_text()
