@@ -6,6 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from gazerig.drivers.errors import BusLost, SetupError
+from gazerig.program_signals import ProgramSignals
 from gazerig.robot.loop.power_down import SAME_REQUEST_S, Interrupts, PowerDown
 
 
@@ -176,3 +177,27 @@ def test_handlers_are_put_back_and_nohup_is_heeded():
             assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+class ParkingHead:
+    """A head of a program that parks, and is asked to end."""
+
+    closing = True
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def end(self, reason: str) -> None:
+        self.asked.append(reason)
+
+
+def test_signals_of_one_closed_terminal_do_not_skip_the_parking_of_a_program_s_head():
+    signals, head = ProgramSignals(), ParkingHead()
+    signals.add(head)
+    try:
+        for number in (signal.SIGTERM, signal.SIGTERM, signal.SIGHUP):
+            signal.raise_signal(number)
+    finally:
+        signals.remove(head)
+    assert head.asked == ["SIGTERM"]
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
