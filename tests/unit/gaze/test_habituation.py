@@ -1,8 +1,9 @@
 """Interest that wears off, the place just left, and several people who share the gaze."""
 
 from itertools import groupby
-from math import exp, radians
-from typing import Literal
+from math import exp, log, radians
+from types import SimpleNamespace
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -84,6 +85,17 @@ def test_a_rule_keeps_its_floor_of_interest():
     assert model.share(two, 2, 1.0)[1] == 1.0
     assert model.share(two, -1, 1.0)[2] == pytest.approx(0.6 + 0.4 * exp(-0.6), abs=0.01)
     assert model.share({2: 0.5}, 2, 9.0) == {2: 1.0}  # one alone is not left for habituation
+
+
+@pytest.mark.parametrize(("drawn", "stay_s"), [(-99.0, 0.0), (0.0, 1.28), (99.0, 6.0)])
+def test_a_look_lasts_longer_by_a_draw_and_by_six_seconds_at_most(drawn: float, stay_s: float):
+    rng: Any = SimpleNamespace(standard_normal=lambda: drawn)
+    model = Habituation(PARAMS, rng)
+    model.start_stay(1)
+    looks = (k / 30 for k in range(400))
+    lasts_s = next(t_s for t_s in looks if model.share({1: 1.0, 2: 1.0}, 1, t_s)[1] < 1.0)
+    # What has been seen fades within 10 s.
+    assert lasts_s == pytest.approx(-10.0 * log(1.0 - 0.1 * (0.6 + stay_s)), abs=0.04)
 
 
 @pytest.mark.parametrize(("aside_deg", "age_s"), [(0.0, 0.0), (4.0, 0.0), (4.0, 1.5), (20.0, 0.0)])
