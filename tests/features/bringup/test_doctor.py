@@ -168,7 +168,9 @@ def test_a_joint_far_outside_its_range_is_an_error_with_the_text_of_a_refused_ru
     specs = [ServoSpec(1, EYE[kind.name], 4050), ServoSpec(2, EYE[kind.name], 2500)]
     findings = Rig(kind, [*specs, ServoSpec(7, NECK[kind.name], 2048)]).check()
     far = one(findings, "error", PAN, "141 deg outside its range -34.98..34.98 deg: a slipped horn")
-    assert "gazerig run --recover" in far.remedy and "gazerig calibrate --joint" in far.remedy
+    assert (
+        "gazerig run RIG --recover" in far.remedy and "gazerig calibrate RIG --joint" in far.remedy
+    )
     assert not [
         f for f in findings if f.where == PAN and "is at step" in f.what and f.level != "ok"
     ]
@@ -227,7 +229,7 @@ def test_a_wrong_model_or_two_servos_are_not_judged_further(kind):
     other = found_as(kind, number=1240 if kind is DYNAMIXEL else 1029)
     (only,) = apply_rules(servo_state(kind, found=other, torque_enable=1))
     assert only.level == "error" and f"the YAML says {EYE[kind.name]}" in only.what
-    assert "gazerig setup --joint left_eye_pan" in only.remedy
+    assert "gazerig setup RIG --joint left_eye_pan" in only.remedy
     (only,) = apply_rules(servo_state(kind, shares_id=True, torque_enable=1))
     assert "two servos share id 1" in only.what
 

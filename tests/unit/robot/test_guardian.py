@@ -137,14 +137,18 @@ class Unattended(Guardian):
         pass
 
 
-@pytest.fixture
-def sts():
-    rig, guardian = StsRig(), Unattended()
+def guarded(setups=None):
+    rig, guardian = StsRig(setups=setups), Unattended()
     rig.inner = rig.bus  # type: ignore[attr-defined]
     rig.bus = GuardedBus(rig.inner, rig.setups, guardian, 0)  # type: ignore[attr-defined]
     rig.guardian = guardian  # type: ignore[attr-defined]
     rig.bus.open()
     return rig
+
+
+@pytest.fixture
+def sts():
+    return guarded()
 
 
 def test_it_watches_from_before_torque_on_until_torque_off(sts):
@@ -204,8 +208,8 @@ def test_servos_that_refuse_are_asked_again_and_get_no_goals(sts):
     assert any("torque on again" in line for line in sts.bus.events())
 
 
-def test_a_joint_far_outside_its_range_gets_no_torque_again(sts):
-    sts.bus.retune([setup._replace(far_steps=100.0) for setup in sts.setups])
+def test_a_joint_far_outside_its_range_gets_no_torque_again():
+    sts = guarded([setup._replace(far_steps=100.0) for setup in StsRig().setups])
     sts.bus.enable_torque()
     sts.run(0.3, [2000] * 4)
     sts.bus.events()
