@@ -1,6 +1,6 @@
 """Gaze around turns beside people, in the report and in the export for eye-tracking tools."""
 
-from collections.abc import Iterator
+from itertools import cycle
 from math import degrees
 from typing import Any, get_args
 
@@ -19,34 +19,22 @@ from gazerig.gaze.attention.conversation import (
 )
 from gazerig.gaze.types import TurnState
 
-
-def scripted_turns(role: Role, rng: np.random.Generator) -> Iterator[tuple[TurnState, float]]:
-    """Return states and their durations without end.
-
-    speaking: monologues of 20 to 60 s after a thought; listening: the same of the partner;
-    dialogue: turns of some 3 s by both, with thoughts.
-    """
-    while True:
-        if role == "listening":
-            yield "listening", float(rng.uniform(20.0, 60.0))
-        elif role == "dialogue":
-            yield "listening", float(np.clip(rng.lognormal(np.log(3.0), 0.7), 0.7, 9.5))
-            yield "thinking", float(rng.uniform(0.4, 1.0))
-            yield "speaking", float(np.clip(rng.lognormal(np.log(3.5), 0.6), 0.7, 9.5))
-        else:
-            yield "listening", 1.0
-            yield "thinking", float(rng.uniform(0.5, 1.0))
-            yield "speaking", float(rng.uniform(20.0, 60.0))
+SCRIPTS: dict[Role, tuple[tuple[TurnState, float], ...]] = {
+    "speaking": (("listening", 1.0), ("thinking", 0.75), ("speaking", 40.0)),
+    "listening": (("listening", 40.0),),
+    "dialogue": (("listening", 3.1), ("thinking", 0.7), ("speaking", 3.6)),
+}
+"""States and their seconds, again and again: monologues, the partner's, and turns of both."""
 
 
 def model_alone(role: Role) -> GazeTrace:
     """Return 20 minutes of looks away and turns, without a robot, before a face at 1 m."""
-    random = [np.random.default_rng((1, n)) for n in range(4)]
-    attention: Any = type("Unused", (), {"converse": lambda *of: None})()
+    random = [np.random.default_rng((1, n)) for n in range(3)]
+    attention: Any = type("Unused", (), {"converse": lambda *of: None, "search": None})()
     params = AversionParams(), ConversationParams()
     gaze = ConversationGaze("people", *params, attention, *random[:2])
     face = target(salience=1.0, top_down=True)
-    script, rests_s, end_s, number, rows = scripted_turns(role, random[2]), 0.0, 0.0, 0, []
+    script, rests_s, end_s, number, rows = cycle(SCRIPTS[role]), 0.0, 0.0, 0, []
     for t_s in np.arange(0.0, 1200.0, 0.05).tolist():
         if t_s >= end_s:
             state, lasts_s = next(script)
@@ -55,7 +43,7 @@ def model_alone(role: Role) -> GazeTrace:
         gaze.step(t_s)
         look = gaze.look(face, (0.0, 0.0, 0.0), t_s, False, rests_s)
         if t_s > rests_s:
-            rests_s = t_s + float(random[3].exponential(0.3))  # looks at parts of the face
+            rests_s = t_s + float(random[2].exponential(0.3))  # looks at parts of the face
         yaw, pitch = yaw_pitch(look.p_world_m)
         rows.append((t_s, STATES.index(state), number, degrees(yaw), degrees(pitch)))
     table = np.zeros(len(rows), ROW)

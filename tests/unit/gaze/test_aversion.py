@@ -30,7 +30,7 @@ def face(shift: int = 1, name: int = 4) -> Target:
     return replace(eye, part="LE", why="left eye of face 4")
 
 
-ATTENTION: Any = SimpleNamespace(converse=lambda *of: None)
+ATTENTION: Any = SimpleNamespace(converse=lambda *of: None, search=None)
 PARAMS = AversionParams(), ConversationParams()
 
 
