@@ -130,3 +130,34 @@ def test_nobody_of_many_waits_for_long_and_no_look_is_a_glance(n: int):
     targets = watch(arc(*[1.5] * n), 60.0)
     assert max(waits_s(targets, n)) < 15.0 and min(shares(targets).values()) > 0.75 / n
     assert min(stays_s(targets)[n:]) > 1.0
+
+
+def sharing() -> Habituation:
+    return Habituation(HabituationParams(), NO_STAYS)
+
+
+def test_surpluses_grow_with_the_looks_and_are_those_over_the_one_looked_at_least():
+    shared, three = sharing(), dict.fromkeys((1, 2, 3), 1.0)
+    assert shared.surpluses(three, -1, 0.0) == {1: 0.0, 2: 0.0, 3: 0.0}
+    assert shared.surpluses(three, 2, 0.5) == pytest.approx({1: 0.0, 2: 0.5, 3: 0.0})
+    # A new person is behind no one; the heaviest of similar ones comes first.
+    assert shared.surpluses({2: 0.5, 4: 1.0}, 4, 0.5)[4] == 0.0
+    found = shared.surpluses({1: 1.0, 2: 0.5, 4: 1.0}, 1, 0.9)
+    assert found[4] == 0.0 and found[1] == pytest.approx(0.4) and 0.45 < found[2] < 0.5
+
+
+def test_a_look_at_a_body_of_half_the_weight_counts_twice():
+    shared, two = sharing(), {1: 1.0, 2: 0.5}
+    shared.surpluses(two, -1, 0.0)
+    shared.surpluses(two, 1, 1.0)
+    assert shared.surpluses(two, 2, 1.5)[1] == pytest.approx(0.0, abs=0.1)
+
+
+def test_surpluses_are_bounded_fade_and_are_forgotten():
+    shared, three = sharing(), dict.fromkeys((1, 2, 3), 1.0)
+    for k in range(100):
+        found = shared.surpluses(three, 1, 0.5 * k)
+    assert found == {1: 8.0, 2: 0.0, 3: 0.0}
+    assert 0.0 < shared.surpluses(three, -1, 60.0)[1] < 3.0
+    shared.reset(60.0)
+    assert shared.surpluses(three, -1, 60.0) == {1: 0.0, 2: 0.0, 3: 0.0}
