@@ -16,12 +16,14 @@ from gazerig.drivers.sound.params import KINDS
 from gazerig.params import unknown_text
 from gazerig.robot.cli.options import PidOption
 from gazerig.robot.cli.terminal import FAULT, clear_errors, confirm, say
+from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import (
     NO_TRACK,
     AnyCommand,
     Ask,
     Command,
     Fault,
+    Find,
     Look,
     LookAt,
     LookAtPerson,
@@ -37,6 +39,7 @@ from gazerig.robot.model.commands import (
     Unsaved,
 )
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
+from gazerig.robot.model.reply import Progress, command_outcome
 from gazerig.robot.net.client import RobotClient, connect_to_all
 
 ctl = typer.Typer(
@@ -211,6 +214,24 @@ def look(
         else:
             rig.send(command)
             say("it looks there, until: gazerig ctl look free")
+
+
+@ctl.command()
+def find(
+    sought: Annotated[
+        str, typer.Argument(metavar="N | left | right | anybody", help="A person, or a side.")
+    ] = "anybody",
+    pid: PidOption = None,
+) -> None:
+    """Make the running head search for a person; print who is where, or not found."""
+    wanted: Any = int(sought) if sought.isdecimal() else sought
+    with connect(pid, "find") as rig:
+        reply, clock, end = rig.send(Find(wanted)), RealClock(), None
+        while end is None:
+            clock.sleep_until(clock.now_s() + 0.1)
+            if (state := rig.state()[0]) is not None:
+                end = command_outcome(reply, Progress(state.client_control, state.tracks))
+    say(f"{end[0]}: {end[1]}")
 
 
 @ctl.command()

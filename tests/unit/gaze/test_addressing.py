@@ -71,8 +71,6 @@ def test_who_has_left_addresses_nobody():
     play(model, 1.0, 0.0, face(1, ANN))
     found = play(model, 1.0, 1.0)
     assert found[5] and not found[12]
-    play(model, 1.0, 2.0, face(1, ANN))
-    assert not model.step(None, HEAD, 5.0)  # without further frames
 
 
 def test_lifeless_faces_never_count():
