@@ -26,7 +26,6 @@ from gazerig.features.study import film
 from gazerig.features.study.analyse import analyse_study
 from gazerig.features.study.design import HOME, Study, load_study, participant_order, williams
 from gazerig.features.study.journal import Journal, StudyFolder
-from gazerig.features.study.report import answers_csv, write_report
 from gazerig.features.study.session import PageEvent, StudySession
 from gazerig.features.study.simulate import simulate_study
 
@@ -149,6 +148,8 @@ def test_shipped_studies_find_their_effects_in_simulated_answers(name: str, tmp_
     found = analyse_study(folder.path)
     assert [one.verdict for one in found.decisions] == ["supported"] * len(study.design.hypotheses)
     if name == "example":
+        from gazerig.features.study.report import write_report
+
         page = write_report(found, tmp_path / "report").read_text()
         assert "simulated participants" in page and page.count("<svg") == len(found.scores)
         with pytest.raises(SetupError, match="--data"):
@@ -156,6 +157,8 @@ def test_shipped_studies_find_their_effects_in_simulated_answers(name: str, tmp_
 
 
 def test_answers_that_do_not_count(study: Path, tmp_path: Path):
+    from gazerig.features.study.report import answers_csv  # loads matplotlib
+
     loaded, folder = load_study(str(study)), StudyFolder(tmp_path / "data")
     folder.claim(loaded)
     for number in (1, 2):

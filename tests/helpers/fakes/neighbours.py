@@ -179,7 +179,7 @@ def talk_in_a_room(participant: Any, calls: list[str]) -> TalkingHead:
             if state == "speaking":
                 room.handlers["track_subscribed"](bytes(640), sound, known)
             head.addressed_by = person
-            await until(lambda count=count: len(calls) > count)
+            await until(lambda count=count: len(calls) > count)  # type: ignore[misc]
         room.handlers["participant_disconnected"](SimpleNamespace(attributes=agent("speaking")))
         await head.reaches("idle")
         room.handlers["disconnected"]("closed")

@@ -74,8 +74,8 @@ def test_a_satellite_detects_a_look_as_its_wake_word():
             head.addressed_by = 3
             assert Detection.from_event(await read()) == Detection(name, 20)
             # The same look calls once.
-            for one in (AudioStop(), Detect(names=[name]), AudioStart(**shape), AudioStop()):
-                await wake.write_event(one.event())
+            for again in (AudioStop(), Detect(names=[name]), AudioStart(**shape), AudioStop()):
+                await wake.write_event(again.event())
             assert NotDetected.is_type((await read()).type)
             head.addressed_by = None
             await until(lambda: link.addressed_by is None)
