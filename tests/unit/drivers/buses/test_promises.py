@@ -197,7 +197,7 @@ def test_torque_off_is_confirmed_and_names_who_was_not_reached(name):
     if name in BOARDS:
         bench.command("lose all")
         bus.disable_torque()
-        assert all(has_line(bus.events() or [""], label(bench, i)) for i in (0,))
+        assert has_line(bus.events(), label(bench, 0))
         return
     bench.command(f"lose {bench.setups[1].id}")
     bus.disable_torque()
@@ -279,8 +279,7 @@ def test_the_watchdog_stops_the_servos_of_a_host_that_falls_silent(name):
     assert any(all(f.rearmed) for f in first)
     assert near(bench, bench.places(), stopped, 0.005)
     bench.go(bus, [0.9] * 4)
-    assert has_line(bus.events(), "watchdog") or has_line(bus.events(), "late")
-    bench.wait(0.0)
+    assert has_line(bus.events(), "watchdog")
 
 
 # --- what is named
