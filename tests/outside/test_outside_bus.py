@@ -47,7 +47,7 @@ def test_it_passes_the_shipped_suites(tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-4000:]
     found = re.search(r"(\d+) passed in", done.stdout)
-    assert found is not None and int(found[1]) >= 13, done.stdout
+    assert found is not None and int(found[1]) >= 12, done.stdout
     assert "skipped" not in done.stdout and "deselected" not in done.stdout
 
 

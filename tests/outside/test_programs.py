@@ -132,7 +132,7 @@ def free(rig: Rig) -> Iterator[None]:
     yield
     time.sleep(0.1)  # the limits of rates fill again, by ten messages
     if rig.client.status()["stopped"]:
-        time.sleep(HELD_S + 0.1)
+        time.sleep(max(HELD_S, 1.0) + 0.1)  # a program may resume once a second
         rig.client.send(Resume(confirmed=True))
     rig.client.send(LookAt(None))
     rig.client.send(Jog(()))
