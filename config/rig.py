@@ -132,6 +132,17 @@ class GazeConfig(PluginSections):
     # fmt: on
 
 
+@dataclass(frozen=True)
+class DoorParams:
+    """A door to a voice stack, which begins and ends with the head."""
+
+    # fmt: off
+    address: Annotated[str, "of the voice stack; empty: the usual one"] = ""
+    bind: Annotated[str, "HOST:PORT where the door listens; empty: the usual port, for this computer only"] = ""
+    addressed: Annotated[bool, "the voice stack listens, without a wake word, when a person addresses the head"] = False
+    # fmt: on
+
+
 @dataclass(frozen=True, kw_only=True)
 class Rig(PluginSections):
     """One head: buses, geometry, joints, limits and gaze."""
@@ -172,8 +183,8 @@ class Rig(PluginSections):
     expression_blend_s: Annotated[float, Bounds(0.05, 10), "time from one expression to another"] = 0.5
     levels: Annotated[Mapping[str, LevelParams],
         "values 0..1 that a program sets many times per second, such as a jaw's opening from loudness"] = field(default_factory=dict)
-    doors: Annotated[tuple[str, ...],
-        "voice stacks, each in a process of its own: NAME [ADDRESS] [--bind HOST:PORT] [--addressed], as for gazerig door"] = ()
+    doors: Annotated[Mapping[str, DoorParams],
+        "voice stacks by the names of their doors, each in a process of its own"] = field(default_factory=dict)
     # fmt: on
 
     @property

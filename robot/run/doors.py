@@ -5,14 +5,14 @@ gazerig`` only, so nothing that a neighbour sends can delay the control loop.
 """
 
 import argparse
-import shlex
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Protocol, cast
 
+from gazerig.config.rig import DoorParams
 from gazerig.drivers.plugins import DOOR, find
 from gazerig.drivers.process import child_process
 from gazerig.drivers.process.visible_text import visible
@@ -42,26 +42,28 @@ class DoorProcesses:
     """The processes of a rig's doors; one that ends is reported.
 
     Args:
-        entries: The rig's key ``doors``: the words after ``gazerig door``.
+        doors: The rig's key ``doors``.
         pid: Process id of the head.
         say: Receives one line per message.
     """
 
-    def __init__(self, entries: Iterable[str], pid: int, say: Callable[[str], None]) -> None:
-        self._entries, self._pid, self._say = tuple(entries), pid, say
+    def __init__(
+        self, doors: Mapping[str, DoorParams], pid: int, say: Callable[[str], None]
+    ) -> None:
+        self._doors, self._pid, self._say = doors, pid, say
         self._running: list[subprocess.Popen[bytes]] = []
         self._threads: list[threading.Thread] = []
         self._closing = False
 
     def open(self) -> None:
         """Start all doors, without waiting."""
-        for entry in self._entries:
-            words = (str(self._pid), *shlex.split(entry))
+        for name, door in self._doors.items():
+            words = _words(name, door)
             pipe = subprocess.PIPE
-            process = child_process.start(__name__, *words, stdin=pipe, stderr=pipe)
+            process = child_process.start(__name__, str(self._pid), *words, stdin=pipe, stderr=pipe)
             self._running.append(process)
             thread = threading.Thread(
-                target=self._follow, args=(entry, process), name=f"door {entry}", daemon=True
+                target=self._follow, args=(words, process), name=f"door {name}", daemon=True
             )
             self._threads.append(thread)
             thread.start()
@@ -81,9 +83,9 @@ class DoorProcesses:
         for thread in self._threads:
             thread.join(_ENDS_S)
 
-    def _follow(self, entry: str, process: "subprocess.Popen[bytes]") -> None:
+    def _follow(self, words: Sequence[str], process: "subprocess.Popen[bytes]") -> None:
         """Report a door's lines, and its end."""
-        label = f"door {next(iter(entry.split()), '')}"
+        label = f"door {words[0]}"
         with process:
             for line in process.stderr or ():
                 text = line[:_MAX_LINE].decode("utf-8", "replace").strip()
@@ -93,12 +95,20 @@ class DoorProcesses:
         if not self._closing:
             self._say(
                 f"{label}: ended with code {code}; the head continues; start the door again with "
-                f"gazerig door {entry}"
+                f"gazerig door {' '.join(words)}"
             )
 
 
+def _words(name: str, door: DoorParams) -> list[str]:
+    """Return the words after ``gazerig door`` that start a door."""
+    words = [name, door.address] if door.address else [name]
+    if door.bind:
+        words += "--bind", door.bind
+    return [*words, "--addressed"] if door.addressed else words
+
+
 def main() -> int:
-    """Run a door until the rig's process ends; its command line: process id, then the entry."""
+    """Run a door until the rig's process ends; its command line: process id, then ``_words``."""
 
     def say(line: str) -> None:
         sys.stderr.write(f"{visible(line)}\n")

@@ -64,8 +64,8 @@ def test_doors_begin_and_end_with_the_head(
     rig = at_rate(tmp_path, "desk", 80.0)
     with open(rig, "a") as file:
         file.write(
-            f"doors: [voice-assistant ws://127.0.0.1:{assistant.port}, "
-            f"pipecat --bind 127.0.0.1:{port}]\n"
+            f"doors:\n  voice-assistant: {{address: ws://127.0.0.1:{assistant.port}}}\n"
+            f"  pipecat: {{bind: 127.0.0.1:{port}, addressed: true}}\n"
         )
 
     with gazerig.open(rig, mock=True, scene="face-to-face", say=said.append) as head:
