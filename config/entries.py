@@ -5,6 +5,7 @@ libyaml's parser reads: ten minutes of a track's frames take a second.
 
 import re
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,14 @@ _SCALARS: tuple[tuple[re.Pattern[str], Any], ...] = (
     (re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"), float),
 )
 """Values without quotes that are not text, as in YAML 1.2: no, on and 12:30 are text."""
+_SPACES = "\u00a0\u2007\u202f"
+_LOOKALIKES = (
+    (r"[-+]?[0-9]+(,)[0-9]+", "a decimal comma", "."),
+    (r"([\u2012-\u2015\u2212])[0-9.].*", "a typographic minus", "-"),
+    (r"([\u2018-\u201f]).*|.*([\u2018-\u201f])", "a typographic quote", '"'),
+    (rf"([{_SPACES}]).*|.*([{_SPACES}])|[0-9]+([{_SPACES}])[0-9].*", "a no-break space", " "),
+)
+"""Values without quotes as word processors and web pages write them, and what a keyboard has."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +110,9 @@ def _syntax_fault(file: str, text: str, error: yaml.YAMLError) -> ConfigFault:
         words = f"{error.context} from line {error.context_mark.line + 1}, {words}"
     if "start any token" in words:
         cure = "indent with spaces, and put text with %, @ or ` in quotes"
+    for number, row in list(enumerate(text.splitlines(), 1))[:line][-2:]:
+        if found := re.search(f"[{_SPACES}]", row):
+            cure = f"column {found.start() + 1} of line {number} is a no-break space"
     return ConfigFault(file, line, "", f"not valid YAML: {words}; {cure}")
 
 
@@ -145,11 +157,26 @@ class _Reader:
             )
         if isinstance(event, yaml.MappingStartEvent):
             return self._mapping(start, depth + 1)
-        if event.implicit[0]:
-            for pattern, convert in _SCALARS:
-                if pattern.fullmatch(event.value):
-                    return convert(event.value)
-        return event.value
+        if not event.implicit[0]:
+            return event.value
+        for pattern, convert in _SCALARS:
+            if pattern.fullmatch(event.value):
+                return convert(event.value)
+        return self._text(event, line, key)
+
+    def _text(self, event: Any, line: int, key: str) -> str | float:
+        """Return a text without quotes; of a lookalike, which is a fault, what was meant."""
+        text: str = event.value
+        for pattern, name, right in _LOOKALIKES:
+            if found := re.fullmatch(pattern, text):
+                at = found.start(found.lastindex or 0)
+                column = event.start_mark.column + at + 1
+                rule = f"column {column} is {name} ({text[at]}); write {right!r}"
+                self.faults.append(ConfigFault(self._file, line, key, rule))
+                text = text.replace(text[at], right).strip(' "')
+                with suppress(ValueError):
+                    return float(text)
+        return text
 
     def _mapping(self, start: str, depth: int) -> dict[str, Any]:
         """Return the rest of a mapping; each value has the line of its key."""

@@ -29,6 +29,11 @@ camera:
         ("\n- a\n", "rig.yaml:2: is not a mapping; write 'key: value' lines"),
         (b"a: 1\nb: \xff\n", "rig.yaml:2: is not UTF-8 text; save it as UTF-8"),
         (
+            "a: 1\nb:\u00a05\n",
+            "rig.yaml:3: not valid YAML: while scanning a simple key from line 2, "
+            "could not find expected ':'; column 3 of line 2 is a no-break space",
+        ),
+        (
             "ä: 1\nb: 2\x07\n",
             "rig.yaml:2: not valid YAML: control characters are not allowed; remove it",
         ),

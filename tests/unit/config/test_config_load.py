@@ -129,6 +129,22 @@ def test_words_that_look_like_something_else_are_text(tmp_path: Path, word: str)
         ("neck", "nekc", "3: joints: there is no neck"),
         ("offset_m: [0, 0.5, -1e-2]", "fps: 2", "9: camera.fps: too slow to follow a face"),
         ("name: nod", "name: nod\nname: x", "3: name: duplicate key, first in line 2"),
+        (
+            "500",
+            "500,5",
+            "7: joints.pan.max_speed_deg_s: column 25 is a decimal comma (,); write '.'",
+        ),
+        (
+            "0.5",
+            "\u22120.5",
+            "9: camera.offset_m.1: column 17 is a typographic minus (−); write '-'",
+        ),
+        (
+            "0.5",
+            "0.5\u00a0",
+            "9: camera.offset_m.1: column 20 is a no-break space (\u00a0); write ' '",
+        ),
+        ("nod", "“nod”", "2: name: column 7 is a typographic quote (“); write '\"'"),
     ],
 )
 def test_each_fault_alone(tmp_path: Path, change: str, to: str, fault: str):

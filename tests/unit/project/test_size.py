@@ -9,7 +9,7 @@ LARGEST = {
     "gaze": 55_370,
     "drivers": 79_520,
     "sim_mock": 35_870,
-    "config": 11_330,
+    "config": 11_560,
     "robot": 119_180,
     "robot/dashboard": 21_800,
     "gazerig": 12_900,
