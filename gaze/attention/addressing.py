@@ -14,7 +14,7 @@ A face counts only if it has moved since it came into view and shows life: a pos
 everybody, for longer than any person.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import dist, inf, radians
 
@@ -40,8 +40,11 @@ _ABSENT_S = 0.5
 """Time without a sight of the person, after which that person has left."""
 _TALKS_S = 2.0
 """Time after a look in a talk with somebody else for which that talk still goes on."""
-_AT_PERSON_RAD = radians(30.0)
-"""Largest angle of the face to the person at whom it looks: eyes turn farther than the head."""
+_AT_PERSON_RAD = radians(45.0)
+"""Largest angle of the face to the person at whom it looks: eyes turn farther than the head, and
+the pose of a face that is seen from the side is measured too small."""
+_REMEMBERED_S = 10.0
+"""Time for which a person who is turned away, and so not seen, is still where it was."""
 
 
 class Addressing(Struct, frozen=True, gc=False):
@@ -84,6 +87,7 @@ class AddressingModel:
     def reset(self) -> None:
         """Forget all people."""
         self._looks: dict[int, _Look] = {}
+        self._places: dict[int, tuple[Vec3, float]] = {}
         self._since_s: dict[int, float] = {}
         self._at_s = -inf
 
@@ -114,11 +118,17 @@ class AddressingModel:
     def _update(self, percept: Percept, p_head: Vec3) -> None:
         """Update with a new frame."""
         now_s, bodies = percept.captured_s, percept.bodies
-        for id, kind in zip(bodies.ids, bodies.kinds, strict=True):
+        rows = bodies.rows()
+        for id, kind, p in zip(rows.ids, rows.kinds, rows.p_world_m, strict=True):
             if kind == "face":
                 self._looks.setdefault(id, _Look()).seen_s = now_s
-        for id in _people_in_talk(percept):
-            self._looks[id].talked_s = now_s
+                self._places[id] = p, now_s
+        self._places = {
+            id: place for id, place in self._places.items() if now_s - place[1] <= _REMEMBERED_S
+        }
+        for id in _people_in_talk(percept.faces, {id: p for id, (p, _) in self._places.items()}):
+            if id in self._looks:
+                self._looks[id].talked_s = now_s
         for face in percept.faces:
             look = self._looks[face.id]
             near = dist(face.p_world_m, p_head) <= NEAR_M
@@ -139,15 +149,15 @@ class AddressingModel:
         }
 
 
-def _people_in_talk(percept: Percept) -> Iterator[int]:
-    """Yield the people who now talk with another person in view."""
-    rows = percept.bodies.rows()
-    places = {
-        id: p
-        for id, kind, p in zip(rows.ids, rows.kinds, rows.p_world_m, strict=True)
-        if kind == "face"  # also one who sits so still that no life was seen for seconds
-    }
-    faces = {face.id: face for face in percept.faces}
+def _people_in_talk(seen: Sequence[Face], places: dict[int, Vec3]) -> Iterator[int]:
+    """Yield the people who now talk with another person.
+
+    Args:
+        seen: Faces in view.
+        places: Places of all people by number, also of those who sit so still that no life was
+            seen for seconds, and of those who were in view a while ago.
+    """
+    faces = {face.id: face for face in seen}
     partners = {id: _partner(face, places) for id, face in faces.items() if id in places}
     for id, other in partners.items():
         if other is not None and (

@@ -3,6 +3,7 @@
 import contextlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from math import degrees
 from pathlib import Path
 from typing import Annotated, Any
@@ -40,7 +41,7 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import Progress, command_outcome
-from gazerig.robot.net.client import RobotClient, connect_to_all
+from gazerig.robot.net.client import RobotClient, connect_to_all, is_chosen
 
 ctl = typer.Typer(
     name="ctl",
@@ -232,6 +233,8 @@ def find(
             if (state := rig.state()[0]) is not None:
                 end = command_outcome(reply, Progress(state.client_control, state.tracks))
     say(f"{end[0]}: {end[1]}")
+    if end[0] != "arrived":
+        raise typer.Exit(FAULT)
 
 
 @ctl.command()
@@ -293,21 +296,27 @@ def stop(
 ) -> None:
     """Switch the torque of every running rig off at once; nothing parks, the programs continue."""
     with clear_errors():
-        rigs = connect_to_all(pid, "gazerig stop")
-        if not rigs:
+        rigs = connect_to_all(who="gazerig stop")
+        with ThreadPoolExecutor(len(rigs) or 1) as pool:  # one that hangs delays no other
+            stopped = [*pool.map(lambda rig: _stop(rig, why, pid), rigs)]
+        if not any(one is not None for one in stopped):
             RobotClient.connect(pid)  # raises the reason
-        failed = False
-        for rig in rigs:
-            try:
-                with rig:
-                    rig.send(Stop(why))
-            except DriverError as error:
-                failed = True
-                say(f"{rig.pid}: NOT KNOWN TO HAVE STOPPED, press the emergency stop: {error}")
-            else:
-                say(f"{rig.pid}: torque is off; gazerig ctl resume continues")
-    if failed:
+    if False in stopped:
         raise typer.Exit(FAULT)
+
+
+def _stop(rig: RobotClient, why: str, which: str | None) -> bool | None:
+    """Stop a rig and return whether it confirms it, None if another one is meant."""
+    with rig:
+        if which is not None and not is_chosen(rig, which):
+            return None
+        try:
+            rig.send(Stop(why))
+        except DriverError as error:
+            say(f"{rig.pid}: NOT KNOWN TO HAVE STOPPED, press the emergency stop: {error}")
+            return False
+    say(f"{rig.pid}: torque is off; gazerig ctl resume continues")
+    return True
 
 
 @ctl.command()

@@ -8,6 +8,7 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, refuse_existing, write_file
+from gazerig.params import unknown_text
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def check(rig: RigArgument = "desk") -> None:
         say(good_text(rig, loaded))
         for joint, load, remedy in neck_loads(loaded):
             say(f"{rig}: {joint}: {load}{remedy and f'; {remedy}'}")
-        for line in _track_lines(loaded):
+        for line in (*_track_lines(loaded), *_schedule_lines(rig, loaded)):
             say(line)
 
 
@@ -88,3 +89,14 @@ def _track_lines(rig: "Rig") -> Iterator[str]:
             yield f"{file}: {reply.text()}"
         except TrackRefused as refused:
             yield f"{file}: {rig.name} cannot play it: {refused}"
+
+
+def _schedule_lines(name: str, rig: "Rig") -> Iterator[str]:
+    """Return which tracks of the schedule are not there yet."""
+    from gazerig.config.tracks import tracks_of
+
+    beside = (Path(name).expanduser().parent / "tracks").glob("*.yaml")
+    known = sorted({*tracks_of(rig.track_files), *[file.stem for file in beside]})
+    for track in rig.schedule:
+        if track not in known:
+            yield f"{name}: schedule: {unknown_text('track', track, known)}"

@@ -95,7 +95,7 @@ _rig = "RIG"
 
 def complete_suggestions(text: str) -> str:
     """Return a message whose suggested commands use the rig and port of the current command."""
-    return text.replace(" RIG", f" {_rig}")
+    return re.sub(r"\bRIG\b", lambda found: _rig, text)
 
 
 BAD_INPUT = 2

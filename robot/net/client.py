@@ -349,7 +349,7 @@ def connect_to_all(which: int | str | None = None, who: str = "") -> list[RobotC
         dial = partial(_connect_wire, path)
         with contextlib.suppress(OSError):  # killed: the next rig that starts removes it
             rig = RobotClient(dial(), pid, who, dial)
-            if which is None or _is_chosen(rig, str(which)):
+            if which is None or is_chosen(rig, str(which)):
                 found.append(rig)
             else:
                 rig.close()
@@ -361,7 +361,7 @@ def _connect_wire(path: Path) -> Wire:
     return Wire(connect_to_socket(path, CONNECT_S), ANSWER_BYTES)
 
 
-def _is_chosen(rig: RobotClient, which: str) -> bool:
+def is_chosen(rig: RobotClient, which: str) -> bool:
     """Return whether a rig has this process id or name."""
     if which.isdecimal():
         return rig.pid == int(which)
