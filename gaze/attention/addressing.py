@@ -43,8 +43,9 @@ _TALKS_S = 2.0
 _AT_PERSON_RAD = radians(45.0)
 """Largest angle of the face to the person at whom it looks: eyes turn farther than the head, and
 the pose of a face that is seen from the side is measured too small."""
-_REMEMBERED_S = 10.0
-"""Time for which a person who is turned away, and so not seen, is still where it was."""
+_REMEMBERED_S = 60.0
+"""Time for which a person who is turned away, and so not seen, counts as still there: in a talk
+that is seen from the side a face is lost for half a minute."""
 
 
 class Addressing(Struct, frozen=True, gc=False):
