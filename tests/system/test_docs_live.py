@@ -112,7 +112,10 @@ def _works_on_a_head(words: str) -> None:
 def test_commands_to_servos_work(folder: Path):
     """With emulated ones instead of those on a port."""
     for words in TO_SERVOS:
-        copy("maker" if COMMANDS[words] == "start.md" else "desk", folder / "myrig.yaml")
+        copy(
+            "maker" if COMMANDS[words] in ("README.md", "start.md") else "desk",
+            folder / "myrig.yaml",
+        )
         works(f"{words} --mock" + " --once" * (words == "monitor"), answers="y\n")
 
 
@@ -120,6 +123,7 @@ def test_commands_on_a_recording_work(folder: Path):
     """On one under the name that papers give theirs."""
     copy("desk", folder / "my.yaml")
     works("run my.yaml --mock --fast --seconds 1 --scene face-to-face --record evening.mcap")
+    (folder / "minute.mcap").write_bytes((folder / "evening.mcap").read_bytes())
     for words in ON_A_RECORDING:
         works(words)
 
