@@ -1,17 +1,16 @@
 """Starts of tracks that no program orders: times of day, intervals, people who come and go."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, time
 from typing import Annotated, Literal
 
+from gazerig.gaze.presence import Presence
 from gazerig.gaze.types import Percept
 from gazerig.params import Bounds
 
 DAY_S = 86400.0
-GONE_S = 2.0
-"""A person who has not been visible for this time has departed."""
 _TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d)")
 
 
@@ -57,7 +56,7 @@ class Schedule:
     def __init__(self, starts: Mapping[str, TrackStart]) -> None:
         self._starts = starts
         self._before: tuple[float, float] | None = None
-        self._seen_s: dict[int, float] = {}
+        self._people = Presence()
 
     def due(self, percept: Percept | None, t_s: float, day_s: float) -> list[str]:
         """Return the tracks that start now.
@@ -71,7 +70,8 @@ class Schedule:
             self._before, self._began_s = (t_s, day_s), t_s
         (before_s, since_s), self._before = self._before, (t_s, day_s)
         passed_s = (day_s - since_s) % DAY_S
-        changes = set(self._changes(percept, t_s))
+        visible = self._visible(percept) if percept is not None else ()
+        changes = {change for change, _ in self._people.update(visible, t_s)}
         return [
             name
             for name, start in self._starts.items()
@@ -83,14 +83,9 @@ class Schedule:
     def _rounds(self, start: TrackStart, t_s: float) -> float:
         return 0.0 if start.every_s is None else (t_s - self._began_s) // start.every_s
 
-    def _changes(self, percept: Percept | None, t_s: float) -> Iterator[str]:
-        """Yield arrivals and departures of living people."""
-        for face in percept.faces if percept is not None else ():
-            if percept is not None and face.id not in percept.bodies.lifeless:
-                if face.id not in self._seen_s:
-                    yield "arrival"
-                self._seen_s[face.id] = t_s
-        for id, seen_s in tuple(self._seen_s.items()):
-            if t_s - seen_s > GONE_S:
-                del self._seen_s[id]
-                yield "departure"
+    def _visible(self, percept: Percept) -> list[int]:
+        """Return the living people in view, and those who sit so still that no life is seen."""
+        lifeless = percept.bodies.lifeless
+        return [
+            face.id for face in percept.faces if face.id in self._people or face.id not in lifeless
+        ]

@@ -20,7 +20,7 @@ from math import dist, inf, radians
 
 from msgspec import Struct
 
-from gazerig.gaze.angles import angle_between, sub, transpose
+from gazerig.gaze.attention.persons import faced_person
 from gazerig.gaze.types import Face, Percept, Vec3
 
 LOOK_S = 0.6
@@ -68,7 +68,7 @@ class _Look:
 
     began_s, looked_s: beginning of the present look at the head, inf without one, and its last
         frame
-    seen_s: last sight of the person
+    seen_s, p_world_m: last sight of the person, and the place
     talked_s: last look in a talk with somebody else
     """
 
@@ -76,6 +76,7 @@ class _Look:
     looked_s: float = -inf
     seen_s: float = -inf
     talked_s: float = -inf
+    p_world_m: Vec3 = (0.0, 0.0, 0.0)
     confidence: float = 0.0
 
 
@@ -88,7 +89,6 @@ class AddressingModel:
     def reset(self) -> None:
         """Forget all people."""
         self._looks: dict[int, _Look] = {}
-        self._places: dict[int, tuple[Vec3, float]] = {}
         self._since_s: dict[int, float] = {}
         self._at_s = -inf
 
@@ -122,14 +122,16 @@ class AddressingModel:
         rows = bodies.rows()
         for id, kind, p in zip(rows.ids, rows.kinds, rows.p_world_m, strict=True):
             if kind == "face":
-                self._looks.setdefault(id, _Look()).seen_s = now_s
-                self._places[id] = p, now_s
-        self._places = {
-            id: place for id, place in self._places.items() if now_s - place[1] <= _REMEMBERED_S
+                look = self._looks.setdefault(id, _Look())
+                look.seen_s, look.p_world_m = now_s, p
+        self._looks = {
+            id: look
+            for id, look in self._looks.items()
+            if id in self._since_s or now_s - look.seen_s <= _REMEMBERED_S
         }
-        for id in _people_in_talk(percept.faces, {id: p for id, (p, _) in self._places.items()}):
-            if id in self._looks:
-                self._looks[id].talked_s = now_s
+        places = {id: look.p_world_m for id, look in self._looks.items()}
+        for id in _people_in_talk(percept.faces, places):
+            self._looks[id].talked_s = now_s
         for face in percept.faces:
             look = self._looks[face.id]
             near = dist(face.p_world_m, p_head) <= NEAR_M
@@ -143,11 +145,6 @@ class AddressingModel:
                     self._since_s.setdefault(face.id, look.began_s)
             elif face.looks_at_head is False or not living:
                 look.began_s = inf
-        self._looks = {
-            id: look
-            for id, look in self._looks.items()
-            if id in self._since_s or now_s - look.seen_s <= _TALKS_S
-        }
 
 
 def _people_in_talk(seen: Sequence[Face], places: dict[int, Vec3]) -> Iterator[int]:
@@ -169,11 +166,5 @@ def _people_in_talk(seen: Sequence[Face], places: dict[int, Vec3]) -> Iterator[i
 
 def _partner(face: Face, places: dict[int, Vec3]) -> int | None:
     """Return the person at whom a person looks, None if nobody is nearer to it than the head."""
-    ahead = face.gaze_world or transpose(face.R_world_face)[0]
-    others = [
-        (angle_between(ahead, sub(p, face.p_world_m)), id)
-        for id, p in places.items()
-        if id != face.id
-    ]
-    off_rad, id = min(others, default=(inf, -1))
+    off_rad, id = faced_person(face, places)
     return id if off_rad < min(_AT_PERSON_RAD, face.off_head_rad or 0.0) else None

@@ -176,13 +176,7 @@ class Persons:
         """
         places, watched = _face_places(rows), set()
         for face in self._faces if self._at_s - self._spoke_s < _TALKS_S else ():
-            ahead = face.gaze_world or transpose(face.R_world_face)[0]
-            others = [
-                (angle_between(ahead, sub(p, face.p_world_m)), id)
-                for id, p in places.items()
-                if id != face.id
-            ]
-            off_rad, id = min(others, default=(inf, -1))
+            off_rad, id = faced_person(face, places)
             if off_rad < (face.off_head_rad or 0.0):
                 watched.add(id)
         unseen = (id for id in places if self._people[id].seen_s < self._spoke_s)
@@ -280,3 +274,14 @@ def _face_places(rows: BodyRows) -> dict[int, Vec3]:
         for id, kind, p in zip(rows.ids, rows.kinds, rows.p_world_m, strict=True)
         if kind == "face"
     }
+
+
+def faced_person(face: Face, places: Mapping[int, Vec3]) -> tuple[float, int]:
+    """Return the angle from the line of sight to the nearest other person, inf, and who that is."""
+    ahead = face.gaze_world or transpose(face.R_world_face)[0]
+    others = [
+        (angle_between(ahead, sub(p, face.p_world_m)), id)
+        for id, p in places.items()
+        if id != face.id
+    ]
+    return min(others, default=(inf, -1))

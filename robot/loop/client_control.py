@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from gazerig.gaze.angles import add, scale
 from gazerig.gaze.attention.finding import Finding, found
+from gazerig.gaze.presence import GONE_S
 from gazerig.gaze.types import (
     ORDERED,
     SEARCH,
@@ -44,10 +45,6 @@ from gazerig.robot.model.reply import (
     ConversationState,
 )
 from gazerig.robot.model.types import JointAngles
-
-GONE_S = 2.0
-"""A control that follows a person ends when the person has not been visible for this time."""
-
 
 _SETTLED_S, _AT_REST_RAD_S = 0.5, radians(5.0)
 """A head that turns slower than this, this long after a command, rests."""

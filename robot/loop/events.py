@@ -6,8 +6,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import takewhile
 
+from gazerig.gaze.presence import Presence
 from gazerig.gaze.types import ORDERED, Target
-from gazerig.robot.loop.client_control import GONE_S
 from gazerig.robot.loop.head_state import EventKind, HeadEvent, HeadReport, head_state
 from gazerig.robot.loop.tick import Tick, target_name
 from gazerig.robot.model.reply import FINISHED, Progress
@@ -36,7 +36,7 @@ class TickFeed:
         self._events: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)
         # Separate, because the others are many and would displace messages.
         self._messages: deque[HeadEvent] = deque(maxlen=_MOST_MESSAGES)
-        self._seen_s: dict[int, float] = {}
+        self._people = Presence()
         self._joining: deque[Callable[[Progress], bool]] = deque()
         self._never = threading.Event()
         self._followers: list[Callable[[Progress], bool]] = []
@@ -104,13 +104,11 @@ class TickFeed:
 
     def _people_changes(self, tick: Tick) -> Iterator[_Change]:
         """Yield arrivals, and departures of people who have not been seen for some time."""
-        for face in tick.percept.faces if tick.percept is not None else ():
-            if face.id not in self._seen_s:
-                yield f"person {face.id} has arrived", "person_arrived", face.id
-            self._seen_s[face.id] = tick.t_s
-        for person, seen_s in tuple(self._seen_s.items()):
-            if tick.t_s - seen_s > GONE_S:
-                del self._seen_s[person]
+        visible = [face.id for face in tick.percept.faces] if tick.percept is not None else []
+        for change, person in self._people.update(visible, tick.t_s):
+            if change == "arrival":
+                yield f"person {person} has arrived", "person_arrived", person
+            else:
                 yield f"person {person} has left", "person_left", person
 
 

@@ -27,8 +27,8 @@ def test_people_who_arrive_and_leave_start_tracks_and_posters_none():
     found = []
     for t in range(30):
         seen = percept(t, body(7, "face", SOMEBODY.p_world_m))
-        bodies = replace(seen.bodies, lifeless=() if 5 <= t < 10 else (7,))
-        seen = replace(seen, faces=(SOMEBODY,), bodies=bodies)
+        bodies = replace(seen.bodies, lifeless=() if 5 <= t < 6 else (7,))
+        seen = replace(seen, faces=(SOMEBODY,) * (t < 10), bodies=bodies)
         found += [(t, name) for name in schedule.due(seen, t, t)]
     assert found == [(5, "hello"), (12, "bye")]
 
