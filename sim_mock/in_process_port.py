@@ -7,6 +7,7 @@ waiting advances that clock with ``sleep_until``. The baud rate is that of ``set
 
 import errno
 import os
+import threading
 from collections.abc import Callable
 
 from gazerig.drivers.errors import BusLost, PortError
@@ -41,7 +42,17 @@ class InProcessPort:
         self._sleep_until = sleep_until
         self._waiting = b""
         self._lost = False
+        self._in_use = threading.Lock()
         self.baudrate = 0
+
+    def command(self, text: str) -> str:
+        """Run a fault command; return a description of its effect. Thread-safe.
+
+        Raises:
+            ValueError: the command is invalid; the message names the wrong word and valid ones.
+        """
+        with self._in_use:
+            return self.faults.command(text)
 
     def setBaudRate(self, baudrate: int) -> bool:
         """Open at a baud rate.
@@ -69,7 +80,8 @@ class InProcessPort:
         self._fetch_arrived()
         if self._tap is not None:
             self._tap(data)
-        self._waiting += self.line.send(data, self.baudrate)
+        with self._in_use:
+            self._waiting += self.line.send(data, self.baudrate)
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return up to ``length`` bytes, fewer if no more arrive before the deadline.
@@ -80,10 +92,11 @@ class InProcessPort:
         self._fetch_arrived()
         while len(self._waiting) < length and self._sleep_until is not None:
             due_s = self.line.next_due_s()
-            if due_s is None or due_s > deadline_s:
-                self._wait(deadline_s)
+            until_s = deadline_s if due_s is None else min(due_s, deadline_s)
+            self._sleep_until(until_s)
+            self._fetch_arrived()
+            if until_s == deadline_s:
                 break
-            self._wait(due_s)
         taken, self._waiting = self._waiting[:length], self._waiting[length:]
         return taken
 
@@ -96,17 +109,10 @@ class InProcessPort:
 
     def _fetch_arrived(self) -> None:
         """Fetch the bytes that have arrived by now."""
-        if self.faults.is_on("unplug"):
-            self._lost = True
+        with self._in_use:
+            if self.faults.is_on("unplug"):
+                self._lost = True
         if self._lost:
-            self._waiting = b""
-            self.line.forget()
             raise BusLost(f"{self.port_name} is gone: plug the adapter in")
         if self.line.is_busy:
             self._waiting += self.line.take_arrived()
-
-    def _wait(self, until_s: float) -> None:
-        """Advance the device's clock to a time, if it can be advanced."""
-        if self._sleep_until is not None and until_s > self.now_s():
-            self._sleep_until(until_s)
-        self._fetch_arrived()

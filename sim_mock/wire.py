@@ -54,8 +54,8 @@ class ServoLine:
             out.append(self._late.popleft()[1])
         return b"".join(out)
 
-    def send(self, data: bytes, baud: int, now_s: float | None = None) -> bytes:
-        """Send the host's bytes now, or at ``now_s``; return the bytes that arrive immediately."""
+    def send(self, data: bytes, baud: int) -> bytes:
+        """Send the host's bytes now; return the bytes that arrive immediately."""
         faults = self.device.faults
         if faults.has_any:
             data = faults.add_noise(data)
@@ -64,7 +64,7 @@ class ServoLine:
             pieces = faults.disturb(pieces, data)
         elif not (self.wire_time or self._late):
             return b"".join([piece[1] for piece in pieces])
-        now_s = self.device.now_s() if now_s is None else now_s
+        now_s = self.device.now_s()
         byte_s = BITS_PER_BYTE / baud if self.wire_time else 0.0
         start_s = max(now_s, self._host_free_s)
         self._host_free_s = start_s + len(data) * byte_s

@@ -20,8 +20,9 @@ from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rig_limits import bus_names, joints_on, servo_configs
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.faults.grammar import bus_and_command
 from gazerig.sim_mock.ideal.bus import IdealBus
-from gazerig.sim_mock.pty.client import PtyBuses
+from gazerig.sim_mock.in_process_port import InProcessPort
 
 
 class RunBus(NamedTuple):
@@ -41,7 +42,7 @@ class RunBus(NamedTuple):
 
 
 def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
-    """Return the real ports, ideal servos, or an emulated bus here or on a pseudo-terminal.
+    """Return the real ports, ideal servos, or emulated devices in this process.
 
     Args:
         rig: The rig of the servos.
@@ -58,12 +59,8 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
         measured = [rig.joints[name].model_facts.measures_position for name in rig.names]
         starts = [start_step(rig, name) for name in rig.names]
         return ideal_run_bus(rig, IdealBus(servo_configs(rig), starts, measured, clock.now_s))
-    lines = emulated_lines(rig)
-    if not options.fast:
-        buses = PtyBuses()
-        paths = buses.start(lines)
-        return RunBus(guarded_rig_bus(rig, paths), close=buses.stop, inject_fault=buses.command)
-    return in_process_run_bus(rig, {name: build(line, clock.now_s) for name, line in lines.items()})
+    devices = {name: build(line, clock.now_s) for name, line in emulated_lines(rig).items()}
+    return in_process_run_bus(rig, devices, None if options.fast else clock.sleep_until)
 
 
 def ideal_run_bus(rig: Rig, ideal: IdealBus) -> RunBus:
@@ -72,19 +69,31 @@ def ideal_run_bus(rig: Rig, ideal: IdealBus) -> RunBus:
     return RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
 
 
-def in_process_run_bus(rig: Rig, devices: Mapping[str, Device]) -> RunBus:
-    """Return emulated devices in this process, by the name of their bus, with a digest."""
-    from gazerig.sim_mock.in_process_port import InProcessPort
+def in_process_run_bus(
+    rig: Rig,
+    devices: Mapping[str, Device],
+    sleep_until: Callable[[float], None] | None = None,
+) -> RunBus:
+    """Return emulated devices in this process, by the name of their bus, with a digest.
 
+    sleep_until: Waits for late answers, as at a real port; without it no call waits.
+    """
     sent = hashlib.sha256()
-    ports = {name: InProcessPort(device, sent.update) for name, device in devices.items()}
+    ports = {
+        name: InProcessPort(device, sent.update, sleep_until=sleep_until)
+        for name, device in devices.items()
+    }
     places = tuple((name, rig.joints[name].bus, servo_index(rig, name)) for name in rig.names)
 
     def true_steps() -> dict[str, float]:
         steps = {bus: device.positions_steps() for bus, device in devices.items()}
         return {name: steps[bus][place] for name, bus, place in places}
 
-    return RunBus(rig_bus(rig, ports), true_steps, sent.hexdigest)
+    def inject_fault(text: str) -> str:
+        bus, command = bus_and_command(text, ports)
+        return ports[bus].command(command)
+
+    return RunBus(rig_bus(rig, ports), true_steps, sent.hexdigest, inject_fault=inject_fault)
 
 
 def bus_ports(rig: Rig, given: str | None) -> dict[str, str]:

@@ -4,7 +4,7 @@ The grammar of every emulated device is a table of verbs. The name of an argumen
 may be.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple
 
 BOTH, TIME = "count for", "for"
@@ -84,3 +84,18 @@ class CommandTable(NamedTuple):
         verb = self.verbs[name]
         ends = [f"[{word} {_ENDS[word][1]}]" for word in verb.lasting.split()]
         return " ".join([name, *verb.words.split(), *ends])
+
+
+def bus_and_command(text: str, buses: Collection[str]) -> tuple[str, str]:
+    """Return the name of the bus and the command of ``BUS: COMMAND``; without a name the bus "".
+
+    Raises:
+        ValueError: no bus has that name; the message lists the names.
+    """
+    name, _, command = text.partition(":")
+    if command and name in buses:
+        return name, command.strip()
+    if "" not in buses:
+        names = ", ".join(buses)
+        raise ValueError(f"name the bus first ({names}): {next(iter(buses))}: {text}")
+    return "", text

@@ -82,13 +82,13 @@ class TerminalLine:
             return max(0.0, due_s - self._now_s())
         return LOOK_S if self.device.faults.has_any else IDLE_S
 
-    def serve(self, ready: Collection[int], now_s: float) -> None:
-        """Process all that is due; ``ready``: the files that are readable since ``now_s``."""
+    def serve(self, ready: Collection[int]) -> None:
+        """Process all that is due; ``ready``: the files that are readable."""
         terminal = self.terminal
         if terminal.master in ready:
             data = terminal.read()
             self.heard = self.heard or bool(data)
-            terminal.write(self.line.send(data, terminal.client_baud() or 1, now_s))
+            terminal.write(self.line.send(data, terminal.client_baud() or 1))
         if terminal.clients in ready:  # after the last client's bytes, whose answers it drops
             terminal.count_clients()
         if self.line.is_busy and terminal.is_plugged:

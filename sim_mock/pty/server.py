@@ -25,6 +25,7 @@ from typing import Protocol
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process.priority import SHORT_S, request_slice
 from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.faults.grammar import bus_and_command
 from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
 
 
@@ -119,11 +120,10 @@ class Server:
             if self.surroundings is not None:
                 wait_s = min(wait_s, self.surroundings.wait_s())
             ready, _, _ = select.select(watched, (), (), wait_s)
-            now_s = time.monotonic()
             if stop in ready:
                 return
             for line in lines:
-                line.serve(ready, now_s)
+                line.serve(ready)
             # Afterwards, as a command may close terminals that were ready.
             if commands in ready and not self._take_commands(commands):
                 if self._until_eof:
@@ -150,14 +150,11 @@ class Server:
         """Run a command: in the surroundings, on its bus, or on the bus without a name."""
         if self.surroundings is not None and text.split()[0] in self.surroundings.commands:
             return self.surroundings.obey(text)
-        name, _, command = text.partition(":")
-        if name in self.lines and command:
-            return self.lines[name].obey(command.strip())
-        if "" not in self.lines:
-            names = ", ".join(self.lines)
-            first = next(iter(self.lines))
-            return json.dumps({"error": f"name the bus first ({names}): {first}: {text}"})
-        return self.lines[""].obey(text)
+        try:
+            name, command = bus_and_command(text, self.lines)
+        except ValueError as error:
+            return json.dumps({"error": str(error)})
+        return self.lines[name].obey(command)
 
 
 def run(settings: ServerSettings, say: Callable[[str], None], heed_ctrl_c: bool) -> None:

@@ -168,7 +168,7 @@ ALLOWED = {
 }
 """Packages that are imported: no other."""
 
-LATER = ("asyncio", "ssl", "http.server", "gazerig.sim_mock.dynamixel.chain")
+LATER = ("asyncio", "ssl", "http.server")
 """Modules that are large though no packages: none of them."""
 
 RUN = """

@@ -16,7 +16,7 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
     yield from connected(monkeypatch)
 
 
-def with_faults(rig: TickedRig, fault: Callable[[str], str]) -> None:
+def with_faults(rig: TickedRig, fault: Callable[[str], str] | None) -> None:
     rig.made.bus = rig.made.bus._replace(inject_fault=fault)
 
 
@@ -33,5 +33,10 @@ def test_a_command_reaches_the_emulated_servos_and_says_what_it_did(rig: TickedR
     assert device.positions_steps()[1] == pytest.approx(2048 - 30)
 
 
+def test_the_servos_of_a_run_obey(rig: TickedRig):
+    assert "servo 1 does not answer" in gazerig("ctl", "fault", "lose", "1", "count", "3")
+
+
 def test_real_servos_take_none(rig: TickedRig):
+    with_faults(rig, None)
     assert REAL in gazerig("ctl", "fault", "lose", "2")

@@ -31,7 +31,7 @@ class Bench:
 
     def serve(self):
         ready, _, _ = select.select(self.line.watched_files(), (), (), 0.0)
-        self.line.serve(ready, self.now_s)
+        self.line.serve(ready)
 
     def heard(self):
         try:
