@@ -5,11 +5,12 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from attack.ways_out import attack, bench
+from attack.ways_out import case, side_by_side
 from branch import Branch, gazerig
-from features_there import skip_without
+from features_there import is_there
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers.plugins import COMMAND, SHIPPED
 from gazerig.robot.cli.run import report_faults
 from gazerig.robot.loop.joint_faults import JointFaults
 from gazerig.robot.loop.loop import Robot
@@ -40,24 +41,25 @@ def ran(
     return session.Session(made, lambda: None, said.append).run()
 
 
-@pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])
 def test_no_memory_in_the_loop_leaves_by_the_door(
-    rig: str, devices: list[Device], monkeypatch: pytest.MonkeyPatch
+    devices: list[Device], monkeypatch: pytest.MonkeyPatch
 ):
     tick, ticks = Robot.tick, []
 
     def short_of_memory(self: Robot, *words: Any) -> object:
-        ticks.append(on(devices[0]))
+        ticks.append(on(devices[-1]))
         if len(ticks) > 100:
             raise MemoryError
         return tick(self, *words)
 
     monkeypatch.setattr(Robot, "tick", short_of_memory)
-    said: list[str] = []
-    with pytest.raises(MemoryError):
-        ran(rig, said)
-    assert ticks[-1] == len(load_rig(rig).joints) and on(devices[0]) == 0
-    assert said[-1] == "stopped by fault: unexpected MemoryError: parked, torque off"
+    for rig in ("desk", "feetech", "maker"):
+        said: list[str] = []
+        with pytest.raises(MemoryError):
+            ran(rig, said)
+        assert ticks[-1] == len(load_rig(rig).joints) and on(devices[-1]) == 0, rig
+        assert said[-1] == "stopped by fault: unexpected MemoryError: parked, torque off"
+        ticks.clear()
 
 
 def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(
@@ -75,46 +77,34 @@ def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(
     ]
 
 
-@pytest.mark.parametrize("rig", ["desk", "feetech"])
-def test_servos_that_go_silent_at_the_end_are_named(
-    rig: str, devices: list[Device], monkeypatch: pytest.MonkeyPatch
+def test_joints_that_faults_hold_and_servos_silent_at_the_end_are_named(
+    devices: list[Device], monkeypatch: pytest.MonkeyPatch
 ):
     stop = Robot.stop
 
     def unplugged(self: Robot) -> tuple[str, ...]:
         for servo in (2, 3):
-            devices[0].faults.command(f"lose {servo}")
+            devices[-1].faults.command(f"lose {servo}")
         return stop(self)
 
+    def jam(made: Run) -> None:
+        devices[-1].faults.command("stick 7")
+
     monkeypatch.setattr(Robot, "stop", unplugged)
-    said: list[str] = []
-    figures = ran(rig, said, 1.0)
-    assert figures["joint_faults"] == {} and report_faults(figures, said.append)
-    assert said[-1] == (
-        "stopped by seconds: parked, torque off; "
+    silent = (
         "left_eye_tilt (servo 2), right_eye_pan (servo 3): "
         "torque-off not confirmed: cut the servo power"
     )
-
-
-# --- joints that faults hold
-
-
-def test_a_joint_that_does_not_move_is_said_counted_and_in_the_exit_code(
-    devices: list[Device],
-):
     said: list[str] = []
-
-    def jam(made: Run) -> None:
-        devices[0].faults.command("stick 7")
-
-    figures = ran("desk", said, 8.0, jam)
+    figures = ran("feetech", said)
+    assert figures["joint_faults"] == {} and report_faults(figures, said.append)
+    assert said[-1] == f"stopped by seconds: parked, torque off; {silent}"
+    figures = ran("desk", said, 2.5, jam)
+    assert said[-1] == f"stopped by seconds: not parked, torque off; {silent}"
     about = [line for line in said if "neck_yaw: not moving" in line]
     assert about and about[0].endswith("not moving: held") and len(about) <= 4
     assert figures["joint_faults"]["neck_yaw"]["not moving"] >= 1
-    last: list[str] = []
-    assert report_faults(figures, last.append)
-    assert "neck_yaw not moving" in last[0]
+    assert report_faults(figures, said.append) and "neck_yaw not moving" in said[-1]
 
 
 # --- programs of their own
@@ -125,22 +115,29 @@ def begun(words: list[str], breaks: str, **options: Any) -> Branch:
     return Branch(gazerig(*words), **options)
 
 
+WAYS = {
+    ("desk", "run", "SIGINT"): 0,
+    ("desk", "run", "SIGHUP"): 0,
+    ("pca9685", "run", "SIGTERM"): 0,
+    ("feetech", "jog", "tty closed"): 0,
+    ("pca9685", "jog", "tty closed"): 0,
+    ("maker", "jog", "full pipe that nobody reads"): 0,
+    ("desk", "run", "reader killed"): -13,
+    ("desk", "run", "stderr broken"): -13,
+}
+"""The exit code by kind of servos, command and what ends it."""
+
+
 # Parking takes a bounded time, in which a starved machine does not reach the end.
-@pytest.mark.parametrize(
-    ("rig", "command", "way"),
-    [
-        ("desk", "run", "SIGHUP"),
-        ("feetech", "jog", "tty closed"),
-        ("maker", "jog", "full pipe that nobody reads"),
-        ("pca9685", "run", "SIGTERM"),
-        ("pca9685", "jog", "tty closed"),
-        ("desk", "run", "reader killed"),
-        ("desk", "run", "stderr broken"),
-    ],
-)
-def test_no_servo_stays_on(rig: str, command: str, way: str):
-    skip_without(command)
-    with bench(rig, 50.0) as at:
-        row = attack(at, command, way, begun)
-    assert not row.void and row.code is not None and row.on == 0, row
-    assert row.off_park_deg < 6.0, row
+def test_no_servo_stays_on():
+    ways = [way for way in WAYS if is_there(SHIPPED[COMMAND].get(way[1], ""))]
+    rows = side_by_side([case(*way, begun, 50.0) for way in ways], 4)
+    assert not [
+        (way, row)
+        for way, row in zip(ways, rows, strict=True)
+        if row.void
+        or row.on
+        or row.code != WAYS[way]
+        or row.off_park_deg > 6.0
+        or (row.said and row.said != f"stopped by {way[2]}: parked, torque off")
+    ]

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "helpers"))
 
-from attack.ways_out import RIGS, START, Bench, bench, wait_until
+from attack.ways_out import RIGS, START, Bench, Steps, bench, side_by_side, until
 from child_processes import children, end, running_as
 
 LONGEST_S = 20.0
@@ -150,14 +150,15 @@ class Target(NamedTuple):
         return running_as(self.pid, "guardian")
 
 
-Strike = Callable[[Target], None]
+Strike = Callable[[Target], Iterator[float]]
+"""Yields the seconds between its blows."""
 
 
 def send(*numbers: signal.Signals, gap_s: float = 0.03) -> Strike:
-    def strike(target: Target) -> None:
+    def strike(target: Target) -> Iterator[float]:
         for i, number in enumerate(numbers):
             if i:
-                time.sleep(gap_s)
+                yield gap_s
             with suppress(ProcessLookupError) if i else nullcontext():
                 os.kill(target.pid, number)
 
@@ -167,29 +168,30 @@ def send(*numbers: signal.Signals, gap_s: float = 0.03) -> Strike:
 def fault(word: str) -> Strike:
     """Have the program do something to itself."""
 
-    def strike(target: Target) -> None:
+    def strike(target: Target) -> Iterator[float]:
         (target.folder / "blow").write_text(word)
         os.kill(target.pid, signal.SIGUSR2)
+        yield 0.0
 
     return strike
 
 
-def without_guardian(target: Target) -> None:
+def without_guardian(target: Target) -> Iterator[float]:
     """Suspend the guardian; it is replaced within a second, and then the loop is killed."""
     guardians = target.guardians()
     if not guardians:
         raise OSError("there is no guardian")
     for one in guardians:
         os.kill(one, signal.SIGSTOP)
-    time.sleep(2.0)
+    yield 2.0
     os.kill(target.pid, signal.SIGKILL)
 
 
-def without_page(target: Target) -> None:
+def without_page(target: Target) -> Iterator[float]:
     """Suspend every child but the guardian, then ask for the end."""
     for one in {*children(target.pid)} - {*target.guardians()}:
         os.kill(one, signal.SIGSTOP)
-    time.sleep(1.0)
+    yield 1.0
     os.kill(target.pid, signal.SIGTERM)
 
 
@@ -272,8 +274,7 @@ def held(interface: str, benches: list[Bench], begin: Begin) -> Iterator[Target]
             stderr=null,
         )
         try:
-            alive = wait_until(lambda: _holds(program, benches))
-            yield Target(program, program.pid if alive else 0, folder)
+            yield Target(program, program.pid, folder)
         finally:
             end([program.pid])
             program.wait()
@@ -294,42 +295,41 @@ class Row(NamedTuple):
     seconds: float
     code: int | None
     void: str
+    off_park_deg: float = 0.0
 
 
 def case(
     kind: str, interface: str, exit_: str, begin: Begin = fresh, rate_hz: float | None = None
-) -> Row:
-    """Run one case, with another rate of the loops if one is given."""
+) -> Steps[Row]:
+    """Carry out one case, with another rate of the loops if one is given."""
     with ExitStack() as stack:
         names = [kind]
         if interface == "two heads":
             names.append("feetech" if kind != "feetech" else "desk")
         benches = [stack.enter_context(bench(name, rate_hz)) for name in names]
         of = sum(len(one.rig.joints) for one in benches)
+        target = stack.enter_context(held(interface, benches, begin))
+        program = target.program
         try:
-            target = stack.enter_context(held(interface, benches, begin))
-        except RuntimeError as error:
-            return Row(0, of, 0.0, None, str(error))
-        if not target.pid:
-            return Row(0, of, 0.0, target.program.poll(), "no torque within 60 s")
-        time.sleep(0.5)
-        if not all(one.busy() for one in benches):
-            return Row(0, of, 0.0, target.program.poll(), "the loop does not tick")
-        try:
-            EXITS[exit_](target)
-        except (OSError, ValueError) as error:
-            return Row(0, of, 0.0, target.program.poll(), f"the blow failed: {error}")
+            if not (yield from until(lambda: _holds(program, benches))):
+                return Row(0, of, 0.0, program.poll(), "no torque within 60 s")
+            yield 0.5
+            for at in benches:
+                if not (yield from at.busy()):
+                    return Row(0, of, 0.0, program.poll(), "the loop does not tick")
+            yield from EXITS[exit_](target)
+        except (OSError, ValueError, RuntimeError) as error:
+            return Row(0, of, 0.0, program.poll(), f"the blow failed: {error}")
         struck_s = time.monotonic()
-        while (
-            left := sum(one.on() for one in benches)
-        ) and time.monotonic() < struck_s + LONGEST_S:
-            time.sleep(0.01)
+        off = lambda: not any(at.on() for at in benches)  # noqa: E731
+        yield from until(off, LONGEST_S, every_s=0.01)
         took_s = time.monotonic() - struck_s
-        time.sleep(0.3)  # and it stays off
-        left = sum(one.on() for one in benches)
+        yield 0.3  # and it stays off
+        left = sum(at.on() for at in benches)
         if exit_ not in STAYS:
-            wait_until(lambda: target.program.poll() is not None, 8.0)
-        return Row(left, of, took_s, target.program.poll(), "")
+            yield from until(lambda: program.poll() is not None, 8.0)
+        off_deg = max(at.off_park_deg() for at in benches)
+        return Row(left, of, took_s, program.poll(), "", off_deg)
 
 
 def main() -> int:
@@ -345,7 +345,7 @@ def main() -> int:
     ):
         if not meets(interface, exit_):
             continue
-        row = case(kind, interface, exit_)
+        (row,) = side_by_side([case(kind, interface, exit_)])
         cases, powered, void = cases + 1, powered + bool(row.powered), void + bool(row.void)
         what = row.void or f"{row.powered} of {row.of}"
         print(

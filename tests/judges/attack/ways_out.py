@@ -24,12 +24,14 @@ import subprocess
 import sys
 import termios
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from heapq import heappop, heappush
 from itertools import product
 from math import degrees
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "helpers"))
 
@@ -101,10 +103,10 @@ class Bench(NamedTuple):
         """Count the servos with torque, or with pulses."""
         return sum(bool(servo.get("torque", servo.get("target"))) for servo in self.servos())
 
-    def busy(self) -> bool:
+    def busy(self) -> "Steps[bool]":
         """Return whether a program goes on speaking to the servos: its loop ticks."""
         before = self._read_bytes()
-        return wait_until(lambda: self._read_bytes() > before, 2.0)
+        return (yield from until(lambda: self._read_bytes() > before, 2.0))
 
     def _read_bytes(self) -> int:
         """Return what the emulator has read until now, including requests for its status."""
@@ -162,9 +164,9 @@ def fresh(words: list[str], breaks: str = "", **options: Any) -> "subprocess.Pop
     return subprocess.Popen(typed(words, breaks), **options)
 
 
-def started(words: list[str], way: str, begin: Begin = fresh) -> Started:
-    """Start a command as its end requires."""
-    env = {**os.environ, "COLUMNS": "100"}
+def started(words: list[str], way: str, folder: str, begin: Begin) -> Started:
+    """Start a command as its end requires; no other program finds its socket in its folder."""
+    env = {**os.environ, "COLUMNS": "100", "XDG_RUNTIME_DIR": folder}
     breaks = BROKEN.get(way, "")
     command = typed(words, breaks)
     pipe = subprocess.PIPE
@@ -217,84 +219,114 @@ def started(words: list[str], way: str, begin: Begin = fresh) -> Started:
     return Started(process, got, -1)
 
 
-def wait_until(true: Callable[[], bool], within_s: float = 60.0, master: int = -1) -> bool:
+T = TypeVar("T")
+Steps = Generator[float, None, T]
+"""A case at work: it yields the seconds that it waits, and returns its outcome."""
+
+
+def side_by_side(cases: Iterable[Steps[T]], at_once: int = 1) -> list[T]:
+    """Carry out cases, several at once; return their outcomes in order."""
+    waiting, outcomes = deque(enumerate(cases)), {}
+    due: list[tuple[float, int, Steps[T]]] = []
+    try:
+        while waiting or due:
+            while waiting and len(due) < at_once:
+                heappush(due, (0.0, *waiting.popleft()))
+            at_s, number, case = due[0]
+            time.sleep(max(0.0, at_s - time.monotonic()))
+            heappop(due)
+            try:
+                heappush(due, (time.monotonic() + next(case), number, case))
+            except StopIteration as end:
+                outcomes[number] = end.value
+    finally:
+        for _, _, case in due:
+            case.close()
+    return [outcomes[number] for number in sorted(outcomes)]
+
+
+def until(
+    true: Callable[[], bool], within_s: float = 60.0, master: int = -1, every_s: float = 0.05
+) -> Steps[bool]:
     """Wait, and read meanwhile what the program shows on its terminal, as a terminal does."""
     end_s = time.monotonic() + within_s
     while time.monotonic() < end_s:
         if true():
             return True
-        if master < 0:
-            time.sleep(0.05)
-        elif select.select([master], [], [], 0.05)[0]:
+        if master >= 0 and select.select([master], [], [], 0.0)[0]:
             with contextlib.suppress(OSError):  # no process is left
                 os.read(master, 65536)
+        yield every_s
     return False
 
 
-def send(*numbers: signal.Signals, gap_s: float = 0.7) -> Callable[[Started], None]:
-    def end(run: Started) -> None:
-        for i, number in enumerate(numbers):
-            if i:
-                time.sleep(gap_s)
+def send(*numbers: signal.Signals, gap_s: float = 0.7) -> Callable[[Started], Iterator[float]]:
+    def end(run: Started) -> Iterator[float]:
+        for number in numbers:
             if run.process.poll() is None:
                 run.process.send_signal(number)
+            yield gap_s
 
     return end
 
 
-def close_tty(run: Started) -> None:
-    os.close(run.master)
+def close_tty(run: Started) -> Iterator[float]:
+    null = os.open(os.devnull, os.O_RDWR)
+    os.dup2(null, run.master)  # so that no other case gets its number
+    os.close(null)
+    yield 0.0
 
 
-def stop_tty(run: Started) -> None:
+def stop_tty(run: Started) -> Iterator[float]:
     """Ctrl-S, lines that no one reads for a while, then a request to end."""
     slave = os.open(f"/proc/{run.pid}/fd/2", os.O_RDWR | os.O_NOCTTY)
     termios.tcflow(slave, termios.TCOOFF)
-    time.sleep(2.0)
+    yield 2.0
     run.process.send_signal(signal.SIGTERM)
     os.close(slave)
 
 
-def kill_page(run: Started) -> None:
+def kill_page(run: Started) -> Iterator[float]:
     """The page dies; a while later a request to end."""
     for page in running_as(run.pid, "gazerig.robot.dashboard.page_main"):
         os.kill(page, signal.SIGKILL)
-    time.sleep(1.0)
+    yield 1.0
     run.process.send_signal(signal.SIGTERM)
 
 
-def nothing(run: Started) -> None:
+def nothing(run: Started) -> Iterator[float]:
     """It ends without a request."""
+    yield 0.0
 
 
-def later(run: Started) -> None:
-    time.sleep(1.5)
+def later(run: Started) -> Iterator[float]:
+    yield 1.5
     if run.process.poll() is None:
         run.process.send_signal(signal.SIGTERM)
 
 
-def kill_reader(run: Started) -> None:
+def kill_reader(run: Started) -> Iterator[float]:
     """The other end of the pipe goes away, which is a request to end; then another one."""
     assert run.reader is not None
     run.reader.kill()
     run.reader.wait()
-    later_unless_ended(run)
+    yield from later_unless_ended(run)
 
 
-def broken_pipe(run: Started) -> None:
+def broken_pipe(run: Started) -> Iterator[float]:
     """The reader of standard error goes away, which is a request to end; then another one."""
     assert run.process.stderr is not None
     run.process.stderr.close()
-    later_unless_ended(run)
+    yield from later_unless_ended(run)
 
 
-def later_unless_ended(run: Started) -> None:
+def later_unless_ended(run: Started) -> Iterator[float]:
     """Request the end of a run that goes on: a second request skips the parking."""
-    if not wait_until(lambda: run.process.poll() is not None, 6.0):
-        later(run)
+    if not (yield from until(lambda: run.process.poll() is not None, 6.0)):
+        yield from later(run)
 
 
-WAYS: dict[str, Callable[[Started], None]] = {
+WAYS: dict[str, Callable[[Started], Iterator[float]]] = {
     "SIGHUP": send(signal.SIGHUP),
     "SIGQUIT": send(signal.SIGQUIT),
     "SIGTERM": send(signal.SIGTERM),
@@ -332,7 +364,15 @@ class Row(NamedTuple):
     void: str
 
 
-def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
+def case(
+    kind: str, name: str, way: str, begin: Begin = fresh, rate_hz: float | None = None
+) -> Steps[Row]:
+    """Carry out one case, with another rate of the loop if one is given."""
+    with bench(kind, rate_hz) as at:
+        return (yield from attack(at, name, way, begin))
+
+
+def attack(at: Bench, name: str, way: str, begin: Begin) -> Steps[Row]:
     """Start a command, wait for torque, end it, and inspect the servos."""
     words = [*commands(at.name, at.file)[name], "--port", at.port]
     folder = TemporaryDirectory()
@@ -340,7 +380,7 @@ def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
         words.remove("--no-page")
     if way == "recorder's disk full":
         words += ["--record", f"{folder.name}/full.mcap", "--force"]
-    run = started(words, way, begin)
+    run = started(words, way, folder.name, begin)
     if name == "calibrate" and at.name in BOARDS:
         keys = run.master if run.process.stdin is None else run.process.stdin.fileno()
         with contextlib.suppress(OSError):
@@ -350,27 +390,26 @@ def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
     needs = 0 if is_limp else 1
     # A lack of memory is timed by ticks; everything else starts when the program works.
     ended = lambda: run.process.poll() is not None  # noqa: E731
-    ticks = lambda: at.on() >= needs and at.busy() and at.on() >= needs  # noqa: E731
-    up = wait_until(lambda: ticks() or ended(), master=run.master)
-    void = "" if up and not ended() else "no torque, or no loop that ticks"
+    on = lambda: at.on() >= needs or ended()  # noqa: E731
+    ticks, end_s = False, time.monotonic() + 60.0
+    while not ticks and not ended() and time.monotonic() < end_s:
+        yield from until(on, master=run.master)
+        ticks = (yield from at.busy()) and at.on() >= needs
+    void = "" if ticks and not ended() else "no torque, or no loop that ticks"
     if way != "MemoryError in the loop":
-        wait_until(ended, 4.2 if way == "recorder's disk full" else 1.2, run.master)
-        if ended() or not ticks():
+        yield from until(ended, 4.2 if way == "recorder's disk full" else 1.2, run.master)
+        if ended() or not on() or not (yield from at.busy()):
             void = void or "it had ended before the blow"
     began_s = time.monotonic()
     if not ended():
-        WAYS[way](run)
+        yield from WAYS[way](run)
     said = b""
-    took_s = LONGEST_S
-    while time.monotonic() - began_s < LONGEST_S:
-        if run.process.poll() is not None:
-            took_s = time.monotonic() - began_s
-            break
-        if way not in ("full pipe that nobody reads", "stderr broken") and run.errors >= 0:
-            if select.select([run.errors], [], [], 0.05)[0]:
-                said += os.read(run.errors, 65536)
-        else:
-            time.sleep(0.02)
+    reads = way not in ("full pipe that nobody reads", "stderr broken") and run.errors >= 0
+    while time.monotonic() - began_s < LONGEST_S and not ended():
+        if reads and select.select([run.errors], [], [], 0.0)[0]:
+            said += os.read(run.errors, 65536)
+        yield 0.02
+    took_s = time.monotonic() - began_s if ended() else LONGEST_S
     code = run.process.poll()
     left, off = at.on(), at.off_park_deg()
     if code is None:
@@ -411,8 +450,7 @@ def main() -> int:
         for command, way in product(asked.command or commands(name), asked.way or WAYS):
             if way in ONLY_RUN and command != "run":
                 continue
-            with bench(name) as at:
-                row = attack(at, command, way)
+            (row,) = side_by_side([case(name, command, way)])
             cases, left, hung = cases + 1, left + row.on, hung + (row.code is None)
             void += bool(row.void)
             what = (RIGS[name], command, way, f"{row.on} of {row.of}")
