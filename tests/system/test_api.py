@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from math import degrees, nan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,22 +18,12 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 @pytest.fixture
 def head() -> Iterator[gazerig.SimulatedHead]:
-    yield from _opened()
-
-
-@pytest.fixture(scope="module")
-def shared_head() -> Iterator[gazerig.SimulatedHead]:
-    """Return a head for what changes nothing."""
-    yield from _opened()
-
-
-def _opened() -> Iterator[gazerig.SimulatedHead]:
     with gazerig.open("desk", fast=True, scene="face-to-face") as head:
         head.step(2.0)
         yield head
 
 
-def test_an_order_arrives_and_says_what_is_really_done(head: gazerig.SimulatedHead):
+def test_orders_arrive_are_taken_over_and_end(head: gazerig.SimulatedHead):
     began_s = head.time_s
     order = head.look_at(1.0, 0.5, 0.3)
     assert order.outcome is None and head.time_s == began_s  # time passes only when stepped
@@ -40,6 +31,22 @@ def test_an_order_arrives_and_says_what_is_really_done(head: gazerig.SimulatedHe
     assert 0.02 < head.time_s - began_s < 1.5
     assert order.active and head.state.controlled_by == "the program: look at 1 0.5 0.3"
     assert degrees(gaze_error(head, (1.0, 0.5, 0.3))) < 1.0
+    first = head.look_at(1.0, 1.0, 0.3)
+    second = head.look_towards(-10.0, 5.0)
+    assert first.wait() == "taken over" and "look in direction -10.0 5.0" in first.why
+    assert second.wait() == "arrived"
+    assert head.gaze.direction_deg == pytest.approx((-10.0, 5.0), abs=1.0)
+    # An arrived order stays so, whatever follows.
+    head.look_freely().wait()
+    assert second.outcome == "arrived" and not second.active
+    order = head.look_at(1.0, 0.4, 0.3)
+    head.step(0.5)
+    assert order.active
+    order.end()
+    head.step()
+    assert not order.active and head.state.controlled_by == ""
+    timed = head.look_at(1.0, 1.0, 0.3, for_s=0.05)
+    assert timed.wait() == "taken over" and timed.why == "its time is over"
 
 
 def gaze_error(head: gazerig.Head, point: Vec3) -> float:
@@ -65,46 +72,28 @@ def test_a_point_out_of_reach_is_told_when_the_head_rests_as_near_as_it_can(
     assert degrees(rests) == pytest.approx(off_deg, abs=3.0)
 
 
-def test_the_next_order_takes_over_and_the_first_says_by_whom(head: gazerig.SimulatedHead):
-    first = head.look_at(1.0, 1.0, 0.3)
-    second = head.look_towards(-10.0, 5.0)
-    assert first.wait() == "taken over" and "look in direction -10.0 5.0" in first.why
-    assert second.wait() == "arrived"
-    assert head.gaze.direction_deg == pytest.approx((-10.0, 5.0), abs=1.0)
-    # An arrived order stays so, whatever follows.
-    head.look_freely().wait()
-    assert second.outcome == "arrived" and not second.active
-
-
-def test_an_order_ends_on_request_or_after_its_time(head: gazerig.SimulatedHead):
-    order = head.look_at(1.0, 0.4, 0.3)
-    head.step(0.5)
-    assert order.active
-    order.end()
-    head.step()
-    assert not order.active and head.state.controlled_by == ""
-    timed = head.look_at(1.0, 1.0, 0.3, for_s=0.05)
-    assert timed.wait() == "taken over" and timed.why == "its time is over"
-
-
-@pytest.mark.parametrize(
-    ("ask", "rule"),
-    [
-        (lambda head: head.look_at(nan, 0.0, 0.0), "look_at: .*p_world_m"),
-        (lambda head: head.jog("nose", 1.0), "no joint 'nose'"),
-        (lambda head: head.express("smug"), "no expression 'smug'"),
-        (lambda head: head.move_opponent(0.7, 0.0, 0.0), "no opponent to move"),
-        (lambda head: head.get("gaze.hed"), "no key .hed."),
-        (lambda head: head.save(), "is part of the program and is never changed"),
-        (lambda head: next(head.states(0.0)), "above 0"),
-    ],
+REFUSED = (
+    (lambda head: head.look_at(nan, 0.0, 0.0), "look_at: .*p_world_m"),
+    (lambda head: head.jog("nose", 1.0), "no joint 'nose'"),
+    (lambda head: head.express("smug"), "no expression 'smug'"),
+    (lambda head: head.move_opponent(0.7, 0.0, 0.0), "no opponent to move"),
+    (lambda head: head.get("gaze.hed"), "no key .hed."),
+    (lambda head: head.save(), "is part of the program and is never changed"),
+    (lambda head: next(head.states(0.0)), "above 0"),
 )
-def test_what_cannot_be_meant_is_refused_at_once(
-    shared_head: gazerig.SimulatedHead, ask: object, rule: str
+
+
+def test_what_cannot_be_meant_is_refused_and_values_are_set_and_saved(
+    head: gazerig.SimulatedHead, tmp_path: Path
 ):
-    assert callable(ask)
-    with pytest.raises(gazerig.Refused, match=rule):
-        ask(shared_head)
+    for ask, rule in REFUSED:
+        with pytest.raises(gazerig.Refused, match=rule):
+            ask(head)
+    key = "gaze.head.eye_only_range_deg"
+    assert head.set({key: 11.0}) == (f"{key} = 11.0",)
+    assert head.get(key) == {key: 11.0}
+    assert head.save(tmp_path / "mine.yaml").read_text().count("eye_only_range_deg: 11") == 1
+    assert head.set({key: 12.0}) and head.revert() == (f"{key} = 11.0",)
 
 
 def test_people_pixels_and_joints(head: gazerig.SimulatedHead):
@@ -143,15 +132,7 @@ def test_face_and_behaviour(head: gazerig.SimulatedHead):
     assert head.menus()["behaviour"][0] == behaviour
 
 
-def test_parameters(head: gazerig.SimulatedHead, tmp_path: Path):
-    key = "gaze.head.eye_only_range_deg"
-    assert head.set({key: 11.0}) == (f"{key} = 11.0",)
-    assert head.get(key) == {key: 11.0}
-    assert head.save(tmp_path / "mine.yaml").read_text().count("eye_only_range_deg: 11") == 1
-    assert head.set({key: 12.0}) and head.revert() == (f"{key} = 11.0",)
-
-
-def test_states_and_events_step_the_head(head: gazerig.SimulatedHead):
+def test_states_events_and_conditions_step_the_head(head: gazerig.SimulatedHead):
     began_s = head.state.t_s
     times = [state.t_s - began_s for state in head.states(rate_hz=10.0, seconds=0.5)]
     assert times == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4], abs=0.006)
@@ -159,14 +140,11 @@ def test_states_and_events_step_the_head(head: gazerig.SimulatedHead):
     before_s = head.state.t_s
     head.sleep(0.25)
     assert head.state.t_s - before_s == pytest.approx(0.25, abs=0.006)
+    assert head.run_until(lambda state: state.gaze.phase == "saccade", 5.0)
+    assert not head.run_until(lambda state: state.t_s < 0.0, 0.1)
     head.look_at(1.0, 0.0, 0.3)
     texts = [event.text for event in head.events(timeout_s=0.2)]
     assert "controlled by the program: look at 1 0 0.3" in texts
-
-
-def test_a_condition_is_waited_for(head: gazerig.SimulatedHead):
-    assert head.run_until(lambda state: state.gaze.phase == "saccade", 5.0)
-    assert not head.run_until(lambda state: state.t_s < 0.0, 0.1)
 
 
 def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path):
@@ -185,49 +163,6 @@ def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path):
     assert again.is_same and again.sent_bytes_same and not again.notes
 
 
-def test_a_head_moves_in_its_block_alone():
-    closed = gazerig.open("desk", fast=True)
-    with pytest.raises(gazerig.Error, match="in a with block"):
-        closed.look_at(1.0, 0.0, 0.0)
-    with closed as head:
-        head.step()
-    with pytest.raises(gazerig.HeadEnded, match="the program"):
-        head.step()
-    with pytest.raises(gazerig.Error, match="open another"), closed:
-        pass
-
-
-def test_the_end_of_the_block_parks_whatever_ends_it():
-    said: list[str] = []
-    with (
-        pytest.raises(ZeroDivisionError),
-        gazerig.open("desk", fast=True, say=said.append) as head,
-    ):
-        head.step(0.5)
-        raise ZeroDivisionError
-    assert said[-1] == "stopped by the program: parked, torque off"
-
-
-@pytest.mark.parametrize(
-    ("options", "error", "words"),
-    [
-        ({"rig": "dusk"}, gazerig.ConfigError, "did you mean"),
-        ({"scene": "visitr"}, gazerig.ConfigError, "did you mean .visitor."),
-        ({"scene": "visitor", "video": "x.avi"}, gazerig.SetupError, "exclude each other"),
-        ({"video": "/nowhere.avi"}, gazerig.SetupError, "nowhere.avi"),
-    ],
-)
-def test_what_does_not_fit_is_one_line_of_one_family(
-    options: dict[str, object], error: type[Exception], words: str
-):
-    assert issubclass(error, gazerig.Error)
-    with (
-        pytest.raises(error, match=words),
-        gazerig.open(**{"fast": True, **options}),  # type: ignore[call-overload]
-    ):
-        pass
-
-
 class BadRule:
     """Fails."""
 
@@ -235,35 +170,36 @@ class BadRule:
         raise RuntimeError("out of ideas")
 
 
-def test_an_own_rule_that_fails_ends_the_head_with_its_error():
-    with (
-        pytest.raises(RuntimeError, match="out of ideas"),
-        gazerig.open("desk", fast=True, attention=BadRule()) as head,
-    ):
+def test_a_head_moves_in_its_block_alone_and_parks_whatever_ends_it():
+    said: list[str] = []
+    closed = gazerig.open("desk", fast=True, say=said.append)
+    with pytest.raises(gazerig.Error, match="in a with block"):
+        closed.look_at(1.0, 0.0, 0.0)
+    with pytest.raises(ZeroDivisionError), closed as head:
+        head.step(0.5)
+        raise ZeroDivisionError
+    assert said[-1] == "stopped by the program: parked, torque off"
+    with pytest.raises(gazerig.HeadEnded, match="the program"):
+        head.step()
+    with pytest.raises(gazerig.Error, match="open another"), closed:
+        pass
+    bad = gazerig.open("desk", fast=True, attention=BadRule(), say=said.append)
+    with pytest.raises(RuntimeError, match="out of ideas"), bad as head:
         head.step(0.1)
+    assert said[-1] == "stopped by the program: parked, torque off"
 
 
-# Geometry
+UNFIT: tuple[tuple[dict[str, Any], type[Exception], str], ...] = (
+    ({"rig": "dusk"}, gazerig.ConfigError, "did you mean 'desk'"),
+    ({"character": "shyy"}, gazerig.ConfigError, "did you mean 'shy'"),
+    ({"scene": "visitr"}, gazerig.ConfigError, "did you mean .visitor."),
+    ({"scene": "visitor", "video": "x.avi"}, gazerig.SetupError, "exclude each other"),
+    ({"video": "/nowhere.avi"}, gazerig.SetupError, "nowhere.avi"),
+)
 
 
-@pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])
-def test_inverse_and_forward_meet(rig: str):
-    point = (1.2, 0.15, 0.2)
-    solved = gazerig.inverse(rig, point)
-    assert solved.reachable and solved.error_deg < 1.0
-    assert solved.joints_rad.keys() == gazerig.load_rig(rig).joints.keys()
-    pose = gazerig.forward(rig, solved.joints_rad)
-    sight = np.add(pose.left_sight, pose.right_sight)
-    to = np.subtract(point, pose.head_m)
-    cosine = np.dot(sight, to) / np.linalg.norm(sight) / np.linalg.norm(to)
-    assert degrees(np.arccos(min(1.0, cosine))) < 1.0
-
-
-def test_a_point_behind_is_not_reachable():
-    loaded = gazerig.load_rig("desk")
-    solved = gazerig.inverse(loaded, (-1.0, 0.2, 0.3))
-    assert not solved.reachable and solved.error_deg > 30.0
-    with pytest.raises(gazerig.Refused, match="p_world_m"):
-        gazerig.inverse(loaded, (nan, 0.0, 0.0))
-    with pytest.raises(gazerig.Refused, match="no joint 'nose'; available: left_eye_pan"):
-        gazerig.forward(loaded, {"nose": 0.1})
+def test_what_does_not_fit_is_one_line_of_one_family():
+    for options, error, words in UNFIT:
+        assert issubclass(error, gazerig.Error)
+        with pytest.raises(error, match=words), gazerig.open(**{"fast": True, **options}):
+            pass

@@ -51,21 +51,21 @@ def head(running: gazerig.Head) -> Iterator[gazerig.Head]:
     running.look_freely()
 
 
-pytestmark = pytest.mark.usefixtures("head")
+REFUSED = (
+    ((RATE, "1e9"), "20 to 1000 Hz"),
+    (("gaze.scanpath.model", "markof"), "did you mean 'markov'?"),
+    ((RATE,), "a value is missing"),
+    ((RATE, "100\nmore: 1"), "more than one value"),
+)
 
 
-def test_get_shows_all_and_marks_what_is_not_saved():
+def test_values_are_shown_set_refused_and_reverted(head: gazerig.Head):
     everything = invoked("ctl", "get").out.splitlines()
     assert len(everything) > 200 and everything[0].split() == ["key", "value", "unit", "default"]
-    assert invoked("ctl", "set", RATE, "150").code == 0
-    table = invoked("ctl", "get", "loop").out.splitlines()
-    (row,) = (line for line in table if RATE in line)
-    assert row.split() == ["*", RATE, "150.0", "Hz", "200.0", "next", "start"]
-    alone = invoked("ctl", "get", RATE).out
-    assert "control rate; 20 .. 1000 Hz; changes at the next start" in alone
-
-
-def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it():
+    for words, rule in REFUSED:
+        done = invoked("ctl", "set", *words)
+        assert done.code == 2 and rule in done.err and "Traceback" not in done.err
+        assert done.out == "" and head.get(RATE) == {RATE: 80.0}
     done = invoked("ctl", "set", RATE, "150", "gaze.scanpath.model", "random")
     assert done.code == 0, done.err
     assert sorted(done.out.splitlines()) == [
@@ -74,36 +74,37 @@ def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it():
     ]
     assert "already active" in invoked("ctl", "set", RATE, "150.0").err
     assert "not saved yet: 2 values" in done.err
-
-
-@pytest.mark.parametrize(
-    ("words", "rule"),
-    [
-        ((RATE, "1e9"), "20 to 1000 Hz"),
-        (("gaze.scanpath.model", "markof"), "did you mean 'markov'?"),
-        ((RATE,), "a value is missing"),
-        ((RATE, "100\nmore: 1"), "more than one value"),
-    ],
-)
-def test_what_is_wrong_is_refused_with_the_rule_and_exit_code_2(
-    head: gazerig.Head, words: tuple[str, ...], rule: str
-):
-    done = invoked("ctl", "set", *words)
-    assert done.code == 2 and rule in done.err and "Traceback" not in done.err
-    assert done.out == "" and head.get(RATE) == {RATE: 80.0}
-
-
-def test_revert_tells_what_it_takes_back(head: gazerig.Head):
-    invoked("ctl", "set", RATE, "150")
+    table = invoked("ctl", "get", "loop").out.splitlines()
+    (row,) = (line for line in table if RATE in line)
+    assert row.split() == ["*", RATE, "150.0", "Hz", "200.0", "next", "start"]
+    alone = invoked("ctl", "get", RATE).out
+    assert "control rate; 20 .. 1000 Hz; changes at the next start" in alone
     done = invoked("ctl", "revert")
     assert f"{RATE} = 80.0" in done.out and head.get(RATE) == {RATE: 80.0}
-    assert "1 value undone" in done.err
+    assert "2 values undone" in done.err
 
 
-def test_stop_and_resume(head: gazerig.Head):
+def test_status_menus_stop_and_resume(head: gazerig.Head, rig: str):
+    said = invoked("ctl", "status").out
+    assert f"rig: {rig}, process {os.getpid()}\n" in said
+    assert "looks at: " in said and "guard: " in said and "neck_yaw" in said
+    assert "all saved" in said and "STOPPED" not in said
+    present, *others = head.menus()["conversation"]
+    lines = invoked("ctl", "ask").out.splitlines()
+    assert any(line.startswith("behaviour: ") for line in lines)
+    assert f"conversation: {present} (in force), {', '.join(others)}" in lines
+    done = invoked("ctl", "ask", "conversation", others[0])
+    assert (done.code, done.err) == (0, f"conversation {others[0]} is active\n")
+    (line,) = invoked("ctl", "ask", "conversation").out.splitlines()
+    assert line.startswith(f"conversation: {others[0]} (in force), ")
+    invoked("ctl", "set", RATE, "150")
     done = invoked("stop", "finger")
     assert done.code == 0 and "torque is off" in done.err
     assert head.state.stopped == "finger"
+    said = invoked("ctl", "status").out
+    assert "STOPPED, torque off: finger; gazerig ctl resume continues" in said
+    assert "not saved: 1 value" in said and "said: stopped by gazerig stop (process" in said
+    assert json.loads(invoked("ctl", "status", "--json").out)["stopped"] == "finger"
     unsure = invoked("ctl", "resume")  # no person confirms that no hand is in it
     assert unsure.code != 0 and "no hand" in unsure.out + unsure.err
     assert head.state.stopped == "finger"
@@ -133,31 +134,6 @@ def test_stop_stops_every_rig_that_runs(head: gazerig.Head, rig: str):
         unknown = invoked("ctl", "get", RATE, "--rig", "eva")
         assert "no rig named eva is running: desk (process " in unknown.err
         process.terminate()
-
-
-def test_ask_lists_the_menus_and_chooses_from_them(head: gazerig.Head):
-    present, *others = head.menus()["conversation"]
-    lines = invoked("ctl", "ask").out.splitlines()
-    assert any(line.startswith("behaviour: ") for line in lines)
-    assert f"conversation: {present} (in force), {', '.join(others)}" in lines
-    done = invoked("ctl", "ask", "conversation", others[0])
-    assert (done.code, done.err) == (0, f"conversation {others[0]} is active\n")
-    (line,) = invoked("ctl", "ask", "conversation").out.splitlines()
-    assert line.startswith(f"conversation: {others[0]} (in force), ")
-    invoked("ctl", "ask", "conversation", present)
-
-
-def test_status_says_what_the_rig_does(rig: str):
-    said = invoked("ctl", "status").out
-    assert f"rig: {rig}, process {os.getpid()}\n" in said
-    assert "looks at: " in said and "guard: " in said and "neck_yaw" in said
-    assert "all saved" in said and "STOPPED" not in said
-    invoked("ctl", "set", RATE, "150")
-    invoked("stop", "finger")
-    said = invoked("ctl", "status").out
-    assert "STOPPED, torque off: finger; gazerig ctl resume continues" in said
-    assert "not saved: 1 value" in said and "said: stopped by gazerig stop (process" in said
-    assert json.loads(invoked("ctl", "status", "--json").out)["stopped"] == "finger"
 
 
 def test_where_no_rig_runs_it_is_one_line_and_exit_code_2(

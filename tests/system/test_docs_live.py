@@ -1,5 +1,6 @@
 """Commands of README and docs that need a head that runs, servos, or a recording."""
 
+import json
 import re
 import shlex
 import signal
@@ -7,12 +8,14 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from shutil import which
+from xml.etree import ElementTree
 
 import pytest
 from branch import Branch
 from branch import gazerig as gazerig_branch
 from command_line import invoked
 from features_there import needs_all_features
+from mcap.reader import make_reader
 from papers import COMMANDS, blocks
 from shown_page import wait_for
 
@@ -120,12 +123,24 @@ def test_commands_to_servos_work(folder: Path):
 
 
 def test_commands_on_a_recording_work(folder: Path):
-    """On one under the name that papers give theirs."""
+    """On one under the name that papers give theirs; a viewer reads the rig's description in it."""
     copy("desk", folder / "my.yaml")
     works("run my.yaml --mock --fast --seconds 1 --scene face-to-face --record evening.mcap")
     (folder / "minute.mcap").write_bytes((folder / "evening.mcap").read_bytes())
     for words in ON_A_RECORDING:
-        works(words)
+        shown = works(words)
+        assert not words.startswith("rerun") or re.search(
+            r"\b(\d{3,}) of \1 ticks are bit-identical", shown
+        )
+    with (folder / "evening.mcap").open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        ((schema, _, message),) = reader.iter_messages(["/robot_description"])
+        assert schema is not None and schema.encoding == "jsonschema" and schema.name
+        assert json.loads(schema.data)["type"] == "object"
+        robot = ElementTree.fromstring(json.loads(message.data)["data"])
+        (_, _, state), *_ = reader.iter_messages(["/joint_states"])
+    joints = {joint.get("name") for joint in robot.iter("joint")}
+    assert {joint["name"] for joint in json.loads(state.data)["joints"]} <= joints
 
 
 @pytest.mark.pty

@@ -5,18 +5,15 @@ import os
 import signal
 from pathlib import Path
 
-import pytest
+from command_line import invoked
 from commands_started import start
 from present import present
-from typer.testing import CliRunner
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.robot.cli.emulate import app
 
 ROOT = Path(__file__).parents[2]
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTTIN)
 
 
 class Emulator:
@@ -76,21 +73,10 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
     assert not os.path.lexists(link)
 
 
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
+def test_bad_input_is_one_clear_line():
+    for options, message in (
         ((), "name a rig, or its servos: --servos 1-6:xl330-m077"),
-        (("--servos", "1:xl330-m077", "--link", "README.md"), "File exists"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
-)
-def test_bad_input_is_one_clear_line(options, says, monkeypatch):
-    monkeypatch.chdir(ROOT)
-    before = {number: signal.getsignal(number) for number in SIGNALS}
-    done = CliRunner().invoke(app, options)
-    for number, handler in before.items():
-        signal.signal(number, handler)
-    assert done.exit_code == 2
-    assert says in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert done.stdout == ""
+        (("--servos", "1:xl330-m077", "--link", str(ROOT / "README.md")), "File exists"),
+    ):
+        code, out, err = invoked("emulate", *options)
+        assert (code, out, message in err, err.count("\n")) == (2, "", True, 1), err

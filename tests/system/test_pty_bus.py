@@ -8,7 +8,9 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
+from subprocess import PIPE
 
 import pytest
 from fakes.pty_bus import PtyBus
@@ -51,54 +53,39 @@ def found(port):
     return len(port.read_until(14, port.now_s() + WAIT_S)) == 14
 
 
-@pytest.fixture
-def server(tmp_path):
+@contextmanager
+def server(tmp_path, *options):
     """Start a server as a client does, and give it with its terminal."""
     settings = tmp_path / "settings"
     settings.write_bytes(pickle.dumps(ServerSettings((BusSettings(DEVICE),), until_eof=True)))
-    command = [sys.executable, "-m", "gazerig.sim_mock.pty.server", str(settings)]
-    with subprocess.Popen(
-        command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as started:
+    command = [sys.executable, *options, "-m", "gazerig.sim_mock.pty.server", str(settings)]
+    with subprocess.Popen(command, cwd=ROOT, stdin=PIPE, stdout=PIPE, stderr=PIPE) as started:
         yield started, json.loads(present(started.stdout).readline())["path"]
 
 
-def test_the_server_says_its_path_and_ends_with_its_parents_pipe(server):
-    process, terminal = server
-    assert Path(terminal).is_char_device()
-    present(process.stdin).close()
-    assert process.wait(60) == 0
-
-
-def test_the_server_ignores_ctrl_c_and_heeds_sigterm(server):
-    process, terminal = server
-    process.send_signal(signal.SIGINT)
-    port = port_at(terminal)
-    assert found(port)
-    port.closePort()
-    held = os.open(terminal, os.O_RDONLY | os.O_NOCTTY)
-    process.terminate()
-    assert process.wait(60) == 0
-    assert os.read(held, 1) == b""  # hung up; another test may have its number by now
-    os.close(held)
-
-
-def test_the_server_loads_nothing_heavy():
-    code = "import sys, gazerig.sim_mock.pty.server; print(*sys.modules)"
-    loaded = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout.split()
-    assert not {"numpy", "cv2", "serial", "dynamixel_sdk", "pydantic"} & set(loaded)
-
-
-def test_a_wrong_specification_is_an_error(capfd):
+def test_the_server_ignores_ctrl_c_and_ends_with_its_parents_pipe_or_when_asked(tmp_path, capfd):
+    with server(tmp_path) as (process, terminal):
+        process.send_signal(signal.SIGINT)
+        port = port_at(terminal)
+        assert found(port)
+        port.closePort()
+        held = os.open(terminal, os.O_RDONLY | os.O_NOCTTY)
+        process.terminate()
+        assert process.wait(60) == 0
+        assert os.read(held, 1) == b""  # hung up; another test may have its number by now
+        os.close(held)
+    with server(tmp_path, "-X", "importtime") as (process, _):
+        present(process.stdin).close()
+        imported = {line.split()[-1] for line in present(process.stderr).read().splitlines()}
+        assert process.wait(60) == 0
+    assert b"gazerig.sim_mock.pty.line" in imported
+    assert not imported & {b"numpy", b"cv2", b"serial", b"dynamixel_sdk", b"pydantic"}
     with PtyBus() as wrong, pytest.raises(RuntimeError, match="did not start"):
         wrong.start([(1, "no-such-model", 2048)])
     assert "no-such-model" in capfd.readouterr().err
 
 
-def test_a_full_terminal_does_not_stop_the_server(bus):
-    """A client that asks and never listens loses answers; the next one is served."""
+def test_clients_come_go_forget_to_listen_and_are_unplugged(bus):
     fd = os.open(bus.path, os.O_RDWR | os.O_NOCTTY)
     for _ in range(2000):
         os.write(fd, PING)
@@ -107,9 +94,6 @@ def test_a_full_terminal_does_not_stop_the_server(bus):
     port.drain()
     assert found(port)
     port.closePort()
-
-
-def test_answers_that_a_client_did_not_read_are_not_the_next_ones(bus):
     flags = os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK
     fd = os.open(bus.path, flags)
     os.write(fd, PING)
@@ -119,9 +103,6 @@ def test_answers_that_a_client_did_not_read_are_not_the_next_ones(bus):
     fd = os.open(bus.path, flags)
     assert select.select([fd], (), (), 0.0)[0] == []
     os.close(fd)
-
-
-def test_unplug_is_an_error_and_plug_brings_the_name_back(bus):
     client = port_at(bus.path)
     for _ in range(2):
         bus.command("unplug")
@@ -138,25 +119,20 @@ def test_unplug_is_an_error_and_plug_brings_the_name_back(bus):
 
 def test_the_buses_of_a_rig_live_in_one_process():
     with PtyBuses() as buses:
-        paths = buses.start({"": DEVICE, "neck": FeetechLine((ServoSpec(1, "sts3215"),))})
-        assert list(paths) == ["", "neck"]
+        paths = buses.start({"eyes": DEVICE, "neck": FeetechLine((ServoSpec(1, "sts3215"),))})
+        assert list(paths) == ["eyes", "neck"]
         neck = port_at(paths["neck"])
         neck.write(STS_PING)
         assert neck.read_until(6, neck.now_s() + 20.0) == STS_PONG
         neck.closePort()
         assert buses.command("lose 1 count 1", "neck") == "servo 1 does not answer 1 times"
         assert json.loads(buses.command("status", "neck"))["faults"] == ["lose 1"]
-        assert json.loads(buses.command("status"))["faults"] == []
+        assert json.loads(buses.command("status", "eyes"))["faults"] == []
+        with pytest.raises(ValueError, match=r"name the bus first \(eyes, neck\): eyes: status"):
+            buses.command("status")
         buses.command("unplug", "neck")
         assert [Path(path).exists() for path in paths.values()] == [True, False]
         with pytest.raises(ValueError, match="'lsoe' is not a command"):
-            buses.command("lsoe 1")
+            buses.command("lsoe 1", "eyes")
         pid = buses.pid
     assert not Path(f"/proc/{pid}").exists()
-
-
-def test_a_command_for_no_bus_is_refused_with_the_names():
-    with PtyBuses() as buses:
-        buses.start({"eyes": DEVICE, "neck": DEVICE})
-        with pytest.raises(ValueError, match=r"name the bus first \(eyes, neck\): eyes: status"):
-            buses.command("status")

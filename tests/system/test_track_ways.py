@@ -7,9 +7,6 @@ import pytest
 from ticked_rig import TickedRig, connected, gazerig
 
 from gazerig.config.schema import load_rig
-from gazerig.gaze.attention.top_down import Rule
-from gazerig.gaze.track.track_trigger import TrackTrigger
-from gazerig.gaze.types import Target
 from gazerig.robot.model.commands import Jog, Play, Resume, Stop, set_client
 from gazerig.robot.net.client import RequestRejected, RobotClient
 from gazerig.robot.run import session
@@ -54,23 +51,6 @@ def test_whoever_is_stopped_or_led_by_hand_does_not_track(rig: TickedRig):
     rig.command(Jog((("jaw", 0.1),), who="me", stay=True))
     with pytest.raises(RequestRejected, match="held at their angles"):
         RobotClient.connect().send(Play("nod"))
-
-
-def looked_at(kind: str, number: int = 1) -> Target:
-    return Target((1.0, 0.0, 0.2), (0.0, 0.0, 0.0), 0.0, kind, number, 0.5, True, None, 0, "")
-
-
-def test_a_rule_plays_its_track_at_its_onset_and_not_again_too_soon():
-    rule = Rule("hand", 0.5, gesture="nod")
-    trigger = TrackTrigger()
-    seen = [(0.0, "face"), (0.1, "hand"), (0.2, "hand"), (0.3, "face"), (0.4, "hand"),
-            (9.9, "face"), (10.2, "hand"), (17.0, "hand")]  # fmt: skip
-    played = [t for t, kind in seen if trigger.step("wait", rule, looked_at(kind), t)]
-    assert played == [0.1, 10.2]
-    named = Rule("id:7", 0.5, gesture="nod")
-    assert not trigger.step("one", named, looked_at("face", 6), 20.0)
-    assert trigger.step("one", named, looked_at("face", 7), 20.1) == "nod"
-    assert not trigger.step("none", Rule("face", 0.5), looked_at("face"), 30.0)
 
 
 def test_a_visitor_who_waves_is_nodded_to():

@@ -1,5 +1,6 @@
 """The serial port: waiting, time limits, and errors that name the cure."""
 
+import errno
 import os
 import pty
 import tty
@@ -8,6 +9,7 @@ import pytest
 from serial.tools import list_ports
 
 from gazerig.drivers.errors import BusLost, PortError
+from gazerig.drivers.serial.list_ports import open_failure_text
 from gazerig.drivers.serial.port import BlockingPort
 
 
@@ -80,6 +82,11 @@ def test_an_absent_port_is_named_with_the_ports_there_are(monkeypatch):
     assert str(caught.value) == (
         "no serial port /dev/ttyUSB99: plug the adapter in; ports here: /dev/ttyACM7 (U2D2)"
     )
+
+
+def test_a_port_without_rights_names_the_cure():
+    text = open_failure_text("/dev/ttyUSB0", errno.EACCES)
+    assert "no permission to open /dev/ttyUSB0: join its group with 'sudo usermod -aG" in text
 
 
 def test_a_busy_port_is_named(line):

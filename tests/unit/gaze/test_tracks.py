@@ -14,13 +14,15 @@ from hypothesis import strategies as st
 from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track, shipped_tracks
+from gazerig.gaze.attention.top_down import Rule
 from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.track.curves import Curves, key_states
 from gazerig.gaze.track.motion import Motion
 from gazerig.gaze.track.player import TrackPlayer, Voice
 from gazerig.gaze.track.pose_offset import PoseOffset
 from gazerig.gaze.track.track import LIMIT_SHARE, KeyFrame, Track
-from gazerig.gaze.types import Floats, GazeCommand
+from gazerig.gaze.track.track_trigger import TrackTrigger
+from gazerig.gaze.types import Floats, GazeCommand, Target
 from gazerig.robot.loop.track_choices import TrackChoices
 from gazerig.robot.model.commands import EndTrack, Play
 from gazerig.robot.model.joint import JointLimit
@@ -450,3 +452,20 @@ def test_cues_loops_and_a_clock_of_a_sound():
     it.player.step(t + 0.5)
     (playing,) = [one for one in it.player.states(t + 0.5) if one.is_playing]
     assert 1.0 <= playing.position_s <= 1.5 and playing.cue == "top"
+
+
+def looked_at(kind: str, number: int = 1) -> Target:
+    return Target((1.0, 0.0, 0.2), (0.0, 0.0, 0.0), 0.0, kind, number, 0.5, True, None, 0, "")
+
+
+def test_a_rule_plays_its_track_at_its_onset_and_not_again_too_soon():
+    rule = Rule("hand", 0.5, gesture="nod")
+    trigger = TrackTrigger()
+    seen = [(0.0, "face"), (0.1, "hand"), (0.2, "hand"), (0.3, "face"), (0.4, "hand"),
+            (9.9, "face"), (10.2, "hand"), (17.0, "hand")]  # fmt: skip
+    played = [t for t, kind in seen if trigger.step("wait", rule, looked_at(kind), t)]
+    assert played == [0.1, 10.2]
+    named = Rule("id:7", 0.5, gesture="nod")
+    assert not trigger.step("one", named, looked_at("face", 6), 20.0)
+    assert trigger.step("one", named, looked_at("face", 7), 20.1) == "nod"
+    assert not trigger.step("none", Rule("face", 0.5), looked_at("face"), 30.0)

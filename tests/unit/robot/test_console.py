@@ -1,8 +1,12 @@
 """Output of a run on the terminal: little, plain, and nothing about missing parts."""
 
+import signal
+
 import pytest
 
+from gazerig.robot.cli.command_list import Commands
 from gazerig.robot.cli.run import has_desktop, report_faults
+from gazerig.robot.cli.terminal import exit_on_signals
 
 DESK = {"DISPLAY": ":0"}
 
@@ -30,3 +34,28 @@ def test_a_fault_of_many_joints_is_told_once():
     figures = {"joint_faults": dict.fromkeys("abcdefghi", stale), "stopped_by": "seconds"}
     assert report_faults(figures, said.append)
     assert said == ["the run had faults: 9 joints stale joints (3 times)"]
+
+
+def test_the_list_of_commands_is_that_of_their_modules():
+    listed = Commands()
+    for name, entry in listed.entries.items():
+        command = listed[name]
+        assert command.name == name and command.rich_help_panel == entry.panel
+        first = " ".join(command.help.split("\n\n")[0].split())
+        assert entry.summary == first, f"{name}: mend cli/command_list.py"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_request_to_end_while_a_run_is_made_ends_it_in_order(number: signal.Signals):
+    before = signal.signal(number, signal.SIG_DFL)
+    tidied = False
+    try:
+        with pytest.raises(SystemExit) as end, exit_on_signals():
+            try:
+                signal.raise_signal(number)
+            finally:
+                tidied = True
+        assert (end.value.code, tidied) == (128 + number, True)
+        assert signal.getsignal(number) == signal.SIG_DFL
+    finally:
+        signal.signal(number, before)

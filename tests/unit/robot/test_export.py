@@ -88,6 +88,35 @@ def test_an_eye_whose_servo_is_silent_is_lost_and_only_that(face: list[Tick], tm
     assert lost["right_lid"] == [False, False, True, False] and not any(lost["left_lid"])
 
 
+@pytest.fixture(scope="module")
+def maker() -> list[Tick]:
+    """Two seconds of a rig of six hobby servos without a neck."""
+    ticks: list[Tick] = []
+    play(simulated("maker"), 2.2, ticks.append)
+    return ticks
+
+
+def test_cells_of_joints_that_a_rig_lacks_are_empty(maker: list[Tick], tmp_path: Path):
+    rows, _, _ = export(maker, tmp_path)
+    assert {row["head_yaw_deg"] for row in rows} == {""}
+    lower_right = maker[300].pose.lower_right
+    assert float(rows[300]["right_lower_lid"]) == pytest.approx(lower_right, abs=6e-4)
+    assert "" not in {row["x_deg"] for row in rows}
+
+
+def test_a_linkage_without_an_answer_loses_both_eyes(maker: list[Tick], tmp_path: Path):
+    silent = [
+        replace(tick, joints=replace(tick.joints, missing=missing))
+        for tick, missing in zip(
+            maker[100:103], [("eyes_tilt",), ("right_lower_lid",), ()], strict=True
+        )
+    ]
+    rows, _, _ = export(silent, tmp_path)
+    for column in ("left_x_deg", "right_x_deg", "x_deg"):
+        assert [row[column] == "" for row in rows] == [True, False, False]
+    assert [row["right_lower_lid"] == "" for row in rows] == [False, True, False]
+
+
 def test_a_row_a_sample_with_what_was_measured(face: list[Tick], tmp_path: Path):
     rows, events, _ = export(face, tmp_path)
     assert tuple(rows[0]) == SAMPLES and tuple(events[0]) == EVENTS and len(rows) == len(face)
