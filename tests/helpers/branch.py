@@ -44,6 +44,7 @@ class Branch(subprocess.Popen[Any]):
         for name in _OF_MOST:
             import_module(name)
         gc.collect()  # an unclosed film would wait for its decoder's threads, which no fork has
+        gc.freeze()  # what is left is neither looked at nor copied by the next
         super().__init__(["fork"], preexec_fn=begin, **options)
 
 

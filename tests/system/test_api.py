@@ -1,6 +1,7 @@
 """Requests of a program to a head in simulated time: orders and their ends, values, parameters."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from math import degrees, nan
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import gazerig
 from gazerig.gaze.types import GazeState, Percept, Vec3
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.run.rerun import rerun
+from gazerig.sim_mock.device import Device
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -137,9 +139,10 @@ def test_states_events_and_conditions_step_the_head(head: gazerig.SimulatedHead)
     times = [state.t_s - began_s for state in head.states(rate_hz=10.0, seconds=0.5)]
     assert times == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4], abs=0.006)
     assert next(head.states(rate_hz=10.0)).t_s >= times[-1]
-    before_s = head.state.t_s
-    head.sleep(0.25)
-    assert head.state.t_s - before_s == pytest.approx(0.25, abs=0.006)
+    for wait in (head.sleep, head.step):
+        before_s = head.time_s
+        wait(0.25)
+        assert head.time_s - before_s == pytest.approx(0.25, abs=0.002)
     assert head.run_until(lambda state: state.gaze.phase == "saccade", 5.0)
     assert not head.run_until(lambda state: state.t_s < 0.0, 0.1)
     head.look_at(1.0, 0.0, 0.3)
@@ -170,7 +173,7 @@ class BadRule:
         raise RuntimeError("out of ideas")
 
 
-def test_a_head_moves_in_its_block_alone_and_parks_whatever_ends_it():
+def test_a_head_moves_in_its_block_alone_and_parks_whatever_ends_it(devices: list[Device]):
     said: list[str] = []
     closed = gazerig.open("desk", fast=True, say=said.append)
     with pytest.raises(gazerig.Error, match="in a with block"):
@@ -187,6 +190,11 @@ def test_a_head_moves_in_its_block_alone_and_parks_whatever_ends_it():
     with pytest.raises(RuntimeError, match="out of ideas"), bad as head:
         head.step(0.1)
     assert said[-1] == "stopped by the program: parked, torque off"
+    dead = gazerig.open("desk", fast=True, bus="emulated", say=said.append)
+    with pytest.raises(gazerig.HeadEnded, match="fault: neck_yaw: overload"), dead as head:
+        devices[-1].faults.command("overload 7")
+        with suppress(gazerig.HeadEnded):
+            head.step(1.0)
 
 
 UNFIT: tuple[tuple[dict[str, Any], type[Exception], str], ...] = (

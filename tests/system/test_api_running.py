@@ -9,10 +9,12 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import pytest
+from attack.ways_out import bench
 from branch import Branch, script
 from slow_rigs import at_rate
 
@@ -36,18 +38,14 @@ def said() -> list[str]:
     return []
 
 
-Open = Callable[..., gazerig.Head]
+Open = Callable[[], gazerig.Head]
 
 
 @pytest.fixture
 def opened(said: list[str], tmp_path: Path) -> Open:
     """Return what opens a head with a slow loop."""
     rig = at_rate(tmp_path, "desk", 40.0)
-
-    def head(bus: Literal["emulated", "ideal"] = "ideal") -> gazerig.Head:
-        return gazerig.open(rig, mock=True, bus=bus, scene="face-to-face", say=said.append)
-
-    return head
+    return partial(gazerig.open, rig, mock=True, bus="ideal", scene="face-to-face", say=said.append)
 
 
 def assert_let_go(said: list[str], why: str = "the program") -> None:
@@ -56,9 +54,7 @@ def assert_let_go(said: list[str], why: str = "the program") -> None:
     assert not [t for t in threading.enumerate() if t.name.startswith("head ")]
 
 
-def test_a_block_leaves_the_program_its_handlers_and_forks_leave_it_the_head(
-    said: list[str], opened: Open
-):
+def test_a_block_leaves_the_program_its_handlers_and_forks_leave_it_the_head(said: list[str]):
     def handle(number: int, frame: object) -> None:
         said.append(signal.Signals(number).name)
 
@@ -67,7 +63,10 @@ def test_a_block_leaves_the_program_its_handlers_and_forks_leave_it_the_head(
     handlers = [signal.getsignal(n) for n in numbers]
     switching_s = sys.getswitchinterval()
     try:
-        with opened("emulated") as head:
+        with (
+            bench("desk", 40.0) as at,
+            gazerig.open(at.file, port=at.port, scene="face-to-face", say=said.append) as head,
+        ):
             assert not {signal.getsignal(n) for n in numbers} & {*handlers}
             signal.raise_signal(signal.SIGTERM)
             pid = os.fork()
@@ -80,6 +79,7 @@ def test_a_block_leaves_the_program_its_handlers_and_forks_leave_it_the_head(
                     os._exit(code)
             assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
             assert head.look_at(1.0, 0.4, 0.3).wait(100.0) == "arrived"
+            assert at.on() == len(at.rig.joints)
         assert signal.getsignal(signal.SIGTERM) is handle and "SIGTERM" in said
     finally:
         signal.signal(signal.SIGTERM, before)

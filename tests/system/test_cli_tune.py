@@ -112,7 +112,9 @@ def test_status_menus_stop_and_resume(head: gazerig.Head, rig: str):
     assert "nothing to resume" in invoked("ctl", "resume").err
 
 
-def test_stop_stops_every_rig_that_runs(head: gazerig.Head, rig: str):
+def test_stop_stops_every_rig_that_runs_and_says_where_none_does(
+    head: gazerig.Head, rig: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     def run() -> None:
         body.MIN_HOLD_S = 0.0
         with opened(rig):
@@ -134,11 +136,6 @@ def test_stop_stops_every_rig_that_runs(head: gazerig.Head, rig: str):
         unknown = invoked("ctl", "get", RATE, "--rig", "eva")
         assert "no rig named eva is running: desk (process " in unknown.err
         process.terminate()
-
-
-def test_where_no_rig_runs_it_is_one_line_and_exit_code_2(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     none = (2, "", "no rig is running: start one with gazerig run ...\n")
     for words in (("get",), ("set", RATE, "100"), ("stop",), ("look", "free"), ("save",),

@@ -50,7 +50,7 @@ def ping(port, servo_id):
     return line.identify(servo_id)
 
 
-def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
+def test_it_serves_commands_and_clients_that_come_and_go_and_refuses_bad_input(tmp_path):
     link = tmp_path / "servos"
     emulator = Emulator("--servos", "1-2:xl330-m077,7:xc330-m288@100", "--link", str(link))
     assert emulator.ready == {"path": str(link), "baud": 1_000_000}
@@ -71,9 +71,6 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
     port.closePort()
     assert emulator.end() == 0
     assert not os.path.lexists(link)
-
-
-def test_bad_input_is_one_clear_line():
     for options, message in (
         ((), "name a rig, or its servos: --servos 1-6:xl330-m077"),
         (("--servos", "1:xl330-m077", "--link", str(ROOT / "README.md")), "File exists"),

@@ -103,7 +103,9 @@ def test_the_second_head_looks_where_the_first_does(shown: Shown):
     assert max(other for _, other in yaws) - min(other for _, other in yaws) > 8.0
 
 
-def test_the_own_door_passes_words_on(monkeypatch: pytest.MonkeyPatch, shown: Shown):
+def test_the_own_door_passes_words_on_and_a_key_starts_a_track(
+    monkeypatch: pytest.MonkeyPatch, shown: Shown
+):
     head, words = TalkingHead(), iter((b"listening\n", b"sing", b"\xff", b"speaking"))
     port = SimpleNamespace(bind=lambda address: None, recv=lambda most: next(words))
     monkeypatch.setattr(gazerig, "connect", lambda **_: nullcontext(head))
@@ -111,21 +113,16 @@ def test_the_own_door_passes_words_on(monkeypatch: pytest.MonkeyPatch, shown: Sh
     with pytest.raises(StopIteration):
         shown("own_door.py")
     assert head.states == ["listening", "speaking"]
-
-
-def test_a_key_starts_a_track_and_a_package_that_is_missing_is_named(
-    monkeypatch: pytest.MonkeyPatch, shown: Shown
-):
     for example in ("osc.py", "midi.py", "gpio.py"):
         with pytest.raises(SystemExit, match="pip install"):
             shown(example)
     reply = SimpleNamespace(text=lambda: "nod takes 1 s")
-    head = SimpleNamespace(play=lambda track: SimpleNamespace(reply=reply))
-    monkeypatch.setattr(gazerig, "connect", lambda **_: nullcontext(head))
+    player = SimpleNamespace(play=lambda track: SimpleNamespace(reply=reply))
+    monkeypatch.setattr(gazerig, "connect", lambda **_: nullcontext(player))
     key = SimpleNamespace(type="note_on", velocity=9, note=60)
     mido = SimpleNamespace(open_input=lambda: nullcontext([key]))
     monkeypatch.setitem(sys.modules, "mido", mido)
-    assert shown("midi.py") == ["nod takes 1 s"]
+    assert shown("midi.py")[-1] == "nod takes 1 s"
 
 
 @pytest.mark.slow

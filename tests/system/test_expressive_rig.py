@@ -1,14 +1,11 @@
 """The shipped rig with a jaw and brows goes through every part of the program."""
 
 from math import degrees
-from pathlib import Path
 
 import pytest
-from command_line import answers_in, invoked
 from expressive_rig import started
 from fakes.runs import ticks
 
-from gazerig.config.load import shipped_path
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.robot.model.commands import Express, Value
@@ -20,19 +17,6 @@ NAMES = (
     "eyes_pan", "eyes_tilt", "left_upper_lid", "right_upper_lid", "neck_yaw", "neck_pitch", "jaw",
     "left_brow", "right_brow",
 )  # fmt: skip
-
-
-def test_a_jaw_is_calibrated_by_hand(tmp_path: Path):
-    pytest.importorskip("gazerig.features.bringup")
-    rig = tmp_path / "face.yaml"
-    text = shipped_path("rigs", "expressive").read_text()
-    rig.write_text(text)
-    done = invoked(
-        "calibrate", "joints", str(rig), "--joint", "jaw", "--mock", "--dry-run",
-        "--answers", answers_in(tmp_path, "turn 300", "", "turn -500", "", "", "y"),
-    )  # fmt: skip
-    assert "turn jaw to its POSITIVE end" in done.out + done.err
-    assert "joints.jaw.zero_step" in done.out + done.err, done
 
 
 def test_a_face_keeps_clear_shuts_its_lids_and_moves_its_jaw_without_a_camera():

@@ -5,7 +5,6 @@ import os
 import re
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -73,8 +72,6 @@ class LightPython:
 
 
 ROOT = Path(__file__).parents[2]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
 
 _WITHOUT = """
 import sys
@@ -134,26 +131,6 @@ def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_d
     spreads = f"distributed is not installed: pip install -e '{ROOT}[cluster]'"
     assert (codes, said) == (["2"] * 5, [writes, writes, spreads, sees, places])
     assert not list(tmp_path.iterdir())
-
-
-@needs_all_features
-def test_every_extra_that_is_named_brings_its_package_and_the_tests_have_them_all():
-    named = {
-        (package, extra)
-        for path in ROOT.glob("[dfgr]*/**/*.py")
-        for package, extra in re.findall(
-            r'(?:extra_hint|require_package)\("([\w-]+)", "(\w+)"', path.read_text("utf-8")
-        )
-        if "docs" not in path.relative_to(ROOT).parts
-    }
-    assert {("depthai", "oak"), ("matplotlib", "report")} <= named
-    base = " ".join(PROJECT["dependencies"])
-    tested = re.search(r"gazerig\[(.+)\]", " ".join(EXTRAS["dev"]))
-    assert tested is not None
-    for package, extra in named:
-        assert any(wanted.startswith(package) for wanted in EXTRAS[extra]), extra
-        assert package not in base
-        assert extra in tested[1].split(",")
 
 
 # ---- Imports of processes: the control loop has NumPy, the serial port and rig files only.

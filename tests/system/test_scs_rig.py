@@ -18,7 +18,7 @@ def rig(tmp_path, monkeypatch):
     return str(path)
 
 
-def test_it_is_scanned_for_examined_and_mended(rig):
+def test_it_is_scanned_for_examined_mended_set_up_jogged_watched_and_run(rig):
     with served(rig) as (given, paths, command):
         code, out, _ = invoked("scan", "--port", paths[""], "--kind", "feetech", "--json")
         servos = json.loads(out)["servos"]
@@ -32,9 +32,6 @@ def test_it_is_scanned_for_examined_and_mended(rig):
         command("overload 7", "")
         code, out, _ = invoked("doctor", rig, "--port", given)
         assert code != 0 and "overload" in out
-
-
-def test_it_is_set_up_jogged_watched_and_run(rig):
     code, out, err = invoked("setup", rig, "--mock", "--yes", "--joint", "neck_yaw")
     assert code == 0 and "id 1 -> 7" in out + err
     code, out, _ = invoked("monitor", rig, "--mock", "--once")

@@ -84,7 +84,7 @@ frames:
 """
 
 
-def test_gaze_keeps_the_eyes_on_the_point_while_a_track_owns_neck_and_jaw(
+def test_what_a_track_owns_is_its_alone_and_gaze_keeps_the_eyes_on_the_point(
     tmp_path: Path, started: Callable[[Rig], Run]
 ):
     file = tmp_path / "own.yaml"
@@ -104,17 +104,14 @@ def test_gaze_keeps_the_eyes_on_the_point_while_a_track_owns_neck_and_jaw(
     assert max(errors) < errors[0] + 0.7
     assert found[at_2s].tracks[-1].owns == ("neck_yaw", "neck_pitch", "jaw")
     assert found[-1].tracks[-1].end_reason == "finished"
-
-
-def test_owned_eyes_and_lids_are_the_track_s_alone(tmp_path: Path, started: Callable[[Rig], Run]):
     file = tmp_path / "stare.yaml"
     file.write_text(
         "description: x\nowns: [eyes, lids]\nframes:\n"
         "  - {time_s: 1, eyes_yaw_deg: 10, lids: {all: 0.4}}\n"
         "  - {time_s: 3, eyes_yaw_deg: 10, lids: {all: 0.4}}\n  - {time_s: 4, eyes_yaw_deg: 0}\n"
     )
-    rig = replace(load_rig("desk"), track_files=(str(file),))
-    made = started(rig)
+    desk = replace(load_rig("desk"), track_files=(str(file),))
+    made = started(desk)
     ticks(made, 300)
     _, found = played(made, "stare")
     held = found[240:580]  # saccades and blinks of gaze do not move them

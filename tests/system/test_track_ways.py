@@ -21,7 +21,7 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
     yield from connected(monkeypatch)
 
 
-def test_tracks_from_the_command_line(rig: TickedRig):
+def test_tracks_from_the_command_line_and_of_a_head_that_is_stopped_or_led_by_hand(rig: TickedRig):
     assert "nod takes 1.0 s" in gazerig("ctl", "play", "nod")
     assert set_client(rig.commands[-1], "") == Play("nod")
     before = rig.tick(20)["neck_pitch"]
@@ -36,9 +36,6 @@ def test_tracks_from_the_command_line(rig: TickedRig):
     listed = gazerig("ctl", "play")
     assert "brow_shrug    who knows: the brows go up (1.2 s)" in listed and "nod " in listed
     assert "no track 'wink'; available: brow_shrug" in gazerig("ctl", "play", "wink")
-
-
-def test_whoever_is_stopped_or_led_by_hand_does_not_track(rig: TickedRig):
     rig.command(Play("nod"))
     rig.tick(40)
     rig.command(Stop("test", who="me"))

@@ -12,6 +12,7 @@ import yaml
 from command_line import invoked
 from features_there import skip_without
 from papers import ROOT
+from slow_rigs import at_rate
 
 import gazerig
 
@@ -89,18 +90,17 @@ def _merge(into: Any, more: Any, place: str) -> None:
 pytestmark = pytest.mark.usefixtures("simulated_wires")
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def at_step(folder: Path, step: int, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Go to an empty folder for a step."""
+    here = folder / str(step)
+    here.mkdir()
+    monkeypatch.chdir(here)
+    return here
 
 
 def test_every_command_of_every_step_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     for step in range(1, len(steps()) + 1):
-        folder = tmp_path / str(step)
-        folder.mkdir()
-        monkeypatch.chdir(folder)
-        write_files(folder, step)
+        write_files(at_step(tmp_path, step, monkeypatch), step)
         for line in commands(step):
             words = shlex.split(line)
             if words[0] == "gazerig" and words[1] != "ctl":
@@ -111,7 +111,7 @@ def test_every_command_of_every_step_works(tmp_path: Path, monkeypatch: pytest.M
 def tried(line: str, *words: str) -> str:
     """Type a command, a run of it in simulated time; give what it wrote."""
     if words[0] == "run":
-        words = (*_without(words, "--seconds", "--summary"), "--fast", "--seconds", "1")
+        words = (*_without(words, "--seconds", "--summary"), "--fast", "--seconds", "0.2")
     done = invoked(*words)
     assert done.code == 0, f"{line}: {done.err}"
     return done.out + done.err
@@ -125,28 +125,26 @@ def _without(words: tuple[str, ...], *options: str) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("step", [6, 7])
-def test_every_command_to_a_running_head_works(
-    step: int, folder: Path, monkeypatch: pytest.MonkeyPatch
+def test_commands_to_a_running_head_and_the_program_that_greets_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(folder))
-    write_files(folder, step)
-    with gazerig.open("myhead.yaml", mock=True, say=lambda line: None) as running:
-        for line in commands(step):
-            words = shlex.split(line)[1:]
-            if words[0] == "ctl":
-                tried(line, *words)
-        told = [event.text for event in running.events(timeout_s=0.0)]
-        face = running.menus()["expression"][0]
-    assert face == "surprised" if step == 6 else any("agree" in text for text in told)
-
-
-def test_the_program_greets_the_visitor(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    for step in (6, 7):
+        write_files(at_step(tmp_path, step, monkeypatch), step)
+        with gazerig.open("myhead.yaml", mock=True, say=lambda line: None) as running:
+            for line in commands(step):
+                words = shlex.split(line)[1:]
+                if words[0] == "ctl":
+                    tried(line, *words)
+            told = [event.text for event in running.events(timeout_s=0.0)]
+            face = running.menus()["expression"][0]
+        assert face == "surprised" if step == 6 else any("agree" in text for text in told)
     opened = gazerig.open
-    monkeypatch.setattr(gazerig, "open", lambda rig, mock: opened(rig, fast=mock))
+    folder = at_step(tmp_path, 8, monkeypatch)
     write_files(folder, 8)
+    at_rate(folder, "myhead.yaml", 50.0)
+    monkeypatch.setattr(gazerig, "open", lambda rig, mock: opened(rig, fast=mock))
+    capsys.readouterr()
     assert commands(8) == ["python greet.py"]
     runpy.run_path("greet.py", run_name="__main__")
     assert capsys.readouterr().out == "hello, 1\n"

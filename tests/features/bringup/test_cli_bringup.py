@@ -214,6 +214,13 @@ def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig: Path, tmp_pa
     assert "joints.left_eye_pan.zero_step" in done.err
 
 
+def test_a_jaw_is_calibrated_by_hand(tmp_path: Path):
+    answers = answers_in(tmp_path, "turn 300", "", "turn -500", "", "", "y")
+    done = calibrated("expressive", "--mock", "--dry-run", "--joint", "jaw", "--answers", answers)
+    assert "turn jaw to its POSITIVE end" in done.out + done.err
+    assert "joints.jaw.zero_step" in done.out + done.err, done
+
+
 # --- on a port that another program serves, from a process of its own
 
 

@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 
 from command_line import parse
+from features_there import needs_all_features
 
 ROOT = Path(__file__).parents[3]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -54,3 +55,24 @@ def test_the_container_holds_all_sources_and_starts_a_command_that_is_one():
     parse(json.loads(words))
     [python] = re.findall(r"python:([\d.]+)-slim", file)
     assert f"Programming Language :: Python :: {python}" in PROJECT["project"]["classifiers"]
+
+
+@needs_all_features
+def test_every_extra_that_is_named_brings_its_package_and_the_tests_have_them_all():
+    named = {
+        (package, extra)
+        for path in ROOT.glob("[dfgr]*/**/*.py")
+        for package, extra in re.findall(
+            r'(?:extra_hint|require_package)\("([\w-]+)", "(\w+)"', path.read_text("utf-8")
+        )
+        if "docs" not in path.relative_to(ROOT).parts
+    }
+    assert {("depthai", "oak"), ("matplotlib", "report")} <= named
+    extras = PROJECT["project"]["optional-dependencies"]
+    base = " ".join(PROJECT["project"]["dependencies"])
+    tested = re.search(r"gazerig\[(.+)\]", " ".join(extras["dev"]))
+    assert tested is not None
+    for package, extra in named:
+        assert any(wanted.startswith(package) for wanted in extras[extra]), extra
+        assert package not in base
+        assert extra in tested[1].split(",")
