@@ -5,10 +5,11 @@ People look at the one to whom they speak: a speaker's gaze is on the addressee 
 So a person addresses the head with a look of .6 s from the distances of personal and near social
 talk (Hall 1966), and still does while the gaze is averted for a moment, as speakers' is.
 
-People who talk with each other glance at what is near them. A look at another person counts as a
-talk if the looking person speaks, if the other looks back, or if the other's face is not visible:
-two people in talk are turned to each other, and so at least one of them away from the head. Both
-must have finished before one of them addresses the head.
+People who talk with each other glance at what is near them. Who looks at another person talks, and
+so does the other one if the looking person speaks, or if the other's face is not visible: two
+people in talk are turned to each other, and so at least one of them away from the head. Both must
+have finished before one of them addresses the head. A look is enough, because lips are too small
+to be read from 2 m on.
 
 A face counts only if it has moved since it came into view and shows life: a poster looks at
 everybody, for longer than any person.
@@ -156,12 +157,16 @@ def _people_in_talk(seen: Sequence[Face], places: dict[int, Vec3]) -> Iterator[i
             seen for seconds, and of those who were in view a while ago.
     """
     faces = {face.id: face for face in seen}
-    partners = {id: _partner(face, places) for id, face in faces.items() if id in places}
+    partners = {
+        id: _partner(face, places)
+        for id, face in faces.items()
+        if id in places and not face.looks_at_head
+    }
     for id, other in partners.items():
-        if other is not None and (
-            faces[id].speaks or other not in faces or partners.get(other) == id
-        ):
-            yield from (id, other)
+        if other is not None:
+            yield id
+            if faces[id].speaks or other not in faces:
+                yield other
 
 
 def _partner(face: Face, places: dict[int, Vec3]) -> int | None:

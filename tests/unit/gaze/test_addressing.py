@@ -97,8 +97,10 @@ def test_people_who_talk_with_each_other_address_it_only_when_they_have_finished
 
 
 def test_an_onlooker_does_not_keep_a_person_from_addressing_it():
-    both = face(1, ANN, speaks=True), face(2, BEN, ANN)
-    assert first(play(AddressingModel(), 1.0, 0.0, *both))[-1] == 1
+    model = AddressingModel()
+    play(model, 1.0, 0.0, face(1, ANN, speaks=True), face(2, BEN, ANN))
+    found = play(model, 1.5, 1.0, face(1, ANN), face(2, BEN))
+    assert [one.person for one in found[-1]] == [1]  # the onlooker only glances at it
 
 
 def test_the_first_of_several_people_keeps_the_head():
