@@ -91,6 +91,7 @@ class Rig:
             max_size=None,
             compression=None,
             open_timeout=PATIENCE_S,
+            close_timeout=0.2,  # who floods does not read the answer to its farewell
             additional_headers={k: v for k, v in given.items() if v is not None},
         )
 

@@ -44,7 +44,7 @@ class Rig:
         self.observers = Observers[Tick](self.said.append)
         self.audience.attach(self.observers)
         self.newest: Tick | None = None
-        self.pace_s = PACE_S
+        self._pace_s = PACE_S
         self.orders: list[Any] = []
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._tick_on)
@@ -54,19 +54,29 @@ class Rig:
         self.audience.open()
         self._thread.start()
         words = wait_for(lambda: self.saying("the page is at "), "the page's address")
-        return str(words).rpartition(" ")[2]
+        self.address = str(words).rpartition(" ")[2]
+        return self.address
 
     def saying(self, part: str) -> str | None:
         return next((line for line in self.said if part in line), None)
 
     def _tick_on(self) -> None:
         clock = self.made.clock
-        while not self._over.wait(self.pace_s):
+        while not self._over.wait(self._pace_s):
             clock.sleep_until(clock.now_s() + TICK_S)
             tick = self.robot.tick(clock.now_s(), TICK_S)
             self.newest = tick
             self.orders += [o for o in tick.commands if not isinstance(o, Renew)]
             self.observers.update(tick)
+
+    @contextmanager
+    def hurrying(self) -> Iterator[None]:
+        """Let its time pass as fast as it can, while a test waits for it."""
+        self._pace_s = 0.001
+        try:
+            yield
+        finally:
+            self._pace_s = PACE_S
 
     def desired_deg(self) -> float:
         assert self.newest is not None
@@ -212,9 +222,8 @@ def resumed(rig: Rig, person: Person, question: str = "Fingers out?") -> None:
     """Switch a stopped rig on again by the page, with confirmation, until it continues."""
     assert rig.newest is not None
     held_s = rig.newest.t_s + 2.1
-    rig.pace_s = 0.001
-    wait_for(lambda: present(rig.newest).t_s > held_s, "the time that a stop holds at least")
-    rig.pace_s = PACE_S
+    with rig.hurrying():
+        wait_for(lambda: present(rig.newest).t_s > held_s, "the time that a stop holds at least")
     person.click(saying("Resume …"))
     assert rig.robot.stopped  # not without a second question
     wait_for(lambda: person.reads(question), "the question")

@@ -73,12 +73,16 @@ class Stub:
     """
 
     def __init__(self) -> None:
+        self._sockets: set[web.WebSocketResponse] = set()
+        self._loop = asyncio.new_event_loop()
+        self.reset()
+
+    def reset(self) -> None:
+        """Be as at first."""
         self.asked: list[dict[str, Any]] = []
         self.state, self.rig, self.run = head_state(first_tick()), RIG, RUN
         self.answer: Callable[[dict[str, Any]], dict[str, Any] | None] = lambda asked: None
         self.missing: set[str] = set()
-        self._sockets: set[web.WebSocketResponse] = set()
-        self._loop = asyncio.new_event_loop()
         rig = load_rig("desk")
         live = [one for one in parameters(rig, rig) if one.live == "next tick"]
         self.usual: dict[str, object] = {

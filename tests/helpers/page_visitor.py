@@ -5,16 +5,16 @@ import socket
 import urllib.error
 import urllib.request
 from email.message import Message
+from importlib.metadata import version
 from typing import Any
 from urllib.parse import urlsplit
 
 import msgspec
-import viser
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 PATIENCE_S = 180.0  # how long a slow machine is waited for, not how long it takes
-VISER = Subprotocol(f"viser-v{viser.__version__}")
+VISER = Subprotocol(f"viser-v{version('viser')}")
 
 # The page counts a browser as connected when it has sent its viewpoint.
 LOOKING = msgspec.msgpack.encode(

@@ -188,34 +188,34 @@ def shown() -> Iterator[Shown]:
         yield Shown(browser, stub)
 
 
-@pytest.mark.parametrize("size", SIZES)
-def test_nothing_is_cut_off_covered_or_too_small(shown: Shown, size: str):
-    shown.size(size)
-    for state in CHANGES:
-        shown.state(state)
-        assert (state, faults(shown.browser)) == (state, [])
-        # STOP can be hit with a finger, whatever else is shown.
-        stop = "document.getElementById('rig-stop').getBoundingClientRect().height"
-        assert value(shown.browser, stop) >= 44.0
-    shown.state("awake")
-    for tab in TABS:
-        shown.tab(tab)
-        folds = f"document.querySelectorAll('#drawer-{tab} details')"
-        shown.browser.run(f"{folds}.forEach((fold) => {{ fold.open = true; }})")
-        found = tab, faults(shown.browser)
-        shown.tab(tab)
-        assert found == (tab, [])
+def test_nothing_is_cut_off_covered_or_too_small(shown: Shown):
+    for size in SIZES:
+        shown.size(size)
+        for state in CHANGES:
+            shown.state(state)
+            assert (size, state, faults(shown.browser)) == (size, state, [])
+            # STOP can be hit with a finger, whatever else is shown.
+            stop = "document.getElementById('rig-stop').getBoundingClientRect().height"
+            assert value(shown.browser, stop) >= 44.0
+        shown.state("awake")
+        for tab in TABS:
+            shown.tab(tab)
+            folds = f"document.querySelectorAll('#drawer-{tab} details')"
+            shown.browser.run(f"{folds}.forEach((fold) => {{ fold.open = true; }})")
+            found = size, tab, faults(shown.browser)
+            shown.tab(tab)
+            assert found == (size, tab, [])
 
 
-@pytest.mark.parametrize(("size", "theme"), [("desk", "light"), ("laptop", "dark")])
-def test_axe_finds_nothing_serious(shown: Shown, size: str, theme: str):
-    shown.size(size)
-    shown.state("awake")
-    shown.theme(theme)
-    for tab in ("", *TABS):
-        if tab:
-            shown.tab(tab)
-        found = tab, violations(shown.browser)
-        if tab:
-            shown.tab(tab)
-        assert found == (tab, [])
+def test_axe_finds_nothing_serious(shown: Shown):
+    for size, theme in (("desk", "light"), ("laptop", "dark")):
+        shown.size(size)
+        shown.state("awake")
+        shown.theme(theme)
+        for tab in ("", *TABS):
+            if tab:
+                shown.tab(tab)
+            found = theme, tab, violations(shown.browser)
+            if tab:
+                shown.tab(tab)
+            assert found == (theme, tab, [])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from browser import RARE_DRAWING, Browser, browsing
 from msgspec.structs import replace
-from page_person import STOP, Person, beside, saying
+from page_person import STOP, Person, beside, everywhere, saying
 from page_stub import PICTURE, RIG, RUN, YOU, Stub, serving
 from shown_page import wait_for
 
@@ -24,10 +24,27 @@ def tab() -> Iterator[Browser]:
         yield tab
 
 
-@pytest.fixture
-def page(tab: Browser) -> Iterator[tuple[Stub, Person]]:
+@pytest.fixture(scope="module")
+def served() -> Iterator[tuple[Stub, str]]:
     with serving() as (stub, url):
-        yield stub, opened(tab, url)
+        yield stub, url
+
+
+@pytest.fixture
+def page(tab: Browser, served: tuple[Stub, str]) -> tuple[Stub, Person]:
+    """Return a stub that is as it was at first, and a person who has opened its page."""
+    stub, url = served
+    stub.reset()
+    return stub, opened(tab, url)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def silent() -> Iterator[tuple[Stub, Person]]:
+    """Another page, opened before all others, whose rig falls silent then."""
+    with browsing((1100, 760), RARE_DRAWING) as tab, serving() as (stub, url):
+        person = opened(tab, url)
+        stub.send("picture", PICTURE, GREY)
+        yield stub, person
 
 
 def opened(tab: Browser, url: str) -> Person:
@@ -47,7 +64,9 @@ def headline(person: Person) -> str:
 # --- STOP ---------------------------------------------------------------------------------
 
 
-def test_a_stop_that_the_rig_does_not_confirm_is_sent_again(page: tuple[Stub, Person]):
+def test_a_stop_is_sent_until_it_is_confirmed_and_resuming_asks_about_a_hand(
+    page: tuple[Stub, Person],
+):
     stub, person = page
     lost: list[dict[str, Any]] = []
 
@@ -62,32 +81,7 @@ def test_a_stop_that_the_rig_does_not_confirm_is_sent_again(page: tuple[Stub, Pe
     wait_for(lambda: len(stub.orders("stop")) > 3, "the stops")
     wait_for(lambda: not person.reads("stopping…"), "the confirmation")
     assert lost[0]["why"] == "STOP was pressed on the page"
-
-
-def test_stop_and_space_work_without_any_other_script(tab: Browser):
-    with serving() as (stub, url):
-        stub.missing = {"page.js", "elements.js", "webcam.js", "words.js", "stage.js"}
-        tab.go(url)
-        person = Person(tab)
-        wait_for(lambda: person.run("document.querySelector('#rig-words') !== null"), "the page")
-
-        def stopped(press: Any) -> bool:
-            before = len(stub.orders("stop"))
-            press()
-            person.wait_for_frames(2)
-            return len(stub.orders("stop")) > before
-
-        wait_for(lambda: stopped(lambda: person.click(STOP)), "a stop by the button")
-        wait_for(lambda: stopped(person.space), "a stop by the space bar")
-        # Also with the focus in the frame of the view.
-        person.run("document.querySelector('#view').focus()")
-        wait_for(lambda: stopped(person.space), "a stop by the space bar over the view")
-
-
-def test_resuming_asks_about_the_hand_that_may_be_in_the_mechanism(
-    page: tuple[Stub, Person],
-):
-    stub, person = page
+    # Resuming asks about the hand that may be in the mechanism.
     guessed = {name: replace(one, estimated=True) for name, one in stub.state.joints.items()}
     stub.show(stopped=f"STOP was pressed on the page ({YOU})", level="torque_off", joints=guessed)
     person.click(saying("Resume …"))
@@ -103,28 +97,42 @@ def test_resuming_asks_about_the_hand_that_may_be_in_the_mechanism(
     wait_for(lambda: stub.orders("resume") == [{"do": "resume", "confirmed": True}], "the order")
 
 
-def test_what_no_longer_comes_is_grey_and_stop_says_that_it_cannot_work(
-    page: tuple[Stub, Person],
-):
-    stub, person = page
-    stub.send("picture", PICTURE, GREY)
-    wait_for(
-        lambda: person.reads("as it was") and person.reads("STOP does nothing here"), "the words"
-    )
-    grey = "getComputedStyle(document.querySelector('{}')).filter.includes('grayscale')"
-    assert person.run(grey.format("#camera canvas")) and person.run(grey.format("#view"))
-    stub.show()
-    stub.send("picture", replace(PICTURE, number=2), GREY)
-    wait_for(lambda: not person.reads("STOP does nothing here"), "the connection")
-    wait_for(lambda: not person.run(grey.format("#camera canvas")), "a new picture")
+def test_stop_and_space_work_without_any_other_script(tab: Browser, served: tuple[Stub, str]):
+    stub, url = served
+    stub.reset()
+    stub.missing = {"page.js", "elements.js", "webcam.js", "words.js", "stage.js"}
+    tab.go(url)
+    person = Person(tab)
+    wait_for(lambda: person.run("document.querySelector('#rig-words') !== null"), "the page")
+
+    def stopped(press: Any) -> bool:
+        before = len(stub.orders("stop"))
+        press()
+        person.wait_for_frames(2)
+        return len(stub.orders("stop")) > before
+
+    wait_for(lambda: stopped(lambda: person.click(STOP)), "a stop by the button")
+    wait_for(lambda: stopped(person.space), "a stop by the space bar")
+    # Also with the focus in the frame of the view.
+    person.run("document.querySelector('#view').focus()")
+    wait_for(lambda: stopped(person.space), "a stop by the space bar over the view")
 
 
 # --- the head and what it looks at --------------------------------------------------------
 
 
-def test_headline_and_ring_name_the_same_part(page: tuple[Stub, Person]):
+def test_the_first_panel_says_why_and_headline_and_ring_name_the_same_part(
+    page: tuple[Stub, Person],
+):
     stub, person = page
     (someone,) = stub.state.people
+    person.open("Watch")
+    stub.show(people=(replace(someone, speaks=True),))
+    wait_for(lambda: person.reads(f"looks at person {someone.id}", "who speaks, for"), "the words")
+    assert not person.reads("translation")
+    person.click(saying("why: the terms of the equation", "summary"))
+    wait_for(lambda: person.reads("translation", "habituation"), "the terms")
+    stub.show(people=(someone,))
     number = 1
 
     def shown(part: str, eyes_at: str) -> str:
@@ -147,17 +155,6 @@ def test_headline_and_ring_name_the_same_part(page: tuple[Stub, Person]):
     stub.show(addressed_by=someone.id)
     shown("left eye", "left eye")
     assert person.reads(f"person {someone.id} addresses it")
-
-
-def test_the_first_panel_says_in_words_what_and_why(page: tuple[Stub, Person]):
-    stub, person = page
-    (someone,) = stub.state.people
-    person.open("Watch")
-    stub.show(people=(replace(someone, speaks=True),))
-    wait_for(lambda: person.reads(f"looks at person {someone.id}", "who speaks, for"), "the words")
-    assert not person.reads("translation")
-    person.click(saying("why: the terms of the equation", "summary"))
-    wait_for(lambda: person.reads("translation", "habituation"), "the terms")
 
 
 def test_the_head_looks_at_the_pointer_over_the_view(page: tuple[Stub, Person]):
@@ -192,7 +189,9 @@ def test_the_head_looks_at_the_pointer_over_the_view(page: tuple[Stub, Person]):
 # --- panels -------------------------------------------------------------------------------
 
 
-def test_only_a_head_in_a_ring_is_offered_to_box(page: tuple[Stub, Person]):
+def test_panels_are_those_of_the_head_and_what_packages_and_clients_say_never_runs(
+    page: tuple[Stub, Person],
+):
     stub, person = page
     person.open("Steer")
     wait_for(lambda: person.reads("wink left", "bold"), "the choices")
@@ -201,6 +200,17 @@ def test_only_a_head_in_a_ring_is_offered_to_box(page: tuple[Stub, Person]):
     wait_for(
         lambda: person.reads("attack", "guard", "boxer", "move the opponent"), "the boxer's choices"
     )
+    evil = "<img src=x onerror='window.evil=1'><script>window.evil=1</script><b>harmless</b>"
+    person.open("Watch")
+    stub.send("panel", PanelContent("a package's panel", evil))
+    person.click(saying("a package's panel", "summary"))
+    wait_for(lambda: person.reads("harmless"), "the panel")
+    images = f"{everywhere('img[src=x]')}.length"
+    in_the_panel = person.run(images)
+    stub.show(stopped=evil)
+    wait_for(lambda: person.reads("<img src=x"), "the words as they are")
+    assert person.run("window.evil === undefined") is True
+    assert person.run(images) == in_the_panel
 
 
 def test_a_refused_value_is_put_back_and_anothers_change_is_shown(
@@ -249,13 +259,19 @@ def test_a_track_plays_on_a_timeline_with_its_sound_and_cues(page: tuple[Stub, P
     wait_for(lambda: stub.orders("end_track") == [{"do": "end_track", "track": ""}], "the end")
 
 
-def test_what_packages_and_clients_say_never_runs(page: tuple[Stub, Person]):
-    stub, person = page
-    evil = "<img src=x onerror='window.evil=1'><script>window.evil=1</script><b>harmless</b>"
-    person.open("Watch")
-    stub.send("panel", PanelContent("a package's panel", evil))
-    person.click(saying("a package's panel", "summary"))
-    wait_for(lambda: person.reads("harmless"), "the panel")
-    stub.show(stopped=evil)
-    wait_for(lambda: person.reads("<img src=x"), "the words as they are")
-    assert person.run("window.evil === undefined") is True
+# --- a rig that has fallen silent
+
+
+def test_what_no_longer_comes_is_grey_and_stop_says_that_it_cannot_work(
+    silent: tuple[Stub, Person],
+):
+    stub, person = silent
+    wait_for(
+        lambda: person.reads("as it was") and person.reads("STOP does nothing here"), "the words"
+    )
+    grey = "getComputedStyle(document.querySelector('{}')).filter.includes('grayscale')"
+    assert person.run(grey.format("#camera canvas")) and person.run(grey.format("#view"))
+    stub.show()
+    stub.send("picture", replace(PICTURE, number=2), GREY)
+    wait_for(lambda: not person.reads("STOP does nothing here"), "the connection")
+    wait_for(lambda: not person.run(grey.format("#camera canvas")), "a new picture")

@@ -38,7 +38,6 @@ def test_scan_lists_every_servo():
 # --- doctor
 
 
-@pytest.mark.pty
 def test_doctor_finds_and_fixes():
     code, out, _ = invoked("doctor", "--mock")
     assert code == 0

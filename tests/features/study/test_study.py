@@ -22,7 +22,7 @@ from gazerig.config.load import ConfigError
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.film_writer import film_writer
-from gazerig.features.study import film
+from gazerig.features.study import film, session
 from gazerig.features.study.analyse import analyse_study
 from gazerig.features.study.design import HOME, Study, load_study, participant_order, williams
 from gazerig.features.study.journal import Journal, StudyFolder
@@ -45,14 +45,15 @@ participants: 2
 
 @pytest.fixture
 def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A study of two films of two seconds."""
+    """A study of two films of two seconds, of which a quarter is shown and is enough."""
 
     def draw(study: Study, key: str, path: Path, progress: object) -> None:
         with film_writer(path, (64, 64), 10.0) as write:
-            for _ in range(20):
+            for _ in range(5):
                 write(np.full((64, 64, 3), 100 * (key == "beta"), np.uint8))
 
     monkeypatch.setattr(film, "_render", draw)
+    monkeypatch.setattr(session, "WHOLE_SHARE", 0.2)
     path = tmp_path / "short.yaml"
     path.write_text(STUDY)
     film.films(load_study(str(path)), tmp_path / "data" / "films", lambda what, share: None)
@@ -256,7 +257,7 @@ def _see_film(one: Program) -> None:
     page = one.page()
     status, film = one.fetch(f"/film/{page['page']}")
     assert status == 200 and film[:4] == b"\x1aE\xdf\xa3"
-    time.sleep(2.0)
+    time.sleep(0.5)
     assert one.do(page, "seen") == 200
 
 

@@ -19,6 +19,7 @@ class TalkingHead:
         self.ended_tracks: list[str] = []
         self.said: list[str] = []
         self.addressed_by: int | None = None
+        self.looks = 0
 
     def connect(self) -> "TalkingHead":
         return self
@@ -31,6 +32,7 @@ class TalkingHead:
 
     @property
     def state(self) -> object:
+        self.looks += 1
         conversation = SimpleNamespace(state=self.last or "idle")
         return SimpleNamespace(tracks=(), conversation=conversation, addressed_by=self.addressed_by)
 
@@ -77,6 +79,11 @@ class TalkingHead:
     @property
     def last(self) -> str:
         return self.states[-1] if self.orders else ""
+
+    async def is_looked_at(self) -> None:
+        """Wait until a door has looked at it as it is now, and has done what follows."""
+        seen = self.looks
+        await until(lambda: self.looks >= seen + 3)
 
     async def reaches(self, state: str) -> None:
         """Wait until a state is the last that was ordered."""

@@ -14,8 +14,11 @@ pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 from gazerig.doors import openai_realtime, pipecat, voice_assistant, wyoming
 from gazerig.doors.door import DoorLink
 
-LOOKS_S = 0.35
-"""Time in which a door that watches the head has looked at it."""
+
+@pytest.fixture(autouse=True)
+def look_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("_WATCH_S", "_LOOK_S"):
+        monkeypatch.setattr(f"gazerig.doors.door.{name}", 0.02)
 
 
 @pytest.mark.parametrize("addressed", [True, False])
@@ -27,16 +30,16 @@ def test_a_voice_assistant_listens_when_the_head_does_not_speak(addressed: bool)
             await until(lambda: assistant.sockets)
             head.addressed_by = 3
             if not addressed:
-                await asyncio.sleep(LOOKS_S)
+                await head.is_looked_at()
                 assert not assistant.commands
                 return
             await until(lambda: assistant.commands == ["start_listening"])
             await assistant.send(lva("listening"), lva("tts_speaking"))
             await head.reaches("speaking")
             head.addressed_by = None
-            await asyncio.sleep(LOOKS_S)
+            await head.is_looked_at()
             head.addressed_by = 4  # it speaks
-            await asyncio.sleep(LOOKS_S)
+            await head.is_looked_at()
             assert len(assistant.commands) == 1
             await assistant.send(lva("tts_finished"))
             await until(lambda: assistant.commands == ["start_listening"] * 2)
@@ -70,7 +73,7 @@ def test_a_satellite_detects_a_look_as_its_wake_word():
                 AudioChunk(**shape, audio=bytes(640), timestamp=20),
             ):  # fmt: skip
                 await wake.write_event(one.event())
-            await asyncio.sleep(LOOKS_S)
+            await head.is_looked_at()
             head.addressed_by = 3
             assert Detection.from_event(await read()) == Detection(name, 20)
             # The same look calls once.
@@ -139,7 +142,7 @@ def test_a_realtime_session_detects_turns_while_addressed(beta: bool):
 
         async def receives_nothing() -> None:
             head.addressed_by = None
-            await asyncio.sleep(LOOKS_S)
+            await head.is_looked_at()
             await receives()
 
         opened = {"type": "input_audio_buffer.clear"}

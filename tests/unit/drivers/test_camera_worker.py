@@ -227,7 +227,7 @@ def test_source_that_cannot_be_opened_says_so_at_once(tmp_path):
 
 
 class Ticking:
-    """A source of 50 frames a second, which is no file."""
+    """A source of 200 frames a second, which is no file."""
 
     number = 0
 
@@ -235,7 +235,7 @@ class Ticking:
         self.number = 0
 
     def take(self, now_s, stop):
-        stop.wait(0.02)
+        stop.wait(0.005)
         self.number += 1
         return Shot(now_s(), self.number, np.zeros((48, 64, 3), np.uint8))
 

@@ -169,6 +169,7 @@ def coupled_file(tmp_path: Path) -> str:
     return str(path)
 
 
+@pytest.mark.usefixtures("simulated_wires")
 def test_bring_up_of_a_coupled_neck(tmp_path: Path):
     pytest.importorskip("gazerig.features.bringup")
     rig = coupled_file(tmp_path)

@@ -187,7 +187,12 @@ def test_a_stop_overtakes_all_that_waits_and_is_answered_by_the_rig(near: Rig):
             you = json.loads(end.recv(timeout=PATIENCE_S))["ok"]["you"]
             for _ in range(10):
                 end.send(json.dumps({"do": "save"}))
-            assert "ok" in answer_to(end, do="stop", why="a hand", more=["nonsense"])
+            end.send(json.dumps({"do": "resume", "confirmed": True, "tag": "before"}))
+            end.send(json.dumps({"do": "stop", "why": "a hand", "more": ["nonsense"], "tag": 1}))
+            # A resume from before the stop may not follow it.
+            refusal = {"refused": "it has been stopped meanwhile", "tag": "before"}
+            assert json.loads(end.recv(timeout=PATIENCE_S)) == refusal
+            assert json.loads(end.recv(timeout=PATIENCE_S)) == DONE | {"tag": 1}
             assert near.stops[-1]["why"] == f"a hand ({you})"
             assert near.stops[-1]["who"].startswith(f"{you}, websocket ")
         assert near.post(b'{ "do": "stop",\n "why": "a test" }')[0] == 200

@@ -1,11 +1,9 @@
 """Visitors on the page are people with a face, where they were seen; hands are hands."""
 
 import pytest
-import trimesh
 import viser
 from page_feed import shown
 from seen_things import seen
-from trimesh.proximity import closest_point_naive
 
 from gazerig.robot.dashboard.view.people import PeopleView
 from gazerig.robot.description.people import LOOKS, head
@@ -24,6 +22,9 @@ def nodes(server: viser.ViserServer) -> set[str]:
 
 @pytest.mark.parametrize("part", ["LE", "RE", "M", "N", "DN", "UP", "FL", "FR"])
 def test_a_person_has_the_parts_of_a_face_where_the_canonical_face_has_them(part: str):
+    import trimesh  # half a second of a processor, which no other test needs at collection
+    from trimesh.proximity import closest_point_naive
+
     for number in range(LOOKS):
         mesh = trimesh.Trimesh(*head(number).mesh, process=False)
         _, (away_m,), _ = closest_point_naive(mesh, [PARTS_FACE_M[part]])

@@ -103,23 +103,24 @@ def test_other_programs_open_it(recorded: Recorded):
     assert tuple(states) == GAZE_JOINTS
 
 
-@pytest.mark.parametrize("odd", [0.25, nan, -inf])
-def test_any_tick_comes_back(recorded: Recorded, odd: float, tmp_path: Path):
-    track = TrackState(2, "nod", 0.5, 1.0, owns=("jaw",), who="somebody")
-    lead = ControlState(4, True, False, odd, "", "pointer", "somebody", "look", ("neck_yaw",))
-    face = Face(3, (odd, 0.0, 1.0), (0.0,) * 3, ((1.0, 0.0, 0.0),) * 3, ((odd,) * 3,) * 8, 0.5)
-    bodies = Bodies((3, 9), ("face", "hand"), *(np.full((2, 3), odd),) * 3, np.array([odd, 1.0]),
-                    np.full((2, 6, 6), odd))  # fmt: skip
-    ticks = [
-        replace(
-            recorded.ticks[-1],
-            client_control=lead,
-            tracks=(track,),
-            percept=percept,
-            detections=None,
-        )
-        for percept in (Percept(odd, bodies, (face,)), Percept(1.0, scene=4), None)
-    ]
+def test_any_tick_comes_back(recorded: Recorded, tmp_path: Path):
+    ticks = []
+    for odd in (0.25, nan, -inf):
+        track = TrackState(2, "nod", 0.5, 1.0, owns=("jaw",), who="somebody")
+        lead = ControlState(4, True, False, odd, "", "pointer", "somebody", "look", ("neck_yaw",))
+        face = Face(3, (odd, 0.0, 1.0), (0.0,) * 3, ((1.0, 0.0, 0.0),) * 3, ((odd,) * 3,) * 8, 0.5)
+        bodies = Bodies((3, 9), ("face", "hand"), *(np.full((2, 3), odd),) * 3,
+                        np.array([odd, 1.0]), np.full((2, 6, 6), odd))  # fmt: skip
+        ticks += [
+            replace(
+                recorded.ticks[-1],
+                client_control=lead,
+                tracks=(track,),
+                percept=percept,
+                detections=None,
+            )
+            for percept in (Percept(odd, bodies, (face,)), Percept(1.0, scene=4), None)
+        ]
     recorder = Recorder(tmp_path / "odd.mcap", recorded.info, patient=True)
     recorder.open()
     for tick in ticks:
@@ -351,7 +352,7 @@ class Killed:
         lines = []
         for line in process.stdout:
             lines.append(line)
-            if float(line.split()[1]) >= 2.5:
+            if float(line.split()[1]) >= 1.5:
                 break
         if both:
             os.kill(writer, signal.SIGKILL)

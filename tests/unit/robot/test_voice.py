@@ -1,7 +1,6 @@
 """A head that speaks: files, texts and streams as tracks with a mouth, and every end of them."""
 
 import asyncio
-import contextlib
 import os
 import threading
 from collections.abc import Iterator
@@ -37,12 +36,15 @@ def speech(seconds: float) -> bytes:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with an expressive rig whose sounds are silent, and two sounds."""
+    """Return a folder with an expressive rig whose sounds are silent, and three sounds."""
     folder = tmp_path_factory.mktemp("voice")
     text = SHIPPED.read_text("utf-8").replace(
         "profile: robot", "profile: robot\nsound: {device: silent}"
     )
-    (folder / "rig.yaml").write_text(text, "utf-8")
+    show = "description: x\nsound: long.wav\nframes: [{time_s: 50, head_yaw_deg: 3}]\n"
+    (folder / "show.yaml").write_text(show, "utf-8")
+    (folder / "rig.yaml").write_text(f"{text}\ntrack_files: [show.yaml]\n", "utf-8")
+    write_wav(folder / "word.wav", speech(0.25), RATE)
     write_wav(folder / "short.wav", speech(1.5), RATE)
     write_wav(folder / "long.wav", speech(60.0), RATE)
     return folder
@@ -150,13 +152,15 @@ def test_clients_of_the_network_may_name_sounds_of_the_folders_only(folder: Path
 # --- in real time
 
 
-@contextlib.contextmanager
-def speaking(folder: Path) -> Iterator[Any]:
-    """Yield a head in real time that says a long file."""
+@pytest.fixture(scope="module")
+def speaker(folder: Path) -> Iterator[Any]:
+    """A head in real time for several tests, each of which leaves it silent and free."""
     with opened(folder) as head:
-        head.say("long.wav")
-        wait_for(lambda: (sound_s(head) or 0.0) > 0.1)
         yield head
+
+
+def is_playing(head: Any) -> bool:
+    return any(one.is_playing for one in head.state.tracks)
 
 
 def sound_s(head: Any) -> float | None:
@@ -173,7 +177,9 @@ def is_silent(head: Any) -> bool:
 
 
 def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder: Path):
-    with speaking(folder) as head:
+    with opened(folder) as head:
+        head.say("long.wav")
+        wait_for(lambda: (sound_s(head) or 0.0) > 0.1)
         track = next(one for one in head.state.tracks if one.name == "speech")
         assert track.clock == "sound" or track.position_s < 1.0
         pid = head._made.voice._player.pid
@@ -188,29 +194,29 @@ def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder:
         os.kill(pid, 0)
 
 
-def test_a_stream_moves_the_mouth_and_a_stall_shuts_it(folder: Path):
-    with opened(folder) as head:
-        voice = head._made.voice
-        voice.feed(speech(1.0), RATE, 1)
-        wait_for(lambda: head.state.joints["jaw"].commanded_deg > 0.3 * JAW_DEG)
-        wait_for(lambda: any("stalled" in one.text for one in head.events(0.0)))
-        wait_for(lambda: abs(head.state.joints["jaw"].commanded_deg) < 0.5)
-        with pytest.raises(gazerig.Error, match="this piece is not played"):
-            voice.feed(speech(5.0), RATE, 1)
-        voice.finish()
-        wait_for(lambda: not [one for one in head.state.tracks if one.is_playing])
-        voice.feed(speech(1.0), RATE, 1)
-        assert head.say("short.wav").wait(20.0) == "arrived"  # it replaces the stream
-        head.jog("neck_yaw", 0.0)
-        with pytest.raises(gazerig.Error, match="the joints are held"):
-            voice.feed(speech(0.1), RATE, 1)
+def test_a_stream_moves_the_mouth_and_a_stall_shuts_it(speaker: Any):
+    head, voice = speaker, speaker._made.voice
+    voice.feed(speech(0.5), RATE, 1)
+    wait_for(lambda: head.state.joints["jaw"].commanded_deg > 0.3 * JAW_DEG)
+    wait_for(lambda: any("stalled" in one.text for one in head.events(0.0)))
+    wait_for(lambda: abs(head.state.joints["jaw"].commanded_deg) < 0.5)
+    with pytest.raises(gazerig.Error, match="this piece is not played"):
+        voice.feed(speech(5.0), RATE, 1)
+    voice.finish()
+    wait_for(lambda: not is_playing(head))
+    voice.feed(speech(1.0), RATE, 1)
+    assert head.say("word.wav").wait(20.0) == "arrived"  # it replaces the stream
+    head.jog("neck_yaw", 0.0)
+    with pytest.raises(gazerig.Error, match="the joints are held"):
+        voice.feed(speech(0.1), RATE, 1)
+    head.release_joints()
 
 
 def test_a_stream_without_volume_moves_the_mouth_and_needs_no_loudspeaker(folder: Path):
     text, rig = (folder / "rig.yaml").read_text("utf-8"), folder / "elsewhere.yaml"
     rig.write_text(text.replace("device: silent", "device: none such"), "utf-8")
     with gazerig.open(str(rig), mock=True, say=lambda line: None) as head:
-        pieces = [speech(1.0)[i : i + 1280] for i in range(0, 32000, 1280)]
+        pieces = [speech(0.5)[i : i + 1280] for i in range(0, 16000, 1280)]
         with pytest.raises(Refused, match="none such"):
             head.say(pieces, rate_hz=RATE)
         with pytest.raises(Refused, match="the volume is 2: give 0..1"):
@@ -222,39 +228,33 @@ def test_a_stream_without_volume_moves_the_mouth_and_needs_no_loudspeaker(folder
         wait_for(lambda: not [one for one in head.state.tracks if one.is_playing])
 
 
-def test_other_programs_say_files_and_streams(folder: Path):
+def test_other_programs_say_files_and_streams(speaker: Any):
     async def say(pid: int) -> str:
         async with gazerig.aio.connect(pid) as head:
-            return await head.say("short.wav")
+            return await head.say("word.wav")
 
-    with opened(folder) as here:
-        with gazerig.connect(os.getpid()) as head:
-            assert head.say("short.wav").reply.track.name == "speech"  # type: ignore[union-attr]
-            with pytest.raises(Refused, match="there is no such file"):
-                head.say("none.wav")
-            pieces = [speech(0.2)[i : i + 1280] for i in range(0, 6400, 1280)]
-            assert head.say(pieces, rate_hz=RATE).wait() == "arrived"
-            with pytest.raises(Refused, match="whole frames"):
-                head._say_piece(b"a", RATE, 1, 1.0)
-            wait_for(lambda: not [one for one in here.state.tracks if one.is_playing])
-        assert asyncio.run(say(os.getpid())) == "arrived"
+    with gazerig.connect(os.getpid()) as head:
+        assert head.say("word.wav").reply.track.name == "speech"  # type: ignore[union-attr]
+        with pytest.raises(Refused, match="there is no such file"):
+            head.say("none.wav")
+        pieces = [speech(0.2)[i : i + 1280] for i in range(0, 6400, 1280)]
+        assert head.say(pieces, rate_hz=RATE).wait() == "arrived"
+        with pytest.raises(Refused, match="whole frames"):
+            head._say_piece(b"a", RATE, 1, 1.0)
+        wait_for(lambda: not is_playing(speaker))
+    assert asyncio.run(say(os.getpid())) == "arrived"
 
 
-def test_the_sound_of_a_track_file_begins_and_ends_with_it(folder: Path):
-    show = "description: x\nsound: long.wav\nframes: [{time_s: 50, head_yaw_deg: 3}]\n"
-    (folder / "show.yaml").write_text(show, "utf-8")
-    text = (folder / "rig.yaml").read_text("utf-8")
-    (folder / "rig.yaml").write_text(f"{text}\ntrack_files: [show.yaml]\n", "utf-8")
-    with opened(folder) as head:
-        assert head.play("show").reply.track.duration_s >= 59.9
-        wait_for(lambda: (sound_s(head) or 0.0) > 0.1)
-        head.end_track("show")
-        wait_for(lambda: is_silent(head))
-        head.play("show", from_s=30.0)
-        wait_for(lambda: (sound_s(head) or 0.0) > 30.0)
-        track = head.state.tracks[-1]
-        assert track.position_s == pytest.approx(sound_s(head), abs=2.0)
-        head.play("show", speed=0.5)
-        wait_for(lambda: is_silent(head))
-        assert "without its sound, which plays at speed 1" in head.state.tracks[-1].limited
-    (folder / "rig.yaml").write_text(text, "utf-8")
+def test_the_sound_of_a_track_file_begins_and_ends_with_it(speaker: Any):
+    head = speaker
+    assert head.play("show").reply.track.duration_s >= 59.9
+    wait_for(lambda: (sound_s(head) or 0.0) > 0.1)
+    head.end_track("show")
+    wait_for(lambda: is_silent(head))
+    head.play("show", from_s=30.0)
+    wait_for(lambda: (sound_s(head) or 0.0) > 30.0)
+    track = head.state.tracks[-1]
+    assert track.position_s == pytest.approx(sound_s(head), abs=2.0)
+    head.play("show", speed=0.5)
+    wait_for(lambda: is_silent(head))
+    assert "without its sound, which plays at speed 1" in head.state.tracks[-1].limited
