@@ -17,5 +17,8 @@ if __name__ == "__main__":
         button = Button(PIN)
         while True:
             button.wait_for_press()
-            print(head.play(TRACK).reply.text())
+            try:
+                print(head.play(TRACK).reply.text())
+            except gazerig.Refused as error:  # the head was stopped
+                print(error)
             button.wait_for_release()

@@ -16,4 +16,7 @@ if __name__ == "__main__":
     with gazerig.connect(who="midi") as head, mido.open_input() as keys:
         for message in keys:
             if message.type == "note_on" and message.velocity and message.note in TRACKS:
-                print(head.play(TRACKS[message.note]).reply.text())
+                try:
+                    print(head.play(TRACKS[message.note]).reply.text())
+                except gazerig.Refused as error:  # the head was stopped
+                    print(error)

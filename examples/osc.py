@@ -13,7 +13,14 @@ if __name__ == "__main__":
     except ImportError:
         raise SystemExit("pip install python-osc") from None
     with gazerig.connect(who="osc") as head:
+
+        def play(_: str, track: str) -> None:
+            try:
+                print(head.play(track).reply.text())
+            except gazerig.Refused as error:  # an unknown track, or a stop
+                print(error)
+
         desk = Dispatcher()
-        desk.map("/play", lambda _, track: print(head.play(track).reply.text()))
-        desk.map("/stop", lambda _: head.stop("OSC"))
+        desk.map("/play", play)
+        desk.map("/stop", lambda _: print(head.stop("OSC").reply.refused or "stopped"))
         BlockingOSCUDPServer(("127.0.0.1", 9000), desk).serve_forever()

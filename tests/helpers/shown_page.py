@@ -1,12 +1,12 @@
 """A page process to look at, and a face for it to show."""
 
-import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
 import numpy as np
+from fakes.waiting import free_port
 from page_visitor import PATIENCE_S
 
 from gazerig.gaze.types import Face
@@ -43,12 +43,6 @@ def wait_for(ready: Callable[[], T | None], what: str) -> T:
             return found
         time.sleep(0.02)
     raise AssertionError(f"{what} did not come within {PATIENCE_S:.0f} s")
-
-
-def free_port() -> int:
-    with socket.socket() as trial:
-        trial.bind(("127.0.0.1", 0))
-        return int(trial.getsockname()[1])
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from math import hypot
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from fakes.talking_head import TalkingHead
@@ -116,13 +117,16 @@ def test_the_own_door_passes_words_on_and_a_key_starts_a_track(
     for example in ("osc.py", "midi.py", "gpio.py"):
         with pytest.raises(SystemExit, match="pip install"):
             shown(example)
-    reply = SimpleNamespace(text=lambda: "nod takes 1 s")
-    player = SimpleNamespace(play=lambda track: SimpleNamespace(reply=reply))
+    player = Mock()
+    player.play.side_effect = (
+        Mock(**{"reply.text.return_value": "nod takes 1 s"}),
+        gazerig.Refused("stopped"),
+    )
     monkeypatch.setattr(gazerig, "connect", lambda **_: nullcontext(player))
     key = SimpleNamespace(type="note_on", velocity=9, note=60)
-    mido = SimpleNamespace(open_input=lambda: nullcontext([key]))
+    mido = SimpleNamespace(open_input=lambda: nullcontext([key, key]))
     monkeypatch.setitem(sys.modules, "mido", mido)
-    assert shown("midi.py")[-1] == "nod takes 1 s"
+    assert shown("midi.py")[-2:] == ["nod takes 1 s", "stopped"]
 
 
 @pytest.mark.slow

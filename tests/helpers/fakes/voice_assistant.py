@@ -2,20 +2,14 @@
 
 import asyncio
 import json
-import socket
 from typing import Any
 
 from aiohttp import web
+from fakes.waiting import free_port
 
 
 def lva(event: str, **data: Any) -> dict[str, Any]:
     return {"event": event, "data": data} if data else {"event": event}
-
-
-def free_port() -> int:
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1])
 
 
 class Assistant:

@@ -1,5 +1,6 @@
-"""Waiting for another thread or process."""
+"""Waiting for another thread or process, and a port for it."""
 
+import socket
 import time
 from collections.abc import Callable
 from typing import TypeVar
@@ -26,3 +27,9 @@ def eventually(check: Callable[[], object]) -> bool:
             return True
         time.sleep(0.02)
     return False
+
+
+def free_port() -> int:
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        return int(trial.getsockname()[1])
