@@ -91,12 +91,14 @@ class RunRecording:
 
     @property
     def note(self) -> str:
-        """Return a description of the recording's defect, "" if it has none."""
+        """Return the recording's defect, or the fault that ended the run; "" without either."""
         name, lost = self.path.name, self.end.lost
         if not self.whole:
             return f"{name} was not closed: it contains the data that its writer had written to the disk"
         if not self.end.stopped_by:
             return f"{name} ends at the time at which the program was killed"
+        if self.end.stopped_by.startswith("fault"):
+            return f"{name} ends with a {self.end.stopped_by}"
         return f"{name} lacks {lost} ticks that could not be stored" if lost else ""
 
     def ticks(self) -> Iterator[Tick]:

@@ -277,9 +277,11 @@ def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path):
     for tick in seen:
         recorder.record(tick)  # would never return if it waited
     process.send_signal(18)  # SIGCONT
-    assert recorder.close("seconds").startswith("400 ticks")
+    assert recorder.close("fault: jaw: overload").startswith("400 ticks")
     assert recorder.lost == 0
-    back = list(RunRecording(path).ticks())
+    recording = RunRecording(path)
+    assert recording.note == "late.mcap ends with a fault: jaw: overload"
+    back = list(recording.ticks())
     assert list(map(exact, back)) == list(map(exact, seen))
 
 
