@@ -8,7 +8,7 @@ import { count } from "/rig/words.js";
 /** Parameters with which the drawer opens, and their plain names. */
 const FIRST = {
   "gaze.scanpath.rate_scale": "liveliness",
-  "gaze.scanpath.spot_height_mm": "time on the eyes",
+  "gaze.scanpath.spot_height_mm": "height on the face",
   "gaze.lids.blinks_per_min": "blinks",
   "gaze.head.eye_only_range_deg": "range of the eyes alone",
 };
