@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING
 
 import child_processes
 import pytest
+from branch import start_child
 from hypothesis import settings
+
+from gazerig.drivers.process import child_process
 
 if TYPE_CHECKING:
     from commanded_robot import Running
@@ -76,6 +79,14 @@ def chromium_ends() -> Iterator[None]:
     yield
     if "browser" in sys.modules:
         sys.modules["browser"].end_chromium()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def forked_children() -> Iterator[None]:
+    """Have emulated buses and writers of recordings in forks, which load no module."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(child_process, "start", start_child)
+        yield
 
 
 @pytest.fixture(autouse=True)

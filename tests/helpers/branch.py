@@ -9,10 +9,14 @@ import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NoReturn
+
+from gazerig.drivers.process import child_process
 
 _SIGNALS = (
     *(signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT),
@@ -35,11 +39,12 @@ class Branch(subprocess.Popen[Any]):
         work: Callable[[], object],
         env: dict[str, str] | None = None,
         preexec_fn: Callable[[], object] = lambda: None,
+        keep_fds: Sequence[int] = (),
         **options: Any,
     ) -> None:
         def begin() -> None:
             preexec_fn()
-            become(work, env)
+            become(work, env, keep_fds)
 
         for name in _OF_MOST:
             import_module(name)
@@ -48,17 +53,23 @@ class Branch(subprocess.Popen[Any]):
         super().__init__(["fork"], preexec_fn=begin, **options)
 
 
-def become(work: Callable[[], object], env: dict[str, str] | None = None) -> NoReturn:
+def become(
+    work: Callable[[], object], env: dict[str, str] | None = None, keep_fds: Sequence[int] = ()
+) -> NoReturn:
     """Be another program from here on, in a process that has just been forked."""
     code = 1
     try:
-        os.closerange(3, 4096)  # also the pipe on which Popen waits for the start
+        # Also the pipe on which Popen waits for the start.
+        for before, after in pairwise((2, *sorted(keep_fds), 4096)):
+            os.closerange(before + 1, after)
         if env is not None:
             os.environ.clear()
             os.environ.update(env)
         for number in _SIGNALS:
             signal.signal(number, signal.SIG_DFL)
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        for number in (signal.SIGPIPE, signal.SIGXFSZ):
+            signal.signal(number, signal.SIG_IGN)  # as Python has them at its start
         atexit._clear()
         sys.excepthook, sys.unraisablehook = sys.__excepthook__, sys.__unraisablehook__
         threading.excepthook = threading.__excepthook__
@@ -121,3 +132,32 @@ def script(file: Path, *words: str) -> Callable[[], None]:
         runpy.run_path(str(file), run_name="__main__")
 
     return work
+
+
+_FORKED = ("gazerig.sim_mock.pty.server", "gazerig.robot.recording.writer")
+_start = child_process.start
+
+
+def start_child(
+    module: str,
+    *arguments: str,
+    pass_fds: Sequence[int] = (),
+    variables: Mapping[str, str] = MappingProxyType({}),
+    **options: Any,
+) -> "subprocess.Popen[bytes]":
+    """Stand for child_process.start: servers and writers of many tests load nothing again."""
+    if module not in _FORKED:
+        return _start(module, *arguments, pass_fds=pass_fds, variables=variables, **options)
+    return Branch(
+        lambda: _run_module(module, arguments),
+        env={**os.environ, **variables},
+        preexec_fn=os.setsid,
+        keep_fds=pass_fds,
+        **{"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, **options},
+    )
+
+
+def _run_module(module: str, arguments: Sequence[str]) -> None:
+    sys.argv = [module, *arguments]
+    entry = import_module(module).main
+    entry(int(arguments[0])) if entry.__code__.co_argcount else entry()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import gazerig
+from gazerig.config.load import shipped_path
 from gazerig.gaze.types import GazeState, Percept, Vec3
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.run.rerun import rerun
@@ -151,8 +152,14 @@ def test_states_events_and_conditions_step_the_head(head: gazerig.SimulatedHead)
 
 
 def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path):
+    """Also with tracks whose files come, change and go meanwhile."""
+    tracks, rig = tmp_path / "tracks", tmp_path / "my.yaml"
+    tracks.mkdir()
+    rig.write_text(shipped_path("rigs", "desk").read_text("utf-8"))
     file = tmp_path / "program.mcap"
-    with gazerig.open("desk", fast=True, bus="emulated", scene="face-to-face", record=file) as head:
+    bow = "description: x\nframes: [{{time_s: 0.5, head_pitch_deg: {}}}]\n"
+    options: dict[str, Any] = {"bus": "emulated", "scene": "face-to-face", "record": file}
+    with gazerig.open(str(rig), fast=True, **options) as head:
         head.step(1.0)
         head.look_at_pixel(200.0, 150.0).wait()
         head.play("nod")
@@ -160,8 +167,22 @@ def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path):
         head.step(0.5)
         head.look_at(1.0, -0.2, 0.1).wait()
         head.look_at_person(head.people[0].id).wait()
+        (tracks / "late.yaml").write_text(bow.format(-4))
+        head.play("late")
+        head.step(0.5)
+        first_deg = head.state.joints["neck_pitch"].commanded_deg
+        (tracks / "late.yaml").write_text(bow.format(6.5))
+        head.step(1.0)
+        head.play("late")
+        head.step(0.5)
+        assert head.state.joints["neck_pitch"].commanded_deg > first_deg + 8.0
+        (tracks / "bad.yaml").write_text("description: x\nframes: [{time_s: 1}]\n")
+        with pytest.raises(gazerig.Refused, match=r"bad.yaml:2: .*names no motion"):
+            head.play("bad")
         head.jog("neck_yaw", 10.0)
         head.step(0.5)
+    for track in tracks.iterdir():
+        track.unlink()
     again = rerun(RunRecording(file))
     assert again.is_same and again.sent_bytes_same and not again.notes
 

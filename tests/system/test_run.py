@@ -14,6 +14,7 @@ from slow_rigs import at_rate
 from gazerig.config.schema import load_rig
 from gazerig.features.lab.report.gaze_trace import PHASES
 from gazerig.features.lab.simulated_run import simulate
+from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.run.options import RunOptions
 
 
@@ -47,15 +48,18 @@ def test_e59_before_a_photo_same_seed_same_bytes_in_another_process(tmp_path: Pa
     photo = str(tmp_path / "photo.png")
     cv2.imwrite(photo, np.ascontiguousarray(data.astronaut()[:, :, ::-1]))
     rig = at_rate(tmp_path, "desk", 100.0)
-    words = (rig, "--video", photo, "--seconds", "2", "--seed")
-    done = gazerig("run", "--mock", "--fast", "--summary", "-", *words, "1")
+    words = (rig, "--video", photo, "--seconds", "1.5", "--seed")
+    recording = tmp_path / "run.mcap"
+    record = ("--record", str(recording), "--summary", "-")
+    done = gazerig("run", "--mock", "--fast", *record, *words, "1")
     assert done.returncode == 0, done.stderr
+    assert RunRecording(recording).end.stopped_by == "seconds"
     one: dict[str, Any] = json.loads(done.stdout)
     again = figures(*words, "1")
     assert one.pop("wall_seconds") > 0.0 and again.pop("wall_seconds") > 0.0
     assert again == one
-    assert again["faces_seen"] == again["pictures"] >= 17
-    assert again["target_share"]["face"] > 0.8  # after a reaction time
+    assert again["faces_seen"] == again["pictures"] >= 12
+    assert again["target_share"]["face"] > 0.7  # after a reaction time
     assert re.fullmatch(r"[0-9a-f]{64}", again["bus"]["tx_sha256"])
     others = {figures(rig, "--seconds", "0.5", "--seed", seed)["bus"]["tx_sha256"] for seed in "12"}
     assert len(others) == 2
@@ -71,6 +75,7 @@ FAULTS = (
     ((), "nothing to look at"),
     (("--mock", "--page", "8080"), "HOST:PORT"),
     (("nosuchrig", "--mock"), "nosuchrig"),
+    (("--mock", "--scene", "circus"), "circus"),
     (("--mock", "--profile", "giant"), "giant"),
 )
 
@@ -79,6 +84,3 @@ def test_what_a_person_can_mend_is_one_line_and_exit_code_2(capfd: pytest.Captur
     for words, message in FAULTS:
         code, said = typed("run", "--no-page", *words), capfd.readouterr().err
         assert (code, message in said, said.count("\n")) == (2, True, 1), said
-    done = gazerig("run", "--no-page", "--mock", "--scene", "circus", timeout=30)
-    said = done.stderr
-    assert (done.returncode, "circus" in said, said.count("\n")) == (2, True, 1), said

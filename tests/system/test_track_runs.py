@@ -9,16 +9,11 @@ import numpy as np
 import pytest
 from fakes.runs import ticks
 
-import gazerig
-from gazerig import Refused
-from gazerig.config.load import shipped_path
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import LookAt, Play
 from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.run.rerun import rerun
 from gazerig.robot.run.run import Run
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -121,27 +116,3 @@ def test_what_a_track_owns_is_its_alone_and_gaze_keeps_the_eyes_on_the_point(
     assert [tick.gaze.lid_left for tick in held] == pytest.approx([0.4] * len(held), abs=1e-6)
     assert len({tick.gaze.saccades for tick in held}) > 1
     assert found[-1].gaze.eye_left_rad != found[-1].gaze.eye_right_rad  # they converge again
-
-
-def test_a_file_in_the_folder_tracks_is_found_without_an_edit_or_a_restart(tmp_path: Path):
-    (tmp_path / "tracks").mkdir()
-    (tmp_path / "my.yaml").write_text(shipped_path("rigs", "desk").read_text("utf-8"))
-    bow = "description: x\nframes: [{{time_s: 0.5, head_pitch_deg: {}}}]\n"
-    recording = tmp_path / "run.mcap"
-    with gazerig.open(str(tmp_path / "my.yaml"), fast=True, record=recording) as head:
-        head.step(1.0)
-        (tmp_path / "tracks" / "late.yaml").write_text(bow.format(-4))
-        head.play("late")
-        head.step(0.5)
-        first_deg = head.state.joints["neck_pitch"].commanded_deg
-        (tmp_path / "tracks" / "late.yaml").write_text(bow.format(6.5))
-        head.step(1.0)
-        head.play("late")
-        head.step(0.5)
-        assert head.state.joints["neck_pitch"].commanded_deg > first_deg + 8.0
-        (tmp_path / "tracks" / "bad.yaml").write_text("description: x\nframes: [{time_s: 1}]\n")
-        with pytest.raises(Refused, match=r"bad.yaml:2: .*names no motion"):
-            head.play("bad")
-    for file in (tmp_path / "tracks").iterdir():
-        file.unlink()
-    assert rerun(RunRecording(recording)).is_same

@@ -56,7 +56,7 @@ def test_a_visitor_who_waves_is_nodded_to():
     )
     said: list[str] = []
     rig = load_rig("desk")
-    rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
+    rig = replace(rig, loop=replace(rig.loop, rate_hz=50.0))
     session.Session(Run(rig, options), lambda: None, said.append).run()
     (nod,) = [line for line in said if "track" in line]
     at_s = float(nod.split(" s: ")[0])
