@@ -218,7 +218,7 @@ def _decide(one: Hypothesis, scores: Scores) -> Decision:
     sides = [scores.get(key, {}) for key in keys]
     codes = [code for code in sides[0] if code in sides[1]]
     better, than = (np.array([np.mean(side[code]) for code in codes]) for side in sides)
-    if len(codes) < 2 or not (better != than).any():
+    if not (better != than).any():
         return Decision(one, len(codes), (nan, nan), (_NO_DIFFERENCE,))
     single = [np.concatenate([*side.values()]) for side in sides]
     tests = tuple(

@@ -85,10 +85,6 @@ class AddressingModel:
     """Recognition of the people who address the head, from what perception sees."""
 
     def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget all people."""
         self._looks: dict[int, _Look] = {}
         self._since_s: dict[int, float] = {}
         self._at_s = -inf

@@ -79,10 +79,6 @@ class Animation:
         self._tables = tables
         self._gains = [one.gain for one in tables.ranges.values()]
         self._low: Floats = sum([one.low for one in tables.ranges.values()], self.tracks.rest)
-        self.reset(0.0)
-
-    def reset(self, t_s: float) -> None:
-        """Begin at rest at a time."""
         self._blends = {
             name: MinimumJerkBlend((float(name == NEUTRAL),), one.smoothing_s)
             for name, one in self._tables.ranges.items()
@@ -91,7 +87,6 @@ class Animation:
         self._until_s: dict[str, float] = {}
         self._mouth, self._speaks = 1.0, False
         self._face, self._at_rest = self._low, False
-        self.tracks.reset()
         self._sum = PoseOffset.from_flat(self._low.tolist())
 
     @property

@@ -171,10 +171,6 @@ class TrackPlayer:
         names = (*POSE_CHANNELS, *[""] * joints)
         self.rest: Floats = np.array([rest_value(name) for name in names])
         self._number = 0
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget all tracks."""
         self._voices: list[Voice] = []
         self.owned: dict[int, tuple[float, float]] = {}
         self.moves = True

@@ -58,7 +58,7 @@ def emulate(
         buses = tuple(
             BusSettings(
                 device,
-                name if len(devices) > 1 else None,
+                name or None,
                 link=None if link is None else f"{link}-{name}" if name else str(link),
             )
             for name, device in devices.items()

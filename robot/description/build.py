@@ -82,15 +82,15 @@ def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[I
         Inertia(one.mass_kg, _from_pivot(one.position_mm, measures), np.zeros((3, 3)))
         for one in params.counterweights.values()
     ]
-    return join_inertias((own, *weights)) if weights else own
+    return join_inertias((own, *weights))
 
 
 def carried_links(links: Iterable[Link]) -> list[Inertia]:
     """Return the inertias of links that the head carries, in its frame, all joints at 0."""
-    at: dict[str, Vec3] = {HEAD: ORIGIN}
+    at: dict[str | None, Vec3] = {HEAD: ORIGIN}
     found = []
     for link in links:
-        p = at[link.name] = add(at.get(link.parent or "", ORIGIN), link.p_m)
+        p = at[link.name] = add(at.get(link.parent, ORIGIN), link.p_m)
         if link.inertia is not None:
             found.append(link.inertia._replace(com_m=add(p, link.inertia.com_m)))
     return found

@@ -176,10 +176,6 @@ class CommandExecutor:
         self.opponent: tuple[MovableOpponent, Callable[[], float | None]] | None = None
         self._known: dict[int, Vec3] = {}
         self._taken_over = False
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the newest frame and the tracks that rules have played."""
         self._trigger, self._startle = TrackTrigger(), Startle()
         self._detections: Detections | None = None
         self._percept: Percept | None = None

@@ -208,15 +208,10 @@ class Robot:
         joints = self.body.read(t_s)
         pose = self.kinematics.forward(joints)
         self.poses.remember(t_s, pose.head_rad, pose.R_world_head)
-        self.newest = None
         self.attention.reset(t_s)
         self.conversation_gaze.reset(t_s)
         self._scanpath.reset(t_s)
-        self._addressing.reset()
-        self._gaze_m = None
         self.oculomotor.reset(t_s, pose)
-        self.animation.reset(t_s)
-        self._executor.reset()
         self._executor.commanded_rad = goals
 
     def tick(self, t_s: float, dt_s: float, watch: Callable[[Tick], object] | None = None) -> Tick:

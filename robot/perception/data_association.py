@@ -242,5 +242,5 @@ def _shortest_paths(costs: list[list[float]]) -> list[int]:
         while column:
             row_of[column] = row_of[before[column]]
             column = before[column]
-    column_of = {row: j - 1 for j, row in enumerate(row_of) if j and row}
+    column_of = {row: j - 1 for j, row in enumerate(row_of)}
     return [column_of[row] for row in range(1, n + 1)]

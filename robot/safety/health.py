@@ -127,9 +127,7 @@ class JointHealth:
         # A sagging supply recovers when the joint stops: the joint rests for the same time.
         spent = outside_s >= _OUTSIDE_S and room < 0.0
         self._no_volts[i] = spent or (self._no_volts[i] and self._outside_s[i] > 0.0)
-        if room >= VOLTAGE_MARGIN_V:
-            return 1.0
-        return max(room / VOLTAGE_MARGIN_V, 0.0) if room > 0.0 else 0.0
+        return min(max(room / VOLTAGE_MARGIN_V, 0.0), 1.0)
 
 
 def _joint_value(column: Sequence[float | None], i: int) -> float | None:

@@ -170,8 +170,9 @@ def _matrix(axes: Axes, values: Floats, title: str, people: Floats) -> None:
     axes.grid(False)
     for (row, column), value in np.ndenumerate(values):
         ink = "#c92a2a" if people[row, column] == 0.0 else "white" if value > 0.42 else INK
-        axes.text(column, row, f"{100 * value:.0f}" if value > 0.005 else "", ha="center",
-                  va="center", fontsize=7.5, color=ink)  # fmt: skip
+        axes.text(
+            column, row, f"{100 * value:.0f}", ha="center", va="center", fontsize=7.5, color=ink
+        )
     axes.set(xlabel="to", ylabel="from", title=title)
 
 
