@@ -15,6 +15,7 @@ from fakes.films import write_film
 from features_there import needs_all_features
 
 import gazerig
+from gazerig.drivers.errors import extra_hint
 
 _SERVES = """
 import atexit, json, os, sys, threading, traceback
@@ -131,6 +132,8 @@ def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_d
     spreads = f"distributed is not installed: pip install -e '{ROOT}[cluster]'"
     assert (codes, said) == (["2"] * 5, [writes, writes, spreads, sees, places])
     assert not list(tmp_path.iterdir())
+    broken = ModuleNotFoundError("No module named 'numpy'", name="numpy")
+    assert "depthai cannot be loaded (No module" in extra_hint("depthai", "oak", broken)
 
 
 # ---- Imports of processes: the control loop has NumPy, the serial port and rig files only.

@@ -308,6 +308,17 @@ def test_the_run_is_told_as_the_models_know_it(ticks: list[Tick]):
     assert 0.0 < np.median(late_s) < 0.03  # the servos' lag
 
 
+def test_the_gaze_is_compared_with_the_partner_and_no_one_beside(ticks: list[Tick]):
+    tick = ticks[-1]
+    assert tick.percept is not None
+    (face,) = tick.percept.faces
+    talk = structs.replace(tick.conversation, state="listening", partner=face.id)
+    beside = structs.replace(face, id=99, p_world_m=(0.0, 1.0, 0.0))
+    percept = structs.replace(tick.percept, faces=(beside, face))
+    (row,) = gathered([structs.replace(tick, conversation=talk, percept=percept)]).rows
+    assert abs(row["off_partner"]).max() < 10.0
+
+
 def test_what_is_not_measured_or_stopped_and_a_gap_make_no_events(ticks: list[Tick]):
     builder = GazeTraceBuilder()
     for tick in ticks[:2000]:

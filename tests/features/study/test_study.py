@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from gazerig.features.study.analyse import analyse_study
 from gazerig.features.study.design import HOME, Study, load_study, participant_order, williams
 from gazerig.features.study.journal import Journal, StudyFolder
 from gazerig.features.study.session import PageEvent, StudySession
-from gazerig.features.study.simulate import simulate_study
+from gazerig.features.study.simulate import condition_levels, simulate_study
 
 STUDY = """\
 title: Short
@@ -139,6 +140,12 @@ def test_faults_name_line_and_key(study: Path):
     study.write_text(text.replace("mitake", "none"))
     with pytest.raises(SetupError, match=r"conditions\.alpha: .*none"):
         load_study(str(study))
+
+
+def test_conditions_rank_by_their_chain_of_hypotheses():
+    chain = [SimpleNamespace(better=better, than=than) for better, than in ("cb", "ba")]
+    design: Any = SimpleNamespace(conditions="abcd", hypotheses=chain)
+    assert condition_levels(design) == {"a": 0, "b": 1, "c": 2, "d": 0}
 
 
 @pytest.mark.parametrize("name", shipped_names("studies", HOME))

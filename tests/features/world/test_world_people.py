@@ -85,10 +85,18 @@ def test_nothing_jumps_also_where_a_round_begins_again(name: str):
 
 @pytest.mark.parametrize("name", WORLDS)
 def test_joints_stay_within_what_people_can_do(name: str):
-    most = {"elbow": 151.0, "knee": 151.0, "wrist": 56.0, "head": 85.0, "eye": 45.0}
+    most = {
+        "elbow": 151.0, "knee": 151.0, "wrist": 56.0, "head": 85.0, "neck": 50.0, "eye": 45.0,
+        "walk": 45.0,
+    }  # fmt: skip
     for who in people(name):
         R = {segment: turns(name, f"{who}/{segment}") for segment in SEGMENTS}
-        found = {"head": angles_deg(R["head"][:, :, 0], R["torso"][:, :, 0])}
+        found = {part: angles_deg(R["head"][:, :, 0], R[below][:, :, 0])
+                 for part, below in (("head", "torso"), ("neck", "neck"))}  # fmt: skip
+        speed = np.gradient(places(name, f"{who}/pelvis")[:, :2], STEP_S, axis=0)
+        pace = np.linalg.norm(speed, axis=1)
+        aside = angles_deg(speed / np.maximum(pace, 0.1)[:, None], R["pelvis"][:, :2, 0])
+        found["walk"] = np.where(pace > 0.5, aside, 0.0)  # people walk ahead
         for side in ("left", "right"):
             upper, fore, hand = (
                 R[f"{side}_{part}"][:, :, 2] for part in ("upper_arm", "forearm", "hand")

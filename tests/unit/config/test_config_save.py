@@ -42,6 +42,8 @@ name: nod   # its name
 
 joints:
     pan: {id: 1, zero_step: 2000}    # flow
+    jaw:
+        gains: null
     tilt:
         id: 2
         zero_step: 2048      # by hand, 3 May

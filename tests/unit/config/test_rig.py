@@ -141,6 +141,7 @@ def faults(tmp_path: Path, text: str) -> str:
             "use either left_eye_tilt and right_eye_tilt, or eyes_tilt alone",
         ),
         ("kind: maestro", "kind: maestra", "bus.kind"),
+        ("com_mm: [0, 0, 0]", "mass_kg: 0.01", "the head weighs 0.01 kg with all it carries"),
     ],
 )
 def test_what_cannot_be_is_said(tmp_path: Path, old: str, new: str, says: str):

@@ -19,6 +19,11 @@ def test_values_are_read_as_in_the_file(text: str, value: object):
     assert read == value and type(read) is type(value)
 
 
+def test_a_key_that_is_there_twice_is_refused():
+    with pytest.raises(SetupError, match="key: duplicate key"):
+        read_value("key", "{a: 1, a: 2}")
+
+
 def test_pairs_and_points():
     assert read_pairs(["a", "1", "b", "x"]) == {"a": 1, "b": "x"}
     assert read_look(["1", "-0.5", "2e-1"]) == LookAt((1.0, -0.5, 0.2), stay=True)

@@ -1,12 +1,16 @@
 """Output of a run on the terminal: little, plain, and nothing about missing parts."""
 
 import signal
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+from commanded_robot import Running
 
 from gazerig.robot.cli.command_list import Commands
 from gazerig.robot.cli.run import has_desktop, report_faults
 from gazerig.robot.cli.terminal import exit_on_signals
+from gazerig.robot.dashboard.feed.status_line import StatusLine
 
 DESK = {"DISPLAY": ":0"}
 
@@ -59,3 +63,12 @@ def test_a_request_to_end_while_a_run_is_made_ends_it_in_order(number: signal.Si
         assert signal.getsignal(number) == signal.SIG_DFL
     finally:
         signal.signal(number, before)
+
+
+def test_the_status_line_shows_the_loop_and_the_bus_five_times_a_second(running: Running):
+    figures: Any = SimpleNamespace(over_s=2.0, rate_hz=99.5, late_share=0.0)
+    lines: list[str] = []
+    line = StatusLine(lines.append, running.made.robot.body.bus.health, lambda: figures)
+    for tick in running.ticks:
+        line.update(tick)
+    assert len(lines) == 5 and " 99.5 Hz | " in lines[-1] and "| bus ok" in lines[-1]

@@ -83,13 +83,20 @@ def test_a_servo_fault_ends_the_loop_with_its_cause():
     assert count.ticks <= 105
 
 
-def test_parking_reaches_the_pose_and_torque_goes_off():
+def test_parking_reaches_the_pose_and_torque_goes_off(monkeypatch: pytest.MonkeyPatch):
     assembly = simulated()
     ticks(assembly, 4.0)
     assert assembly.robot.park(assembly.park_rad, assembly.clock, assembly.loop)
-    chain = assembly.robot.body.bus._port.chain  # type: ignore[attr-defined]
+    bus: Any = assembly.robot.body.bus
+    chain = bus._port.chain
     parked = assembly.robot.body.angles(list(chain.positions_steps()))
     assert np.degrees(parked) == pytest.approx(np.degrees(assembly.park_rad), abs=2.5)
+
+    def fail() -> None:
+        monkeypatch.undo()
+        raise MemoryError  # then it is tried once more
+
+    monkeypatch.setattr(bus, "disable_torque", fail)
     assembly.robot.stop()
     assert [chain[i].read(64, 1)[1] for i in range(1, 10)] == [b"\x00"] * 9
 

@@ -194,15 +194,20 @@ def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder:
         os.kill(pid, 0)
 
 
-def test_a_stream_moves_the_mouth_and_a_stall_shuts_it(speaker: Any):
+def test_a_stream_moves_the_mouth_and_a_stall_shuts_it(
+    speaker: Any, monkeypatch: pytest.MonkeyPatch
+):
     head, voice = speaker, speaker._made.voice
+    abandoned_s = "gazerig.robot.run.voice._ABANDONED_S"
+    monkeypatch.setattr(abandoned_s, 600.0)
     voice.feed(speech(0.5), RATE, 1)
     wait_for(lambda: head.state.joints["jaw"].commanded_deg > 0.3 * JAW_DEG)
     wait_for(lambda: any("stalled" in one.text for one in head.events(0.0)))
     wait_for(lambda: abs(head.state.joints["jaw"].commanded_deg) < 0.5)
     with pytest.raises(gazerig.Error, match="this piece is not played"):
         voice.feed(speech(5.0), RATE, 1)
-    voice.finish()
+    assert is_playing(head)
+    monkeypatch.setattr(abandoned_s, 0.0)
     wait_for(lambda: not is_playing(head))
     voice.feed(speech(1.0), RATE, 1)
     assert head.say("word.wav").wait(20.0) == "arrived"  # it replaces the stream
