@@ -84,6 +84,7 @@ def test_the_page_shows_a_head_that_turns_and_asks_no_other_site(at_the_rig: tup
         wait_for(lambda: person.reads("looks at person ", "fixate"), "the words")
     person.open("Health")
     wait_for(lambda: person.reads("bus ok", "guard: ok", "neck yaw"), "the health")
+    assert not person.reads("faces by")  # no picture is searched in a computed scene
     person.run(draw.format("true"))
 
     def elsewhere() -> bool:

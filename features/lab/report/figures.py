@@ -198,7 +198,7 @@ def _draw_map(axes: Axes, density: Floats, title: str) -> None:
     shade = density / density.max()
     axes.imshow(shade[::-1], extent=(left, right, low, high), cmap="plasma",
                 alpha=np.clip(1.6 * shade[::-1], 0.0, 0.85), interpolation="bilinear")  # fmt: skip
-    axes.set(xlim=(40, 680), ylim=(820, 60), title=title)
+    axes.set_title(title)
     axes.axis("off")
 
 

@@ -148,5 +148,4 @@ class RenderedSource:
         return ()
 
     def close(self) -> None:
-        """Free the renderer; safe to call twice."""
-        self._camera.close()
+        """Do nothing: the renderer ends with the camera's process."""

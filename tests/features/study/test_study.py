@@ -22,6 +22,7 @@ from study_program import Program
 from gazerig.config.load import ConfigError
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
+from gazerig.errors import HeadEnded
 from gazerig.features.lab.film_writer import film_writer
 from gazerig.features.study import film, session
 from gazerig.features.study.analyse import analyse_study
@@ -197,6 +198,16 @@ def journal(tmp_path: Path) -> Iterator[Journal]:
     journal = Journal(tmp_path / "data")
     yield journal
     journal.close()
+
+
+def test_a_head_that_is_held_for_more_than_a_second_ends_the_session(study: Path, journal: Journal):
+    state = SimpleNamespace(stopped="", level="hold", reasons=("a program jogs",))
+    clock = iter((0.0, 0.9, 1.1))
+    head: Any = SimpleNamespace(state=state)
+    one = StudySession(load_study(str(study)), 1, journal, lambda: next(clock), str, head)
+    one.poll()
+    with pytest.raises(HeadEnded, match="the joints are held: a program jogs"):
+        one.poll()
 
 
 def test_pages_do_not_distinguish_conditions(study: Path, journal: Journal):
