@@ -47,6 +47,11 @@ def test_field_of_both_eyes(yaw: float, pitch: float, seen: bool):
     assert bool(visible_bodies(bodies(body(1, "x", far)).rows(), looking())) is seen
 
 
+def test_an_eye_sees_further_at_its_temple():
+    apart = structs.replace(looking(), eye_left_rad=(radians(40.0), 0.0))
+    assert visible_bodies(bodies(body(1, "x", (26.0, -97.0, 0.0))).rows(), apart)
+
+
 def test_the_face_wins_over_a_resting_hand_and_loses_to_a_waving_one():
     model = attention()
     still = look(model, 0.0, FACE, waving(0.05))

@@ -273,3 +273,7 @@ def test_an_arm_that_comes_in_at_the_side_is_as_near_as_makes_it_as_wide_as_a_ha
     seen = [reaching(0.17)] * 3 + [reaching(0.06)] * 3 + [reaching(0.25)] * 2
     away = [level(hands.label([one], [FACE], EYE, k / 30)[0].p_m) for k, one in enumerate(seen)]
     assert away[1:] == pytest.approx([0.5] * 7, abs=0.03), "and stays there as less of it moves"
+    own = Hands()
+    for k in range(6):
+        (hand,) = own.label([reaching(0.17, p=(2.0, 0.5, -0.2))], [FACE], EYE, k / 30)
+    assert level(hand.p_m) == pytest.approx(1.0, abs=0.03)  # from the person's own shoulder
