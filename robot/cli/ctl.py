@@ -71,7 +71,11 @@ def rigs() -> None:
         found = connect_to_all()
         for rig in found:
             with rig:
-                now = rig.status()
+                try:
+                    now = rig.status()
+                except DriverError as error:  # it is ending or hangs
+                    say(f"process {rig.pid}: {error}")
+                    continue
                 print(
                     *(now[key] for key in ("name", "rig", "pid", "page") if now.get(key)), sep="  "
                 )
