@@ -95,7 +95,7 @@ def test_setup_in_steps_with_answers(rig, found, done):
 @pytest.mark.pty
 def test_sigterm_while_jogging_parks_and_lets_go():
     with served("desk") as desk:
-        process = start("jog", "desk", "neck_yaw", "60", "--speed", "15", "--port", desk.ports)
+        process = start("jog", "desk", "neck_yaw", "60", "--speed", "40", "--port", desk.ports)
         hear(process.stderr, "torque on")
         time.sleep(0.3)
         process.send_signal(signal.SIGTERM)

@@ -345,16 +345,16 @@ def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
 def test_a_program_leads_while_it_lives_and_is_named(
     rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(client_control, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
+    monkeypatch.setattr(client_control, "HEARTBEAT_S", 1.0)  # simulated: time goes faster here
     monkeypatch.setattr(client, "_EVERY_S", 0.05)
     with RobotClient.connect(who="a show") as show:
         assert show.send(LookAt((-1.0, 0.0, 0.3))).control_number and show.in_control
         status = rig.status()
         assert status["controlled_by"] == f"a show (process {os.getpid()}): look at -1 0 0.3"
         count = len(beat.ticks)
-        assert beat.pulse.wait_for_ticks(800, 20.0)  # twice as long
+        assert beat.pulse.wait_for_ticks(400, 20.0)  # twice as long
         assert show.in_control and beat.ticks[-1].controlled_by and len(beat.ticks) > count
-    assert beat.pulse.wait_for_ticks(500, 20.0)
+    assert beat.pulse.wait_for_ticks(250, 20.0)
     assert beat.ticks[-1].controlled_by == "" and rig.status()["controlled_by"] == ""
 
 
@@ -447,7 +447,7 @@ def test_a_resume_from_before_a_stop_is_not_executed_after_it(
 def test_who_sends_far_too_much_is_hung_up_on_after_his_stop(
     rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(server_module, "REST_S", 3.0)
+    monkeypatch.setattr(server_module, "REST_S", 1.5)
     with raw(folder) as end:
         over = threading.Event()
 
