@@ -10,6 +10,7 @@ import gazerig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.cli.run import say_publicly
 from gazerig.robot.dashboard.door.token_file import read_token
+from gazerig.robot.dashboard.feed.page_process import PageProcess
 
 GOOD = "Zk3-_mcd94kfuw82kd01xy"
 
@@ -73,6 +74,10 @@ def test_an_address_is_told_without_a_token_that_is_kept_or_would_be_logged(
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     file, said = tmp_path / "token", list[str]()
     page = f"127.0.0.1:{free_port()}"
+    address = f"http://{page}/?token="
+    # As if its process had started.
+    monkeypatch.setattr(PageProcess, "open", lambda _: "the page starts")
+    monkeypatch.setattr(PageProcess, "url", lambda _: address + file.read_text().strip())
     with gazerig.open("desk", mock=True, page=page, token_file=file, say=said.append):
         wait_for(lambda: any("the page is at" in one for one in said), "the page's address")
     assert not any("token=" in one for one in said)
