@@ -117,7 +117,6 @@ class AutoDetector:
         self._known: list[FoundFace] = []
         self._size: tuple[int, ...] = ()
         self._since_search, self._searches, self._next_tile = 0, 0, 0
-        self.searched = False
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Return faces, the largest first, in pixels of the image."""

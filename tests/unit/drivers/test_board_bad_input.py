@@ -51,3 +51,5 @@ def test_a_board_that_is_not_the_one(tmp_path: Path, device: Emulated, rig: str,
         path = bus.start_device(device)
         assert reported in jog(on_pca9685(tmp_path) if rig == "pca9685" else rig, "--port", path)
         assert not any(one["target"] for one in json.loads(bus.command("status"))["servos"])
+        folder = Path(path).parent
+    assert not folder.exists()

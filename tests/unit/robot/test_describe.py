@@ -234,6 +234,8 @@ def test_torques_are_those_of_mujoco(name: str):
         expected = mujoco_loads_nm(rig, angles)
         loads = statics.load_nm(angles)
         assert loads == pytest.approx({name: expected[name] for name in loads}, abs=1e-9)
+    light = statics_of(heavy(name)).load_nm(angles)  # without the counterweight
+    assert abs(light["neck_pitch"] - loads["neck_pitch"]) > 0.05
 
 
 class Neck:

@@ -406,8 +406,8 @@ def test_what_is_written_is_put_on_the_disk_every_second(
 
 def test_a_writer_whose_program_has_died_ends_although_a_fork_holds_its_pipe():
     theirs, ours = os.pipe()
-    os.write(ours, writer.PREFIX.pack(writer.END, 5, 0) + b"first")
+    os.write(ours, writer.PREFIX.pack(writer.FRAME, 5, 6) + b"firstpixels")
     found = list(islice(writer.receive(theirs, os.getpid()), 3))  # our parent is another one
-    assert found == [(writer.END, b"first", b"")]
+    assert found == [(writer.FRAME, b"first", b"pixels")]
     os.close(ours)
     os.close(theirs)
