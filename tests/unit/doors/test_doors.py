@@ -66,9 +66,7 @@ def test_a_voice_assistant_is_followed_and_found_again():
     assistant = Assistant()
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        assert re.match("waiting for a Linux Voice Assistant at ws.*: .* failed", head.said[0]), (
-            head.said
-        )
+        assert re.match("waiting for a Linux Voice Assistant at ws.*: .* failed", head.said[0])
         async with assistant:
             await until(lambda: assistant.sockets)
             await assistant.send(lva("wake_word_detected"))

@@ -3,7 +3,6 @@
 import random
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from math import copysign, radians
 from types import SimpleNamespace
 from typing import Any
@@ -264,14 +263,14 @@ def test_it_parks_in_time_on_a_host_that_is_late(name: str, host: str):
 
     slow = radians(rig.guard.soft_start_speed_deg_s)
     soft = SOFT_START_RAD_S2
-    times = [t_s for t_s, _ in sent]
+    times, commands = map(np.array, zip(*sent, strict=True))
+    gap_s = np.diff(times, prepend=times[0])
     for i, (limit, park_rad) in enumerate(zip(limits, made.park_rad, strict=True)):
-        angles = [command_rad[i] for _, command_rad in sent]
-        assert all(limit.low_rad - 1e-9 <= angle <= limit.high_rad + 1e-9 for angle in angles)
+        angles = commands[:, i]
+        assert limit.low_rad - 1e-9 <= angles.min() and angles.max() <= limit.high_rad + 1e-9
         # The last degree is no slow passage: the joint has met its goal.
-        far = [k for k in range(1, len(sent)) if abs(angles[k - 1] - park_rad) > radians(1.0)]
-        step = [0.0, *(now - before for before, now in pairwise(angles))]
-        gap_s = [0.0, *(now - before for before, now in pairwise(times))]
+        far = 1 + np.flatnonzero(abs(angles[:-1] - park_rad) > radians(1.0))
+        step = np.diff(angles, prepend=angles[0])
         for k in far[1:]:  # no farther than the slow speed reaches in the passed time
             last = abs(step[k - 1]) / gap_s[k - 1]
             assert abs(step[k]) / gap_s[k] <= max(slow, last) + 1e-6
@@ -279,7 +278,7 @@ def test_it_parks_in_time_on_a_host_that_is_late(name: str, host: str):
             continue
         # One tick in four comes in time: each moves joints for one slot, from what is left of
         # their speed. That is regained with the joint's own acceleration, and no more than that.
-        speed = [one / period_s for one in step]
+        speed = step / period_s
         fastest = abs(speed[1])
         for k in far[1:]:
             lost = limit.accel_rad_s2 * (gap_s[k] - period_s)

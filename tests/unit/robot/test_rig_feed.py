@@ -2,8 +2,11 @@
 
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
+import cv2
+import numpy as np
 import pytest
 from fakes.runs import play, simulated
 from msgspec import structs
@@ -141,6 +144,12 @@ def test_a_picture_comes_once_with_what_was_seen_and_where_the_head_looked(
     gaze_x, gaze_y = present(picture.gaze_px)
     assert x < gaze_x < x + width and y < gaze_y < y + height
     assert page.live.picture() is None
+    white = np.full((found.height_px, found.width_px, 3), 255, np.uint8)
+    found = replace(found, number=found.number + 1, image=white)
+    page.stream.update(structs.replace(ran.ticks[-1], t_s=99.0, detections=found))
+    page.newest()
+    _, jpeg = present(page.live.picture())
+    assert cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE).min() > 250
 
 
 def test_a_page_that_takes_nothing_delays_nothing_and_is_counted(ran: FeedRun, page: Page):

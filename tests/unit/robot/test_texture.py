@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.description.mesh import (
@@ -25,15 +26,9 @@ SHAPES: dict[str, Callable[[], Painted]] = {
 
 def _seen(mesh: TexturedMesh, uv: Floats) -> Floats:
     """Return the image's colours at points (n, 2), interpolated between texels as engines do."""
-    rows, columns = mesh.image.shape[:2]
-    x = uv[:, 0] * columns - 0.5
-    y = uv[:, 1] * rows - 0.5
-    left, top = np.floor(x + 1e-9).astype(int), np.floor(y + 1e-9).astype(int)
-    a, b = (x - left)[:, None], (y - top)[:, None]
-    image = mesh.image.astype(float)
-    right, below = np.minimum(left + 1, columns - 1), np.minimum(top + 1, rows - 1)
-    above = image[top, left] * (1 - a) + image[top, right] * a
-    return (1 - b) * above + b * (image[below, left] * (1 - a) + image[below, right] * a)
+    at = uv[:, ::-1].T * np.reshape(mesh.image.shape[:2], (2, 1)) - 0.5
+    channels = np.moveaxis(mesh.image.astype(float), -1, 0)
+    return np.stack([map_coordinates(one, at, order=1, mode="nearest") for one in channels], -1)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
