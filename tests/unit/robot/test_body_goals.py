@@ -1,8 +1,4 @@
-"""Cost of a tick of joints: the number of calls of Python functions.
-
-Between ticks the loop sleeps and the processor's caches are used by others, so the number of
-functions is what a tick costs; counted here, as time on a shared machine means nothing.
-"""
+"""Goals of a body's joints as positions of its servos."""
 
 import pytest
 from stand_in import StandIn
@@ -12,24 +8,17 @@ from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS
 
 IDS = tuple(range(1, 10))
-
-
-def joints_of(model, **more):
-    names = GAZE_JOINTS[: len(IDS)]
-    return {
-        name: JointParams(i, model, -30.0, 30.0, 600.0, 45_000.0, **more)
-        for i, name in zip(IDS, names, strict=True)
-    }
+POINTS = ((-30.0, 1700.0), (0.0, 2048.0), (30.0, 2300.0))
 
 
 def test_straight_and_measured_linkages_of_one_body_keep_their_own_angles():
-    points = ((-30.0, 1700.0), (0.0, 2048.0), (30.0, 2300.0))
-    joints = joints_of("xl330-m077", sign=-1, ratio=1.5)
-    bent = [name for i, name in enumerate(joints) if i % 3 == 0]
-    for name in bent:
-        joints[name] = JointParams(
-            joints[name].id, "xl330-m077", -30.0, 30.0, 600.0, 45_000.0, transmission_points=points
+    bent, straight = {"transmission_points": POINTS}, {"sign": -1, "ratio": 1.5}
+    joints = {
+        name: JointParams(
+            i, "xl330-m077", -30.0, 30.0, 600.0, 45_000.0, **(bent if i % 3 == 1 else straight)
         )
+        for i, name in zip(IDS, GAZE_JOINTS, strict=False)
+    }
     sent = []
 
     class Bus(StandIn):

@@ -409,5 +409,7 @@ def test_a_writer_whose_program_has_died_ends_although_a_fork_holds_its_pipe():
     os.write(ours, writer.PREFIX.pack(writer.FRAME, 5, 6) + b"firstpixels")
     found = list(islice(writer.receive(theirs, os.getpid()), 3))  # our parent is another one
     assert found == [(writer.FRAME, b"first", b"pixels")]
+    os.write(ours, writer.PREFIX.pack(writer.FRAME, 5, 6) + b"firstpix")  # cut off
     os.close(ours)
+    assert not [*writer.receive(theirs, os.getpid())]
     os.close(theirs)
