@@ -163,6 +163,10 @@ def test_a_satellite_s_sound_is_said_and_reported_as_played():
     pcm = bytes(range(256)) * 50  # .4 s
     shape = {"rate": 16000, "width": 2, "channels": 1}
 
+    async def play(client: Any, pcm: bytes, *end: Any) -> None:
+        for one in (AudioStart(**shape), AudioChunk(**shape, audio=pcm), *end):
+            await client.write_event(one.event())
+
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
         async with (
             AsyncTcpClient("127.0.0.1", port) as sounds, AsyncTcpClient("127.0.0.1", port) as events
@@ -175,14 +179,12 @@ def test_a_satellite_s_sound_is_said_and_reported_as_played():
             assert answer is not None and Pong.from_event(answer).text == "x"
             await events.write_event(Detection(name="hey").event())
             await until(lambda: head.states == ["listening"])
-            for one in (AudioStart(**shape), AudioChunk(**shape, audio=pcm), AudioStop()):
-                await sounds.write_event(one.event())
+            await play(sounds, pcm, AudioStop())
             answer = await sounds.read_event()
             assert answer is not None and Played.is_type(answer.type)
             await head.reaches("idle")
             async with AsyncTcpClient("127.0.0.1", port) as more:
-                for one in (AudioStart(**shape), AudioChunk(**shape, audio=pcm), AudioStop()):
-                    await more.write_event(one.event())
+                await play(more, pcm, AudioStop())
                 await head.reaches("speaking")
             await head.reaches("idle")  # though it has left before the sound was heard
             del head.sounds[-1]
@@ -190,8 +192,7 @@ def test_a_satellite_s_sound_is_said_and_reported_as_played():
             assert head.sounds == [(16000, 1, bytes(1280)), (16000, 1, pcm)]
             assert any(order[:2] == ("speaking", 0.4) for order in head.orders), head.orders
             # A long sound is interrupted: most of it is never said.
-            await sounds.write_event(AudioStart(**shape).event())
-            await sounds.write_event(AudioChunk(**shape, audio=bytes(960_000)).event())
+            await play(sounds, bytes(960_000))
             await head.reaches("speaking")
             await events.write_event(VoiceStarted().event())
             await until(lambda: "interrupt" in head.states)

@@ -68,9 +68,9 @@ def follow(
 
 def test_who_keeps_moving_keeps_the_number_and_two_are_not_mixed_up():
     tracks = MotionTracks()
-    first = [f.id for f in follow(tracks, 0, (50, 50), (200, 50), v=(100, 0))]
+    first = [f.id for f in follow(tracks, 0, (50, 50), (200, 50), v=(600, 0))]
     for k in range(1, 6):
-        found = follow(tracks, k, (200 + 10 * k, 50), (50 + 10 * k, 50), v=(100, 0))
+        found = follow(tracks, k, (200 + 60 * k, 50), (50 + 60 * k, 50), v=(600, 0))
         assert [f.id for f in found] == first[::-1]
         assert all(tracks.is_confirmed(f) for f in found)
 
