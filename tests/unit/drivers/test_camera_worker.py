@@ -272,8 +272,9 @@ def test_a_process_that_ends_or_hangs_is_told_of_and_started_again(end, care, re
     wait_for(lambda: present(camera.latest(0.0)).number > before.number + 20)
     after = present(camera.latest(0.0))
     assert after.captured_s > before.captured_s + 0.2 and after.image is not None
-    lost, back = camera.events()
-    assert lost == reported and back.startswith("camera back after")
+    # On a busy machine it may fall silent for a second more than once.
+    lines = camera.events()
+    assert set(lines[::2]) == {reported} and lines[1].startswith("camera back after")
     assert pid_of(camera) != first
     camera.close()
 
