@@ -1,5 +1,6 @@
 """The maker's eyes and a rig of three kinds of bus, alive in simulated time."""
 
+from dataclasses import replace
 from math import radians
 from pathlib import Path
 
@@ -17,7 +18,7 @@ Ran = tuple[Run, list[Tick], tuple[str, ...]]
 
 def ran(rig: Rig, seconds: float) -> Ran:
     """Run a rig before a visitor; return the run, every tick, and the messages at the start."""
-    made = simulated(rig)
+    made = simulated(replace(rig, loop=replace(rig.loop, rate_hz=100.0)))
     ticks: list[Tick] = []
     made.robot.start(made.clock)
     said = made.robot.body.bus.events()
@@ -34,9 +35,9 @@ def _looks_blinks_and_lets_go(made: Run, ticks: list[Tick]) -> None:
     last = ticks[-1]
     assert all(len(t.desired_rad) == len(rig.names) == len(t.joints.position_rad) for t in ticks)
     assert last.gaze.saccades > 8 and last.gaze.blinks >= 1
-    assert {t.target.kind for t in ticks[400:]} >= {"face"}
+    assert {t.target.kind for t in ticks[200:]} >= {"face"}
     # Both eyes' mean line of sight is on the point that is looked at.
-    on = [t for t in ticks[600:] if t.target.kind == "face" and t.gaze.phase == "fixate"]
+    on = [t for t in ticks[300:] if t.target.kind == "face" and t.gaze.phase == "fixate"]
     eyes = np.array([(t.pose.eye_left_rad, t.pose.eye_right_rad) for t in on]).mean(axis=1)
     desired = np.array([(t.gaze.eye_left_rad, t.gaze.eye_right_rad) for t in on]).mean(axis=1)
     assert np.degrees(np.median(np.abs(eyes - desired))) < 0.6
@@ -66,7 +67,7 @@ def test_the_makers_eyes_have_no_neck_to_move_and_four_lids_that_meet():
     assert ticks[at].desired_rad[i["left_upper_lid"]] == pytest.approx(radians(ends_deg[0]))
     assert ticks[at].gaze.lower_left == 0.0
     # Between blinks the lids follow the eyes: upper and lower in the same direction.
-    open_ = [k for k, t in enumerate(ticks) if not t.gaze.blink and k > 600]
+    open_ = [k for k, t in enumerate(ticks) if not t.gaze.blink and k > 300]
     tilt = desired[open_, i["eyes_tilt"]]
     upper, lower = desired[open_, i["left_upper_lid"]], desired[open_, i["left_lower_lid"]]
     assert np.ptp(tilt) > 2.0

@@ -170,6 +170,8 @@ def test_handlers_are_put_back_and_nohup_is_heeded():
     before = [signal.getsignal(number) for number in numbers]
     with Interrupts() as interrupts, interrupts:
         assert [signal.getsignal(number) for number in numbers] != before
+        for number in (signal.SIGTTIN, signal.SIGTTOU):  # they would stop it with the torque on
+            assert signal.getsignal(number) == signal.SIG_IGN
     assert [signal.getsignal(number) for number in numbers] == before
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
