@@ -1,17 +1,16 @@
 """The papers' scenes through the whole robot."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 from math import degrees, dist, inf, pi, sin
 from statistics import median
-from typing import Any, Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from fakes.runs import play
 
 from gazerig.config.schema import load_rig
-from gazerig.gaze.types import Vec3
+from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.run import Run
@@ -20,150 +19,79 @@ from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
 from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing, there_and_back
 
-
-class _EventOutcome(NamedTuple):
-    """Outcome of one event.
-
-    latency_s: "look": time from the event's start to the first look, None without one;
-        "return": time of the gaze elsewhere, None if it was never drawn away
-    """
-
-    seen: bool
-    latency_s: float | None
-    looked_s: float
-    event_s: float
-
-
-class _EventObservation:
-    """Observation of one event while it lasts."""
-
-    def __init__(self) -> None:
-        self._first_s: float | None = None
-        self._on = False
-        self._on_s = 0.0
-        self._off_s = 0.0
-
-    def update(self, on: bool, since_s: float, dt_s: float) -> None:
-        """Count one tick, ``since_s`` after the event's start."""
-        self._on = on
-        if not on:
-            self._off_s += dt_s
-            return
-        self._on_s += dt_s
-        if self._first_s is None:
-            self._first_s = since_s
-
-    def outcome(self, response: Literal["look", "return"]) -> _EventOutcome:
-        lasted_s = self._on_s + self._off_s
-        if response == "return":
-            away_s = self._off_s if self._off_s > 0.0 else None
-            return _EventOutcome(self._on, away_s, self._on_s, lasted_s)
-        return _EventOutcome(self._first_s is not None, self._first_s, self._on_s, lasted_s)
-
-
-class BehaviourScore:
-    """Scores a run, tick by tick."""
-
-    def __init__(
-        self,
-        events: Iterable[Event],
-        round_s: float,
-    ) -> None:
-        self._events = tuple(events)
-        self._round_s = round_s
-        self._observations: dict[int, _EventObservation] = {}
-        self._outcomes: dict[str, list[_EventOutcome]] = {event.name: [] for event in self._events}
-        self._first_s: float | None = None
-        self._last_s = 0.0
-        self._round = 0
-
-    def update(self, tick: Tick) -> None:
-        """Count one tick; the first one is the start of the scene."""
-        if self._first_s is None:
-            self._first_s = self._last_s = tick.t_s
-        dt_s, self._last_s = tick.t_s - self._last_s, tick.t_s
-        number, phase_s = divmod(tick.t_s - self._first_s, self._round_s)
-        if number != self._round:
-            self._round = int(number)
-            for i in tuple(self._observations):
-                self._close_event(i)
-        for i, event in enumerate(self._events):
-            if event.start_s <= phase_s < event.end_s:
-                watch, target = self._observations.setdefault(i, _EventObservation()), tick.target
-                away_m = dist(target.p_world_m, event.place_world_m)
-                on = target.kind == event.kind and away_m <= event.within_m
-                watch.update(on, phase_s - event.start_s, dt_s)
-            elif i in self._observations:
-                self._close_event(i)
-
-    def _close_event(self, i: int) -> None:
-        """Record the outcome of an event."""
-        event = self._events[i]
-        outcome = self._observations.pop(i).outcome(event.response)
-        self._outcomes[event.name].append(outcome)
-
-    def figures(self) -> dict[str, dict[str, float | int | None]]:
-        """Return for each name the number of events, the number seen, and statistics.
-
-        latency_s: median over the events seen (away: over those that drew the gaze away)
-        share: fraction of the events' time in which the gaze was on the expected target
-        """
-        return {name: _outcome_figures(answers) for name, answers in self._outcomes.items()}
-
-
-def _outcome_figures(outcomes: list[_EventOutcome]) -> dict[str, float | int | None]:
-    latencies = [answer.latency_s for answer in outcomes if answer.latency_s is not None]
-    lasted_s = sum(answer.event_s for answer in outcomes)
-    return {
-        "seen": sum(answer.seen for answer in outcomes),
-        "of": len(outcomes),
-        "latency_s": round(median(latencies), 4) if latencies else None,
-        "share": round(sum(a.looked_s for a in outcomes) / lasted_s, 4) if lasted_s > 0.0 else None,
-    }
-
-
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
-FACE: Vec3 = (1.0, 0.0, 0.2)
-HAND: Vec3 = (0.7, 0.2, 0.1)
+
+RATE_HZ = 50.0
+
+
+class Figure(NamedTuple):
+    """Outcome of the events of one name.
+
+    latency_s: median over the events seen, None without one; of an event to "look" at: time from
+        its start to the first look; of one to "return" from: time of the gaze elsewhere
+    share: fraction of the events' time in which the gaze was on the expected target
+    """
+
+    seen: int
+    of: int
+    latency_s: float | None
+    share: float
 
 
 class Lived:
     """A scene as a robot lived through it: its ticks, and the scene's time of each."""
 
     def __init__(self, made: Run, scene: Scene, seconds: float) -> None:
-        self.score = BehaviourScore(scene.events(), scene.round_s)
-        self.scene_s: list[float] = []
         self.ticks: list[Tick] = []
-        self._scene = scene
-        play(made, seconds, self._watch)
-
-    def _watch(self, new: Tick) -> None:
-        self.ticks.append(new)
-        self.scene_s.append(new.t_s - self.ticks[0].t_s)
-        self.score.update(new)
+        self.scene = scene
+        play(made, seconds, self.ticks.append)
+        self.scene_s = [tick.t_s - self.ticks[0].t_s for tick in self.ticks]
 
     def within(self, start_s: float, end_s: float) -> list[Tick]:
-        pairs = zip(self.scene_s, self.ticks, strict=True)
-        return [each for t_s, each in pairs if start_s <= t_s < end_s]
+        first, end = np.searchsorted(self.scene_s, (start_s, end_s))
+        return self.ticks[first:end]
+
+    def figure(self, name: str) -> Figure:
+        seen, latencies_s, looks = [], [], []
+        for event in self.scene.events():
+            if event.name != name:
+                continue
+            during = self.within(event.start_s, event.end_s)
+            on = [_is_on(event, tick.target) for tick in during]
+            looks += on
+            is_back = event.response == "return"
+            seen.append(on[-1] if is_back else any(on))
+            if is_back and not all(on):
+                latencies_s.append(on.count(False) / RATE_HZ)
+            elif not is_back and any(on):
+                first_s = during[on.index(True)].t_s - self.ticks[0].t_s
+                latencies_s.append(first_s - event.start_s)
+        latency_s = median(latencies_s) if latencies_s else None
+        return Figure(sum(seen), len(seen), latency_s, float(np.mean(looks)))
 
 
-def made_for(scene: str, seed: int = 0, rate_hz: float = 200.0) -> Run:
+def _is_on(event: Event, target: Target) -> bool:
+    away_m = dist(target.p_world_m, event.place_world_m)
+    return target.kind == event.kind and away_m <= event.within_m
+
+
+def made_for(scene: str) -> Run:
     rig = load_rig("desk")
-    rig = replace(rig, loop=replace(rig.loop, rate_hz=rate_hz))
-    return Run(rig, RunOptions(mock=True, fast=True, seed=seed, scene=scene))
+    rig = replace(rig, loop=replace(rig.loop, rate_hz=RATE_HZ))
+    return Run(rig, RunOptions(mock=True, fast=True, seed=0, scene=scene))
 
 
 @pytest.fixture(scope="module")
 def boxing() -> Lived:
     scene = load_scene("boxing")
-    return Lived(made_for("boxing", 0, 50.0), scene, scene.round_s + 0.05)
+    return Lived(made_for("boxing"), scene, scene.round_s + 0.05)
 
 
-def latency(figure: dict[str, float | int | None]) -> float:
-    assert figure["seen"] == figure["of"] and figure["of"]
-    assert isinstance(figure["latency_s"], float)
-    return figure["latency_s"]
+def latency(figure: Figure) -> float:
+    assert figure.seen == figure.of and figure.of
+    assert figure.latency_s is not None
+    return figure.latency_s
 
 
 def actions(lived: Lived, start_s: float, end_s: float) -> list[str]:
@@ -180,10 +108,10 @@ def begun(lived: Lived, action: str) -> list[float]:
 
 
 def test_e46_a_a_punch_is_looked_at_and_guarded_against_in_time_and_nothing_else(boxing: Lived):
-    figure = boxing.score.figures()["punch"]
-    assert figure["of"] == 4
+    figure = boxing.figure("punch")
+    assert figure.of == 4
     assert latency(figure) <= 0.4
-    events = boxing._scene.events()
+    events = boxing.scene.events()
     punches = [one for one in events if one.name == "punch"]
     for event in punches:
         arrives_s = event.start_s + 0.25
@@ -203,10 +131,10 @@ def test_e46_a_a_punch_is_looked_at_and_guarded_against_in_time_and_nothing_else
 
 
 def test_e46_b_the_place_to_be_hit_is_looked_at_before_the_blow(boxing: Lived):
-    figure = boxing.score.figures()["attack"]
-    assert figure["of"] == 3
+    figure = boxing.figure("attack")
+    assert figure.of == 3
     assert latency(figure) < 0.5
-    events = boxing._scene.events()
+    events = boxing.scene.events()
     punches = [one for one in events if one.name == "punch"]
     openings = [one for one in events if one.name == "attack"]
     hit = set()
@@ -214,7 +142,7 @@ def test_e46_b_the_place_to_be_hit_is_looked_at_before_the_blow(boxing: Lived):
         during = boxing.within(event.start_s - 1.0, event.end_s + 0.6)
         attacks = [each.target for each in during if each.target.plan.startswith("attack")]
         assert attacks and attacks[-1].kind == "attack_target"
-        face = boxing._scene.people(event.start_s)[0].p_world_face_m
+        face = boxing.scene.people(event.start_s)[0].p_world_face_m
         hit.add(attacks[-1].p_world_m[2] < face[2] - 0.1)
     assert hit == {True, False}  # at the chest and at the face's side
     blows_s = begun(boxing, "attack")
@@ -236,11 +164,11 @@ def test_e46_the_face_otherwise_a_waved_hand_and_a_feint_for_a_moment_and_who_re
         ("return", None, 0.0, 1.0),
         ("reach", None, 0.0, 0.5),
     ):
-        figure: Any = boxing.score.figures()[event]
-        assert figure["seen"] == figure["of"] == (of or figure["of"]) > 0, event
-        assert figure["share"] >= share, event
+        figure = boxing.figure(event)
+        assert figure.seen == figure.of == (of or figure.of) > 0, event
+        assert figure.share >= share, event
         assert within_s == inf or latency(figure) <= within_s, event
-    for reach in (one for one in boxing._scene.events() if one.name == "reach"):
+    for reach in (one for one in boxing.scene.events() if one.name == "reach"):
         side = 1.0 if reach.place_world_m[1] > 0.0 else -1.0
         before, *_, last = boxing.within(reach.start_s, reach.end_s)
         assert side * degrees(last.pose.head_rad[0] - before.pose.head_rad[0]) > 1.5
@@ -275,21 +203,21 @@ class Distracted:
 def test_e48_back_on_the_face_within_a_second_of_a_distraction():
     for way_m, seen in (((0.0, 0.2, 0.0), (5,)), ((0.0, 0.0, 0.15), (3, 4, 5))):
         scene = Distracted(way_m)
-        made = made_for("boxing", rate_hz=50.0)
+        made = made_for("boxing")
         own, dice = made.robot.camera, np.random.default_rng(0)
         assert isinstance(own, SceneCamera)
         made.robot.camera = SceneCamera(
             FrameParams(rate_hz=15.0), scene, own._mount, own._head_pose, dice
         )
         lived = Lived(made, scene, 17.0)
-        figure = lived.score.figures()["return"]
+        figure = lived.figure("return")
         # A hand that comes down again may be no target any more when the reaction time is over.
-        assert figure["seen"] in seen and figure["of"] == 5
-        assert isinstance(figure["latency_s"], float)  # it was drawn away
-        assert 0.1 < figure["latency_s"] <= 1.0
+        assert figure.seen in seen and figure.of == 5
+        assert figure.latency_s is not None  # it was drawn away
+        assert 0.1 < figure.latency_s <= 1.0
         for start_s in scene.starts_s:
             during = lived.within(start_s, start_s + 1.5)
-            assert sum(each.target.kind == "hand" for each in during) / 50.0 <= 1.0
+            assert sum(each.target.kind == "hand" for each in during) / RATE_HZ <= 1.0
 
 
 # ---- A pinwheel that spins
@@ -301,9 +229,9 @@ PINWHEEL, SPIN_S = (0.75, 0.0, 0.06), (4.0, 7.0)
 
 def test_e80_what_spins_draws_the_gaze_by_its_spin():
     scene, (start_s, end_s) = load_scene("two-people"), SPIN_S
-    lived = Lived(made_for("two-people", 0, 50.0), scene, end_s)
+    lived = Lived(made_for("two-people"), scene, end_s)
     on = [tick for tick in lived.within(start_s, end_s) if tick.target.kind == "pinwheel"]
-    assert len(on) / 50.0 > 0.5
+    assert len(on) / RATE_HZ > 0.5
     first = on[0].target
     assert first.p_world_m == pytest.approx(PINWHEEL, abs=0.03)
     salience = first.saliences[0]
