@@ -87,7 +87,7 @@ def test_nothing_jumps_also_where_a_round_begins_again(name: str):
 def test_joints_stay_within_what_people_can_do(name: str):
     most = {
         "elbow": 151.0, "knee": 151.0, "wrist": 56.0, "head": 85.0, "neck": 50.0, "eye": 45.0,
-        "walk": 45.0,
+        "walk": 45.0, "up": 30.0,
     }  # fmt: skip
     for who in people(name):
         R = {segment: turns(name, f"{who}/{segment}") for segment in SEGMENTS}
@@ -96,6 +96,7 @@ def test_joints_stay_within_what_people_can_do(name: str):
         speed = np.gradient(places(name, f"{who}/pelvis")[:, :2], STEP_S, axis=0)
         pace = np.linalg.norm(speed, axis=1)
         aside = angles_deg(speed / np.maximum(pace, 0.1)[:, None], R["pelvis"][:, :2, 0])
+        found["up"] = np.degrees(np.arcsin(R["head"][:, 2, 0]))
         found["walk"] = np.where(pace > 0.5, aside, 0.0)  # people walk ahead
         for side in ("left", "right"):
             upper, fore, hand = (
