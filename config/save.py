@@ -8,7 +8,7 @@ import io
 import json
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
@@ -16,11 +16,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gazerig.config.entries import parse
-from gazerig.config.load import ConfigError, Document, find_file, load, read_yaml
+from gazerig.config.load import ConfigError, Document, find_file, read_yaml
 from gazerig.config.parameters import flatten_changes, merge, nest, to_plain, value_of
 from gazerig.config.schema import load_rig, refusal
 from gazerig.config.shipped_files import SHIPPED
-from gazerig.config.tracks import TrackSet, load_track, track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import output_file
 from gazerig.robot.model.parameter import ParamChange, SavedFile
@@ -200,34 +199,6 @@ def params_text(params: Any) -> str:
     ``gazerig.config.load.load`` reads exactly the same values.
     """
     return "".join(_lines(to_plain(params)))
-
-
-def tracks_text(files: Sequence[str]) -> str:
-    """Return the rig's own tracks as one YAML text, "" without any.
-
-    Raises:
-        gazerig.config.load.ConfigError: one has a fault.
-    """
-    found = {}
-    for file in files:
-        track = load_track(find_file("tracks", file))
-        # A rerun plays no sound, and its track is another file.
-        found[track_name(file)] = replace(track, sound=Path(track.sound).name)
-    return params_text(TrackSet(found)) if found else ""
-
-
-def track_files(text: Path, folder: Path) -> tuple[str, ...]:
-    """Write each track of a text from ``tracks_text`` to a separate file; return the files.
-
-    Raises:
-        gazerig.config.load.ConfigError: the text has a fault.
-    """
-    files = []
-    for name, track in load(text, TrackSet).tracks.items():
-        file = folder / f"{name}.yaml"
-        file.write_text(params_text(track), encoding="utf-8")
-        files.append(str(file))
-    return tuple(files)
 
 
 def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:

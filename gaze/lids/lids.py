@@ -12,7 +12,9 @@ the preceding text describes. Opening 0 is shut, with upper and lower lid in con
 open. A blink moves both lids from their present openings to 0, so they meet at any gaze direction.
 """
 
+from collections.abc import Sequence
 from math import degrees, inf, tanh
+from operator import add
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -60,23 +62,17 @@ class LidOpenings(NamedTuple):
     lower_left: float
     lower_right: float
 
-    @property
-    def openings(self) -> tuple[float, float, float, float]:
-        """Return the openings in the order of the factors of ``scale``."""
-        return self.left, self.right, self.lower_left, self.lower_right
+    def change(self, factors: Sequence[float], added: Sequence[float]) -> "LidOpenings":
+        """Return the openings times factors, slowing down towards fully open, and plus others.
 
-    def replace(self, openings: tuple[float, float, float, float]) -> "LidOpenings":
-        """Return other openings with the same blink."""
-        left, right, lower_left, lower_right = openings
-        return LidOpenings(left, right, self.blink, lower_left, lower_right)
-
-    def scale(self, factors: tuple[float, float, float, float]) -> "LidOpenings":
-        """Return the openings times factors, slowing down towards fully open.
-
-        factors: factors of the left and right upper, then of the left and right lower lid
+        Args:
+            factors: Those of the left and right upper, then of the left and right lower lid.
+            added: What is added to the products, in the same order.
         """
-        a, b, c, d = map(_scale_opening, self.openings, factors)
-        return self.replace((a, b, c, d))
+        openings = self.left, self.right, self.lower_left, self.lower_right
+        scaled = map(_scale_opening, openings, factors)
+        left, right, low_left, low_right = map(_clip, map(add, scaled, added))
+        return LidOpenings(left, right, self.blink, low_left, low_right)
 
 
 def _scale_opening(opening: float, factor: float) -> float:

@@ -27,7 +27,7 @@ from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.pursuit import FASTEST_SWING_RAD_S, Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
-from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.gaze.track.track import EYES, HEAD, LIDS, NO_OFFSET, PoseOffset
 from gazerig.gaze.types import (
     ORDERED,
     Angles2,
@@ -155,22 +155,12 @@ class Oculomotor:
             wanted, place.point_m = controller.fixate(
                 target, place.point_m, wanted if jumps else None, place, view, t_s, dt_s
             )
-        if offset.eyes_rad != NO_OFFSET.eyes_rad:
-            wanted = (
-                _add_offset(wanted[0], offset.eyes_rad),
-                _add_offset(wanted[1], offset.eyes_rad),
-            )
-        if offset.owned:
-            wanted = offset.mix_eye(wanted[0]), offset.mix_eye(wanted[1])
+        wanted = _move_eye(wanted[0], offset), _move_eye(wanted[1], offset)
         left, right = self._clip_eyes(wanted)
         limited = () if (left, right) == wanted else self._limited_angles(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
-        if offset.lids != NO_OFFSET.lids:
-            lids = lids.scale(offset.lids)
-        head = self._add_drift(head, offset.head_rad, t_s)
-        if offset.owned:
-            head = self._head.clip_to_range(offset.mix_head(head))
-            lids = lids.replace(offset.mix_lids(lids.openings))
+        lids = lids.change(offset.factors[LIDS], offset.added[LIDS])
+        head = self._move_head(head, offset, t_s)
         phase: Phase = (
             "saccade" if place.is_in_saccade
             else "pursue" if norm(velocity) > MOVING_M_S
@@ -257,13 +247,12 @@ class Oculomotor:
                 found.append(LimitedAngle(f"head {axis}", facing[i], head[i], _AT_END))
         return tuple(found)
 
-    def _add_drift(self, head: Angles3, offset: Angles3, t_s: float) -> Angles3:
+    def _move_head(self, head: Angles3, offset: PoseOffset, t_s: float) -> Angles3:
         """Return the head's angles with drift and offset, clipped to the neck's range."""
         if self._drift is not None:
             head = add(head, self._drift.step(t_s))
-        elif offset == NO_OFFSET.head_rad:
-            return head
-        return self._head.clip_to_range(add(head, offset))
+        yaw, pitch, roll = offset.change(HEAD, head)
+        return self._head.clip_to_range((yaw, pitch, roll))
 
     def _predict_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
         """Return the head's pose at the time when a present eye command takes effect."""
@@ -305,8 +294,9 @@ def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:
     return (min(max(eye[0], yaw_low), yaw_high), min(max(eye[1], pitch_low), pitch_high))
 
 
-def _add_offset(eye: Angles2, offset: Angles2) -> Angles2:
-    return eye[0] + offset[0], eye[1] + offset[1]
+def _move_eye(eye: Angles2, offset: PoseOffset) -> Angles2:
+    yaw, pitch = offset.change(EYES, eye)
+    return yaw, pitch
 
 
 def _meeting_point(state: GazeState) -> Vec3:

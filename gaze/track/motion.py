@@ -1,38 +1,69 @@
-"""Motion of one track on one rig, slower only where a joint needs it."""
+"""Motion of one track on one rig: curves through its keys, slower only where a joint needs it.
 
-from collections.abc import Sequence
+Between two keys every value is a polynomial of fifth order (Flash and Hogan 1985: least jerk from
+rest to rest). At a reversal, a held value and both ends it rests. Elsewhere it passes a key at the
+speed of a parabola through it and its neighbours, but at most so fast that the control points of
+the curve do not turn back: then the curve does not either.
+"""
+
+from collections.abc import Iterable, Sequence
 from functools import reduce
-from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
+from numpy.typing import NDArray
 
 from gazerig.gaze.minimum_jerk import min_jerk
-from gazerig.gaze.track.curves import Curves, key_states
-from gazerig.gaze.track.track import EYE_CHANNELS, POSE_CHANNELS, Track
+from gazerig.gaze.track.track import EYES, TrackState
 from gazerig.gaze.types import Floats
 
+_MOST_OF_MEAN = 1.25
+"""Largest speed at a key as a share of the slower mean speed beside it: 2/5 of the sum of both
+speeds of a segment is less than its mean speed, so its control points are in order."""
+_ENDS = np.array([polyval(end, polyder(np.eye(6), k)) for end in (0.0, 1.0) for k in range(3)])
+"""Value, speed and acceleration at both ends of a unit of time, of the powers 0 to 5 of time."""
 _SHARES = np.linspace(0.0, 1.0, 25)
 """Places between two keys at which limits are checked."""
-_LEAST_S = 0.02
-"""Length of a track that has no motion of its own."""
-_ROUNDS, _KEPT = 12, 1.0 + 1e-3
-"""Corrections of single segments, and the ratio to a limit that counts as kept."""
+_ROUNDS, _KEPT = 20, 1.0 + 1e-3
+"""Most corrections of the segments, and the ratio to a limit that counts as kept."""
 _GROWING = np.array([min_jerk(share) for share in np.linspace(0.0, 1.0, 81)])[:, None]
+"""Share of a track in the motion while it grows from rest."""
 _BLEND_STRAIN = 1.09
 """Factor that joints may need in a blend, which may use more of their limits than a motion."""
-_EYES = [POSE_CHANNELS.index(name) for name in EYE_CHANNELS]
 
 ChannelKeys = tuple[int, Floats, Floats]
 """Channel, and the times and values relative to rest of its keys; the first is rest at time 0."""
 
 
-class ChannelBounds(NamedTuple):
-    """(channels,) least and greatest values relative to rest, greatest speeds and accelerations."""
+def key_states(times_s: Floats, values: Floats) -> Floats:
+    """Return the (3, n) values, speeds and accelerations at n keys from rest to rest."""
+    mean = np.diff(values) / np.diff(times_s)
+    slower = np.minimum(np.abs(mean[:-1]), np.abs(mean[1:])) * (mean[:-1] * mean[1:] > 0.0)
+    most = _MOST_OF_MEAN * np.pad(slower, 1)
+    speed = np.clip(np.gradient(values, times_s), -most, most)
+    return np.stack((values, speed, np.zeros(len(values))))
 
-    low: Floats
-    high: Floats
-    speed: Floats
-    acceleration: Floats
+
+class Curves:
+    """Curves of several values through common knots; before and behind them they rest.
+
+    Args:
+        knots_s: (n,) increasing times.
+        states: (3, n, values) values, speeds and accelerations at these times.
+    """
+
+    def __init__(self, knots_s: Floats, states: Floats) -> None:
+        self._knots_s, self._spans_s = knots_s, np.diff(knots_s)[:, None]
+        scales = self._spans_s ** np.arange(3)[:, None, None]
+        ends = np.concatenate((states[:, :-1] * scales, states[:, 1:] * scales))
+        powers = np.tensordot(np.linalg.inv(_ENDS).round(3), ends, 1)
+        self._powers = [polyder(powers, k) / scales[k] for k in range(3)]
+
+    def sample(self, times_s: Floats) -> Floats:
+        """Return (3, k, values) values, speeds and accelerations at (k,) times."""
+        i = np.searchsorted(self._knots_s[1:-1], times_s, side="right")
+        share = np.clip((times_s - self._knots_s[i])[:, None] / self._spans_s[i], 0.0, 1.0)
+        return np.stack([polyval(share, powers[:, i], tensor=False) for powers in self._powers])
 
 
 class Motion:
@@ -43,84 +74,73 @@ class Motion:
     beginning, at positions below it.
 
     Args:
-        track: The track.
-        rows: Its keys, of any channels in any order.
-        bounds: What the rig's joints can do.
-        owned: Channels that it owns.
+        keys: Its keys, of any channels in any order.
+        marks_s: Further positions: cues, and the end of its sound.
+        limits: (2, channels) greatest speeds and accelerations.
+        owned: (channels,) whether it owns a channel.
         speed: Factor on its defined speed.
-        sound_s: Duration of its sound, 0 without one.
 
     Attributes:
-        channels: Channels that it moves or owns.
-        moves: Whether there are any.
-        mouth: Times and openings of the mouth of a speech, None without one.
-        lead_s: Time by which the openings must be ahead of the sound.
-        limited: What the rig changes, "" if nothing.
+        state: What is known of it before it is played, at the position at which it begins.
+        mouth: (2, n) times and openings of the mouth of a speech.
+        curves: The curves of all channels.
+        channels: (channels,) whether it moves or owns a channel.
+        duration_s: Duration.
+        length_s: Last position.
         rate: Mean speed of the position; ``speed`` if nothing behind the first key is slower.
-        slowed_by: Factor by which it takes longer.
-        owns: Joints that gaze does not move meanwhile.
-        slowest: Channel that needs this, or -1.
+        slowest: Channel that is nearest to its limits.
     """
 
+    state: TrackState
+    mouth: Floats
+
     def __init__(
-        self, track: Track, rows: Sequence[ChannelKeys], bounds: ChannelBounds,
-        owned: frozenset[int] = frozenset(), speed: float = 1.0, sound_s: float = 0.0,
+        self, keys: Sequence[ChannelKeys], marks_s: Iterable[float], limits: Floats,
+        owned: NDArray[np.bool], speed: float,
     ) -> None:  # fmt: skip
-        self.track, self.owned, self.speed, self.sound_s = track, owned, speed, sound_s
-        self.channels = owned.union(channel for channel, _, _ in rows)
-        self.moves, self.lead_s = bool(rows or owned), 0.0
-        self.mouth: tuple[Floats, Floats] | None = None
-        self.limited, self.slowest, self._bounds = "", -1, bounds
-        self.owns: tuple[str, ...] = ()
-        self.cues = sorted((time_s, name) for name, time_s in track.cues.items())
-        times = [times_s for _, times_s, _ in rows]
-        length_s = sound_s if rows else max(sound_s, _LEAST_S)
-        self._positions = np.unique(np.concatenate(([0.0, length_s, *track.cues.values()], *times)))
+        self.owned, self._limits = owned, limits
+        self.channels = owned.copy()
+        self.channels[[channel for channel, _, _ in keys]] = True
+        times = [times_s for _, times_s, _ in keys]
+        self._positions = np.unique(np.concatenate(([0.0, *marks_s], *times)))
         self._times = self._positions / speed
-        self._slow_down(rows)
+        self._slow_down(keys)
         self.duration_s, self.length_s = float(self._times[-1]), float(self._positions[-1])
-        self.slowed_by = self.duration_s * speed / self.length_s
         self._positions[0] = self._positions[1] - self._times[1] * speed
         self.rate = round(float(np.ptp(self._positions)) / self.duration_s, 6)
 
-    def _slow_down(self, rows: Sequence[ChannelKeys]) -> None:
+    def _slow_down(self, keys: Sequence[ChannelKeys]) -> None:
         """Make the curves, with more time between keys where a joint would be too fast."""
-        for attempt in range(_ROUNDS + 2):
-            states = np.zeros((3, len(self._times), len(self._bounds.low)))
-            for channel, times_s, values in rows:
+        for _ in range(_ROUNDS):
+            states = np.zeros((3, len(self._times), len(self.owned)))
+            for channel, times_s, values in keys:
                 knots_s = np.interp(times_s, self._positions, self._times)
                 curve = Curves(knots_s, key_states(knots_s, values)[:, :, None])
                 states[:, :, channel] += curve.sample(self._times)[:, :, 0]
-            self._curves = Curves(self._times, states)
+            self.curves = Curves(self._times, states)
             begins_s, spans_s = self._times[:-1], np.diff(self._times)
-            every = (self.strain(*self.sample(begins_s + k * spans_s)[1:]) for k in _SHARES)
+            every = (self.strain(self.curves.sample(begins_s + k * spans_s)[1:]) for k in _SHARES)
             factors = reduce(np.maximum, every)
-            if factors.max() <= _KEPT:
-                return
-            if self.slowest < 0:
-                self.slowest = int(factors.max(axis=0).argmax())
+            self.slowest = int(factors.max(axis=0).argmax())
             longer = factors.max(axis=1)
-            longer[longer <= _KEPT] = 1.0
-            if attempt >= _ROUNDS:
-                longer[:] = longer.max()
-            self._times = np.append(0.0, np.cumsum(spans_s * longer))
+            if longer.max() <= _KEPT:
+                break
+            spans_s *= np.where(longer > _KEPT, longer, 1.0)
+            self._times = np.append(0.0, np.cumsum(spans_s))
 
-    def strain(self, speed: Floats, acceleration: Floats) -> Floats:
+    def strain(self, rates: Floats) -> Floats:
         """Return the (n, channels) factors by which motion must take longer to keep the limits.
 
         The eyes turn against the head, unless the track owns them.
-        """
-        for rate in (speed, acceleration):
-            for head, eyes in enumerate(_EYES):
-                rate[:, eyes] -= rate[:, head] * (eyes not in self.owned)
-        by_speed = np.abs(speed) / self._bounds.speed
-        by_acceleration = np.sqrt(np.abs(acceleration) / self._bounds.acceleration)
-        strain: Floats = np.maximum(by_speed, by_acceleration)
-        return strain
 
-    def sample(self, times_s: Floats) -> Floats:
-        """Return (3, n, channels) values, speeds and accelerations at (n,) times."""
-        return self._curves.sample(times_s)
+        Args:
+            rates: (2, n, channels) speeds and accelerations.
+        """
+        rates = rates.copy()
+        rates[:, :, EYES] -= rates[:, :, :2] * ~self.owned[EYES]
+        by_speed, by_acceleration = np.abs(rates) / self._limits[:, None]
+        strain: Floats = np.maximum(by_speed, np.sqrt(by_acceleration))
+        return strain
 
     def position_at(self, time_s: float) -> float:
         """Return the position in the track at a time since its start."""
@@ -140,8 +160,9 @@ class Motion:
         """
         for blend_s in least_s * 1.25 ** np.arange(16):
             times = np.linspace(0.0, blend_s, len(_GROWING))
-            value = self.sample(time_s + times)[0] * (_GROWING if rising else _GROWING[::-1])
+            value = self.curves.sample(time_s + times)[0] * (_GROWING if rising else _GROWING[::-1])
             speed = np.gradient(value, times, axis=0)
-            if self.strain(speed, np.gradient(speed, times, axis=0)).max() <= _BLEND_STRAIN:
+            rates = np.stack((speed, np.gradient(speed, times, axis=0)))
+            if self.strain(rates).max() <= _BLEND_STRAIN:
                 break
         return float(blend_s)

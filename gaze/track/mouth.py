@@ -12,7 +12,7 @@ that opens the mouth (``gazerig.gaze.track.animation``) smooths the openings wit
 can follow.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -36,57 +36,9 @@ _DIP_SHARE, _DIP_FRAMES, _DIP_MARGIN = 0.4, 10, 2
 _KEY_S = 0.02
 _LEAST_CLOSED_S = 0.08
 """A level that is smoothed within 80 ms closes in the shortest closure."""
-_P_CLOSED_S = 0.055
-_CLOSED_SHARE = {"b": 0.5, "m": 0.65}
+_P_CLOSED_S, _B_CLOSED, _M_CLOSED = 0.055, 0.5, 0.65
+"""Closure before the release of p in s, and as a share of b and m."""
 _BLOCK_S = 10.0
-
-Closure = tuple[float, float]
-"""Begin and end of a time in which the lips are closed, seconds."""
-
-
-def band_pressures(samples: Floats, rate_hz: float) -> Floats:
-    """Return the pressure of speech in every frame of sound.
-
-    Args:
-        samples: (n,) one channel, -1..1.
-        rate_hz: Rate of the samples.
-
-    Returns:
-        Root mean squares, the first centred at WINDOW_S / 2.
-    """
-    length, step = round(WINDOW_S * rate_hz), round(FRAME_S * rate_hz)
-    if len(samples) < length:
-        return np.zeros(0)
-    frames = np.lib.stride_tricks.sliding_window_view(samples, length)[::step]
-    taper, frequencies = np.hanning(length), np.fft.rfftfreq(length, 1.0 / rate_hz)
-    band = (frequencies >= _BAND_HZ[0]) & (frequencies <= _BAND_HZ[1])
-    powers = (np.abs(np.fft.rfft(frames * taper, axis=1)[:, band]) ** 2).sum(axis=1)
-    pressures: Floats = np.sqrt(2.0 * powers / (length * (taper**2).sum()))
-    return pressures
-
-
-def opening(pressure: float, loud: float) -> float:
-    """Return the opening 0..1 by loudness, 1 at the pressure of the loudest parts."""
-    return float(min(max((pressure / loud) ** _EXPONENT - _SHUT, 0.0) / (1.0 - _SHUT), 1.0))
-
-
-def phoneme_closures(spoken: Sequence[tuple[str, float]], end_s: float) -> list[Closure]:
-    """Return the closures of spoken phonemes.
-
-    A p is reported at its release, which the closure precedes; b and m begin with it.
-
-    Args:
-        spoken: (name, begin in s): phonemes in the names of espeak-ng or IPA.
-        end_s: End of the last one.
-    """
-    closures = []
-    for (name, begin_s), (_, next_s) in pairwise([*spoken, ("", end_s)]):
-        letter = name[:1].lower()
-        if letter == "p":
-            closures.append((max(0.0, begin_s - _P_CLOSED_S), begin_s))
-        elif share := _CLOSED_SHARE.get(letter):
-            closures.append((begin_s, begin_s + share * (next_s - begin_s)))
-    return closures
 
 
 class Mouth:
@@ -98,30 +50,55 @@ class Mouth:
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz, self._step = rate_hz, round(FRAME_S * rate_hz)
+        self._taper = np.hanning(round(WINDOW_S * rate_hz))
+        frequencies = np.fft.rfftfreq(len(self._taper), 1.0 / rate_hz)
+        self._band = (frequencies >= _BAND_HZ[0]) & (frequencies <= _BAND_HZ[1])
         self._rest: Floats = np.zeros(0)
         self._loud = _FIRST_LOUD
         self._values: list[float] = []
         self._dips = _DIP_SHARE
 
+    def band_pressures(self, samples: Floats) -> Floats:
+        """Return the root mean squares of speech in the frames of sound, -1..1."""
+        length = len(self._taper)
+        if len(samples) < length:
+            return np.zeros(0)
+        frames = np.lib.stride_tricks.sliding_window_view(samples, length)[:: self._step]
+        spectra = np.fft.rfft(frames * self._taper, axis=1)[:, self._band]
+        powers = 2.0 * (np.abs(spectra) ** 2).sum(axis=1) / (length * (self._taper**2).sum())
+        return np.asarray(np.sqrt(powers))
+
     def add(self, samples: Floats) -> None:
         """Add samples (n,) of one channel, -1..1."""
-        block = round(_BLOCK_S * self._rate_hz)
-        for begin in range(0, len(samples), block):
-            self._rest = np.concatenate((self._rest, samples[begin : begin + block]))
-            pressures = band_pressures(self._rest, self._rate_hz).tolist()
+        blocks = 1 + int(len(samples) / self._rate_hz / _BLOCK_S)
+        for block in np.array_split(samples, blocks):
+            self._rest = np.concatenate((self._rest, block))
+            pressures = self.band_pressures(self._rest).tolist()
             self._rest = self._rest[len(pressures) * self._step :]
             for pressure in pressures:
                 self._loud = max(_FIRST_LOUD, pressure, self._loud * _LOUD_DECAY)
-                self._values.append(_SIZE * opening(pressure, self._loud))
+                share = (pressure / self._loud) ** _EXPONENT
+                self._values.append(_SIZE * max(share - _SHUT, 0.0) / (1.0 - _SHUT))
 
-    def close(self, closures: Iterable[Closure]) -> None:
-        """Close the lips at these times of what has been added, instead of in its dips."""
+    def close(self, spoken: Iterable[tuple[str, float]], end_s: float) -> None:
+        """Close the lips at the phonemes of what has been added, instead of in its dips.
+
+        A p is reported at its release, which the closure precedes; b and m begin with it.
+
+        Args:
+            spoken: (name, begin in s): phonemes in the names of espeak-ng or IPA.
+            end_s: End of the last one.
+        """
         self._dips = 0.0
-        for begin_s, end_s in closures:
-            more_s = 0.5 * max(0.0, _LEAST_CLOSED_S - (end_s - begin_s))
-            first = max(0, self._frame(begin_s - more_s))
-            last = min(self._frame(end_s + more_s) + 1, len(self._values))
-            self._values[first:last] = [0.0] * (last - first)
+        for (name, begin_s), (_, next_s) in pairwise([*spoken, ("", end_s)]):
+            long_s = next_s - begin_s
+            lips_s = {"p": -_P_CLOSED_S, "b": _B_CLOSED * long_s, "m": _M_CLOSED * long_s}
+            if (closed_s := lips_s.get(name[:1].lower())) is not None:
+                middle_s = begin_s + 0.5 * closed_s
+                half_s = 0.5 * max(_LEAST_CLOSED_S, abs(closed_s))
+                first, last = self._frame(middle_s - half_s), self._frame(middle_s + half_s)
+                for i in range(max(0, first), min(last + 1, len(self._values))):
+                    self._values[i] = 0.0
 
     def _frame(self, t_s: float) -> int:
         return round((t_s - 0.5 * WINDOW_S) * self._rate_hz / self._step)
@@ -139,7 +116,7 @@ class Mouth:
         around = before[-2:] + behind[1:2]
         return sum(around) / len(around)
 
-    def keys(self, end_s: float) -> tuple[tuple[float, float], ...]:
-        """Return (time, opening) pairs from the beginning to a time, at which it is shut."""
+    def keys(self, end_s: float, ahead_s: float = 0.0) -> tuple[tuple[float, float], ...]:
+        """Return (time, later opening) pairs from the beginning to a time, at which it is shut."""
         times = np.arange(0.0, end_s, _KEY_S).tolist()
-        return (*((t_s, self.opening_at(t_s)) for t_s in times), (end_s, 0.0))
+        return (*((t_s, self.opening_at(t_s + ahead_s)) for t_s in times), (end_s, 0.0))

@@ -1,157 +1,107 @@
 """Player of tracks on top of gaze: several at once, and each begins and ends in motion."""
 
-from collections.abc import Iterable
 from math import inf
-from typing import Literal
 
 import numpy as np
-from msgspec import Struct, structs
+from msgspec import structs
 
 from gazerig.gaze.minimum_jerk import min_jerk
 from gazerig.gaze.track.motion import Motion
-from gazerig.gaze.track.track import FINISHED, HEAD_CHANNELS, POSE_CHANNELS, rest_value
+from gazerig.gaze.track.track import (
+    FINISHED,
+    HEAD,
+    LIDS,
+    POSE_CHANNELS,
+    SHOWN_S,
+    TrackState,
+)
 from gazerig.gaze.types import Floats
 
-SHOWN_S = 2.0
-"""Time for which an ended track is shown."""
 SPEECH = "speech"
 """Name of the track of a speech."""
 _BLEND_IN_S, _BLEND_OUT_S = 0.4, 0.25
 """Shortest times in which a track grows from gaze, and fades to it."""
+_AT_ONCE_S = 1e-9
+"""Time of a beginning or an end without a blend."""
 _CLOCK_SHARE = 0.05
 """Largest change of the speed by which a track follows another clock."""
 _CLOCK_SMOOTH_S = 0.25
 
-Clock = Literal["loop", "sound", "external"]
 
-
-class TrackState(Struct, frozen=True):
-    """One track after a tick; an ended one is shown for ``SHOWN_S``, the newest one always.
-
-    Attributes:
-        number: Number of the track since the start, from 1.
-        name: Its name.
-        position_s: Position in the track; below 0 while the motion begins before the sound.
-        duration_s: Its duration at its own speed.
-        speed: Factor on that speed.
-        loop: Whether it repeats until it is ended.
-        owns: Joints that gaze does not move meanwhile.
-        who: Name of the client, "" if unknown.
-        sound: Path of the sound, "" without one.
-        clock: Clock that the position follows.
-        end_reason: Reason for its end, ``FINISHED`` at its own end, "" while it plays.
-        limited: What the rig's limits changed, "" if nothing.
-        volume: Volume of the sound, 0..1.
-        cue: Name of the cue that it has passed last, "" before the first.
-        cues: Number of cues that it has passed.
-    """
-
-    number: int
-    name: str
-    position_s: float = 0.0
-    duration_s: float = 0.0
-    speed: float = 1.0
-    loop: bool = False
-    owns: tuple[str, ...] = ()
-    who: str = ""
-    sound: str = ""
-    clock: Clock = "loop"
-    end_reason: str = ""
-    limited: str = ""
-    volume: float = 1.0
-    cue: str = ""
-    cues: int = 0
-
-    @property
-    def is_playing(self) -> bool:
-        """Return whether it has not ended."""
-        return not self.end_reason
-
-
-class Voice:
-    """One track that plays.
+class Playback:
+    """A track that plays.
 
     Args:
-        state: What is shown of it.
         motion: Its curves.
-        from_s: Position at which it begins.
-        rounds: Number of repetitions, 0: until it is ended.
+        number: Its number.
+        begins_s: Time of the loop at which it begins.
         lead_s: Time by which its motion is ahead of its sound and its cues.
 
     Attributes:
-        begins_s: Time of the loop at which it begins.
-        ended_s, gone_s: Time of its end, and the time from which it does not move the head.
+        time_s: Present time of its motion.
     """
 
-    def __init__(
-        self, state: TrackState, motion: Motion, from_s: float, rounds: int, lead_s: float
-    ) -> None:
-        self.state, self.motion, self.lead_s = state, motion, lead_s
-        self.begins_s, self.ended_s, self.gone_s = 0.0, inf, inf
-        self._rounds, self._since_s = rounds, 0.0
-        self._time_s = motion.time_at(from_s) if from_s > 0.0 else 0.0
-        self._next_cue = sum(at_s < from_s for at_s, _ in motion.cues)
-        self._late_s = self._rate = self._entry_s = 0.0
-        if motion.owned or from_s > 0.0:
-            self._entry_s = motion.blend_s(self._time_s, _BLEND_IN_S, rising=True)
+    def __init__(self, motion: Motion, number: int, begins_s: float, lead_s: float) -> None:
+        state, self.motion, self._lead_s = motion.state, motion, lead_s
+        self._begins_s = self._since_s = begins_s
+        self._ended_s, self._fade_s, self._entry_s = inf, _AT_ONCE_S, _AT_ONCE_S
+        self._rounds, self._late_s, self._rate = state.rounds, 0.0, 0.0
+        self.time_s = motion.time_at(state.position_s) if state.position_s > 0.0 else 0.0
+        if motion.owned.any() or state.position_s > 0.0:
+            self._entry_s = motion.blend_s(self.time_s, _BLEND_IN_S, rising=True)
+        duration_s = lead_s + motion.duration_s * max(1, state.rounds) - self.time_s
+        self.state = structs.replace(
+            state, number=number, duration_s=duration_s, position_s=self._position_s
+        )
 
-    def begin(self, number: int, t_s: float) -> None:
-        """Get its number, and begin at a time."""
-        self.begins_s = self._since_s = t_s
-        self.state = structs.replace(self.state, number=number, position_s=self.position_s(t_s))
-
-    def time_s(self, t_s: float) -> float:
-        """Return the time of its motion at a time of the loop."""
-        return self._time_s + max(0.0, t_s - self._since_s)
-
-    def position_s(self, t_s: float) -> float:
+    @property
+    def _position_s(self) -> float:
         """Return the position in the track, and in its sound."""
-        heard_s = self.time_s(t_s) - self.lead_s
-        return self.motion.position_at(heard_s) + min(0.0, heard_s) * self.motion.speed
+        heard_s = self.time_s - self._lead_s
+        return round(self.motion.position_at(heard_s) + min(0.0, heard_s), 6)
 
     def advance(self, t_s: float) -> None:
-        """Pass cues, repeat, and end at its end."""
-        motion, dt_s = self.motion, max(0.0, t_s - self._since_s)
+        """Repeat, and end at its end."""
+        dt_s = max(0.0, t_s - self._since_s)
         wanted = min(max(self._late_s, -_CLOCK_SHARE), _CLOCK_SHARE)
         self._rate += (wanted - self._rate) * min(1.0, dt_s / _CLOCK_SMOOTH_S)
         self._late_s -= self._rate * dt_s
-        self._time_s += (1.0 + self._rate) * dt_s
+        self.time_s += (1.0 + self._rate) * dt_s
         self._since_s = max(t_s, self._since_s)
-        state, position_s = self.state, self.position_s(t_s)
-        passed = sum(at_s <= position_s for at_s, _ in motion.cues)
-        if passed > self._next_cue:
-            cues = state.cues + passed - self._next_cue
-            state = structs.replace(state, cue=motion.cues[passed - 1][1], cues=cues)
-            self._next_cue = passed
-        self.state = structs.replace(state, position_s=position_s)
-        if self._time_s >= motion.duration_s + self.lead_s:
-            if self._rounds == 1:
-                self.leave(FINISHED, t_s, fades=bool(motion.owned))
-                return
-            self._rounds = max(0, self._rounds - 1)
-            self._time_s -= motion.duration_s
-            self._next_cue = 0
+        if not self.state.is_playing:
+            return
+        self.state = structs.replace(self.state, position_s=self._position_s)
+        if self.time_s >= self.motion.duration_s + self._lead_s:
+            self._rounds -= 1
+            if self._rounds == 0:
+                self.leave(FINISHED, t_s, fades=bool(self.motion.owned.any()))
+            else:
+                self.time_s -= self.motion.duration_s
 
-    def follow(self, clock: Clock, position_s: float, t_s: float) -> None:
+    def follow(self, position_s: float, t_s: float) -> None:
         """Follow another clock: its position at a time, approached slowly."""
-        self.state = structs.replace(self.state, clock=clock)
-        self._late_s = (position_s - self.position_s(t_s)) / self.motion.speed
+        wanted_s = self.motion.time_at(position_s) + self._lead_s
+        self._late_s = wanted_s - self.time_s - (t_s - self._since_s)
         if self._rounds != 1:  # the clock may be in another round
             self._late_s -= self.motion.duration_s * round(self._late_s / self.motion.duration_s)
 
-    def leave(self, reason: str, t_s: float, fades: bool) -> None:
+    def leave(self, reason: str, t_s: float, fades: bool = True) -> None:
         """End, at once or fading to gaze within the limits of the joints."""
-        self.state = structs.replace(self.state, end_reason=reason)
-        self.ended_s = self.gone_s = t_s
-        if fades and t_s >= self.begins_s:
-            self.gone_s += self.motion.blend_s(self.time_s(t_s), _BLEND_OUT_S, rising=False)
+        if self.state.is_playing:
+            self.state = structs.replace(self.state, end_reason=reason)
+            self._ended_s = t_s
+            if fades and t_s >= self._begins_s:
+                self._fade_s = self.motion.blend_s(self.time_s, _BLEND_OUT_S, rising=False)
+
+    @property
+    def gone_s(self) -> float:
+        """Return the time from which it does not move the head any more."""
+        return self._ended_s + self._fade_s
 
     def weight(self, t_s: float) -> float:
         """Return its share in the motion, 0..1."""
-        weight = min_jerk((t_s - self.begins_s) / self._entry_s) if self._entry_s else 1.0
-        if t_s > self.ended_s:
-            weight *= 1.0 - min_jerk((t_s - self.ended_s) / (self.gone_s - self.ended_s))
-        return weight
+        grown = min_jerk((t_s - self._begins_s) / self._entry_s)
+        return grown * (1.0 - min_jerk((t_s - self._ended_s) / self._fade_s))
 
 
 class TrackPlayer:
@@ -163,102 +113,72 @@ class TrackPlayer:
         joints: Number of joints that gaze does not move.
 
     Attributes:
-        owned: Value and share of each channel that tracks give instead of gaze.
-        moves: Whether ``step`` may return another offset than last time.
+        latency_s: Latency of the joints, by which motion is ahead of its sound.
+        moves: Whether ``step`` may return other values than last time.
+        replaces_gaze: Whether a track gives the head's angles.
     """
 
     def __init__(self, joints: int) -> None:
-        names = (*POSE_CHANNELS, *[""] * joints)
-        self.rest: Floats = np.array([rest_value(name) for name in names])
-        self._number = 0
-        self._voices: list[Voice] = []
-        self.owned: dict[int, tuple[float, float]] = {}
-        self.moves = True
+        self._lids = np.zeros(len(POSE_CHANNELS) + joints)
+        self._lids[LIDS] = 1.0
+        self.latency_s, self._number = 0.0, 0
+        self._playbacks: list[Playback] = []
+        self.moves, self.replaces_gaze = True, False
 
     @property
-    def playing(self) -> list[Voice]:
+    def playing(self) -> list[Playback]:
         """Return the tracks that play, the newest last."""
-        return [voice for voice in self._voices if voice.state.is_playing]
+        return [one for one in self._playbacks if one.state.is_playing]
 
     @property
-    def speech(self) -> Voice | None:
+    def speech(self) -> Playback | None:
         """Return the speech that plays."""
-        for voice in self._voices:
-            if voice.state.name == SPEECH and voice.state.is_playing:
-                return voice
-        return None
+        return next((one for one in self.playing if one.state.name == SPEECH), None)
 
-    @property
-    def replaces_gaze(self) -> bool:
-        """Return whether a track gives the head's angles."""
-        return min(self.owned, default=len(HEAD_CHANNELS)) < len(HEAD_CHANNELS)
-
-    def overlapping(self, motion: Motion, name: str) -> list[Voice]:
-        """Return the tracks that another one replaces: those of its channels, or of its name."""
-        return [
-            voice
-            for voice in self._voices
-            if voice.state.name == name or voice.motion.channels & motion.channels
-        ]
-
-    def start(self, voice: Voice, t_s: float) -> None:
-        """Begin a track as soon as those that it replaces have faded."""
-        name = voice.state.name
-        replaced = self.overlapping(voice.motion, name)
-        self.end([one for one in replaced if one.state.is_playing], f"another track: {name}", t_s)
+    def start(self, motion: Motion, t_s: float) -> TrackState:
+        """Begin a track as soon as those of its channels or its name have faded."""
+        self.moves, begins_s, name = True, t_s, motion.state.name
+        for one in self._playbacks:
+            if one.state.name == name or (one.motion.channels & motion.channels).any():
+                one.leave(f"another track: {name}", t_s)
+                begins_s = max(begins_s, one.gone_s)
         self._number += 1
-        voice.begin(self._number, max([t_s, *[one.gone_s for one in replaced]]))
-        self._voices.append(voice)
+        lead_s = self.latency_s if motion.state.sound else 0.0
+        self._playbacks.append(Playback(motion, self._number, begins_s, lead_s))
+        return self._playbacks[-1].state
 
-    def end(self, voices: Iterable[Voice], reason: str, t_s: float, fades: bool = True) -> float:
-        """End tracks, and return the time until all have faded to gaze, s."""
-        self.moves, longest_s = True, 0.0
-        for voice in voices:
-            voice.leave(reason, t_s, fades and voice.motion.moves)
-            longest_s = max(longest_s, voice.gone_s - t_s)
-        return longest_s
+    def end(self, reason: str, t_s: float, name: str = "", fades: bool = True) -> None:
+        """End the tracks of a name, "" for all; they fade to gaze, or not."""
+        self.moves = True
+        for one in self.playing:
+            if name in ("", one.state.name):
+                one.leave(reason, t_s, fades)
 
-    def sync(self, number: int, clock: Clock, position_s: float, t_s: float) -> None:
+    def sync(self, number: int, position_s: float, t_s: float) -> None:
         """Correct the position of a track by another clock; an ended track is ignored."""
-        for voice in self.playing:
-            if voice.state.number == number:
-                voice.follow(clock, position_s, t_s)
+        for one in self.playing:
+            if one.state.number == number:
+                one.follow(position_s, t_s)
 
-    def drop(self, t_s: float) -> str:
-        """End all tracks at once, as a client holds the joints or the torque is off.
-
-        Returns:
-            The names of the tracks, "" if there were none.
-        """
-        playing = self.playing
-        reason = "its joints are controlled by a client or switched off"
-        self.end(playing, reason, t_s, fades=False)
-        return ", ".join(voice.state.name for voice in playing)
-
-    def step(self, t_s: float) -> Floats:
-        """Return the (channels,) offset from rest at a time."""
-        for voice in self.playing:
-            voice.advance(t_s)
-        self.owned, self.moves = {}, False
-        offset: Floats = np.zeros(len(self.rest))
-        for voice in self._voices:
-            self.moves |= t_s < voice.gone_s
-            if not voice.begins_s <= t_s < voice.gone_s:
-                continue
-            weight, motion = voice.weight(t_s), voice.motion
-            values = motion.sample(np.array([voice.time_s(t_s)]))[0, 0]
-            for i in motion.owned:
-                self.owned[i] = float(self.rest[i] + values[i]), weight
-                values[i] = 0.0
-            offset += weight * values
-        return offset
+    def step(self, t_s: float) -> tuple[Floats, Floats]:
+        """Return the factors on the values by gaze, and what is added to them, of all channels."""
+        factors, added = np.ones_like(self._lids), np.zeros_like(self._lids)
+        for one in self._playbacks:
+            one.advance(t_s)
+            if weight := one.weight(t_s):
+                moved = weight * one.motion.curves.sample(np.array([one.time_s]))[0, 0]
+                owned = one.motion.owned
+                factors *= np.where(owned, 1.0 - weight, 1.0 + self._lids * moved)
+                added += moved + self._lids * np.where(owned, weight, -moved)
+        self.moves = any(t_s < one.gone_s for one in self._playbacks)
+        self.replaces_gaze = bool(factors[HEAD].min() < 1.0)
+        return factors, added
 
     def states(self, t_s: float) -> tuple[TrackState, ...]:
         """Return the tracks that play, and the last ones that have ended, by their numbers."""
-        self._voices = [
-            voice
-            for voice in self._voices
-            if t_s < max(voice.gone_s, voice.ended_s + SHOWN_S)
-            or voice.state.number == self._number
+        self._playbacks = [
+            one
+            for one in self._playbacks
+            if t_s < one.gone_s + SHOWN_S or one.state.number == self._number
         ]
-        return tuple([voice.state for voice in self._voices])
+        return tuple([one.state for one in self._playbacks])

@@ -13,17 +13,13 @@ class TrackTrigger:
     """Trigger of the tracks of rules."""
 
     def __init__(self) -> None:
-        self._named_by: str | None = None
+        self._reached_by: str | None = None
         self._played_s: dict[str, float] = {}
 
     def step(
-        self,
-        behaviour: str,
-        rule: Rule,
-        target: Target,
-        t_s: float,
+        self, behaviour: str, rule: Rule, target: Target, t_s: float,
         named_ids: frozenset[int] = frozenset(),
-    ) -> str:
+    ) -> str:  # fmt: skip
         """Return the track to play now, "" for none.
 
         Args:
@@ -35,23 +31,11 @@ class TrackTrigger:
         """
         if not rule.gesture:
             return ""
-        before = self._named_by
-        named = _is_named(rule, target, named_ids)
-        self._named_by = behaviour if named else None
-        if not named or before == behaviour:
-            return ""
-        if t_s < self._played_s.get(behaviour, -inf) + _REFRACTORY_S:
+        ids = named_ids if rule.person is not None else {rule.body_id}
+        reached = target.id in ids or target.kind == rule.look_at
+        before, self._reached_by = self._reached_by, behaviour if reached else None
+        played_s = self._played_s.get(behaviour, -inf)
+        if not reached or before == behaviour or t_s < played_s + _REFRACTORY_S:
             return ""
         self._played_s[behaviour] = t_s
         return rule.gesture
-
-
-def _is_named(rule: Rule, target: Target, named_ids: frozenset[int]) -> bool:
-    """Return whether a target triggers the rule's track."""
-    if rule.person is not None:
-        return target.id in named_ids
-    if rule.body_id is not None:
-        return target.id == rule.body_id
-    if rule.point_world_m is not None:
-        return target.p_world_m == rule.point_world_m
-    return target.kind == rule.look_at

@@ -255,7 +255,7 @@ def play(
             for one in rig.ask(Tracks(), tuple[dict[str, Any], ...]):
                 say(_track_line(one))
             return
-        say(rig.send(Play("" if track == NO_TRACK else track)).text())
+        say(rig.send(Play("" if track == NO_TRACK else track)).text() or "all tracks end")
 
 
 @ctl.command(name="say")

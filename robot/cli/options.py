@@ -12,7 +12,7 @@ from gazerig.robot.cli.terminal import RigArgument, say
 from gazerig.robot.run.options import Option, RunOptions
 
 if TYPE_CHECKING:
-    from gazerig.robot.model.reply import TrackReply
+    from gazerig.robot.model.reply import TrackState
 
 F = TypeVar("F", bound=Callable[..., Any])
 DEFAULT_RIG = "desk"
@@ -76,7 +76,7 @@ def add_run_options(command: F) -> F:
     return command
 
 
-def print_track_fit(rig_name: str, path: Path, reply: "TrackReply") -> None:
+def print_track_fit(rig_name: str, path: Path, track: "TrackState") -> None:
     """Print how a rig plays a track, and how to use it."""
-    say(f"{path}: on {rig_name} {reply.text()}")
+    say(f"{path}: on {rig_name} {track.text()}")
     say(f"use it: in a folder tracks/ beside the rig's file, gazerig ctl play {path.stem} finds it")

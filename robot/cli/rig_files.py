@@ -77,26 +77,24 @@ def _track_lines(rig: "Rig") -> Iterator[str]:
     """Return how a rig plays each of its own tracks."""
     from gazerig.config.load import find_file
     from gazerig.config.tracks import load_track
-    from gazerig.robot.model.reply import TrackReply
-    from gazerig.robot.model.track_fit import TrackRefused
+    from gazerig.robot.model.commands import Play
     from gazerig.robot.run.rig_limits import limits, track_fit
 
     for file in rig.track_files:
         path = find_file("tracks", file)
         try:
-            motion = track_fit(rig).motion(load_track(path), limits(rig.joints))
-            reply = TrackReply(path.stem, motion.duration_s, motion.limited)
-            yield f"{file}: {reply.text()}"
-        except TrackRefused as refused:
+            order, track = Play(path.stem), load_track(path)
+            motion = track_fit(rig).motion(track, limits(rig.joints), order)
+            yield f"{file}: {motion.state.text()}"
+        except ValueError as refused:
             yield f"{file}: {rig.name} cannot play it: {refused}"
 
 
 def _schedule_lines(name: str, rig: "Rig") -> Iterator[str]:
     """Return which tracks of the schedule are not there yet."""
-    from gazerig.config.tracks import tracks_of
+    from gazerig.config.load import shipped_names
 
-    beside = (Path(name).expanduser().parent / "tracks").glob("*.yaml")
-    known = sorted({*tracks_of(rig.track_files), *[file.stem for file in beside]})
+    known = sorted({*shipped_names("tracks"), *[Path(file).stem for file in rig.track_files]})
     for track in rig.schedule:
         if track not in known:
             yield f"{name}: schedule: {unknown_text('track', track, known)}"

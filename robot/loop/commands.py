@@ -19,7 +19,7 @@ from gazerig.params import unknown_text
 from gazerig.robot.loop.body import Body, StopControl
 from gazerig.robot.loop.chooser import TargetChooser
 from gazerig.robot.loop.client_control import ClientControl, Conversation
-from gazerig.robot.loop.track_choices import TrackChoices
+from gazerig.robot.loop.tracks import TrackChoices
 from gazerig.robot.model.commands import (
     NO_TRACK,
     Ask,
@@ -40,7 +40,6 @@ from gazerig.robot.model.commands import (
     Resume,
     Say,
     SetLevel,
-    Speak,
     Stop,
     SyncTrack,
     Talk,
@@ -195,20 +194,20 @@ class CommandExecutor:
             "conversation": _put_first(self._gaze.chosen_mode, MODES),
             "lids": _LID_COMMANDS,
         }
-        if animation.expressions:
-            menus["expression"] = _put_first(animation.expression, animation.expressions)
-        infos = self.tracks.all_tracks(self._guard.limits)
-        names = [one.name for one in infos if not one.refused]
+        if expressions := animation.names["expression"]:
+            menus["expression"] = _put_first(animation.expression, expressions)
+        names = [one.name for one in self.tracks.states() if not one.refused]
         newest = animation.tracks.playing[-1:]
         present = newest[0].state.name if newest else NO_TRACK
         menus["track"] = _put_first(present, (NO_TRACK, *names))
         return menus
 
-    def refuse_impossible(self, command: Command) -> None:
-        """Refuse a command that names something that this robot does not have.
+    def prepare(self, command: Command) -> Command:
+        """Return a command as it is queued; a track is fitted to the rig.
 
         Raises:
-            ValueError: The message lists the available choices.
+            ValueError: It names something that this robot does not have; the message lists the
+                available choices.
         """
         match command:
             case Ask(menu, choice):
@@ -217,6 +216,8 @@ class CommandExecutor:
                     raise ValueError(unknown_text("menu", menu, menus))
                 if choice not in menus[menu]:
                     raise ValueError(unknown_text(menu, choice, menus[menu]))
+                if menu == "track":
+                    return self.prepare(Play("" if choice == NO_TRACK else choice))
             case Jog(angles_rad):
                 names = self._names
                 for name, _ in angles_rad:
@@ -228,18 +229,16 @@ class CommandExecutor:
                 self._animation.require("level", name)
             case Say():
                 raise ValueError("this run has no voice")
-            case Play() | Speak():
-                self.tracks.prepare(command, self._guard.limits)
+            case Play(""):
+                return EndTrack(who=command.who)
+            case Play():
+                return self.tracks.prepare(command)
+        return command
 
     # --- execution, in the loop's thread
 
     def complete(self, command: Command) -> Command:
         """Return a command as it is executed, with everything that a recording needs."""
-        if isinstance(command, Ask) and command.menu == "track":
-            command = Play("" if command.choice == NO_TRACK else command.choice)
-        if isinstance(command, Play):
-            with suppress(ValueError):  # its execution reports it
-                return self.tracks.prepare(command, self._guard.limits)
         frame = self._detections
         if frame is None or not isinstance(command, LookAtPixel):
             return command
@@ -250,7 +249,7 @@ class CommandExecutor:
 
     def execute(self, command: Command, t_s: float) -> CommandReply:
         """Execute a command; return its reply, with the reason if it is refused now."""
-        if self.stop.reason and isinstance(command, ControlCommand | Play | Speak):
+        if self.stop.reason and isinstance(command, ControlCommand | Play):
             return CommandReply(f"stopped ({self.stop.reason}): resume first")
         try:
             return self._execute(command, t_s) or CommandReply()
@@ -265,16 +264,16 @@ class CommandExecutor:
                 return self._jog(command, t_s)
             case Look():
                 return self._look(command, t_s)
-            case Play() | Speak():
+            case Play():
                 return self._play(command, t_s)
             case EndTrack():
                 return self.tracks.end(command, t_s)
-            case SyncTrack(number, position_s, clock):
-                self._animation.tracks.sync(number, clock, position_s, t_s)
+            case SyncTrack(number, position_s):
+                self._animation.tracks.sync(number, position_s, t_s)
             case Express(name, strength):
-                self._animation.express(name, strength)
+                self._animation.set_face("expression", name, strength, t_s)
             case SetLevel(name, value):
-                self._animation.set_level(name, value, t_s)
+                self._animation.set_face("level", name, value, t_s)
             case MoveOpponent(point):
                 self._move_opponent(t_s, point)
             case Talk():
@@ -290,7 +289,7 @@ class CommandExecutor:
             case Stop():
                 self.stop.halt(command, t_s)
                 self.lead.end(f"stopped: {command.why}")
-                self._animation.tracks.drop(t_s)
+                self._animation.tracks.end("the torque is switched off", t_s, fades=False)
             case Resume() if self.stop.reason:
                 goals = self.stop.resume(command, t_s)
                 if isinstance(goals, CommandReply):
@@ -330,7 +329,7 @@ class CommandExecutor:
             self._gaze.choose_mode(choice, t_s)
             self._lids.set_conversation(self._gaze.converses)
         elif menu == "expression":
-            self._animation.express(choice)
+            self._animation.set_face("expression", choice, 1.0, t_s)
         else:
             self._lids.wink("left" if choice == "wink left" else "right", t_s)
 
@@ -391,8 +390,8 @@ class CommandExecutor:
 
     def _jog(self, command: Jog, t_s: float) -> CommandReply:
         """Move the given joints and hold the others; without any, free the joints."""
-        if command.angles_rad and (dropped := self._animation.tracks.drop(t_s)):
-            self._messages.append(f"track {dropped} ends: a client controls the joints")
+        if command.angles_rad:
+            self._animation.tracks.end("a client controls the joints", t_s, fades=False)
         self._change_control(lambda: self.lead.jog(command, self.commanded_rad, t_s))
         if command.angles_rad:
             self._guard.start_gently()  # a slider may jump from end to end
@@ -420,15 +419,13 @@ class CommandExecutor:
         else:
             opponent.update(t_s - start_s)
 
-    def _play(self, command: Play | Speak, t_s: float) -> CommandReply:
+    def _play(self, command: Play, t_s: float) -> CommandReply:
         """Play a track on top of the gaze, unless a client holds the joints."""
-        starts = isinstance(command, Speak) or bool(command.track)
-        if starts and self.lead.pose_rad:
+        if self.lead.pose_rad:
             return CommandReply(f"{self.lead.state.client}: the joints are held at their angles")
-        reply = self.tracks.play(command, t_s, self._guard.limits)
-        if starts:
-            by = f" for {command.who}" if command.who else ""
-            self._messages.append(f"track{by}: {reply.text()}")
+        reply = self.tracks.play(command, t_s)
+        by = f" for {command.who}" if command.who else ""
+        self._messages.append(f"track{by}: {reply.text()}")
         return reply
 
     # --- tracks that no client has asked for
@@ -463,15 +460,13 @@ class CommandExecutor:
 
     def _play_unasked(self, command: Play, t_s: float) -> None:
         """Play a track unless a client or a show moves the head."""
-        tracks, limits = self.tracks, self._guard.limits
-        if self.stop.reason or self.lead.state.active:
+        shows = any(one.state.owns for one in self._animation.tracks.playing)
+        if self.stop.reason or self.lead.state.active or shows:
             return
-        prepared: Play | Speak = command
-        with suppress(ValueError):  # ``_play`` reports it
-            if tracks.ends_show(command, limits):
-                return
-            prepared = tracks.prepare(command, limits)
-        self._play(prepared, t_s)
+        try:
+            self._play(self.tracks.prepare(command), t_s)
+        except ValueError as error:
+            self._messages.append(f"track for {command.who}: refused: {error}")
 
 
 def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> None:

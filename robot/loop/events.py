@@ -15,6 +15,7 @@ from gazerig.robot.model.reply import FINISHED, Progress
 _MOST_EVENTS, _MOST_MESSAGES = 2000, 100
 """Number of stored events, and of messages besides."""
 _LOOK_S = 0.002
+_INSTANT_S = 1e-6
 _REGISTER = re.compile(r": .+ (-?\d+ -> -?\d+|set)$")
 
 _Change = tuple[str, EventKind, int | str]
@@ -134,8 +135,13 @@ def _track_changes(last: Tick, tick: Tick) -> Iterator[_Change]:
     before = {track.number: track for track in last.tracks}
     for now in tick.tracks:
         was = before.get(now.number)
-        if now.cues > (was.cues if was is not None else 0):
-            yield f"{now.name} passes the cue {now.cue}", "cue", now.cue
+        before_s = was.position_s if was is not None else now.position_s - _INSTANT_S
+        for cue, at_s in now.cues:
+            passed = before_s < at_s <= now.position_s
+            if now.position_s < before_s:  # it has begun again
+                passed = at_s > before_s or at_s <= now.position_s
+            if passed:
+                yield f"{now.name} passes the cue {cue}", "cue", cue
         if not now.is_playing and was is not None and was.is_playing:
             finished = now.end_reason == FINISHED
             text = "has finished" if finished else f"ended: {now.end_reason}"

@@ -5,8 +5,6 @@ from collections.abc import Callable
 from math import inf, radians
 from typing import Any, NamedTuple
 
-from msgspec import structs
-
 from gazerig.drivers.camera.capture_loop import CLOSING
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.plugins import describe_error, plugin_error
@@ -23,7 +21,6 @@ from gazerig.robot.loop.commands import CommandExecutor, CommandQueue, refuse_ou
 from gazerig.robot.loop.tick import Tick as Tick
 from gazerig.robot.loop.tick import stopped_result
 from gazerig.robot.loop.timing import freeze_objects
-from gazerig.robot.loop.track_choices import TrackInfo
 from gazerig.robot.model.clock import Clock, LoopParams, RealClock
 from gazerig.robot.model.commands import (
     AnyCommand,
@@ -31,12 +28,11 @@ from gazerig.robot.model.commands import (
     Command,
     Jog,
     MoveOpponent,
-    Play,
     check_command,
 )
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.reply import Ticket
+from gazerig.robot.model.reply import Ticket, TrackState
 from gazerig.robot.model.scene import MovableOpponent
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
@@ -124,8 +120,6 @@ class Robot:
             refuse_out_of_range(command, self.body.names, self.guard.limits)
         if isinstance(command, MoveOpponent) and self._executor.opponent is None:
             raise ValueError("no opponent to move: the run is in no world with a boxer")
-        if isinstance(command, Play):  # only a recording defines a track
-            command = structs.replace(command, definition=None)
         return self.replay_command(command)
 
     def replay_command(self, command: Command) -> Ticket:
@@ -134,9 +128,7 @@ class Robot:
         Raises:
             ValueError: As ``command``.
         """
-        command = check_command(command)
-        self._executor.refuse_impossible(command)
-        return self._commands.add(command)
+        return self._commands.add(self._executor.prepare(check_command(command)))
 
     def set_opponent(self, opponent: MovableOpponent, start_s: Callable[[], float | None]) -> None:
         """Let commands move a boxer of the emulated world.
@@ -163,9 +155,9 @@ class Robot:
         """Return the choices of ``Ask``: menu -> choices, the present one first."""
         return self._executor.menus()
 
-    def tracks(self) -> tuple[TrackInfo, ...]:
-        """Return all tracks with their fit to this rig."""
-        return self._executor.tracks.all_tracks(self.guard.limits)
+    def tracks(self) -> tuple[TrackState, ...]:
+        """Return all tracks as this rig plays them."""
+        return self._executor.tracks.states()
 
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
         """Open camera and bus, switch the torque on and start from the present angles.

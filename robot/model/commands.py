@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 import msgspec
 from msgspec import Meta, Struct, structs
 
-from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED, Track
+from gazerig.gaze.track.track import MAX_DURATION_S, Track
 from gazerig.params import unknown_text
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
@@ -193,23 +193,27 @@ class SetLevel(Command, frozen=True):
 class Play(ClientCommand, frozen=True):
     """Play a track; "" ends all tracks.
 
+    The last three are for recordings: clients cannot set them.
+
     Attributes:
         track: Name of the track.
         speed: Factor on its defined speed.
         times: Number of repetitions, 0 for the track's own.
         from_s: Position in the track, in s or as the name of a cue, at which it begins.
         loop: Repeat it until it is ended, as a track with ``loop: true`` does.
-        sound_s: Duration of its sound, set on execution.
-        definition: The track, set on execution if its file is newer than the run.
+        sound_s: Duration of its sound.
+        definition: The track, if it is a speech, or if its file is newer than the run.
+        mouth: (time in s, opening 0..1) pairs of a speech; the mouth shuts at the end.
     """
 
     track: _Name
-    speed: Annotated[float, Meta(ge=MIN_SPEED, le=MAX_SPEED)] = 1.0
-    times: Annotated[int, Meta(ge=0, le=MAX_COUNT)] = 0
+    speed: Annotated[float, Meta(ge=0.1, le=4.0)] = 1.0
+    times: Annotated[int, Meta(ge=0, le=20)] = 0
     from_s: _Position | _Name = 0.0
     loop: bool = False
     sound_s: _Position = 0.0
     definition: Track | None = None
+    mouth: Annotated[tuple[tuple[_SpeechTime, _Share], ...], Meta(max_length=61_000)] = ()
 
 
 class EndTrack(ClientCommand, frozen=True):
@@ -228,12 +232,10 @@ class SyncTrack(Command, frozen=True):
     Attributes:
         number: ``TrackState.number``.
         position_s: Position at which the track should be now.
-        clock: Source of the position.
     """
 
     number: _Number
     position_s: _Position
-    clock: Literal["sound", "external"] = "external"
 
 
 class Talk(ClientCommand, frozen=True):
@@ -260,7 +262,7 @@ class Talk(ClientCommand, frozen=True):
 
 
 class Say(ClientCommand, frozen=True):
-    """Say a sound file or a text; a run's voice makes a ``Speak`` of it.
+    """Say a sound file or a text; a run's voice makes a track of it.
 
     Attributes:
         what: A file, by its ending (.wav, .flac, .mp3, .ogg), or a text.
@@ -268,24 +270,6 @@ class Say(ClientCommand, frozen=True):
     """
 
     what: str
-    volume: _Share = 1.0
-
-
-class Speak(ClientCommand, frozen=True):
-    """Speak: a track with a sound and its mouth.
-
-    Attributes:
-        sound: Path of the sound, "" without one.
-        duration_s: Duration in s.
-        level: Level of the rig's table that opens the mouth, "" without one.
-        mouth: (time in s, opening 0..1) pairs; the mouth shuts at the end.
-        volume: Factor 0..1.
-    """
-
-    sound: str
-    duration_s: Annotated[float, Meta(gt=0.0, le=MAX_SPEECH_S)]
-    level: str = ""
-    mouth: Annotated[tuple[tuple[_SpeechTime, _Share], ...], Meta(max_length=61_000)] = ()
     volume: _Share = 1.0
 
 
@@ -338,8 +322,8 @@ class Tune(Command, frozen=True):
 
 AnyCommand = (
     Ask | LookAt | LookAtDirection | LookAtPerson | LookAtPixel | Find | Jog | Express
-    | SetLevel | Play | EndTrack | SyncTrack | Talk | Say | Speak | MoveOpponent | Renew | Stop
-    | Resume | Tune
+    | SetLevel | Play | EndTrack | SyncTrack | Talk | Say | MoveOpponent | Renew | Stop | Resume
+    | Tune
 )  # fmt: skip
 REPEATED = (Renew, SetLevel, SyncTrack, MoveOpponent)
 """Commands that programs send many times per second; they create no message and no mark."""
@@ -487,9 +471,9 @@ Change = Set | Save | Revert | SayPiece | Fault
 SLOW: frozenset[str] = frozenset((*map(verb, get_args(Change)), "say"))
 """Requests that may read or write files."""
 ORDERS: dict[str, type[Command]] = {
-    name: kind for name, kind in COMMANDS.items() if kind not in (Tune, Speak)
+    name: kind for name, kind in COMMANDS.items() if kind is not Tune
 }
-"""Commands that programs may send; the requests set and say check and prepare the others."""
+"""Commands that programs may send; the request set checks and prepares the other."""
 REQUESTS: dict[str, type[Request]] = {
     verb(kind): kind for kind in (*get_args(Question | Change), *ORDERS.values())
 }
@@ -509,8 +493,10 @@ def read_request(data: object) -> Request:
             name = str(data.get("do", "")) if isinstance(data, dict) else ""
             raise ValueError(unknown_text("request", name, REQUESTS)) from None
         raise ValueError(f"{error}; {_fields_text(kind)}") from None
-    if isinstance(request, Tune | Speak):
-        raise ValueError("this is done by the requests set and say, which check it")
+    if isinstance(request, Tune):
+        raise ValueError("this is done by the request set, which checks it")
+    if isinstance(request, Play):
+        return structs.replace(request, sound_s=0.0, definition=None, mouth=())
     return request
 
 

@@ -11,8 +11,8 @@ from typing import Literal
 from msgspec import Struct
 
 from gazerig.gaze.attention.finding import Found
-from gazerig.gaze.track.player import TrackState as TrackState
 from gazerig.gaze.track.track import FINISHED as FINISHED
+from gazerig.gaze.track.track import TrackState as TrackState
 from gazerig.gaze.types import TurnState
 from gazerig.robot.model.commands import Command
 
@@ -166,28 +166,6 @@ ARRIVED_RAD = radians(1.0)
 """A gaze or joint has arrived if its measured error is below this."""
 
 
-class TrackReply(Struct, frozen=True):
-    """The reply for a track that starts, or with name "" for the end of the present one.
-
-    Attributes:
-        name: Name of the track.
-        duration_s: Time until everything is at rest again.
-        limited: Where it is slower or smaller than defined, and what the rig lacks; "" if nothing.
-        number: Number of the track (``gazerig.robot.model.reply.TrackState``).
-    """
-
-    name: str
-    duration_s: float
-    limited: str = ""
-    number: int = 0
-
-    def text(self) -> str:
-        """Return one line for users."""
-        if not self.name:
-            return f"tracks end within {self.duration_s:.2f} s"
-        return f"{self.name} takes {self.duration_s:.1f} s{self.limited and f'; {self.limited}'}"
-
-
 class CommandReply(Struct, frozen=True):
     """The robot's reply to one command on its execution.
 
@@ -201,7 +179,7 @@ class CommandReply(Struct, frozen=True):
 
     refused: str = ""
     control_number: int = 0
-    track: TrackReply | None = None
+    track: TrackState | None = None
     t_s: float = 0.0
 
     def text(self) -> str:

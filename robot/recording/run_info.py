@@ -25,7 +25,7 @@ class RunInfo(Struct, frozen=True):
         rate_hz: Control rate at the start.
         started_utc: Wall clock at the start.
         walk_yaml: The face walk's file.
-        tracks_yaml: The tracks that the rig defines, "" if it defines none.
+        tracks: The files of the rig's own tracks by name.
         scene: The simulated scene, None with a camera.
         eyes: Description of the camera.
         mock: Whether the servos were emulated.
@@ -43,7 +43,7 @@ class RunInfo(Struct, frozen=True):
     started_utc: Annotated[datetime, Meta(tz=True)]
     character: str | None = None
     walk_yaml: str = ""
-    tracks_yaml: str = ""
+    tracks: dict[str, str] = {}
     scene: str | None = None
     eyes: str = ""
     mock: bool = False

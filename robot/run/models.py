@@ -23,7 +23,7 @@ from gazerig.gaze.track.animation import Animation
 from gazerig.robot.loop.chooser import RuleChooser, TargetChooser
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.types import further_joints
-from gazerig.robot.run.rig_limits import eye_limits, face_tables, head_limits, lid_ends
+from gazerig.robot.run.rig_limits import eye_limits, faces, head_limits, lid_ends
 
 _DRAWS = (
     "scanpath", "lids", "camera", "idle", "aversion", "endpoint", "reaction", "head", "drift",
@@ -76,7 +76,8 @@ class GazeModels:
             gaze.oculomotor, self.kinematics, eye_limits(rig), self.saccade, self.pursuit,
             self.head, self.lids, random["endpoint"], self.drift,
         )  # fmt: skip
-        self.animation = Animation(further_joints(rig.joints), face_tables(rig))
+        self.animation = Animation(further_joints(rig.joints), faces(rig))
+        self.animation.tracks.latency_s = gaze.oculomotor.eye_lag_ms / 1e3
 
     def retune(self, old: Rig, new: Rig) -> None:
         """Take changed parameters over between two ticks; every model keeps its state.

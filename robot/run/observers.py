@@ -82,9 +82,7 @@ class RunObservers:
                 self._parts.append(("the page", self._page.open, self._page.close))
             doors = DoorProcesses(run.rig.doors, os.getpid(), say)
             self._parts.append(("the doors", doors.open, doors.close))
-        has_sound = not options.fast and any(
-            one.sound for one in run.tracks.all_tracks(limits(run.rig.joints))
-        )
+        has_sound = not options.fast and any(one.sound for one in run.tracks.states())
         opened = run.voice.open if has_sound else lambda: None
         self._parts.append(("the voice", opened, run.voice.close))
 

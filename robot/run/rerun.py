@@ -14,7 +14,6 @@ from msgspec import structs
 
 from gazerig.config.load import ConfigError, load
 from gazerig.config.rig import Rig
-from gazerig.config.save import track_files
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.loop import Tick
@@ -159,10 +158,9 @@ def _recorded_rig(recording: RunRecording, folder: Path) -> Rig:
             f"{recording.path} was made with a configuration that this version does not support "
             f"({first.key}: {first.rule})"
         ) from None
-    if info.tracks_yaml:
-        kept = _write_text(info.tracks_yaml, folder / "tracks.yaml")
-        (folder / "tracks").mkdir()
-        rig = replace(rig, track_files=track_files(kept, folder / "tracks"))
+    tracks = {name: folder / f"{name}.yaml" for name in info.tracks}
+    files = [str(_write_text(info.tracks[name], file)) for name, file in tracks.items()]
+    rig = replace(rig, track_files=tuple(files))
     if info.walk_yaml:
         file = str(_write_text(info.walk_yaml, folder / "walk.yaml"))
         scanpath = replace(rig.gaze.scanpath, transition_matrix=file)

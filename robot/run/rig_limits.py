@@ -7,13 +7,13 @@ import numpy as np
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.types import ServoConfig
-from gazerig.gaze.track.animation import NEUTRAL, FaceRange, FaceTables
-from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.gaze.track.animation import NEUTRAL, Face
+from gazerig.gaze.track.track import EYE_CHANNELS
 from gazerig.gaze.types import Angles2, Floats, Vec3
+from gazerig.robot.loop.tracks import TrackFit
 from gazerig.robot.model.coupling import servo_setups
 from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.kinematics import LIDS, NECK, LidEnds
-from gazerig.robot.model.track_fit import TrackFit
 from gazerig.robot.model.types import further_joints, order_joints
 
 EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
@@ -110,47 +110,34 @@ def park_rad(rig: Rig) -> dict[str, float]:
     return {name: radians(angle) for name, angle in rig.park_deg.items()}
 
 
-def face_tables(rig: Rig) -> FaceTables:
-    """Return the pose offsets of expressions and levels."""
-
-    def change(angles_deg: Mapping[str, float]) -> Floats:
-        rest, moved = pose_offset(rig, {}), pose_offset(rig, angles_deg)
-        return np.subtract(moved.to_flat(), rest.to_flat())
-
-    faces = {NEUTRAL: {}, **rig.expressions} if rig.expressions else {}
-    expressions = {
-        name: FaceRange(change({}), change(angles), rig.expression_blend_s)
-        for name, angles in faces.items()
+def faces(rig: Rig) -> dict[str, Face]:
+    """Return the expressions of a rig, neutral first, and its levels."""
+    expressions = {NEUTRAL: {}, **rig.expressions} if rig.expressions else {}
+    found = {
+        name: Face("expression", offsets(rig, {}), offsets(rig, angles), rig.expression_blend_s)
+        for name, angles in expressions.items()
     }
-    levels = {
-        name: FaceRange(
-            change({one.joint: one.low_deg}),
-            change({one.joint: one.high_deg - one.low_deg}),
-            one.smoothing_ms / 1e3,
-        )
-        for name, one in rig.levels.items()
-    }
-    return FaceTables(expressions, levels)
+    for name, level in rig.levels.items():
+        low = offsets(rig, {level.joint: level.low_deg})
+        change = offsets(rig, {level.joint: level.high_deg - level.low_deg})
+        found[name] = Face("level", low, change, level.smoothing_ms / 1e3)
+    return found
 
 
 def track_fit(rig: Rig) -> TrackFit:
     """Return the fit of tracks to a rig."""
-    return TrackFit(rig.names, lid_spans(rig), face_tables(rig))
+    return TrackFit(rig.names, lid_spans(rig), faces(rig))
 
 
-def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:
-    """Return angles added to joints as an offset of the pose.
+def offsets(rig: Rig, angles_deg: Mapping[str, float]) -> Floats:
+    """Return angles added to joints as offsets of the channels from rest.
 
     The angle of a lid becomes a factor of its opening, such that the open lid moves by this angle
     and the shut lid stays: blinks still shut it.
 
     Args:
         rig: Defines its joints and the ends of its lids.
-        offsets_deg: Angles by joint, without eyes.
+        angles_deg: Angles by joint, without eyes.
     """
-    offsets = {name: radians(angle) for name, angle in offsets_deg.items()}
-    spans = lid_spans(rig)
-    yaw, pitch, roll = (offsets.get(name, 0.0) for name in NECK)
-    a, b, c, d = (1.0 + offsets.get(name, 0.0) / spans.get(name, 1.0) for name in LIDS)
-    joints = tuple(offsets.get(name, 0.0) for name in further_joints(rig.joints))
-    return NO_OFFSET._replace(head_rad=(yaw, pitch, roll), lids=(a, b, c, d), joints_rad=joints)
+    spans, joints = lid_spans(rig), (*NECK, *EYE_CHANNELS, *LIDS, *further_joints(rig.joints))
+    return np.array([radians(angles_deg.get(one, 0.0)) / spans.get(one, 1.0) for one in joints])

@@ -13,7 +13,7 @@ from gazerig.config.parameters import apply_changes, start_note
 from gazerig.config.rig import Rig
 from gazerig.config.save import RigLayers
 from gazerig.config.shipped_files import shipped_names
-from gazerig.config.tracks import tracks_of
+from gazerig.config.tracks import TrackFiles
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.gaze.scanpath.scanpath import row_sums_note
@@ -22,7 +22,7 @@ from gazerig.robot.loop.body import Body
 from gazerig.robot.loop.chooser import Chooser, RuleChooser, TargetChooser
 from gazerig.robot.loop.commands import CommandExecutor
 from gazerig.robot.loop.loop import Robot
-from gazerig.robot.loop.track_choices import TrackChoices
+from gazerig.robot.loop.tracks import TrackChoices
 from gazerig.robot.model.clock import Clock, LoopParams, RealClock, SimulatedClock
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.frames import CameraParams, fixed_mount
@@ -55,7 +55,6 @@ from gazerig.robot.run.rig_limits import (
 )
 from gazerig.robot.run.run_rig import run_info, with_options
 from gazerig.robot.run.surroundings import RunRoom, refuse_missing_rules, scene_of, world
-from gazerig.robot.run.track_folder import TrackFolder
 from gazerig.robot.run.voice import RunVoice
 from gazerig.robot.safety.guard import Guard
 
@@ -156,7 +155,12 @@ class Run:
             if rule is not None:
                 label = f"attention {type(rule).__name__} of the program"
                 attention = RuleChooser(rule, attention, label)
-            self.tracks = _tracks(rig, models, options.rig)
+            self.tracks = TrackChoices(
+                TrackFiles(options.rig, rig.track_files).read,
+                models.animation.tracks,
+                track_fit(rig),
+                lambda: self.guard.limits,
+            )
             body = wrap_body(self.body) if wrap_body is not None else self.body
             commands = CommandExecutor(
                 body,
@@ -270,7 +274,7 @@ class Run:
         except ConfigError as error:
             return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         self.rig = new
-        self.tracks.latency_s = new.gaze.oculomotor.eye_lag_ms / 1e3
+        self.models.animation.tracks.latency_s = new.gaze.oculomotor.eye_lag_ms / 1e3
         if new.ranges != old.ranges:
             self.guard.start_gently()  # desired angles jump
         lines = [f"tuned: {key} = {value}{start_note(key)}" for key, value in command.changes]
@@ -291,17 +295,6 @@ class Run:
         if browser.in_use:
             self.camera.close()
         browser.close()
-
-
-def _tracks(rig: Rig, models: GazeModels, rig_file: str) -> TrackChoices:
-    """Return the tracks of a rig, those in the folder beside its file included."""
-    return TrackChoices(
-        tracks_of(rig.track_files),
-        models.animation.tracks,
-        track_fit(rig),
-        rig.gaze.oculomotor.eye_lag_ms / 1e3,
-        TrackFolder(rig_file).changes,
-    )
 
 
 def _recorder(rig: Rig, options: RunOptions) -> "Recorder":

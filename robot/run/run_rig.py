@@ -3,9 +3,10 @@
 from dataclasses import replace
 from datetime import UTC, datetime
 
+from gazerig.config.load import find_file
 from gazerig.config.parameters import apply_changes
 from gazerig.config.rig import Rig
-from gazerig.config.save import params_text, tracks_text
+from gazerig.config.save import params_text
 from gazerig.config.schema import load_rig, load_rules, load_walk
 from gazerig.robot.model.commands import Value
 from gazerig.robot.recording.run_info import RunInfo, versions
@@ -54,6 +55,7 @@ def with_options(rig: Rig, options: RunOptions) -> Rig:
 
 def run_info(rig: Rig, options: RunOptions) -> RunInfo:
     """Return the header of a run's recording."""
+    tracks = [find_file("tracks", name) for name in rig.track_files]
     eyes = f"world {options.world_name}{', no pictures' if options.no_pictures else ''}"
     if options.world is None:
         eyes = options.camera_source or f"scene {options.scene}"
@@ -63,7 +65,7 @@ def run_info(rig: Rig, options: RunOptions) -> RunInfo:
         character=options.character or rig.character,
         config_yaml=params_text(rig),
         walk_yaml=params_text(load_walk(rig.gaze.scanpath.transition_matrix)),
-        tracks_yaml=tracks_text(rig.track_files),
+        tracks={path.stem: path.read_text("utf-8") for path in tracks},
         seed=options.seed,
         rate_hz=rig.loop.rate_hz,
         started_utc=datetime.now(UTC),

@@ -4,7 +4,8 @@ Such angles come from recordings and from animation programs.
 """
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +13,23 @@ import numpy as np
 
 from gazerig.config.rig import Rig
 from gazerig.config.save import format_value
-from gazerig.config.tracks import load_track, track_name
+from gazerig.config.tracks import check_name, load_track
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.gaze.track.track import EYE_CHANNELS, HEAD_CHANNELS, LID_CHANNELS
+from gazerig.gaze.track.motion import Curves, key_states
+from gazerig.gaze.track.track import EYE_CHANNELS, HEAD_CHANNELS, LID_CHANNELS, TrackState
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.reply import TrackReply
-from gazerig.robot.model.track_fit import TrackRefused, channel_of_joint
-from gazerig.robot.run.key_fit import GRID_S, fit_keys
+from gazerig.robot.loop.tracks import channel_of_joint
+from gazerig.robot.model.commands import Play
 from gazerig.robot.run.rig_limits import limits, track_fit
 
 TOLERANCE_DEG = 0.7
 """Largest distance of the curve through fitted keys from the samples."""
+GRID_S = 0.02
+"""Grid of the keys' times."""
+_SMOOTHING = np.linalg.pinv(np.vander(np.arange(-4, 5), 4))[-1]
+"""Local cubic over 9 samples (Savitzky and Golay 1964), which removes the jitter of a hand and of
+encoders; it keeps peaks that a mean would flatten."""
 _DENSE_S = 0.09
 """Rows closer than this are samples of a motion, not keys of an animator."""
 _STILL_DEG = 0.01
@@ -42,7 +48,7 @@ def write_track(
     force: bool = False,
     tolerance_deg: float = TOLERANCE_DEG,
     owned: bool = False,
-) -> TrackReply:
+) -> TrackState:
     """Write joint angles over time as the file of a track, and check it against the rig.
 
     Args:
@@ -59,62 +65,80 @@ def write_track(
         How the rig plays the track.
 
     Raises:
-        SetupError: Nothing moves, the file cannot be written, or the rig cannot play the track.
+        SetupError: Nothing moves, or the file cannot be written.
         gazerig.config.load.ConfigError: The name or the track breaks a rule.
     """
-    name = track_name(str(path))
-    start_s = min(float(times[0]) for times, _ in series.values())
-    frames: dict[int, dict[str, float]] = defaultdict(dict)
-    for channel, samples in _channels(series, owned).items():
-        times, angles = _keys(*samples, tolerance_deg)
-        slots = np.rint((times - start_s) / GRID_S).astype(int).tolist()
-        values = _values(rig, channel, angles, owned)
-        for slot, value in zip(slots, values, strict=True):
-            # An owned pose begins with a key, to which the player leads it from rest.
-            if slot > 0 or owned:
-                frames[slot + owned][channel] = round(float(value), 3)
+    check_name(path)
+    start_s = min(times[0] for times, _ in series.values())
+    frames: dict[float, dict[str, Any]] = {}
+    for channel, times, angles in _keys(series, owned, tolerance_deg):
+        values = _values(rig, channel, angles, owned).round(3).tolist()
+        for time_s, value in zip(times.tolist(), values, strict=True):
+            time_s = round(GRID_S * (round((time_s - start_s) / GRID_S) + owned), 3)
+            if time_s == 0.0:
+                continue  # it begins at rest; only an owned pose begins with a key
+            frame = frames.setdefault(time_s, {"time_s": time_s})
+            if channel in HEAD_CHANNELS or channel in EYE_CHANNELS:
+                frame[f"{channel}_deg"] = value
+            else:
+                group = "lids" if channel in LID_CHANNELS else "joints_deg"
+                frame.setdefault(group, {})[channel] = value
     if len(frames) <= owned:
         raise SetupError(f"nothing moves by more than {tolerance_deg:g} deg")
     lines = [f"description: {format_value(description)}"]
     if owned:
-        lines.append(f"owns: [{', '.join(one for one in rig.names if one in series)}]")
-    lines += ["frames:", *(f"  - {_frame_text(slot, frames[slot])}" for slot in sorted(frames))]
+        lines.append(f"owns: [{', '.join(series)}]")
+    lines += ["frames:", *[f"  - {format_value(frames[at])}" for at in sorted(frames)]]
     write_file(path, "\n".join(lines) + "\n", force)
-    try:
-        motion = track_fit(rig).motion(load_track(path), limits(rig.joints))
-    except TrackRefused as refused:
-        raise SetupError(f"{path} is written, but {rig.name} cannot play it: {refused}") from None
-    return TrackReply(name, motion.duration_s, motion.limited)
+    motion = track_fit(rig).motion(load_track(path), limits(rig.joints), Play(path.stem))
+    return motion.state
 
 
-def _channels(series: Mapping[str, Series], owned: bool) -> dict[str, Series]:
-    """Return the series of each channel: the mean of both eyes.
+def _keys(
+    series: Mapping[str, Series], owned: bool, tolerance_deg: float
+) -> Iterator[tuple[str, Floats, Floats]]:
+    """Yield the times and angles of the keys of each channel; the first key alone if it rests.
 
-    Over gaze, the eyes are lines of sight, which turn with the head.
+    Both eyes have their mean. Over gaze, they are lines of sight, which turn with the head.
     """
-    found: dict[str, Series] = {}
-    for name, pair in series.items():
-        channel = channel_of_joint(name)
-        found[channel] = _add(found[channel], pair, 0.5) if channel in found else pair
-    for head, eye in zip(HEAD_CHANNELS, EYE_CHANNELS, strict=False):
-        if not owned and head in found and eye in found:
-            found[eye] = _add(found[eye], found[head], 1.0)
-    return found
+    members: dict[str, list[Series]] = defaultdict(list)
+    for name, samples in series.items():
+        members[channel_of_joint(name)].append(samples)
+    heads = {} if owned else dict(zip(EYE_CHANNELS, HEAD_CHANNELS, strict=False))
+    for channel, pairs in members.items():
+        head = members.get(heads.get(channel, ""), [])
+        times_s = np.unique(np.concatenate([times for times, _ in (*pairs, *head)]))
+        eyes = np.mean([np.interp(times_s, *pair) for pair in pairs], axis=0)
+        angles_deg, still_deg = sum([np.interp(times_s, *one) for one in head], eyes), _STILL_DEG
+        if len(times_s) > 4 and np.median(np.diff(times_s)) < _DENSE_S:
+            times_s, angles_deg = fit_keys(times_s, angles_deg, tolerance_deg)
+            still_deg = tolerance_deg
+        count = None if np.ptp(angles_deg) > still_deg else 1
+        yield channel, times_s[:count], angles_deg[:count]
 
 
-def _add(first: Series, second: Series, share: float) -> Series:
-    both_s = np.union1d(first[0], second[0])
-    return both_s, share * (np.interp(both_s, *first) + np.interp(both_s, *second))
+def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> Series:
+    """Return keys whose curve stays within a tolerance of smoothed samples.
 
+    Each segment that deviates too much gets another key at its worst place, until none does.
 
-def _keys(times_s: Floats, angles_deg: Floats, tolerance_deg: float) -> Series:
-    """Return the keys of a series; the first alone if it rests."""
-    least_deg = _STILL_DEG
-    if len(times_s) > 4 and np.median(np.diff(times_s)) < _DENSE_S:
-        times_s, angles_deg = fit_keys(times_s, angles_deg, tolerance_deg)
-        least_deg = tolerance_deg
-    moves = np.abs(angles_deg - angles_deg[0]).max() > least_deg
-    return (times_s, angles_deg) if moves else (times_s[:1], angles_deg[:1])
+    Args:
+        times_s: (n,) Increasing times of the samples.
+        values: (n,) Values; the motion rests at both ends.
+        tolerance: Largest distance of the curve from the smoothed samples.
+    """
+    even_s = np.arange(times_s[0], times_s[-1] + 1e-9, GRID_S)
+    even = np.interp(even_s, times_s, values)
+    smooth = np.convolve(np.pad(even, len(_SMOOTHING) // 2, mode="edge"), _SMOOTHING, "valid")
+    keys = [0, len(smooth) - 1]
+    while True:
+        curve = Curves(even_s[keys], key_states(even_s[keys], smooth[keys])[:, :, None])
+        error = np.abs(curve.sample(even_s)[0, :, 0] - smooth)
+        worst = [a + int(error[a:b].argmax()) for a, b in pairwise(keys)]
+        more = [i for i in worst if error[i] > tolerance]
+        if not more:
+            return even_s[keys], smooth[keys]
+        keys = sorted({*keys, *more})
 
 
 def _values(rig: Rig, channel: str, angles_deg: Floats, owned: bool) -> Floats:
@@ -125,20 +149,9 @@ def _values(rig: Rig, channel: str, angles_deg: Floats, owned: bool) -> Floats:
     if channel not in LID_CHANNELS:
         return angles_deg if owned else angles_deg - angles_deg[0]
     ends = rig.lid_joints.ends_deg(channel)
-    if ends is None:
-        raise SetupError(f"{channel}: the rig does not define its shut and open angles")
-    shut, wide = ends
-    base = wide if owned else angles_deg[0]
-    if (base - shut) / (wide - shut) < _NEARLY_SHUT:
+    assert ends is not None  # a rule of the rig
+    openings = (angles_deg - ends[0]) / (ends[1] - ends[0])
+    rest = 1.0 if owned else openings[0]
+    if rest < _NEARLY_SHUT:
         raise SetupError(f"{channel}: it begins nearly shut; begin with open lids")
-    return np.clip((angles_deg - shut) / (base - shut), 0.0, 3.0)
-
-
-def _frame_text(slot: int, values: Mapping[str, float]) -> str:
-    frame: dict[str, Any] = {"time_s": round(slot * GRID_S, 3)}
-    for name, value in values.items():
-        if name in (*HEAD_CHANNELS, *EYE_CHANNELS):
-            frame[f"{name}_deg"] = value
-        else:
-            frame.setdefault("lids" if name in LID_CHANNELS else "joints_deg", {})[name] = value
-    return format_value(frame)
+    return np.clip(openings / rest, 0.0, 3.0)

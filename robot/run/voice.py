@@ -1,7 +1,7 @@
 """Voice of a run: texts and files that the head says, streams, and the sounds of tracks.
 
 A speech is prepared in the caller's thread: its samples are read, and the openings of its mouth are
-computed. The command ``Speak`` contains them, so a recorded run repeats it without the sound. In
+computed. The order to play them contains both, so a recorded run repeats it without the sound. In
 every tick the tracks are compared with the sound that is played: it starts and stops with them, and
 the position that is really heard corrects the track's clock. In simulated time nothing is played.
 """
@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from msgspec import structs
 
 from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import file_in_folders
@@ -24,9 +23,9 @@ from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
 from gazerig.drivers.sound.sound_file import check_sound, read_samples, write_wav
 from gazerig.drivers.sound.speech import speak
 from gazerig.gaze.track.animation import MOUTH
-from gazerig.gaze.track.mouth import Mouth, phoneme_closures
+from gazerig.gaze.track.mouth import Mouth
 from gazerig.gaze.track.player import SPEECH
-from gazerig.gaze.track.track import FINISHED
+from gazerig.gaze.track.track import FINISHED, Track
 from gazerig.gaze.types import Floats
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.clock import Clock
@@ -34,9 +33,9 @@ from gazerig.robot.model.commands import (
     MAX_SPEECH_S,
     Command,
     EndTrack,
+    Play,
     Say,
     SetLevel,
-    Speak,
     SyncTrack,
     check_command,
 )
@@ -98,7 +97,7 @@ class RunVoice:
 
     # --- speech
 
-    def prepare(self, command: Say, confined: bool = False) -> Speak:
+    def prepare(self, command: Say, confined: bool = False) -> Play:
         """Return the command that says a file or a text.
 
         Args:
@@ -114,41 +113,44 @@ class RunVoice:
         if what.lower().endswith(KINDS):
             sound = check_sound(self._find(what, confined), MAX_SPEECH_S)
             samples = read_samples(sound).astype(np.float64)
-            speech = self._speech(sound.path, samples, len(samples) / sound.duration_s)
+            speech = self._speech(command, sound.path, samples, len(samples) / sound.duration_s)
         else:
             said = speak(what, params.voice)
             silent_s = _LEAD_IN_S + params.latency_ms / 1e3
             pcm = bytes(2 * round(silent_s * said.rate_hz)) + said.pcm
             phonemes = [(name, t_s + silent_s) for name, t_s in said.phonemes]
-            path = "" if self._fast else self._write(pcm, said.rate_hz)
-            speech = self._speech(path, _mono(pcm, 1), said.rate_hz, phonemes)
+            path = self._write(pcm, said.rate_hz)
+            speech = self._speech(command, path, _mono(pcm, 1), said.rate_hz, phonemes)
         self._open_loudspeaker(params.device)
-        return structs.replace(speech, volume=command.volume, who=command.who)
+        return speech
 
     def prepare_stream(
         self, pieces: Sequence[bytes], rate_hz: int, channels: int, who: str
-    ) -> Speak:
+    ) -> Play:
         """Return the command that says a whole stream, in simulated time.
 
         Raises:
             SoundError: the format is not possible.
         """
         check_format(rate_hz, channels)
-        speech = self._speech("", _mono(b"".join(pieces), channels), rate_hz)
-        return structs.replace(speech, who=who)
+        samples = _mono(b"".join(pieces), channels)
+        return self._speech(Say(_STREAM, who=who), _STREAM, samples, rate_hz)
 
     def _speech(
-        self, path: str, samples: Floats, rate_hz: float, spoken: Sequence[tuple[str, float]] = ()
-    ) -> Speak:
-        """Return the command of a sound, with the openings of the mouth if the rig has one."""
-        duration_s = len(samples) / rate_hz
-        if not self._level:
-            return Speak(path, duration_s)
-        mouth = Mouth(rate_hz)
-        mouth.add(samples)
-        if spoken:
-            mouth.close(phoneme_closures(spoken, duration_s))
-        return Speak(path, duration_s, self._level, mouth.keys(duration_s))
+        self, command: Say, path: str, samples: Floats, rate_hz: float,
+        spoken: Sequence[tuple[str, float]] = (),
+    ) -> Play:  # fmt: skip
+        """Return the order to play a sound, with the openings of the mouth if the rig has one."""
+        duration_s, keys = len(samples) / rate_hz, tuple[tuple[float, float], ...]()
+        if self._level:
+            mouth = Mouth(rate_hz)
+            mouth.add(samples)
+            if spoken:
+                mouth.close(spoken, duration_s)
+            smoothing_s = self._rig().levels[self._level].smoothing_ms / 1e3
+            keys = mouth.keys(duration_s, 0.5 * smoothing_s)
+        track = Track(SPEECH, sound=path, volume=command.volume)
+        return Play(SPEECH, sound_s=duration_s, definition=track, mouth=keys, who=command.who)
 
     def _find(self, name: str, confined: bool) -> Path:
         """Return a file in the folders of sounds, or at its absolute path.
@@ -250,11 +252,12 @@ class RunVoice:
         self, player: SoundPlayer, rate_hz: int, channels: int, volume: float
     ) -> Mouth:
         check_format(rate_hz, channels)
-        ticket = self._command(Speak(_STREAM, _STREAM_TRACK_S, self._level))
+        track = Track(SPEECH, sound=_STREAM)
+        ticket = self._command(Play(SPEECH, sound_s=_STREAM_TRACK_S, definition=track))
         reply = ticket.wait(_REPLY_S) if ticket is not None else None
         if reply is None or reply.track is None:
             raise SoundError(reply.refused if reply is not None else "the control loop hangs")
-        self._played = TrackState(reply.track.number, SPEECH, sound=_STREAM)
+        self._played = reply.track
         heard_s = self._clock.now_s() + STREAM_DELAY_S
         player.open_stream(rate_hz, channels, heard_s, volume * self._rig().sound.volume)
         self._mouth = Mouth(rate_hz)
@@ -339,7 +342,7 @@ class RunVoice:
         if abs(error_s) > _SYNC_ERROR_S:
             # The command is executed in the next tick.
             until_s = max(0.0, tick.t_s + 1.0 / self._rig().loop.rate_hz - now_s)
-            self._try(SyncTrack(wanted.number, track_s + error_s + until_s, "sound"))
+            self._try(SyncTrack(wanted.number, track_s + error_s + until_s))
 
     def _follow_stream(self, mouth: Mouth, player: SoundPlayer) -> None:
         """Open the mouth by the part of the stream that will be heard when it has moved."""

@@ -24,7 +24,6 @@ from gazerig.robot.dashboard.door.page_door import add_headers
 from gazerig.robot.dashboard.door.page_files import add_page_files
 from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.loop.tick import Tick
-from gazerig.robot.loop.track_choices import TrackInfo
 from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.net.topics import JointInfo, Picture, RigInfo, RunState, SeenFace
 
@@ -36,10 +35,6 @@ RUN = RunState("wait", "none", "shy", "", "bus ok", 1, IN_TIME)
 PICTURE = Picture(
     1, 0.0, 640, 400, (320.0, 200.0), (SeenFace((260.0, 120.0, 120.0, 150.0), (), 0.9),), (), (),
 )  # fmt: skip
-TRACKS = (
-    TrackInfo("nod", "says yes", 1.2),
-    TrackInfo("wave", "with a sound", 3.0, sound="/sounds/hello.wav", cues=(("hello", 1.5),)),
-)
 MENUS = {
     "behaviour": ["wait", "guard", "attack"], "conversation": ["none", "talk", "listen", "think"],
     "track": ["none", "nod", "wave", "shake", "surprised", "sleepy"], "lids": ["wink left", "wink right"],
@@ -86,7 +81,7 @@ class Stub:
         rig = load_rig("desk")
         live = [one for one in parameters(rig, rig) if one.live == "next tick"]
         self.usual: dict[str, object] = {
-            "menus": MENUS, "tracks": TRACKS,
+            "menus": MENUS,
             "parameters": live, "get": values(rig), "unsaved": [],
         }  # fmt: skip
 

@@ -248,7 +248,10 @@ def test_a_track_plays_on_a_timeline_with_its_sound_and_cues(page: tuple[Stub, P
     person.click(saying("wave"))
     asked = {"do": "play", "track": "wave", "speed": 1, "loop": True}
     wait_for(lambda: stub.orders("play") == [asked], "the order")
-    playing = TrackState(1, "wave", 1.0, 3.0, sound="/sounds/hello.wav", who="ann", loop=True)
+    playing = TrackState(
+        "wave", length_s=3.0, sound="/sounds/hello.wav", rounds=0,
+        who="ann", number=1, position_s=1.0,
+    )  # fmt: skip
     stub.show(tracks=(playing,), control_source=ControlSource("track", "ann", "wave"))
     wait_for(lambda: person.reads("wave: started by ann"), "the track")
     # The sound's outline is half as high as its row: ink in the middle of the row, none above.

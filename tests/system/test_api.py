@@ -127,10 +127,7 @@ def test_face_and_behaviour(head: gazerig.SimulatedHead):
     second = head.play("nod")
     assert first.wait() == "taken over" and "another track: nod" in first.why
     head.stop("a hand")
-    assert (
-        second.wait() == "taken over"
-        and second.why == "its joints are controlled by a client or switched off"
-    )
+    assert second.wait() == "taken over" and second.why == "the torque is switched off"
     head.step(0.1)
     assert head.menus()["behaviour"][0] == behaviour
 
@@ -179,6 +176,12 @@ def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path):
         (tracks / "bad.yaml").write_text("description: x\nframes: [{time_s: 1}]\n")
         with pytest.raises(gazerig.Refused, match=r"bad.yaml:2: .*names no motion"):
             head.play("bad")
+        cued = bow.format(-4) + "loop: true\ncues: {down: 0.5, up: 0.9, start: 0.0}\n"
+        (tracks / "late.yaml").write_text(cued)
+        head.play("late", from_s="down")
+        head.step(2.0)
+        cues = [event.subject for event in head.events(0.0, kinds=("cue",))]
+        assert cues == ["down", "up", "start"] * 2
         head.jog("neck_yaw", 10.0)
         head.step(0.5)
     for track in tracks.iterdir():

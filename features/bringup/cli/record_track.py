@@ -9,7 +9,7 @@ import typer
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
-from gazerig.config.tracks import track_name
+from gazerig.config.tracks import check_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.features.bringup.cli.monitor import open_readers
@@ -76,8 +76,9 @@ def record_track(
         from gazerig.robot.run.track_file import write_track
 
         loaded = load_rig(rig)
-        track_name(f"{name}.yaml")
-        refuse_existing(folder / f"{name}.yaml", force=force)
+        path = folder / f"{name}.yaml"
+        check_name(path)
+        refuse_existing(path, force=force)
         with record_signals() as stopped:
             end = lambda: stopped() or (enter_pressed() if sys.stdin.isatty() else None)  # noqa: E731
             if live:
@@ -91,7 +92,6 @@ def record_track(
         say(f"recorded {len(recorded.series)} joints; ended: {recorded.ended_by}")
         for one in recorded.left_out:
             say(f"{one}: answered too seldom and is left out")
-        path = folder / f"{name}.yaml"
         description = "recorded from a running head" if live else "recorded by hand"
         reply = write_track(loaded, path, recorded.series, description, force=force, owned=live)
         print_track_fit(loaded.name, path, reply)

@@ -1,9 +1,9 @@
-// What the rig offers to choose from: menus and tracks.
+// What the rig offers to choose from: menus.
 
 import { ask, on } from "/rig/connection.js";
 
-/** menus: name -> choices; tracks: name -> what is known of it. */
-export const choices = { menus: {}, tracks: {} };
+/** menus: name -> choices. */
+export const choices = { menus: {} };
 
 const BOXING = /boxer|^attack$|^guard$/;
 
@@ -21,15 +21,11 @@ export function onChoices(handle) {
 let known = "";
 
 async function read(rig) {
-  const answers = await Promise.all(
-    ["menus", "tracks"].map((verb) => ask({ do: verb }).catch(() => null)),
-  );
-  const text = JSON.stringify([answers, rig]);
+  const menus = await ask({ do: "menus" }).catch(() => null);
+  const text = JSON.stringify([menus, rig]);
   if (text === known) return; // keep a button that is being pressed
   known = text;
-  const [menus, tracks] = answers;
   choices.menus = menus ?? {};
-  choices.tracks = Object.fromEntries((tracks ?? []).map((track) => [track.name, track]));
   for (const handle of handlers) handle();
 }
 

@@ -72,13 +72,12 @@ function drawTrack(canvas, track) {
   const ready = prepare(canvas, HIGH);
   if (!ready) return;
   const { pen, width, colour } = ready, ink = pen.fillStyle;
-  const info = choices.tracks[track.name];
-  const lasts_s = Math.max(track.duration_s, 1e-3);
+  const lasts_s = Math.max(track.length_s, 1e-3);
   const across = (s) => Math.min(Math.max(s / lasts_s, 0), 1) * (width - 2);
   pen.fillText(spaced(track.name) + (track.speed !== 1 ? `, speed ${track.speed}` : "")
-    + (track.loop ? ", loop" : ""), 0, 13);
+    + (track.rounds === 0 ? ", loop" : ""), 0, 13);
   pen.textAlign = "right";
-  pen.fillText(`${Math.max(0, track.position_s).toFixed(1)} of ${track.duration_s.toFixed(1)} s`, width, 13);
+  pen.fillText(`${Math.max(0, track.position_s).toFixed(1)} of ${track.length_s.toFixed(1)} s`, width, 13);
   pen.textAlign = "left";
   const outline = track.sound ? wave(track.name) : null;
   pen.fillStyle = colour("calm");
@@ -92,7 +91,7 @@ function drawTrack(canvas, track) {
   pen.fillStyle = colour("level-ok");
   pen.fillRect(0, bar, x, BAR);
   pen.fillStyle = ink;
-  for (const [name, at_s] of info?.cues ?? []) {
+  for (const [name, at_s] of track.cues) {
     pen.fillRect(across(at_s), bar - 4, 1, BAR + 4);
     pen.fillText(name, Math.min(across(at_s) + 3, width - pen.measureText(name).width), bar - 4);
   }

@@ -16,6 +16,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.animation.animation import ImportedAnimation, Series, joint_map
 from gazerig.gaze.track.track import LIMIT_SHARE
 from gazerig.robot.description.links import Link, LinkJoint
+from gazerig.robot.model.commands import Play
 from gazerig.robot.run.rig_limits import limits, track_fit
 from gazerig.robot.run.track_file import write_track
 
@@ -285,12 +286,12 @@ def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(
     assert done.code == 0 and "for neck_yaw" in done.err
     track = load_track(tmp_path / "far.yaml")
     assert track.owns == ("neck_yaw",)
-    motion = track_fit(desk_rig).motion(track, limits(desk_rig.joints))
+    motion = track_fit(desk_rig).motion(track, limits(desk_rig.joints), Play("far"))
     lead_s = 0.02 - motion.position_at(0.0)
-    yaw = np.degrees(motion.sample(np.array(times) + lead_s)[0, :, 0])
+    yaw = np.degrees(motion.curves.sample(np.array(times) + lead_s)[0, :, 0])
     assert yaw == pytest.approx([40.0, -20.0, 30.0], abs=1e-3)
     most = LIMIT_SHARE * desk_rig.joints["neck_yaw"].limit().accel_rad_s2
-    every = motion.sample(np.arange(0.0, motion.duration_s, 0.001))
+    every = motion.curves.sample(np.arange(0.0, motion.duration_s, 0.001))
     assert np.abs(every[2, :, 0]).max() < 1.002 * most and lead_s < 1.0
 
 

@@ -24,6 +24,7 @@ from gazerig.features.bringup.telemetry import (
     TelemetrySample,
     smart_servo_reader,
 )
+from gazerig.robot.model.commands import Play
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.weight import HeadMassParams, MassParams
 from gazerig.robot.run.rig_limits import bus_names, joints_on, limits, track_fit
@@ -179,9 +180,9 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(desk_rig: Rig, tm
     on_rig = write_track(desk_rig, path, found.series, "by hand")
     track = load_track(path)
     assert len(track.frames) < 40 and on_rig.limited == ""
-    motion = track_fit(desk_rig).motion(track, limits(desk_rig.joints))
+    motion = track_fit(desk_rig).motion(track, limits(desk_rig.joints), Play("mine"))
     at = np.linspace(0.1, 2.3, 50)
-    played = np.degrees(motion.sample(at)[0])
+    played = np.degrees(motion.curves.sample(at)[0])
     wanted = np.array([how(t)["neck_pitch"] for t in at])
     assert np.abs(played[:, 1] - wanted).max() < TOLERANCE_DEG + 0.8
     assert np.abs(played[:, 2]).max() == 0.0  # the roll has not moved

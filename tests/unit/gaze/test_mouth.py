@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
-from gazerig.gaze.track.mouth import (
-    FRAME_S,
-    WINDOW_S,
-    Mouth,
-    band_pressures,
-    opening,
-    phoneme_closures,
-)
+from gazerig.gaze.track.mouth import FRAME_S, WINDOW_S, Mouth
 from gazerig.gaze.types import Floats
 
 RATE = 16000
@@ -23,11 +16,11 @@ def tone(hz: float, seconds: float, size: float = 0.5) -> Floats:
 
 
 def test_the_pressure_is_the_root_mean_square_in_the_band_of_an_open_mouth():
-    inside, murmur, hiss = (band_pressures(tone(hz, 1.0), RATE) for hz in (1000, 200, 6000))
+    inside, murmur, hiss = (Mouth(RATE).band_pressures(tone(hz, 1.0)) for hz in (1000, 200, 6000))
     assert len(inside) == pytest.approx((1.0 - WINDOW_S) / FRAME_S, abs=2)
     assert inside == pytest.approx(0.5 / np.sqrt(2), rel=0.01)
     assert max(murmur.max(), hiss.max()) < 0.05 * inside.min()
-    assert len(band_pressures(tone(1000, 0.01), RATE)) == 0
+    assert len(Mouth(RATE).band_pressures(tone(1000, 0.01))) == 0
 
 
 def mouth_of(samples: Floats, pieces: int = 1, rate: int = RATE) -> Mouth:
@@ -47,10 +40,11 @@ def test_a_frame_has_its_time_at_every_rate_also_in_a_stream():
 
 
 def test_ten_decibels_less_are_half_as_loud():
-    loud, half, shut_at = (opening(one, 1.0) for one in (1.0, 10**-0.5, 10**-1.5))
-    shut = 10 ** (-30 / 20 * 0.6)
-    assert loud == 1.0 and shut_at == pytest.approx(0.0, abs=1e-9)
-    assert half * (1 - shut) + shut == pytest.approx(0.5, abs=0.002)
+    parts = [tone(1000, 0.2, 0.8 * 10**-level) for level in (0.0, 0.5, 1.5)]
+    mouth, shut = mouth_of(np.concatenate(parts)), 10 ** (-30 / 20 * 0.6)
+    loud, half, shut_at = (mouth.opening_at(t_s) / 0.9 for t_s in (0.1, 0.3, 0.5))
+    assert loud == 1.0 and shut_at == pytest.approx(0.0, abs=0.005)
+    assert half * (1 - shut) + shut == pytest.approx(0.5, abs=0.01)  # the loudest part fades
 
 
 @pytest.mark.parametrize("samples", [np.zeros(RATE), np.zeros(0), np.full(RATE, 1.0)])
@@ -67,20 +61,20 @@ def spoken(period_s: float, seconds: float = 3.0) -> Floats:
 
 def followed(mouth: Mouth, seconds: float) -> tuple[Floats, Floats]:
     """Return times, and the opening of a level that follows the keys of a mouth, as it is led."""
-    level, smoothing_s = MinimumJerkBlend((0.0,), 0.08), 0.08
-    keys = np.array(mouth.keys(seconds)).T
+    level = MinimumJerkBlend((0.0,), 0.08)
+    keys = np.array(mouth.keys(seconds, 0.04)).T
     times = np.arange(0.0, seconds, 0.005)
     found = []
     for t_s in times.tolist():
-        level.move_to((float(np.interp(t_s + 0.5 * smoothing_s, *keys)),))
+        level.move_to((float(np.interp(t_s, *keys)),))
         found.append(level.step(t_s)[0])
     return times, np.array(found)
 
 
 def test_the_level_reaches_the_loud_parts_and_is_closed_in_every_closure():
     mouth = mouth_of(spoken(0.25))
-    shut = ((0.98, 1.03), (1.5, 1.5), (2.0, 2.055))
-    mouth.close(shut)
+    mouth.close([("m", 0.98), ("a", 1.06), ("p", 1.5)], 3.0)
+    shut = ((0.98, 1.03), (1.445, 1.5))
     times, found = followed(mouth, 3.0)
     for begin_s, end_s in shut:
         near = (times >= begin_s - 0.005) & (times <= end_s + 0.005)
@@ -95,11 +89,11 @@ def test_the_level_reaches_the_loud_parts_and_is_closed_in_every_closure():
 
 
 def test_lips_close_before_p_and_within_b_and_m():
-    names = [("p", 0.2), ("a", 0.23), ("m", 0.4), ("a", 0.5), ("b", 0.6), ("a", 0.7)]
-    p, m, b = phoneme_closures(names, 0.9)
-    assert p == (pytest.approx(0.145), 0.2)
-    assert m == (0.4, pytest.approx(0.465))
-    assert b == (0.6, pytest.approx(0.65))
+    mouth = mouth_of(tone(1000, 1.0))
+    mouth.close([("p", 0.3), ("a", 0.33), ("m", 0.4), ("a", 0.6), ("b", 0.7), ("a", 0.9)], 1.0)
+    closed = [t for t in (0.25, 0.35, 0.52, 0.56, 0.78, 0.83)
+              if mouth.opening_at(t) == 0.0]  # fmt: skip
+    assert closed == [0.25, 0.52, 0.78]
 
 
 def test_without_phonemes_short_dips_are_closures_and_a_slow_end_is_none():
@@ -114,6 +108,7 @@ def test_without_phonemes_short_dips_are_closures_and_a_slow_end_is_none():
 def test_a_stream_opens_the_mouth_as_the_whole_sound_does():
     samples = spoken(0.25)
     whole, pieces = mouth_of(samples), mouth_of(samples, 75)
-    assert np.array(pieces.keys(3.0)) == pytest.approx(np.array(whole.keys(3.0)), abs=1e-6)
+    first, other = (np.array(mouth.keys(3.0)) for mouth in (whole, pieces))
+    assert other == pytest.approx(first, abs=1e-6)
     assert pieces.opening_at(-1.0) == pieces.opening_at(4.0) == 0.0
     assert whole.keys(2.0)[-1] == (2.0, 0.0)

@@ -284,7 +284,7 @@ def line_of(end: socket.socket) -> dict[str, Any]:
         (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
         (b'{"do": "dance"}\n', "no request 'dance'; available: hello, status, "),
         (b'{"do": "save", "path": "my.yaml"}\n', "absolute path"),
-        (b'{"do": "tune", "changes": [["a", 1]]}\n', "requests set and say"),
+        (b'{"do": "tune", "changes": [["a", 1]]}\n', "request set, which checks it"),
     ],
 )
 def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(

@@ -87,7 +87,7 @@ def test_states_and_events_are_those_of_the_ticks_themselves(ran: FeedRun, page:
     events: list[HeadEvent] = []
     talk = ConversationState(3, "speaking", 1, 0.5, 6.0, 0.9, "Hello", "agent")
     for tick in ran.ticks:
-        tracks = (TrackState(2, "show", owns=("jaw",)),)
+        tracks = (TrackState("show", number=2, owns=("jaw",)),)
         tick = structs.replace(tick, conversation=talk, tracks=tracks)
         page.stream.update(tick)
         direct.update(tick)

