@@ -228,12 +228,14 @@ def stepped(yaw_deg: np.ndarray) -> np.ndarray:
     return np.round(yaw_deg / STEP_DEG) * STEP_DEG
 
 
-def trace(amplitudes: tuple[float, ...], rate_hz: float, slow_deg_s: float = 0.0) -> np.ndarray:
-    """Jump every half second, onto something that moves with ``slow_deg_s``."""
-    t = np.arange(0.0, 0.5 * len(amplitudes) + 0.5, 1.0 / rate_hz)
+def trace(
+    amplitudes: tuple[float, ...], rate_hz: float, slow_deg_s: float = 0.0, every_s: float = 0.5
+) -> np.ndarray:
+    """Jump repeatedly, onto something that moves with ``slow_deg_s``."""
+    t = np.arange(0.0, every_s * len(amplitudes) + 0.5, 1.0 / rate_hz)
     jump, yaw = Jumps(SaccadeParams(profile="min_jerk")).profile, slow_deg_s * t
     for n, size in enumerate(amplitudes):
-        gone = [jump.displacement_rad(radians(abs(size)), s - 0.25 - 0.5 * n) for s in t]
+        gone = [jump.displacement_rad(radians(abs(size)), s - 0.25 - every_s * n) for s in t]
         yaw = yaw + np.sign(size) * np.degrees(gone)
     return yaw
 
@@ -256,6 +258,11 @@ def test_every_jump_is_found_with_its_size_time_and_speed(rate_hz: float):
         peak = np.degrees(np.diff(moved).max() / 0.0005)
         assert low * peak - 5.0 < jump.peak_deg_s < 1.1 * peak + 12.0
         assert jump.peak_share == pytest.approx(0.5, abs=0.12)
+
+
+def test_a_jump_that_follows_at_once_is_one_of_its_own():
+    found = jumps(stepped(trace((20.0, 10.0), 200.0, every_s=0.06)), 200.0)
+    assert [jump.amplitude_deg for jump in found] == pytest.approx([20.0, 10.0], abs=0.5)
 
 
 @pytest.mark.parametrize("slow_deg_s", [10.0, 25.0, 45.0])
