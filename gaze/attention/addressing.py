@@ -134,7 +134,7 @@ class AddressingModel:
             near = dist(face.p_world_m, p_head) <= NEAR_M
             living = face.has_moved and face.id not in bodies.lifeless
             if face.looks_at_head and near and living:
-                if now_s - look.looked_s > _GAP_S:
+                if look.began_s == inf or now_s - look.looked_s > _GAP_S:
                     look.began_s = now_s - _SEEN_LATE_S
                 look.looked_s, look.confidence = now_s, face.confidence
                 silent = now_s - look.talked_s > _TALKS_S

@@ -66,6 +66,13 @@ def test_a_short_look_a_far_one_and_an_uncertain_one_do_not_address_it():
         assert not any(play(model, 0.6, k + 0.4, face(1, ANN, BEN)))
 
 
+def test_a_frame_of_another_look_begins_it_anew():
+    model = AddressingModel()
+    play(model, 0.4, 0.0, face(1, ANN))
+    play(model, 0.05, 0.4, face(1, ANN, BEN))
+    assert first(play(model, 1.0, 0.45, face(1, ANN))) == [None] * 9 + [1] * 11
+
+
 def test_who_has_left_addresses_nobody():
     model = AddressingModel()
     play(model, 1.0, 0.0, face(1, ANN))
