@@ -37,6 +37,7 @@ class Page(NamedTuple):
     page: PageProcess
     url: str
     busy_port: int
+    notice: str | None
     asked: list[dict[str, Any]]
 
 
@@ -60,7 +61,7 @@ def shared() -> Iterator[Page]:
         other.listen()
         busy = other.getsockname()[1]
         with running_page(busy, serve) as (page, url):
-            yield Page(page, url, busy, asked)
+            yield Page(page, url, busy, page.notice(), asked)
 
 
 def page_here(*others: int) -> int | None:
@@ -73,12 +74,11 @@ def page_here(*others: int) -> int | None:
 def test_busy_port_moves_on_and_says_so(shared: Page):
     port = urlsplit(shared.url).port
     assert port is not None and port > shared.busy_port
-    assert shared.page.notice() == f"port {shared.busy_port} is busy, using {port}"
+    assert shared.notice == f"port {shared.busy_port} is busy, using {port}"
     assert b"<html" in Visitor(shared.url).get().lower()
 
 
 def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(shared: Page):
-    shared.page.notice()
     port = urlsplit(shared.url).port
     # The whole of 127.0.0.0/8 is this machine: a page on every address would answer here.
     with pytest.raises(ConnectionRefusedError):
@@ -202,8 +202,13 @@ def test_a_page_that_died_is_started_again_at_its_address_and_close_ends_it_for_
     with Visitor(url).open("/api/v1/socket"):
         wait_for(lambda: "hello" in [asked["do"] for asked in shared.asked], "what it asks")
 
-    # Also one that is frozen is ended by close.
+    # One that is frozen takes no messages, delays nobody, and is ended by close, too.
     os.kill(present(page_here()), signal.SIGSTOP)
+    send = partial(page.send, bytes(100_000))
+    sender = threading.Thread(target=lambda: [send() for _ in range(50)], daemon=True)
+    sender.start()
+    sender.join(PATIENCE_S)
+    assert not sender.is_alive() and not send()
     page.close()
     assert page_here() is None
     page.close()
