@@ -266,6 +266,17 @@ def own_a_page(port: int) -> None:
     time.sleep(60.0)
 
 
+def test_a_page_without_its_address_says_why_and_is_not_started_again():
+    page = PageProcess("192.0.2.1", 8080)
+    page.open()
+    try:
+        words = wait_for(page.notice, "the notice")
+    finally:
+        page.close()
+    assert words.startswith("the page has stopped (cannot open 192.0.2.1 port 8080: ")
+    assert words.endswith("; the rig runs on, start it again to see the page")
+
+
 def test_page_ends_when_the_parent_is_killed():
     """Even if a fork of it goes on, which holds its sockets."""
     work = partial(own_a_page, free_port())
