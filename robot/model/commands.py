@@ -5,7 +5,7 @@ is executed at the next tick. A recording of a run contains it, so that the run 
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import pi
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
@@ -13,7 +13,7 @@ import msgspec
 from msgspec import Meta, Struct, structs
 
 from gazerig.gaze.track.track import MAX_DURATION_S, Track
-from gazerig.params import unknown_text
+from gazerig.params import suggestion_text, unknown_text
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """Value of a key in a rig's YAML."""
@@ -358,7 +358,8 @@ def check_command(command: _C) -> _C:
     try:  # not JSON, in which NaN would become null
         checked: _C = _checker.decode(msgspec.msgpack.encode(command, enc_hook=_plain))
     except ValueError as error:
-        raise ValueError(f"{verb(type(command))}: {error}") from None
+        kind = type(command)
+        raise ValueError(f"{verb(kind)}: {_explain(error, kind)}") from None
     if isinstance(checked, Say) and not checked.what.strip():
         raise ValueError(
             "a text without a word is no speech: give the words, or the name of a sound file"
@@ -492,7 +493,7 @@ def read_request(data: object) -> Request:
         if kind is None:
             name = str(data.get("do", "")) if isinstance(data, dict) else ""
             raise ValueError(unknown_text("request", name, REQUESTS)) from None
-        raise ValueError(f"{error}; {_fields_text(kind)}") from None
+        raise ValueError(_explain(error, kind)) from None
     if isinstance(request, Tune):
         raise ValueError("this is done by the request set, which checks it")
     if isinstance(request, Play):
@@ -500,10 +501,21 @@ def read_request(data: object) -> Request:
     return request
 
 
-def _fields_text(kind: type[Request]) -> str:
-    """Return the names of a request's fields, with their choices."""
-    fields = []
+def _explain(rule: Exception, kind: type[Request]) -> str:
+    """Return a broken rule, a choice like the wrong one, and the request's fields and choices."""
+    fields, words = list[str](), list[str]()
     for field in structs.fields(kind):
-        choices = ", ".join(str(one) for one in get_args(field.type) if isinstance(one, str))
-        fields.append(f"{field.name} ({choices})" if choices else field.name)
-    return f"{verb(kind)} has {', '.join(fields) or 'no fields'}"
+        choices = list(_choices(field.type))
+        words += choices
+        fields.append(f"{field.name} ({', '.join(choices)})" if choices else field.name)
+    wrong = re.match("Invalid enum value '(.*)'", str(rule))
+    near = suggestion_text(wrong[1], words) if wrong else ""
+    return f"{rule}{near}; {verb(kind)} has {', '.join(fields) or 'no fields'}"
+
+
+def _choices(kind: object) -> Iterator[str]:
+    for part in get_args(kind):
+        if isinstance(part, str):
+            yield part
+        else:
+            yield from _choices(part)

@@ -82,6 +82,7 @@ REFUSED = yaml.safe_load(
         ({"do": "stop", "why": "x" * 999}, "length <= 200 - at `.*why`"),
         ({"do": "look_at_person", "id": 10**30}, "out of range|<= 9007199254740992"),
         ({"do": "look_at_pixel", "pixel_px": [1, 2], "captured_s": 10**400}, "out of range"),
+        ({"do": "find", "sought": "anybdy"}, r"mean 'anybody'\?; find has sought \(left, right"),
     ],
 )
 def test_what_is_no_order_is_refused_with_place_and_rule(data: object, words: str):
